@@ -12,10 +12,10 @@ from hybridsim.errors import UsageError, nearest
 from hybridsim.model import Model, load
 
 if TYPE_CHECKING:
-    from hybridsim.engine.keep import Keep
-    from hybridsim.engine.limits import Limits
-    from hybridsim.engine.system import System
-    from hybridsim.integrators.base import Integrator
+    from hybridsim.engine.record.limits import Limits
+    from hybridsim.engine.record.retention import Keep
+    from hybridsim.engine.system.system import System
+    from hybridsim.integrators.contract import Integrator
 
 # The smallest rtol that means anything: a hundred units in the last place, as SciPy has it.
 SMALLEST_RTOL = 100 * 2.0**-52
@@ -319,13 +319,13 @@ def initial_modes(system: System, z0: Any) -> np.ndarray:
 
 def kept(save: Any, system: System) -> Keep:
     """Return the parts of the run to store, from a word or from a length of time before its end."""
-    from hybridsim.engine.keep import ALL, EVENTS, NOTHING, Keep
+    from hybridsim.engine.record.retention import ALL, EVENTS, NOTHING, Keep
 
     words = {"all": ALL, "events": EVENTS, "nothing": NOTHING}
     if isinstance(save, str) and save in words:
         return words[save]
     if isinstance(save, str) and save == "last-period":
-        from hybridsim.engine.period import system_period
+        from hybridsim.engine.system.period import system_period
 
         length = system_period(system)
         if length is None:
@@ -345,7 +345,7 @@ def run_limits(limits: Any) -> Limits:
     """Return the limits of a run from a mapping."""
     from dataclasses import fields
 
-    from hybridsim.engine.limits import UNLIMITED, Limits
+    from hybridsim.engine.record.limits import UNLIMITED, Limits
 
     if limits is None:
         return UNLIMITED

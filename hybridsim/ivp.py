@@ -62,7 +62,7 @@ def to_ivp(
     Notes
     -----
     To bring a solver of your own. What follows an event is then yours to decide; `simulate` does both, and
-    takes a solver of your own as an integrator (`hybridsim.integrators.base.Integrator`).
+    takes a solver of your own as an integrator (`hybridsim.integrators.contract.Integrator`).
 
     Examples
     --------
@@ -73,11 +73,12 @@ def to_ivp(
     >>> float(round(release.t[-1], 6))  # asin(mu*N/F0)/omega
     0.00172
     """
-    from hybridsim.engine.jit import announce_compilation
-    from hybridsim.engine.sides import modes_by_state
-    from hybridsim.engine.stepping import Counters, Flow
-    from hybridsim.engine.system import System
-    from hybridsim.engine.timepair import Instant
+    from hybridsim.engine.native.kernels import announce_compilation
+    from hybridsim.engine.record.counters import Counters
+    from hybridsim.engine.run.stepping import Flow
+    from hybridsim.engine.system.instant import Instant
+    from hybridsim.engine.system.sides import modes_by_state
+    from hybridsim.engine.system.system import System
 
     model = chosen_model(model, params).validate()
     announce_compilation()

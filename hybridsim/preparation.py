@@ -13,21 +13,21 @@ from typing import Any
 import numpy as np
 
 from hybridsim import arguments
-from hybridsim.engine.driving import refuse_driving
-from hybridsim.engine.jit import announce_compilation
-from hybridsim.engine.python_code import PythonCode
-from hybridsim.engine.recent import known_system, system_of
-from hybridsim.engine.stepping import Tolerances
-from hybridsim.engine.system import System
-from hybridsim.engine.timepair import Instant
-from hybridsim.engine.trajectory import Task
+from hybridsim.engine.events.dissipation_check import refuse_driving
+from hybridsim.engine.native.kernels import announce_compilation
+from hybridsim.engine.record.trajectory import Task
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.system_cache import known_system, system_of
+from hybridsim.engine.system.tolerances import Tolerances
+from hybridsim.engine.system.user_functions.code import PythonCode
 from hybridsim.errors import UsageError
 from hybridsim.integrators.automatic import choose, successor_of
-from hybridsim.integrators.base import Integrator
-from hybridsim.integrators.fixed_step_length import refuse_endless
+from hybridsim.integrators.contract import Integrator
+from hybridsim.integrators.fixed_step.step_length import refuse_endless
 from hybridsim.integrators.registry import integrator_class, list_integrators, make_integrator
 from hybridsim.model import Model
-from hybridsim.model.velocity_powers import velocity_powers
+from hybridsim.model.laws.velocity_powers import velocity_powers
 from hybridsim.solution.run import Run
 
 _MOST = 16  # prepared runs stored per system; a loop usually repeats one or a few

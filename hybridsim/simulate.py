@@ -9,12 +9,12 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any, overload
 
 from hybridsim import arguments
-from hybridsim.mechanics.system import MechanicalSystem
+from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.model import Model
 
 if TYPE_CHECKING:
-    from hybridsim.mechanics.solution import MechanicalSolution
-    from hybridsim.mechanics.stepped_solution import SteppedSolution
+    from hybridsim.mechanics.series_loop.solution import MechanicalSolution
+    from hybridsim.mechanics.time_stepping.solution import SteppedSolution
     from hybridsim.solution import Solution
 
 

@@ -22,8 +22,8 @@ from pathlib import Path
 import numpy as np
 
 import hybridsim as hs
-from hybridsim.analysis.closed_forms.forced_coulomb_oscillator import ForcedCoulombOscillator
-from hybridsim.analysis.closed_forms.harmonic_balance import equivalent_viscous_amplitude
+from hybridsim.reference.closed_forms.forced_coulomb_oscillator import ForcedCoulombOscillator
+from hybridsim.reference.closed_forms.harmonic_balance import equivalent_viscous_amplitude
 
 ROOT = Path(__file__).parents[1]
 PAGE, PICTURE = ROOT / "docs" / "studies" / "advice.md", ROOT / "docs" / "images" / "advice-map.png"

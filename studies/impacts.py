@@ -16,7 +16,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from reference.random_blows import random_blow
 
-from hybridsim.engine.impulse import answers
+from hybridsim.engine.events.jumps.impulse import answers
 
 PAGE = Path(__file__).parents[1] / "docs" / "studies" / "impacts.md"
 SHAPES = ((1, 0), (2, 0), (3, 0), (1, 1), (2, 1), (2, 2), (3, 2))  # normal contacts, and those with friction

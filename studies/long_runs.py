@@ -19,7 +19,7 @@ import mpmath
 import numpy as np
 
 import hybridsim as hs
-from hybridsim.engine.limits import resident_megabytes
+from hybridsim.engine.record.limits import resident_megabytes
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from mechanics.stuck_systems import FORCING, stuck_system, ulps_off

@@ -19,7 +19,7 @@ from distributed import Client, LocalCluster
 from rivals.page import machine
 
 import hybridsim as hs
-from hybridsim.engine.limits import resident_megabytes
+from hybridsim.engine.record.limits import resident_megabytes
 
 PAGE = Path(__file__).parents[1] / "docs" / "studies" / "sweeps.md"
 MEASURES = ["amplitude.x", "energy.x", "stick_fraction.f", "kind"]

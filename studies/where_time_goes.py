@@ -72,17 +72,17 @@ def run_for_ever(name: str) -> None:
 
 def _generated() -> dict[int, str]:
     """Machine code that is made for a model, with its names, as it is made."""
-    from hybridsim.engine import jit, machine_code
+    from hybridsim.engine.native import kernels, llvm
 
     found: dict[int, str] = {}
-    make = machine_code.ready
+    make = llvm.ready
 
     def ready(kept: Path, names: Any, written: Any) -> Any:
         addresses, engine = make(kept, names, written)
         found.update(zip(addresses, (f"generated {name}" for name in names), strict=True))
         return addresses, engine
 
-    machine_code.ready = jit.ready = ready  # type: ignore[attr-defined, assignment]  # to hear of each
+    llvm.ready = kernels.ready = ready  # type: ignore[attr-defined, assignment]  # to hear of each
     return found
 
 
@@ -90,12 +90,14 @@ def _kernels() -> dict[int, str]:
     """Addresses of the compiled kernels, those that were inlined into others left out."""
     from numba.core.registry import CPUDispatcher
 
-    from hybridsim.engine import jit
+    from hybridsim.engine.native import kernels
 
-    found = {address: f"kernel {key[0].__name__}" for key, address in jit._addresses.items()}
+    found = {address: f"kernel {key[0].__name__}" for key, address in kernels._addresses.items()}
     dispatchers = (o for o in gc.get_objects() if isinstance(o, CPUDispatcher))
     libraries = [compiled.library for kernel in dispatchers for compiled in kernel.overloads.values()]
-    libraries += [made._library for made in jit._reached]  # their own code is apart from what is called by C
+    libraries += [
+        made._library for made in kernels._reached
+    ]  # their own code is apart from what is called by C
     for library in libraries:
         for function in library._final_module.functions:
             name = re.search(r"^_ZN9hybridsim.*?\d([a-z_]+)B\d+v", function.name)

@@ -182,7 +182,12 @@ def test_figures_depend_on_what_their_commands_use() -> None:
         return {path.relative_to(ROOT / "hybridsim").as_posix() for path in used(command)}
 
     speed, blade = reached("python studies/speed.py"), reached("python studies/blade_damper.py")
-    kernels = {"engine/exact_leap.py", "engine/linear_kernels.py", "integrators/exact.py", "preparation.py"}
+    kernels = {
+        "integrators/closed_form/segments.py",
+        "engine/linear/motion.py",
+        "integrators/closed_form/method.py",
+        "preparation.py",
+    }
     asked = {"analysis/steady/steady_state.py", "analysis/sweep/collected.py"}
     assert kernels <= speed and kernels | asked <= blade
     assert not asked & speed and not any(name.startswith("cli/") for name in speed)
@@ -190,4 +195,4 @@ def test_figures_depend_on_what_their_commands_use() -> None:
     assert {"cli/atlas.py", "cli/entry.py"} <= atlas and "cli/advise.py" not in atlas
     # what a package makes of what it imports, and not only what it hands on
     assert "testing/catalogue/impacts.py" in reached("cd tests && python -m conformance.table")
-    assert "analysis/closed_forms/affine.py" in reached("hybridsim compare --suite")
+    assert "reference/closed_forms/affine.py" in reached("hybridsim compare --suite")

@@ -1,11 +1,11 @@
 """This package answers questions beyond one run: comparisons, steady states, sensitivities and parameter sweeps."""
 
 from hybridsim.analysis.advise import Advice, advise
-from hybridsim.analysis.compare import compare
-from hybridsim.analysis.comparison import Comparison
+from hybridsim.analysis.compare.compare import compare
+from hybridsim.analysis.compare.comparison import Comparison
+from hybridsim.analysis.compare.lines import Series
 from hybridsim.analysis.continuation import Branch, continuation
 from hybridsim.analysis.equilibria import Equilibrium, Linearization, equilibria, linearize
-from hybridsim.analysis.series import Series
 from hybridsim.analysis.steady import SteadyState, steady_state
 from hybridsim.analysis.suite import SuiteComparison, compare_suite
 from hybridsim.analysis.sweep import Sweep, bifurcation, frequency_response, sweep

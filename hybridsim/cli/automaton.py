@@ -7,14 +7,14 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from hybridsim.expr import assignment
-from hybridsim.model.nonsmooth import COMPONENT, KEPT, MODE, POWER, SURFACE, TIMED
-from hybridsim.model.switching import ATTRACTION
+from hybridsim.model.parts.switching import ATTRACTION
+from hybridsim.model.smoothing.nonsmooth import COMPONENT, KEPT, MODE, POWER, SURFACE, TIMED
 
 if TYPE_CHECKING:
-    from hybridsim.engine.report import Report
+    from hybridsim.engine.run.report import Report
     from hybridsim.expr import Expression
     from hybridsim.model import Component, Guard, Input, Mode, Model, Monitor, Schedule
-    from hybridsim.model.nonsmooth import Primitive
+    from hybridsim.model.smoothing.nonsmooth import Primitive
 
 
 def lines_of(

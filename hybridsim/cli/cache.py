@@ -27,7 +27,7 @@ def add_to(commands: Any) -> None:
 
 def execute(args: argparse.Namespace, session: Session) -> int:
     """Carry out the requested action."""
-    from hybridsim.engine.cache import cache_root, clear, kernel_folder
+    from hybridsim.engine.native.cache import cache_root, clear, kernel_folder
 
     root = cache_root()
     if root is None or (args.action == "warm" and kernel_folder() is None):
@@ -47,7 +47,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 def _warm() -> None:
     """Compile all kernels by a short run of the reference model with every integrator."""
     import hybridsim
-    from hybridsim.engine.period import forcing_period
+    from hybridsim.engine.system.period import forcing_period
 
     model = hybridsim.load("dfcs")
     period = forcing_period(model)

@@ -13,11 +13,11 @@ from hybridsim.cli.output import complain, print_json, say
 from hybridsim.cli.session import Session
 
 if TYPE_CHECKING:
-    from hybridsim.engine.report import Report
+    from hybridsim.engine.run.report import Report
     from hybridsim.expr import Expression
     from hybridsim.model import Mode, Model
-    from hybridsim.model.hygiene import Caution
-    from hybridsim.model.nonsmooth import Primitive
+    from hybridsim.model.checks.doubtful import Caution
+    from hybridsim.model.smoothing.nonsmooth import Primitive
 
 
 def add_to(commands: Any) -> None:
@@ -35,10 +35,10 @@ def add_to(commands: Any) -> None:
 
 def execute(args: argparse.Namespace, session: Session) -> int:
     """Print the automaton and the warnings; loading has already rejected a faulty model."""
-    from hybridsim.engine.report import describe
-    from hybridsim.model.hygiene import warnings_of
-    from hybridsim.model.smoothing import smoothing_of
-    from hybridsim.model.starting_facts import starting_facts
+    from hybridsim.engine.run.report import describe
+    from hybridsim.model.checks.doubtful import warnings_of
+    from hybridsim.model.checks.starting_facts import starting_facts
+    from hybridsim.model.smoothing.explicit_corners import smoothing_of
 
     model = values.changed_model(args)
     report = describe(model)

@@ -29,7 +29,7 @@ def add_to(commands: Any) -> None:
 def execute(args: argparse.Namespace, session: Session) -> int:
     """List all integrators, including those of other packages, or describe one with its options."""
     from hybridsim.integrators import integrator_class, list_integrators
-    from hybridsim.integrators.base import CAPABILITIES
+    from hybridsim.integrators.contract import CAPABILITIES
     from hybridsim.integrators.options import options_of
 
     found = (integrator_class(args.name),) if args.name else list_integrators()

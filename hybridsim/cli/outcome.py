@@ -16,7 +16,7 @@ from hybridsim.errors import RunInterrupted, SimulationError, UsageError
 
 if TYPE_CHECKING:
     from hybridsim.solution import Solution
-    from hybridsim.solution.explanation import Explanation
+    from hybridsim.solution.explain.explanation import Explanation
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -82,7 +82,7 @@ def check_arguments(args: argparse.Namespace) -> None:
     if args.points == 1:
         raise UsageError("--points is 1", remedy="use at least 2 (the start and the end)")
     if args.points is not None:
-        from hybridsim.solution.tabulated import MOST_POINTS
+        from hybridsim.solution.files.tabulated import MOST_POINTS
 
         if args.points > MOST_POINTS:
             raise UsageError(f"--points is {args.points}", remedy=f"use at most {MOST_POINTS}")

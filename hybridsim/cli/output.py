@@ -12,7 +12,7 @@ from typing import Any, TextIO
 
 from hybridsim.errors import UsageError, printable
 from hybridsim.files import json_text
-from hybridsim.readable import aligned
+from hybridsim.presentation.readable import aligned
 
 TRIAL = ".hybridsim-"  # prefix of the temporary folder that tests whether a folder is writable
 

@@ -70,7 +70,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     t_end = values.end_time(model, args.t_end)
 
     import hybridsim
-    from hybridsim.model.hygiene import forces_of, jumps_of
+    from hybridsim.model.checks.doubtful import forces_of, jumps_of
 
     cautions = [caution.sentence for caution in (*jumps_of(model), *forces_of(model))]
     for caution in cautions:  # before the run, which may be very slow

@@ -10,7 +10,7 @@ from hybridsim.cli.output import complain, print_json, say
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.errors import SimulationError
-from hybridsim.readable import aligned
+from hybridsim.presentation.readable import aligned
 
 if TYPE_CHECKING:
     from hybridsim.analysis import SteadyState

@@ -15,7 +15,7 @@ from hybridsim.cli.session import Session
 from hybridsim.files import write_text
 
 if TYPE_CHECKING:
-    from hybridsim.analysis.study import Study
+    from hybridsim.studies.he2026.measured import Study
 
 STUDIES = ("he2026",)
 _WIDTH = 100
@@ -52,7 +52,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     require_folder(folder, "--out")
     require_folder(images, "--images")
 
-    from hybridsim.analysis.study import he2026
+    from hybridsim.studies.he2026.measured import he2026
 
     with Progress(session) as progress:
         study = he2026(quick=args.quick, progress=progress)
@@ -71,9 +71,9 @@ def _print(study: Study) -> None:
 
 
 def _write(study: Study, name: str, folder: Path, images: Path, session: Session) -> None:
-    from hybridsim.analysis.study import page
     from hybridsim.plot import save
-    from hybridsim.plot.study import pictures
+    from hybridsim.studies.he2026.measured import page
+    from hybridsim.studies.he2026.pictures import pictures
 
     folder.mkdir(parents=True, exist_ok=True)
     images.mkdir(parents=True, exist_ok=True)

@@ -164,7 +164,7 @@ def end_time(model: Model, text: str | None, default_periods: int = DEFAULT_PERI
     Raises `UsageError` if the text cannot be read as a time, if the time is not above zero, or if it is a number of
     periods and the model has no forcing period.
     """
-    from hybridsim.engine.period import forcing_period
+    from hybridsim.engine.system.period import forcing_period
 
     if text is None:
         duration = model.duration_value()

@@ -1,4 +1,4 @@
-"""Expressions: parsing with a whitelist, evaluation, substitution, conversion to SymPy."""
+"""This folder turns text into checked expressions, evaluates them, substitutes in them, and converts them to SymPy."""
 
 from hybridsim.expr.evaluate import evaluate, resolve
 from hybridsim.expr.function import FunctionExpression, function_name, of_function

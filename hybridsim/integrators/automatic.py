@@ -6,17 +6,17 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.linear_modes import is_linear_beside_corners, what_is_not_linear
-from hybridsim.engine.outcome import Situation
-from hybridsim.engine.python_code import PythonCode
-from hybridsim.engine.rosenbrock_step import linearise
-from hybridsim.engine.settle import Settling
-from hybridsim.engine.system import System
-from hybridsim.engine.taylor import advance
-from hybridsim.engine.timepair import Instant
+from hybridsim.engine.events.outcome import Situation
+from hybridsim.engine.events.resolve import Settling
+from hybridsim.engine.linear.modes import is_linear_beside_corners, what_is_not_linear
+from hybridsim.engine.series.interpreter import advance
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.user_functions.code import PythonCode
+from hybridsim.integrators.rosenbrock.step import linearise
 
 if TYPE_CHECKING:
-    from hybridsim.integrators.base import Integrator
+    from hybridsim.integrators.contract import Integrator
 
 _SMALL = 24  # states and guards up to which tables of closed forms are small
 _TIGHT = 1e-10  # rtol below which series of high order cost least
@@ -95,7 +95,7 @@ def _modes_at_start(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[
 
 def successor_of(name: str, system: System) -> Integrator | None:
     """The method that goes on where one that was chosen meets stiffness on the way; None where it does not look."""
-    from hybridsim.integrators.rodas5p import Rodas5P
+    from hybridsim.integrators.rosenbrock.rodas5p import Rodas5P
 
     return Rodas5P() if name == "dop853" and system.has_tape else None
 

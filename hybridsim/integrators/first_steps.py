@@ -6,8 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from hybridsim.engine.stepping import Flow, Step, Stepper, Tolerances, Watch
-from hybridsim.integrators.dop853 import Dop853
+from hybridsim.engine.run.stepping import Flow, Step, Stepper, Watch
+from hybridsim.engine.system.tolerances import Tolerances
+from hybridsim.integrators.runge_kutta.dop853 import Dop853
 
 # The order of growth from which a guard is late: a gap that opens with its rate and acceleration zero. The first step
 # of order one has an error of its square, which hides whatever grows later than that.

@@ -11,9 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.rk_step import SMALLEST, STRETCH, next_length, on_the_grid
-from hybridsim.engine.stepping import Collapsed, Dense, Flow, Step, StepFailure, Tolerances
-from hybridsim.engine.trajectory import Pieces
+from hybridsim.engine.native.time_grid import on_the_grid
+from hybridsim.engine.record.segments import Dense
+from hybridsim.engine.record.trajectory import Pieces
+from hybridsim.engine.run.stepping import Flow, Step
+from hybridsim.engine.system.failures import Collapsed, StepFailure
+from hybridsim.engine.system.tolerances import Tolerances
+from hybridsim.integrators.runge_kutta.step import SMALLEST, STRETCH, next_length
 
 _MOST_PARTS = 64  # of a step that is repeated up to an event
 _SHORTER = 0.5  # factor on a step whose error up to an event is above the tolerance

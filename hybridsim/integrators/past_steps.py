@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.jit import kernel
-from hybridsim.engine.stepping import Dense
+from hybridsim.engine.native.kernels import kernel
+from hybridsim.engine.record.segments import Dense
 
 MOST = 6  # points: the highest order of backward differentiation formulas is five
 # Taylor series to third order that miss the other end of their step by more than this share of their largest term

@@ -11,27 +11,27 @@ from importlib.metadata import entry_points
 from typing import Any, get_type_hints
 
 from hybridsim.errors import UsageError, near, nearest
-from hybridsim.integrators.base import Integrator
+from hybridsim.integrators.contract import Integrator
 from hybridsim.integrators.options import LARGEST, fits, in_words
 
 ENTRY_POINT = "hybridsim.integrators"
 _OURS = (
-    "dop853:Dop853",
-    "tsit5:Tsit5",
-    "rodas5p:Rodas5P",
-    "exact:Exact",
-    "taylor:Taylor",
-    "scipy_solvers:ScipyDOP853",
-    "scipy_solvers:ScipyRK45",
-    "scipy_solvers:ScipyRK23",
-    "scipy_solvers:ScipyRadau",
-    "scipy_solvers:ScipyBDF",
-    "scipy_solvers:ScipyLSODA",
-    "sundials:CvodeAdams",
-    "sundials:CvodeBDF",
-    "published:Rk4Dichotomy",
-    "published:Rk4Sign",
-    "moreau:Moreau",
+    "runge_kutta.dop853:Dop853",
+    "runge_kutta.tsit5:Tsit5",
+    "rosenbrock.rodas5p:Rodas5P",
+    "closed_form.method:Exact",
+    "taylor.method:Taylor",
+    "scipy.solvers:ScipyDOP853",
+    "scipy.solvers:ScipyRK45",
+    "scipy.solvers:ScipyRK23",
+    "scipy.solvers:ScipyRadau",
+    "scipy.solvers:ScipyBDF",
+    "scipy.solvers:ScipyLSODA",
+    "sundials.cvode:CvodeAdams",
+    "sundials.cvode:CvodeBDF",
+    "fixed_step.published:Rk4Dichotomy",
+    "fixed_step.published:Rk4Sign",
+    "fixed_step.moreau:Moreau",
 )
 
 
@@ -47,7 +47,7 @@ def _registered() -> dict[str, type[Integrator]]:
         if not (isinstance(integrator, type) and issubclass(integrator, Integrator)):
             raise UsageError(
                 f"the entry point {entry.name} = {entry.value} names no Integrator class",
-                remedy=f"let {entry.value} be a subclass of hybridsim.integrators.base.Integrator",
+                remedy=f"let {entry.value} be a subclass of hybridsim.integrators.contract.Integrator",
             )
         if integrator.name in found and found[integrator.name] is not integrator:
             raise UsageError(

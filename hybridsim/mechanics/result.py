@@ -9,12 +9,12 @@ import numpy as np
 
 from hybridsim.arguments import as_times, known_name, text
 from hybridsim.errors import UsageError
-from hybridsim.solution.in_tables import InTables
+from hybridsim.presentation.tables import Table
+from hybridsim.solution.files.in_tables import InTables
 from hybridsim.solution.solution import Solution
-from hybridsim.tables import Table
 
 if TYPE_CHECKING:
-    from hybridsim.mechanics.system import MechanicalSystem
+    from hybridsim.mechanics.declaration.system import MechanicalSystem
     from hybridsim.solution import ModeInterval
 
 _ALONE = "simulate system.to_model(), whose Solution has it (if the contact velocities are independent)"
@@ -84,7 +84,7 @@ class ArraysResult(InTables):
         points : the number of equally spaced times, both ends included; without it ``sol.t``, with both sides
         of each event time, or the grid of `simulate`.
         """
-        from hybridsim.solution.tabulated import equal_steps
+        from hybridsim.solution.files.tabulated import equal_steps
 
         t = self.t if points is None else equal_steps(self.t_start, self.t_end, points)
         before = np.append(np.diff(t) == 0.0, False)[: len(t)]  # the first of two equal times

@@ -13,9 +13,9 @@ from hybridsim import arguments
 from hybridsim.errors import UsageError, nearest
 
 if TYPE_CHECKING:
-    from hybridsim.mechanics.solution import MechanicalSolution
-    from hybridsim.mechanics.stepped_solution import SteppedSolution
-    from hybridsim.mechanics.system import MechanicalSystem
+    from hybridsim.mechanics.declaration.system import MechanicalSystem
+    from hybridsim.mechanics.series_loop.solution import MechanicalSolution
+    from hybridsim.mechanics.time_stepping.solution import SteppedSolution
 
 # Arguments of `simulate` that are not supported here, with the alternatives.
 _OF_MODELS = {
@@ -50,13 +50,13 @@ def simulate_mechanical(
     UsageError
         For unsupported arguments: other integrators, params, z0, a first step, or a backward run.
     """
-    from hybridsim.engine.jit import announce_compilation
-    from hybridsim.engine.keep import ALL
-    from hybridsim.integrators.fixed_step_length import refuse_endless, refuse_longer
+    from hybridsim.engine.native.kernels import announce_compilation
+    from hybridsim.engine.record.retention import ALL
+    from hybridsim.integrators.fixed_step.step_length import refuse_endless, refuse_longer
     from hybridsim.integrators.registry import integrator_class, keyword_elsewhere
-    from hybridsim.mechanics.plant import build
-    from hybridsim.mechanics.run import MechanicalRun
-    from hybridsim.mechanics.solution import MechanicalSolution
+    from hybridsim.mechanics.series_loop.mechanical_arrays import build
+    from hybridsim.mechanics.series_loop.run import MechanicalRun
+    from hybridsim.mechanics.series_loop.solution import MechanicalSolution
 
     name = arguments.integrator_name(integrator)
     if name not in ("auto", "taylor", "moreau"):
@@ -106,8 +106,8 @@ def simulate_mechanical(
     announce_compilation()
     began = time.perf_counter()
     if method is not None:
-        from hybridsim.mechanics.stepped_run import SteppedRun
-        from hybridsim.mechanics.stepped_solution import SteppedSolution
+        from hybridsim.mechanics.time_stepping.run import SteppedRun
+        from hybridsim.mechanics.time_stepping.solution import SteppedSolution
 
         stepped = SteppedRun(system, method, span, start, save == "all", most)
         refuse_longer(stepped.step, longest, name)

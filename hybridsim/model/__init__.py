@@ -1,18 +1,21 @@
-"""Model declarations: models and their parts, read from TOML or built in Python, without numerics."""
+"""A model says what a system is: this folder declares, reads, checks and writes models, and knows no numerics.
 
-from hybridsim.model.component import Choice, Component, Guard, Mode, Surface
-from hybridsim.model.contact import Contact
-from hybridsim.model.frozen_map import FrozenMap
-from hybridsim.model.impact import Impact
-from hybridsim.model.inputs import Input
-from hybridsim.model.law import FrictionLaw
-from hybridsim.model.law_table import LawTable
+Start with `parts` (what one declares), then `toml`, `checks`, `laws` and `smoothing`.
+"""
+
+from hybridsim.model.laws.law import FrictionLaw
+from hybridsim.model.laws.law_table import LawTable
 from hybridsim.model.library import ModelInfo, list_laws, list_models, load, load_law
-from hybridsim.model.model import Model
-from hybridsim.model.monitor import Monitor
-from hybridsim.model.quantities import Discrete, Output, Parameter, State
-from hybridsim.model.schedule import Schedule
-from hybridsim.model.switching import SwitchingSurface
+from hybridsim.model.parts.component import Choice, Component, Guard, Mode, Surface
+from hybridsim.model.parts.contact import Contact
+from hybridsim.model.parts.frozen_map import FrozenMap
+from hybridsim.model.parts.impact import Impact
+from hybridsim.model.parts.inputs import Input
+from hybridsim.model.parts.model import Model
+from hybridsim.model.parts.monitor import Monitor
+from hybridsim.model.parts.quantities import Discrete, Output, Parameter, State
+from hybridsim.model.parts.schedule import Schedule
+from hybridsim.model.parts.switching import SwitchingSurface
 
 __all__ = [
     "Choice",

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from hybridsim.model.model import Model
+    from hybridsim.model.parts.model import Model
 
 
 def free_name(taken: Iterable[str], wish: str) -> str:

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from hybridsim.calls import refusing
 from hybridsim.errors import ModelError, Place, UsageError, nearest
-from hybridsim.model.law import FrictionLaw
-from hybridsim.model.model import Model
+from hybridsim.model.laws.law import FrictionLaw
+from hybridsim.model.parts.model import Model
 
 # Limit of the size of a model file; a model with a thousand states has about 100 kB.
 MAX_BYTES = 1_000_000
@@ -136,8 +136,8 @@ def load_law(name: str) -> FrictionLaw:
 
 @lru_cache(maxsize=64)
 def _packaged_law(name: str) -> FrictionLaw:
-    from hybridsim.model.toml_laws import read_laws
-    from hybridsim.model.toml_read import open_text
+    from hybridsim.model.toml.laws import read_laws
+    from hybridsim.model.toml.read import open_text
 
     if name not in list_laws():
         known = nearest(name, list_laws(), kind="laws")

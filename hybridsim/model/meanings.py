@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 from hybridsim.expr.grammar import TIME
 from hybridsim.expr.polynomial import Polynomial, constant_of, direction, polynomial
 from hybridsim.expr.rebuild import rebuilt, with_names
-from hybridsim.model.one_sided import names_of
+from hybridsim.model.smoothing.one_sided import names_of
 
 if TYPE_CHECKING:
-    from hybridsim.model.component import Component, Mode
-    from hybridsim.model.model import Model
+    from hybridsim.model.parts.component import Component, Mode
+    from hybridsim.model.parts.model import Model
 
 Family = frozenset[object]
 """A key that an expression shares with all its nonzero multiples."""

@@ -9,7 +9,7 @@ from hybridsim.errors import ModelError
 from hybridsim.expr import Expression, parse, substitute
 
 if TYPE_CHECKING:
-    from hybridsim.model.model import Model
+    from hybridsim.model.parts.model import Model
 
 
 def rate_along(model: Model, quantity: Expression, what: str) -> Expression:

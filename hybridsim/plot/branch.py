@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridsim.model.units import units_of
+from hybridsim.model.checks.units import units_of
 from hybridsim.plot import style
 from hybridsim.plot.scale import label_axis
 

@@ -14,7 +14,7 @@ from hybridsim.plot import style
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from hybridsim.analysis.rows import Row
+    from hybridsim.analysis.compare.rows import Row
 
 SIZE = 6.5
 PALE = 0.35

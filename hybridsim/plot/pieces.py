@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridsim.engine.period import forcing_period
+from hybridsim.engine.system.period import forcing_period
 from hybridsim.errors import UsageError, nearest
-from hybridsim.mechanics.system import MechanicalSystem
-from hybridsim.model.units import units_of
+from hybridsim.mechanics.declaration.system import MechanicalSystem
+from hybridsim.model.checks.units import units_of
 
 if TYPE_CHECKING:
     from hybridsim.solution import Solution

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
-from hybridsim.analysis.regularised import exponent_text, exponents
+from hybridsim.analysis.compare.regularised import exponent_text, exponents
 from hybridsim.plot import style
 from hybridsim.plot.lines import draw_line, looks
 from hybridsim.plot.work_precision import handles, headline, verdict_of
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from hybridsim.analysis import Comparison
-    from hybridsim.analysis.rows import Row
+    from hybridsim.analysis.compare.rows import Row
 
 
 def regularisation(comparison: Comparison) -> tuple[Axes, Axes]:

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure, SubFigure
 
-from hybridsim.colours import INK as INK
-from hybridsim.colours import PALETTE as PALETTE
-from hybridsim.colours import mode_colours as mode_colours
 from hybridsim.errors import UsageError
 from hybridsim.files import whole_file
+from hybridsim.presentation.colours import INK as INK
+from hybridsim.presentation.colours import PALETTE as PALETTE
+from hybridsim.presentation.colours import mode_colours as mode_colours
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

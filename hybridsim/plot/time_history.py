@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.patches import Patch
 
 from hybridsim.errors import UsageError
-from hybridsim.model.units import time_unit, units_of
+from hybridsim.model.checks.units import time_unit, units_of
 from hybridsim.plot import style
 from hybridsim.plot.pieces import Piece, Window, extent, pieces_of, refuse_arrays, unit_of, window_of
 from hybridsim.plot.scale import label_axis

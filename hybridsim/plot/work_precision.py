@@ -10,7 +10,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import EngFormatter, FixedLocator, LogLocator, NullFormatter
 
-from hybridsim.analysis.rows import QUANTITIES, Row
+from hybridsim.analysis.compare.rows import QUANTITIES, Row
 from hybridsim.errors import UsageError
 from hybridsim.plot import style
 from hybridsim.plot.lines import PALE, SIZE, Look, draw_line, looks

@@ -1,8 +1,8 @@
 """This package holds the results of runs, resumes runs, and saves results to files."""
 
-from hybridsim.solution.archive import load_solution
 from hybridsim.solution.event import Event, ModeInterval
-from hybridsim.solution.explanation import Explanation
+from hybridsim.solution.explain.explanation import Explanation
+from hybridsim.solution.files.archive import load_solution
 from hybridsim.solution.solution import Solution
 
 __all__ = ["Event", "Explanation", "ModeInterval", "Solution", "load_solution"]

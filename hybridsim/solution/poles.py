@@ -11,14 +11,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridsim.engine.blocks import OccurrenceList, SegmentList
-from hybridsim.engine.pieces import Segment
-from hybridsim.engine.stepping import Counters, Flow
-from hybridsim.model.denominators import Denominator, denominators
+from hybridsim.engine.record.blocks import OccurrenceList, SegmentList
+from hybridsim.engine.record.counters import Counters
+from hybridsim.engine.record.segments import Segment
+from hybridsim.engine.run.stepping import Flow
+from hybridsim.model.checks.denominators import Denominator, denominators
 
 if TYPE_CHECKING:
-    from hybridsim.engine.system import System
-    from hybridsim.engine.trajectory import Trajectory
+    from hybridsim.engine.record.trajectory import Trajectory
+    from hybridsim.engine.system.system import System
 
 _LOOKS = 64  # states of a run that are checked; a denominator rarely crosses zero twice between two of them
 _HALVINGS = 60

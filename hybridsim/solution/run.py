@@ -9,19 +9,19 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridsim.engine.at_once import AtOnce
-from hybridsim.engine.jit import seconds_compiling
-from hybridsim.engine.python_code import PythonCode
+from hybridsim.engine.native.kernels import seconds_compiling
+from hybridsim.engine.run.at_once import AtOnce
+from hybridsim.engine.system.user_functions.code import PythonCode
 from hybridsim.errors import RunInterrupted
-from hybridsim.model.denominators import denominators
-from hybridsim.model.hygiene import jumps_of
+from hybridsim.model.checks.denominators import denominators
+from hybridsim.model.checks.doubtful import jumps_of
 from hybridsim.solution.poles import end_at_pole, passed_unseen
 from hybridsim.solution.solution import Solution
 
 if TYPE_CHECKING:
-    from hybridsim.engine.system import System
-    from hybridsim.engine.trajectory import Task, Trajectory
-    from hybridsim.integrators.base import Integrator
+    from hybridsim.engine.record.trajectory import Task, Trajectory
+    from hybridsim.engine.system.system import System
+    from hybridsim.integrators.contract import Integrator
     from hybridsim.model import Model
 
 

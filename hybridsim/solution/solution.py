@@ -11,20 +11,20 @@ import numpy as np
 
 from hybridsim.arguments import as_times, side_of_event, text
 from hybridsim.calls import refusing
-from hybridsim.engine.places import Frame, find_places
+from hybridsim.engine.record.time_lookup import Frame, find_places
 from hybridsim.errors import UsageError, nearest
+from hybridsim.presentation.tables import Table
 from hybridsim.solution.by_name import ByName
 from hybridsim.solution.event import Event, ModeInterval
-from hybridsim.solution.in_tables import InTables
+from hybridsim.solution.files.in_tables import InTables
 from hybridsim.solution.summary import in_html, in_words
-from hybridsim.tables import Table
 
 if TYPE_CHECKING:
-    from hybridsim.engine.chain import SegmentChain
-    from hybridsim.engine.pieces import Segment
-    from hybridsim.engine.trajectory import Trajectory
-    from hybridsim.model.component import Component
-    from hybridsim.solution.explanation import Explanation
+    from hybridsim.engine.record.block_list import SegmentChain
+    from hybridsim.engine.record.segments import Segment
+    from hybridsim.engine.record.trajectory import Trajectory
+    from hybridsim.model.parts.component import Component
+    from hybridsim.solution.explain.explanation import Explanation
     from hybridsim.solution.run import Run
 
 _GOOD = ("finished", "terminated")
@@ -295,7 +295,7 @@ class Solution(InTables):
         >>> print(sol.explain(0).reason)
         slip+ is the only mode that is admissible just after
         """
-        from hybridsim.solution.explanation import explain
+        from hybridsim.solution.explain.explanation import explain
 
         return explain(self, number)
 
@@ -423,7 +423,7 @@ class Solution(InTables):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle a solution as it is saved to a file; a model with Python functions cannot be pickled."""
-        from hybridsim.solution.archive import of_bytes, to_bytes
+        from hybridsim.solution.files.archive import of_bytes, to_bytes
 
         return of_bytes, (to_bytes(self),)
 
@@ -442,7 +442,7 @@ class Solution(InTables):
         UsageError
             For a model of Python functions, or if the file cannot be written.
         """
-        from hybridsim.solution.archive import save
+        from hybridsim.solution.files.archive import save
 
         save(self, path)
 
@@ -511,7 +511,7 @@ class Solution(InTables):
 
     def table(self, points: int | None = None) -> Table:
         """Return times, states, outputs and modes as columns, at ``sol.t`` or at equally spaced times."""
-        from hybridsim.solution.tabulated import tabulated
+        from hybridsim.solution.files.tabulated import tabulated
 
         return tabulated(self, points)
 

@@ -6,7 +6,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from hybridsim.errors import printable
-from hybridsim.notebook import run_html
+from hybridsim.presentation.notebook import run_html
 
 if TYPE_CHECKING:
     from hybridsim.solution.solution import Solution

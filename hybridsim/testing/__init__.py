@@ -1,4 +1,4 @@
-"""Scenes with known answers, to test integrators and to explain their failures."""
+"""This folder tests an integrator on scenes with known answers: what it gets right, what wrong, and why."""
 
 from hybridsim.testing.catalogue import SCENES
 from hybridsim.testing.scene import END, TOLERANCES, TROUBLES, VOCABULARY, Scene, Truth

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-from hybridsim.engine.limits import LimitReached
+from hybridsim.engine.record.limits import LimitReached
 
 # limit of the elapsed time in units of the processor time, for runs that wait
 BACKSTOP = 10.0

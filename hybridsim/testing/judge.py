@@ -12,7 +12,7 @@ from typing import Any
 
 import hybridsim as hs
 from hybridsim.arguments import chosen_model
-from hybridsim.engine.recent import system_of
+from hybridsim.engine.system.system_cache import system_of
 from hybridsim.testing.clock import ProcessorTime
 from hybridsim.testing.scene import END, Scene
 

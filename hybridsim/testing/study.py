@@ -9,7 +9,7 @@ from typing import Any
 
 import hybridsim as hs
 from hybridsim.errors import HybridsimError
-from hybridsim.integrators.base import Integrator
+from hybridsim.integrators.contract import Integrator
 from hybridsim.testing import judge
 from hybridsim.testing.clock import Endless, bounded_work
 from hybridsim.testing.scene import Scene

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from hybridsim.integrators.base import Integrator
+from hybridsim.integrators.contract import Integrator
 from hybridsim.integrators.registry import registered
 from hybridsim.testing.catalogue import SCENES
 from hybridsim.testing.scene import Scene

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hybridsim.analysis.multiple_precision import multiple_precision_trajectory
+from hybridsim.reference.multiple_precision import multiple_precision_trajectory
 from rivals.method import BACKWARD, FORWARD, STICK, STRUCK, Result
 from rivals.scenes import Scene
 

@@ -24,9 +24,9 @@ from hybridsim.analysis.advise.certificates import certificates
 from hybridsim.analysis.advise.ladder import Limits, climb, scene_of
 from hybridsim.analysis.advise.question import Answer, question_of, watched
 from hybridsim.analysis.advise.settings import Setting, confirmed, rank
-from hybridsim.analysis.race import Budget
-from hybridsim.analysis.rungs import Scene
-from hybridsim.analysis.rungs.regularised import Tanh
+from hybridsim.analysis.compare.timed_runs import Budget
+from hybridsim.analysis.ladder import Scene
+from hybridsim.analysis.ladder.regularised import Tanh
 from hybridsim.errors import SimulationError, UsageError
 
 

@@ -7,20 +7,20 @@ from typing import Any
 
 import pytest
 
-from hybridsim.analysis.allowance import Allowance, OutOfTime, Stopwatch
-from hybridsim.engine import jit
+from hybridsim.analysis.time_budget import Allowance, OutOfTime, Stopwatch
+from hybridsim.engine.native import kernels
 
 
 def _twice(x: float) -> float:
     return 2.0 * x
 
 
-@pytest.mark.skipif(not jit.ENABLED, reason="the compiler is switched off")
+@pytest.mark.skipif(not kernels.ENABLED, reason="the compiler is switched off")
 def test_a_stopwatch_stands_still_while_a_kernel_is_compiled() -> None:
-    before, began, watch = jit.seconds_compiling(), time.perf_counter(), Stopwatch()
-    assert jit.kernel(_twice)(1.0) == 2.0
+    before, began, watch = kernels.seconds_compiling(), time.perf_counter(), Stopwatch()
+    assert kernels.kernel(_twice)(1.0) == 2.0
     seconds, spent = watch.seconds, time.perf_counter() - began
-    compiled = jit.seconds_compiling() - before
+    compiled = kernels.seconds_compiling() - before
     assert 0.0 < compiled < spent
     assert seconds <= spent - compiled
 
@@ -33,12 +33,12 @@ def test_an_allowance_is_looked_at_until_it_is_over() -> None:
         Allowance(-1.0)()
 
 
-@pytest.mark.skipif(not jit.ENABLED, reason="the compiler is switched off")
+@pytest.mark.skipif(not kernels.ENABLED, reason="the compiler is switched off")
 def test_compiling_that_takes_a_while_is_said_once(
     capsys: pytest.CaptureFixture[str], monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr(jit, "_told", set())
-    monkeypatch.setattr(jit, "_NOTICED", 0.0)
+    monkeypatch.setattr(kernels, "_told", set())
+    monkeypatch.setattr(kernels, "_NOTICED", 0.0)
     numba = pytest.importorskip("numba")  # the compiler that is listened to
     for module in ("somebody.else", "hybridsim.engine.mine", "hybridsim.engine.mine"):
 

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 import hybridsim as hs
-from hybridsim.analysis.allowance import OutOfTime
-from hybridsim.analysis.reference import find_reference
-from hybridsim.analysis.timing import timed_in_turns
+from hybridsim.analysis.compare.reference import find_reference
+from hybridsim.analysis.compare.timing import timed_in_turns
+from hybridsim.analysis.time_budget import OutOfTime
 
 DECAY = hs.Model("decay", [hs.State("x", 1.0, "-x")])
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from plot.fake_solution import ball_model, oscillator_model
 
-from hybridsim.analysis.closed_forms import find_closed_form
-from hybridsim.analysis.closed_forms.affine import Affine, NotAffine, affine
-from hybridsim.analysis.closed_forms.coulomb_model import recognise
-from hybridsim.analysis.closed_forms.forced_coulomb_oscillator import ForcedCoulombOscillator
 from hybridsim.expr import parse
 from hybridsim.model import Contact, Discrete, FrictionLaw, Model, Monitor, Output, State, load
+from hybridsim.reference.closed_forms import find_closed_form
+from hybridsim.reference.closed_forms.affine import Affine, NotAffine, affine
+from hybridsim.reference.closed_forms.coulomb_model import recognise
+from hybridsim.reference.closed_forms.forced_coulomb_oscillator import ForcedCoulombOscillator
 
 
 def test_affine_forms() -> None:

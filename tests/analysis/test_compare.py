@@ -14,7 +14,7 @@ from plot.fake_solution import oscillator
 
 import hybridsim as hs
 from hybridsim.analysis import Series
-from hybridsim.analysis.timing import timed_in_turns
+from hybridsim.analysis.compare.timing import timed_in_turns
 from hybridsim.errors import UsageError
 
 PERIOD = 2 * math.pi / hs.load("dfcs").parameter_values()["omega"]
@@ -112,7 +112,7 @@ def test_failures_are_rows(monkeypatch) -> None:
 
 
 def test_a_third_partys_exception_costs_its_own_row_only(monkeypatch) -> None:
-    from hybridsim.integrators.scipy_solvers import ScipyRK45
+    from hybridsim.integrators.scipy.solvers import ScipyRK45
 
     def broken(*arguments, **keywords):
         raise ZeroDivisionError("somebody's bug")
@@ -200,7 +200,7 @@ def test_timing_goes_in_turns() -> None:
 
 
 def test_a_long_run_is_not_repeated_for_ever(monkeypatch) -> None:
-    monkeypatch.setattr("hybridsim.analysis.timing.ENOUGH", 0.02)
+    monkeypatch.setattr("hybridsim.analysis.compare.timing.ENOUGH", 0.02)
     turns = []
     times = timed_in_turns([lambda: time.sleep(0.03), lambda: None], 3, turns.append)
     assert [len(spent) for spent in times] == [1, 3]

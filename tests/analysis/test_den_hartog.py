@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridsim.analysis.closed_forms.den_hartog import largest_friction, linear_amplitude, no_stops
-from hybridsim.analysis.closed_forms.harmonic_balance import equivalent_viscous_amplitude
+from hybridsim.reference.closed_forms.den_hartog import largest_friction, linear_amplitude, no_stops
+from hybridsim.reference.closed_forms.harmonic_balance import equivalent_viscous_amplitude
 
 
 def written_out(r: float, zeta: float, f: float) -> float:

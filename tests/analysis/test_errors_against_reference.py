@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from plot.fake_solution import ball, ball_model, oscillator, oscillator_model
 
-from hybridsim.analysis.errors_against_reference import Yardstick
-from hybridsim.analysis.mode_sequence import SequenceVerdict
-from hybridsim.analysis.resets import resets_of
-from hybridsim.analysis.trajectory import Trajectory, trajectory_of
+from hybridsim.analysis.compare.errors_against_reference import Yardstick
+from hybridsim.analysis.compare.mode_sequence import SequenceVerdict
+from hybridsim.analysis.compare.resets import resets_of
+from hybridsim.analysis.compare.trajectory import trajectory_of
 from hybridsim.model import Model, Monitor, Schedule, State
+from hybridsim.reference.trajectory import Trajectory
 
 PERIOD = 2 * math.pi / oscillator_model().parameter_values()["omega"]
 

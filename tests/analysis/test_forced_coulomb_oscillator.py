@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from hybridsim.analysis.closed_forms.forced_coulomb_oscillator import (
+from hybridsim.reference.closed_forms.forced_coulomb_oscillator import (
     SLIP_BACKWARD,
     SLIP_FORWARD,
     STICK,

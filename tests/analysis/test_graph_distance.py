@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from plot.fake_solution import ball
 
-from hybridsim.analysis.graph_distance import CompletedGraph, graph_distance
-from hybridsim.analysis.trajectory import Trajectory, trajectory_of
+from hybridsim.analysis.compare.graph_distance import CompletedGraph, graph_distance
+from hybridsim.analysis.compare.trajectory import trajectory_of
+from hybridsim.reference.trajectory import Trajectory
 
 SPAN = 2.0
 

@@ -9,8 +9,8 @@ from collections.abc import Iterable
 import numpy as np
 import pytest
 
-from hybridsim.analysis.mode_sequence import SequenceVerdict, _align, _Entry, match_events
-from hybridsim.analysis.trajectory import ExactEvent, Trajectory
+from hybridsim.analysis.compare.mode_sequence import SequenceVerdict, _align, _Entry, match_events
+from hybridsim.reference.trajectory import ExactEvent, Trajectory
 
 CYCLE = [(0.1, "slip+"), (0.3, "stick"), (0.6, "slip-"), (0.8, "stick"), (1.1, "slip+"), (1.3, "stick")]
 

@@ -11,10 +11,11 @@ from reference.arithmetic import multiprecision
 from reference.dfcs_closed_form import Oscillator
 
 import hybridsim as hs
-from hybridsim.analysis.errors_against_reference import Yardstick
-from hybridsim.analysis.multiple_precision import multiple_precision_trajectory
-from hybridsim.analysis.resets import resets_of
-from hybridsim.analysis.trajectory import Trajectory, trajectory_of
+from hybridsim.analysis.compare.errors_against_reference import Yardstick
+from hybridsim.analysis.compare.resets import resets_of
+from hybridsim.analysis.compare.trajectory import trajectory_of
+from hybridsim.reference.multiple_precision import multiple_precision_trajectory
+from hybridsim.reference.trajectory import Trajectory
 
 MP = mpmath.mp.clone()
 MP.dps = 60

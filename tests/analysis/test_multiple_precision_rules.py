@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.analysis.multiple_precision import multiple_precision_trajectory
-from hybridsim.analysis.multiple_precision.functions import Functions
-from hybridsim.analysis.multiple_precision.nodes import Given, in_order
-from hybridsim.analysis.trajectory import Trajectory
 from hybridsim.errors import SimulationError, UsageError
+from hybridsim.reference.multiple_precision import multiple_precision_trajectory
+from hybridsim.reference.multiple_precision.functions import Functions
+from hybridsim.reference.multiple_precision.nodes import Given, in_order
+from hybridsim.reference.trajectory import Trajectory
 
 MP = mpmath.mp.clone()
 MP.dps = 60

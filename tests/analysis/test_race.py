@@ -9,12 +9,12 @@ from types import SimpleNamespace
 
 import pytest
 
-from hybridsim.analysis.errors_against_reference import Errors
-from hybridsim.analysis.mode_sequence import SequenceVerdict
-from hybridsim.analysis.race import Budget, Entry, race
-from hybridsim.analysis.rows import Cost, Row
-from hybridsim.analysis.series import Series
-from hybridsim.analysis.timing import timed_in_turns
+from hybridsim.analysis.compare.errors_against_reference import Errors
+from hybridsim.analysis.compare.lines import Series
+from hybridsim.analysis.compare.mode_sequence import SequenceVerdict
+from hybridsim.analysis.compare.rows import Cost, Row
+from hybridsim.analysis.compare.timed_runs import Budget, Entry, race
+from hybridsim.analysis.compare.timing import timed_in_turns
 
 
 @dataclass
@@ -119,8 +119,8 @@ def test_a_budget_runs_out() -> None:
 
 def test_compiling_is_not_of_the_budget(monkeypatch: pytest.MonkeyPatch) -> None:
     clock, compiled = [0.0], [0.0]
-    monkeypatch.setattr("hybridsim.analysis.allowance.time.perf_counter", lambda: clock[0])
-    monkeypatch.setattr("hybridsim.analysis.allowance.seconds_compiling", lambda: compiled[0])
+    monkeypatch.setattr("hybridsim.analysis.time_budget.time.perf_counter", lambda: clock[0])
+    monkeypatch.setattr("hybridsim.analysis.time_budget.seconds_compiling", lambda: compiled[0])
     budget = Budget(10.0)
     clock[0], compiled[0] = 7.0, 5.0
     assert (budget.spent, budget.left) == (2.0, 8.0)

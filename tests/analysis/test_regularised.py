@@ -10,9 +10,9 @@ import pytest
 
 import hybridsim as hs
 from hybridsim.analysis import Series
-from hybridsim.analysis.regularised import as_set_valued, exponents, regularised_series
-from hybridsim.analysis.trajectory import ExactEvent, Trajectory
+from hybridsim.analysis.compare.regularised import as_set_valued, exponents, regularised_series
 from hybridsim.errors import UsageError
+from hybridsim.reference.trajectory import ExactEvent, Trajectory
 
 PERIOD = 2 * math.pi / hs.load("dfcs").parameter_values()["omega"]
 WIDTHS = (3e-4, 1e-4, 3e-5)

@@ -11,13 +11,13 @@ import threading
 import numpy as np
 import pytest
 
-from hybridsim.analysis.closed_forms.den_hartog import no_stops
-from hybridsim.analysis.closed_forms.forced_coulomb_oscillator import ForcedCoulombOscillator
-from hybridsim.analysis.study import deviation, settings, step_study
-from hybridsim.analysis.study.pool import Pool
-from hybridsim.analysis.study.settings import LITERAL, SIGNS, ZEROED, Point
-from hybridsim.analysis.study.steady import by_steps, exact
-from hybridsim.analysis.study.verdicts import Verdict, plain
+from hybridsim.reference.closed_forms.den_hartog import no_stops
+from hybridsim.reference.closed_forms.forced_coulomb_oscillator import ForcedCoulombOscillator
+from hybridsim.studies.he2026.measured import deviation, settings, step_study
+from hybridsim.studies.he2026.measured.pool import Pool
+from hybridsim.studies.he2026.measured.settings import LITERAL, SIGNS, ZEROED, Point
+from hybridsim.studies.he2026.measured.steady import by_steps, exact
+from hybridsim.studies.he2026.measured.verdicts import Verdict, plain
 
 STICKING = Point(0.6, 0.75)
 SLIPPING = Point(1.0, 0.8)

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.analysis.closed_forms.coulomb_model import recognise
-from hybridsim.analysis.errors_against_reference import Errors
-from hybridsim.analysis.mode_sequence import SequenceVerdict
-from hybridsim.analysis.rows import NOT_STARTED, Cost, Row
+from hybridsim.analysis.compare.errors_against_reference import Errors
+from hybridsim.analysis.compare.mode_sequence import SequenceVerdict
+from hybridsim.analysis.compare.rows import NOT_STARTED, Cost, Row
 from hybridsim.analysis.suite.scenes import SCENES
 from hybridsim.analysis.suite.verdict import Verdict, verdict
-from hybridsim.engine.period import forcing_period
+from hybridsim.engine.system.period import forcing_period
 from hybridsim.errors import UsageError
-from hybridsim.integrators.base import CAPABILITIES
+from hybridsim.integrators.contract import CAPABILITIES
+from hybridsim.reference.closed_forms.coulomb_model import recognise
 
 SCENE = {scene.name: scene for scene in SCENES}
 CHEAP = ("P1", "grazing", "static-kinetic", "bouncing-ball")

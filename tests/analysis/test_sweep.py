@@ -19,7 +19,7 @@ import pytest
 from analysis.swept import SPAN, end, fall, height, longer
 
 import hybridsim as hs
-from hybridsim.analysis.sweep.pieces import Pieces
+from hybridsim.analysis.sweep.work.pieces import Pieces
 
 F0, OMEGA = [22.0, 30.0, 38.0, 40.0], [350.0, 424.0, 500.0]
 GRID = {"F0": F0, "omega": OMEGA}

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.analysis.closed_forms.den_hartog import no_stops
-from hybridsim.engine.fleet import Fleet, sails
-from hybridsim.engine.recent import system_of
+from hybridsim.engine.system.system_cache import system_of
+from hybridsim.ensemble.runs import Fleet, sails
 from hybridsim.errors import UsageError
+from hybridsim.reference.closed_forms.den_hartog import no_stops
 
 WN = math.sqrt(1e5 / 0.2)
 READINGS = (

@@ -9,7 +9,7 @@ import pytest
 from reference.arithmetic import multiprecision
 from reference.dfcs_closed_form import Oscillator
 
-from hybridsim.analysis.closed_forms.forced_coulomb_oscillator import ForcedCoulombOscillator
+from hybridsim.reference.closed_forms.forced_coulomb_oscillator import ForcedCoulombOscillator
 
 MODE = {0: "stick", 1: "slip+", -1: "slip-"}
 NATURAL = math.sqrt(1e5 / 0.2)

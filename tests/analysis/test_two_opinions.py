@@ -7,10 +7,11 @@ import random
 import pytest
 
 import hybridsim as hs
-from hybridsim.analysis.errors_against_reference import Yardstick
-from hybridsim.analysis.multiple_precision import multiple_precision_trajectory
-from hybridsim.analysis.resets import resets_of
-from hybridsim.analysis.trajectory import EventLike, trajectory_of
+from hybridsim.analysis.compare.errors_against_reference import Yardstick
+from hybridsim.analysis.compare.resets import resets_of
+from hybridsim.analysis.compare.trajectory import trajectory_of
+from hybridsim.reference.multiple_precision import multiple_precision_trajectory
+from hybridsim.reference.trajectory import EventLike
 
 END = 6.0
 LAWS = (

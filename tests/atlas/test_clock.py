@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from hybridsim.engine import modules
-from hybridsim.engine.limits import LimitReached
+from hybridsim.engine.record.limits import LimitReached
+from hybridsim.engine.system import modules
 from hybridsim.testing import SCENES, Truth, judge
 from hybridsim.testing.clock import BACKSTOP, Endless, ProcessorTime, bounded_work
 

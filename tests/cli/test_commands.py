@@ -246,7 +246,7 @@ def test_clearing_the_cache_leaves_folders_of_others(
 
 
 def test_cache_path_and_clear(hybridsim: Callable, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from hybridsim.engine.cache import kernel_folder, store
+    from hybridsim.engine.native.cache import kernel_folder, store
 
     root = tmp_path / "cache"
     monkeypatch.setenv("HYBRIDSIM_CACHE", str(root))
@@ -276,7 +276,7 @@ def test_cache_path_and_clear(hybridsim: Callable, tmp_path: Path, monkeypatch: 
 
 
 def test_default_spans_are_those_of_the_library() -> None:
-    library = importlib.import_module("hybridsim.analysis.compare")
+    library = importlib.import_module("hybridsim.analysis.compare.compare")
     assert (values.COMPARED_PERIODS, values.DEFAULT_SECONDS) == (library.PERIODS, library.TIME)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.report import describe
+from hybridsim.engine.run.report import describe
 
 
 def test_check_refuses_a_force_that_drives(tmp_path: Path) -> None:

@@ -93,7 +93,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     numbers = {"nothing": math.nan, "all": np.array([1.0, math.inf]), "count": np.int64(3)}
     monkeypatch.setattr(
-        "hybridsim.analysis.study.he2026", lambda **keywords: SimpleNamespace(to_plain=lambda: numbers)
+        "hybridsim.studies.he2026.measured.he2026",
+        lambda **keywords: SimpleNamespace(to_plain=lambda: numbers),
     )
     monkeypatch.setattr("hybridsim.cli.study._write", lambda *arguments: None)
     return tmp_path

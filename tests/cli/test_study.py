@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from cli.conftest import Outcome
 
-from hybridsim.analysis.study import settings
+from hybridsim.studies.he2026.measured import settings
 
 CLAIMS = (
     "figure 3",
@@ -67,7 +67,7 @@ def test_the_whole_on_few_points(
         timed_periods=10,
         repeats=1,
     )
-    monkeypatch.setattr("hybridsim.analysis.study.he2026.QUICK", tiny)
+    monkeypatch.setattr("hybridsim.studies.he2026.measured.he2026.QUICK", tiny)
     outcome = hybridsim("study", "he2026", "--quick", "--out", "page", "--images", "pictures", "--json")
     assert outcome.code == 0, outcome.err
     printed = json.loads(outcome.out)

@@ -14,9 +14,9 @@ import mpmath
 import numpy as np
 from engine.multiple_precision import evaluate
 
-from hybridsim.engine.system import System
+from hybridsim.engine.system.system import System
 from hybridsim.model import Model
-from hybridsim.model.switching import ATTRACTION
+from hybridsim.model.parts.switching import ATTRACTION
 
 
 class ByHand:

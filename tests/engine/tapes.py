@@ -10,8 +10,8 @@ import mpmath
 import numpy as np
 import sympy
 
-from hybridsim.engine.jets import ORDER, UNIT, run_tape
-from hybridsim.engine.tape import TapeBuilder
+from hybridsim.engine.series.bounded import ORDER, UNIT, run_tape
+from hybridsim.engine.series.tape import TapeBuilder
 from hybridsim.expr import parse
 from hybridsim.expr.symbolic import to_sympy
 

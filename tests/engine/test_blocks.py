@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.accumulation import NOBODY, Accumulation, Limit, accumulated
-from hybridsim.engine.blocks import OccurrenceList, SegmentList
-from hybridsim.engine.chain import Chain
-from hybridsim.engine.crossings import Crossings
-from hybridsim.engine.pieces import Occurrence
-from hybridsim.engine.series_block import SeriesBlock
-from hybridsim.engine.system import Automaton
-from hybridsim.engine.timepair import Instant
+from hybridsim.engine.events.zeno.accumulation import NOBODY, Accumulation, Limit, accumulated
+from hybridsim.engine.record.block_list import Chain
+from hybridsim.engine.record.blocks import OccurrenceList, SegmentList
+from hybridsim.engine.record.event_block import Crossings
+from hybridsim.engine.record.segments import Occurrence
+from hybridsim.engine.record.series_block import SeriesBlock
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import Automaton
 
 
 def occurrence(t: float, component: str = "c", kind: str = "transition") -> Occurrence:

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hybridsim.engine.candidates import verdicts_on
-from hybridsim.engine.decide import FINE, LEAVES, UNDECIDED, choose, joint_candidates
+from hybridsim.engine.events.choice.candidates import verdicts_on
+from hybridsim.engine.events.choice.verdict import FINE, LEAVES, UNDECIDED, choose, joint_candidates
 
 HOLD = 1  # of three modes
 

@@ -9,7 +9,7 @@ import pytest
 from engine.uncompiled import uncompiled
 
 import hybridsim as hs
-from hybridsim.engine import ordinary_event
+from hybridsim.engine.events.compiled import resolve_ordinary
 
 STATES = {
     "x1": hs.State("x1", 0, "v1"),
@@ -54,18 +54,18 @@ SCENES: dict[str, tuple[Any, float, int]] = {
 
 def found(model: Any, end: float) -> list[Any]:
     """All that a run has found, bit by bit, and how many events were settled at first sight."""
-    seen, settle = [0], ordinary_event.settle_clearly
+    seen, settle = [0], resolve_ordinary.settle_clearly
 
     def counted(*arguments: Any) -> bool:
         is_clear = bool(settle(*arguments))
         seen[0] += is_clear
         return is_clear
 
-    ordinary_event.settle_clearly = counted
+    resolve_ordinary.settle_clearly = counted
     try:
         sol = hs.simulate(model, (0, end), integrator="exact")
     finally:
-        ordinary_event.settle_clearly = settle
+        resolve_ordinary.settle_clearly = settle
     events = [
         [e.t.hex(), e.component, e.source, e.target, *(float(v).hex() for v in e.x_plus)] for e in sol.events
     ]
@@ -76,7 +76,7 @@ def both(scene: str) -> None:
     """Print what is found with and without a first sight."""
     model, end, _ = SCENES[scene]
     at_first_sight = found(model, end)
-    ordinary_event.settle_clearly = lambda *_: False
+    resolve_ordinary.settle_clearly = lambda *_: False
     print(json.dumps([at_first_sight, found(model, end)]))
 
 

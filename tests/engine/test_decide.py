@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridsim.engine.decide import (
+from hybridsim.engine.events.choice.verdict import (
     FINE,
     LEAVES,
     NONE,

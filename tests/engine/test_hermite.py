@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridsim.engine.hermite import hermite, middle_weights
+from hybridsim.engine.record.hermite import hermite, middle_weights
 
 
 def taylor(coefficients: list[Fraction], at: Fraction, count: int) -> list[Fraction]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.high_orders import (
+from hybridsim.engine.series.high_orders import (
     FACTOR,
     HAS_B,
     HAS_C,
@@ -17,13 +17,13 @@ from hybridsim.engine.high_orders import (
     RECIPROCAL,
     high_rows,
 )
-from hybridsim.engine.lean_tape import ADD_CONSTANT, DIVIDE_BY, SCALE
-from hybridsim.engine.series import SeriesRun
-from hybridsim.engine.stepping import Tolerances
-from hybridsim.engine.system import System
-from hybridsim.engine.tape import ADD, DIV, EXP, MUL, NEG, SUB
-from hybridsim.engine.taylor import expand
-from hybridsim.engine.timepair import Instant
+from hybridsim.engine.series.interpreter import expand
+from hybridsim.engine.series.optimise import ADD_CONSTANT, DIVIDE_BY, SCALE
+from hybridsim.engine.series.tape import ADD, DIV, EXP, MUL, NEG, SUB
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.series_at import SeriesRun
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.tolerances import Tolerances
 
 SCENES = ("dfcs", "dfcs-stribeck", "belt", "square-wave", "bouncing-ball", "clutches", "static-kinetic")
 X, V, B, C = 0, 1, 2, 3  # states and constants

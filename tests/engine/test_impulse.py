@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from reference.random_blows import random_blow
 
-from hybridsim.engine.impulse import Blow, answers, count, energy
+from hybridsim.engine.events.jumps.impulse import Blow, answers, count, energy
 
 
 def frictionless(effects, before, restitution):

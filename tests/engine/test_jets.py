@@ -19,8 +19,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import hybridsim as hs
-from hybridsim.engine.system import System
-from hybridsim.engine.timepair import Instant, multiple
+from hybridsim.engine.system.instant import Instant, multiple
+from hybridsim.engine.system.system import System
 from hybridsim.expr import parse
 from hybridsim.expr.symbolic import to_sympy
 from hybridsim.model import Model, Monitor, Parameter, State

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine import loop
-from hybridsim.engine.first_exit import FOUND, NEVER, OPEN, first_exit, to_bernstein
-from hybridsim.integrators.taylor import Taylor
+from hybridsim.engine.roots.first_exit import FOUND, NEVER, OPEN, first_exit, to_bernstein
+from hybridsim.engine.run import mode_loop
+from hybridsim.integrators.taylor.method import Taylor
 from hybridsim.testing.catalogue import SCENES
 from hybridsim.testing.judge import load
 from hybridsim.testing.scene import Scene
@@ -144,8 +144,8 @@ def test_leaps_and_the_general_way(scene: Scene, general) -> None:
 def test_the_reference_model_is_one_leap(monkeypatch: pytest.MonkeyPatch) -> None:
     """401 events in a hundred periods, not one of them by the general way."""
     taken = []
-    segment_run = loop.SegmentRun
-    monkeypatch.setattr(loop, "SegmentRun", lambda *args: taken.append(args) or segment_run(*args))
+    segment_run = mode_loop.SegmentRun
+    monkeypatch.setattr(mode_loop, "SegmentRun", lambda *args: taken.append(args) or segment_run(*args))
     sol = hs.simulate("dfcs", (0, 100 * PERIOD), integrator="taylor", rtol=1e-12)
     assert len(sol.events) == 401
     assert not taken
@@ -157,8 +157,8 @@ def test_a_motion_that_settles_is_no_series_that_accumulates(
 ) -> None:
     # next to resonance the intervals between events shrink by one factor, by a few thousandths each
     runs: list[object] = []
-    segment_run = loop.SegmentRun
-    monkeypatch.setattr(loop, "SegmentRun", lambda *a: runs.append(a) or segment_run(*a))
+    segment_run = mode_loop.SegmentRun
+    monkeypatch.setattr(mode_loop, "SegmentRun", lambda *a: runs.append(a) or segment_run(*a))
     model = hs.load("dfcs").with_(N=40, F0=40 * ratio, omega=f"{r}*sqrt(k/m)")
     period = 2 * math.pi / model.parameter_values()["omega"]
     sol = hs.simulate(model, (0.0, 40 * period), integrator="exact")

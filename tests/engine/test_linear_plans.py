@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.linear_modes import what_is_not_linear
-from hybridsim.engine.linear_tables import linear_tables
-from hybridsim.engine.panels import rows_of
-from hybridsim.engine.system import System
-from hybridsim.engine.timepair import Instant
+from hybridsim.engine.linear.modes import what_is_not_linear
+from hybridsim.engine.linear.tables import linear_tables
+from hybridsim.engine.native.simd_products import rows_of
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
 
 MODEL = hs.Model(
     "values",

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine import leaper
-from hybridsim.engine.segment import SegmentRun
+from hybridsim.engine.run import compiled_loop
+from hybridsim.engine.run.segment_run import SegmentRun
 
 OSCILLATOR = hs.Model("free", states=[hs.State("x", 1, der="v"), hs.State("v", 0, der="-x")])
 
@@ -18,7 +18,7 @@ OSCILLATOR = hs.Model("free", states=[hs.State("x", 1, der="v"), hs.State("v", 0
 @pytest.fixture
 def little_room(monkeypatch: pytest.MonkeyPatch) -> None:
     """Room for the least number of steps."""
-    monkeypatch.setattr(leaper, "_ROOM", 0)
+    monkeypatch.setattr(compiled_loop, "_ROOM", 0)
 
 
 @pytest.mark.parametrize("integrator", ["dop853", "tsit5", "taylor"])

@@ -10,14 +10,9 @@ import pytest
 from engine.model_truth import combinations
 
 import hybridsim as hs
-from hybridsim.engine.system import System
-from hybridsim.engine.timepair import Instant
-from hybridsim.model import (
-    Contact,
-    FrictionLaw,
-    Model,
-    State,
-)
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
+from hybridsim.model import Contact, FrictionLaw, Model, State
 
 STICTION = FrictionLaw("stiction", slip="mu_k*N", stick="mu_s*N", parameters={"mu_s": 0.5, "mu_k": 0.4})
 

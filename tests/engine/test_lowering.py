@@ -18,9 +18,9 @@ from engine.random_expressions import random_expression
 from engine.tapes import STATES, Point
 
 import hybridsim as hs
-from hybridsim.engine.lower import Lowering
-from hybridsim.engine.system import System
-from hybridsim.engine.timepair import Instant, multiple
+from hybridsim.engine.lowering.lower import Lowering
+from hybridsim.engine.system.instant import Instant, multiple
+from hybridsim.engine.system.system import System
 from hybridsim.errors import ModelError
 from hybridsim.model import (
     Choice,

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hybridsim.engine import jit
-from hybridsim.engine.jit import ENABLED
+from hybridsim.engine.native import kernels
+from hybridsim.engine.native.kernels import ENABLED
 
 pytestmark = pytest.mark.skipif(not ENABLED, reason="the compiler is switched off")
 
@@ -48,18 +48,21 @@ def called(
     address: int, t: float, x: tuple[float, ...], p: tuple[float, ...], z: int, width: int
 ) -> np.ndarray:
     out = np.full(width, np.nan)
-    assert jit.kernel(_through)(address, t, np.array(x), np.array(p), np.array([z], dtype=np.int64), out) == 0
+    assert (
+        kernels.kernel(_through)(address, t, np.array(x), np.array(p), np.array([z], dtype=np.int64), out)
+        == 0
+    )
     return out
 
 
 def _through(address: int, t: float, x: np.ndarray, p: np.ndarray, z: np.ndarray, out: np.ndarray) -> int:
-    return jit.call(address, t, x, p, z, out)
+    return kernels.call(address, t, x, p, z, out)
 
 
 def test_every_operation_to_the_last_bit(tmp_path: Path) -> None:
     lines = [f"    out[{i}] = {e}" for i, e in enumerate(EXPRESSIONS)]
     made = module("\n".join(["def f(t, x, p, z, out):", *lines, "    return 0"]), tmp_path, "every")
-    address, _alive = jit.compile_model_function(made, "f")
+    address, _alive = kernels.compile_model_function(made, "f")
     for x in POINTS:
         for z in (0, 1):
             expected = [0.0] * len(EXPRESSIONS)
@@ -84,21 +87,21 @@ def test_branches_on_modes(tmp_path: Path) -> None:
         b = 1.0
     out[0] = a + b
     return 0"""
-    address, _alive = jit.compile_model_function(module(text, tmp_path, "branches"), "f")
+    address, _alive = kernels.compile_model_function(module(text, tmp_path, "branches"), "f")
     assert [called(address, 0.0, (3.0,), (), z, 1)[0] for z in (0, 1, 2)] == [9.0, -6.0, 1.0]
 
 
 def test_what_has_no_value_is_nan_or_infinite(tmp_path: Path) -> None:
     text = "def f(t, x, p, z, out):\n    out[0] = 1.0/x[0]\n    out[1] = log(-1.0 - x[0])\n    return 0"
-    address, _alive = jit.compile_model_function(module(text, tmp_path, "none"), "f")
+    address, _alive = kernels.compile_model_function(module(text, tmp_path, "none"), "f")
     got = called(address, 0.0, (0.0,), (), 0, 2)
     assert got[0] == math.inf and math.isnan(got[1])
 
 
 def test_a_damaged_file_is_compiled_anew(tmp_path: Path) -> None:
     made = module("def f(t, x, p, z, out):\n    out[0] = x[0] + 1.0\n    return 0", tmp_path, "damaged")
-    jit.compile_model_function(made, "f")
+    kernels.compile_model_function(made, "f")
     (kept,) = tmp_path.glob("damaged.f.*.o")
     kept.write_bytes(kept.read_bytes()[:100])
-    address, _alive = jit.compile_model_function(made, "f")
+    address, _alive = kernels.compile_model_function(made, "f")
     assert called(address, 0.0, (1.0,), (), 0, 1)[0] == 2.0

@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.linear_tables import LinearTables, linear_tables
-from hybridsim.engine.mode_tables import TapeShelf, shelf_of
-from hybridsim.engine.modes_index import find_modes, index_of
-from hybridsim.engine.recent import system_of
-from hybridsim.engine.system import System
-from hybridsim.engine.timepair import Instant
+from hybridsim.engine.linear.tables import LinearTables, linear_tables
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.programs.mode_tables import TapeShelf, shelf_of
+from hybridsim.engine.system.programs.modes_index import find_modes, index_of
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.system_cache import system_of
 
 COMPILED = ("exact", "taylor", "dop853", "tsit5")
 
@@ -227,7 +227,7 @@ def test_tables_of_many_values_do_not_fill_the_memory(monkeypatch: pytest.Monkey
         hs.simulate(model, (0, end), integrator="exact", save="nothing")
     assert len(kept) >= 3
     most = max(made.rows.size for made in kept.values())
-    monkeypatch.setattr("hybridsim.engine.linear_tables._MOST_BYTES", most)
+    monkeypatch.setattr("hybridsim.engine.linear.tables._MOST_BYTES", most)
     hs.simulate(model, (0, 0.01), integrator="exact", save="nothing")
     assert len(kept) == 1 or sum(made.rows.size for made in kept.values()) <= most
     assert len(kept) < 3

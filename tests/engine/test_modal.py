@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from reference.random_models import matrix
 
-from hybridsim.engine.jit import kernel
-from hybridsim.engine.linear_kernels import moved, states_of, to_modal
-from hybridsim.engine.linear_tables import LinearTables, no_tables
-from hybridsim.engine.modal import Modal, modal
-from hybridsim.engine.packs import packed
-from hybridsim.engine.panels import filled_up, panels_of, vector_of
+from hybridsim.engine.linear.modal import Modal, modal
+from hybridsim.engine.linear.motion import moved, states_of, to_modal
+from hybridsim.engine.linear.tables import LinearTables, no_tables
+from hybridsim.engine.native.kernels import kernel
+from hybridsim.engine.native.simd_products import filled_up, panels_of, vector_of
+from hybridsim.engine.native.struct_pack import packed
 
 UNIT = 2.0**-53
 ROUNDINGS = 256.0  # of the result, as ill conditioned as it is

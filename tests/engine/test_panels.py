@@ -8,8 +8,16 @@ import numpy as np
 import pytest
 from engine.uncompiled import uncompiled
 
-from hybridsim.engine.jit import kernel
-from hybridsim.engine.panels import dot, filled_up, panels_of, product, rows_of, times, vector_of
+from hybridsim.engine.native.kernels import kernel
+from hybridsim.engine.native.simd_products import (
+    dot,
+    filled_up,
+    panels_of,
+    product,
+    rows_of,
+    times,
+    vector_of,
+)
 
 SHAPES = [(1, 1, 0), (2, 2, 3), (4, 4, 4), (5, 3, 1), (9, 8, 7), (3, 0, 2)]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.places import find_places
+from hybridsim.engine.record.time_lookup import find_places
 
 
 def searched(times, starts, ends, origins, spans, sign, is_later):

@@ -32,14 +32,14 @@ import sys
 import numpy as np
 from pathlib import Path
 import hybridsim as hs
-from hybridsim.engine import jit
+from hybridsim.engine.native import kernels
 decay = hs.Model("decay", states=[hs.State("x", 1.0, "-x")])
-if jit.ENABLED:
+if kernels.ENABLED:
     sys.path.insert(0, sys.argv[1])
     import own_kernel
-    address = jit.kernel_address(own_kernel.three, np.zeros(1))
-    assert jit.call_kernel.__name__ and address
-from hybridsim.engine.modules import compiled
+    address = kernels.kernel_address(own_kernel.three, np.zeros(1))
+    assert kernels.call_kernel.__name__ and address
+from hybridsim.engine.system.modules import compiled
 code = compiled(decay)
 out = np.zeros(1)
 code.module.flow(0.0, np.array([0.25]), np.zeros(0), np.zeros(0, dtype=np.int64), out)
@@ -313,7 +313,7 @@ def test_a_full_disk_is_named(tmp_path: Path) -> None:
 def test_files_of_one_name_in_two_folders_have_keys_of_their_own(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from hybridsim.engine import cache
+    from hybridsim.engine.native import cache
 
     monkeypatch.setattr(cache, "_PACKAGE", tmp_path)
     first, second = tmp_path / "engine" / "a" / "same.py", tmp_path / "engine" / "b" / "same.py"

@@ -7,7 +7,7 @@ import random
 import pytest
 from engine.uncompiled import uncompiled
 
-from hybridsim.engine.recipe import Numbers, Recipe
+from hybridsim.engine.linear.recipe import Numbers, Recipe
 
 
 def compute(a: float, b: float, c: float) -> list[float]:
@@ -57,8 +57,8 @@ def test_what_is_no_number_is_no_warning_where_nothing_is_compiled() -> None:
     code = """
 import math, warnings
 warnings.simplefilter("error")
-from hybridsim.engine.recipe import computed
-from hybridsim.engine.tape import DIV
+from hybridsim.engine.linear.recipe import computed
+from hybridsim.engine.series.tape import DIV
 print(math.isnan(computed(DIV, (0.0, 0.0), 0, 0)[0]), computed(DIV, (1.0, 0.0), 0, 0)[0])
 """
     assert uncompiled(code).split() == ["True", "inf"]

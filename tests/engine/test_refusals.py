@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.lower import Lowering
+from hybridsim.engine.lowering.lower import Lowering
 from hybridsim.errors import ModelError
 
 STATES = """schema = 1

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from reference.releases import KINDS, LATE, MODES, Case, compare, draw
 
-from hybridsim.engine import settle
-from hybridsim.engine.decide import FINE, LEAVES, UNDECIDED
+from hybridsim.engine.events import resolve
+from hybridsim.engine.events.choice.verdict import FINE, LEAVES, UNDECIDED
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -85,7 +85,7 @@ def as_computed(series: Any, bounds: Any, *rest: Any) -> int:
     return judge(series, np.zeros_like(bounds), *rest)
 
 
-decree_orders, judge = settle.decree_orders, settle.judge
+decree_orders, judge = resolve.decree_orders, resolve.judge
 
 
 @pytest.mark.parametrize(
@@ -110,12 +110,12 @@ def test_releases_need_the_zeros_by_decree(
     Without it 7 in 10 stay undecided where a coefficient within its bound is (417 of 600), and every sixth run
     stops for want of a motion where the sign of the computed acceleration is believed (106 of 600).
     """
-    monkeypatch.setattr(settle, "decree_orders", decree)
-    monkeypatch.setattr(settle, "judge", rule)
+    monkeypatch.setattr(resolve, "decree_orders", decree)
+    monkeypatch.setattr(resolve, "judge", rule)
     assert least <= verdicts(200)["right"] <= most
 
 
 def test_the_error_bounds_alone_would_find_the_releases_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two lines of defence: the computed acceleration is within its bound, so the jerk decides even without Z."""
-    monkeypatch.setattr(settle, "decree_orders", only_the_velocity)
+    monkeypatch.setattr(resolve, "decree_orders", only_the_velocity)
     assert verdicts(200)["right"] == 200

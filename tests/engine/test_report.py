@@ -9,10 +9,10 @@ import pytest
 
 import hybridsim as hs
 from hybridsim.cli.automaton import lines_of
-from hybridsim.engine.jit import ENABLED
-from hybridsim.engine.machine_code import functions_in
-from hybridsim.engine.modules import compiled
-from hybridsim.engine.report import describe
+from hybridsim.engine.native.kernels import ENABLED
+from hybridsim.engine.native.llvm import functions_in
+from hybridsim.engine.run.report import describe
+from hybridsim.engine.system.modules import compiled
 
 pytestmark = pytest.mark.skipif(not ENABLED, reason="nothing is compiled")
 

@@ -9,13 +9,13 @@ import pytest
 from reference.dfcs_closed_form import Oscillator
 
 import hybridsim as hs
-from hybridsim.engine import leaper, loop
-from hybridsim.engine.dense_guards import stays_positive
-from hybridsim.engine.hermite import bernstein_weights, fit_all, hermite, right_system, shift_matrix
-from hybridsim.engine.rk_leap import first_length
-from hybridsim.engine.rk_step import forget, next_length
-from hybridsim.integrators.dop853 import Dop853
+from hybridsim.engine.record.hermite import bernstein_weights, fit_all, hermite, right_system, shift_matrix
+from hybridsim.engine.roots.dense_guards import stays_positive
+from hybridsim.engine.run import compiled_loop, mode_loop
 from hybridsim.integrators.registry import integrator_class
+from hybridsim.integrators.runge_kutta.dop853 import Dop853
+from hybridsim.integrators.runge_kutta.segments import first_length
+from hybridsim.integrators.runge_kutta.step import forget, next_length
 from hybridsim.testing.catalogue import SCENES
 from hybridsim.testing.judge import load
 from hybridsim.testing.scene import Scene
@@ -150,8 +150,8 @@ def test_leaps_and_the_general_way(scene: Scene, method: str, monkeypatch: pytes
 def test_the_reference_model_is_one_leap(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """401 events in a hundred periods, not one by the general way; their times are those of the closed form."""
     taken = []
-    segment_run = loop.SegmentRun
-    monkeypatch.setattr(loop, "SegmentRun", lambda *args: taken.append(args) or segment_run(*args))
+    segment_run = mode_loop.SegmentRun
+    monkeypatch.setattr(mode_loop, "SegmentRun", lambda *args: taken.append(args) or segment_run(*args))
     sol = hs.simulate("dfcs", (0, 100 * PERIOD), integrator=method, rtol=1e-9)
     assert not taken
     p = hs.load("dfcs").parameter_values()
@@ -209,11 +209,11 @@ def test_a_segment_of_more_steps_than_there_is_room_for(
     states = [hs.State("x", 1, "v"), hs.State("v", 0, "-x*(1 + 0.1*x**2)")]
     whole = hs.simulate(hs.Model("whole", states=states), (0, 200), integrator=integrator, rtol=1e-12)
     monkeypatch.setattr(
-        leaper, "_ROOM", 0
+        compiled_loop, "_ROOM", 0
     )  # for loops that are made from now on: a known model keeps its own
     cramped = hs.simulate(hs.Model("cramped", states=states), (0, 200), integrator=integrator, rtol=1e-12)
     assert cramped.stats["steps"] == pytest.approx(whole.stats["steps"], rel=0.02)
     assert cramped(200.0) == pytest.approx(whole(200.0), abs=1e-9)
     kinds = {type(b).__name__ for b in cramped._trajectory.segments.blocks}
     assert kinds in ({"SeriesBlock"}, {"HermiteBlock"})
-    assert len(cramped._trajectory.segments.blocks) >= whole.stats["steps"] // leaper.LEAST
+    assert len(cramped._trajectory.segments.blocks) >= whole.stats["steps"] // compiled_loop.LEAST

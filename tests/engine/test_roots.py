@@ -15,10 +15,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridsim.engine import roots
-from hybridsim.engine.locate import polish
-from hybridsim.engine.roots import _ACCEPT, POINTS, Crossing, Grazing, find_roots, quiet
-from hybridsim.engine.stepping import StepFailure
+from hybridsim.engine.roots import roots
+from hybridsim.engine.roots.roots import _ACCEPT, POINTS, Crossing, Grazing, find_roots, quiet
+from hybridsim.engine.run.locate import polish
+from hybridsim.engine.system.failures import StepFailure
 
 Function = Callable[[np.ndarray], np.ndarray]
 UNIT = 2.0**-53

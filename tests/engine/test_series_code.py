@@ -12,24 +12,24 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine import code_shelf, mode_tables
-from hybridsim.engine.bernstein_code import LEADING, bernstein_text
-from hybridsim.engine.bounds_code import bounds_text, can_bound
-from hybridsim.engine.code_shelf import CodeShelf
-from hybridsim.engine.dense_guards import guards_at, series_along
-from hybridsim.engine.first_exit import to_bernstein
-from hybridsim.engine.jets import ORDER
-from hybridsim.engine.jit import ENABLED, call_series, compile_series, kernel
-from hybridsim.engine.mode_code import constant_rows, given, mode_tape
-from hybridsim.engine.mode_tables import shelf_of
-from hybridsim.engine.rk_leap import series_of
-from hybridsim.engine.series import SeriesRun
-from hybridsim.engine.series_code import ends_text, series_text
-from hybridsim.engine.stepping import Tolerances
-from hybridsim.engine.steps_ahead import look_ahead, room_ahead
-from hybridsim.engine.system import System
-from hybridsim.engine.taylor import expand, measure
-from hybridsim.engine.timepair import Instant
+from hybridsim.engine.native.kernels import ENABLED, call_series, compile_series, kernel
+from hybridsim.engine.roots.defect_check import look_ahead, room_ahead
+from hybridsim.engine.roots.dense_guards import guards_at, series_along
+from hybridsim.engine.roots.first_exit import to_bernstein
+from hybridsim.engine.series.bounded import ORDER
+from hybridsim.engine.series.emit_bernstein import LEADING, bernstein_text
+from hybridsim.engine.series.emit_bounds import bounds_text, can_bound
+from hybridsim.engine.series.emit_series import ends_text, series_text
+from hybridsim.engine.series.interpreter import expand, measure
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.programs import code_shelf, mode_tables
+from hybridsim.engine.system.programs.code_shelf import CodeShelf
+from hybridsim.engine.system.programs.mode_code import constant_rows, given, mode_tape
+from hybridsim.engine.system.programs.mode_tables import shelf_of
+from hybridsim.engine.system.series_at import SeriesRun
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.tolerances import Tolerances
+from hybridsim.integrators.runge_kutta.segments import series_of
 
 pytestmark = pytest.mark.skipif(not ENABLED, reason="there is no machine code")
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine import modules
-from hybridsim.engine.guard_parts import GuardParts
-from hybridsim.engine.mode_tables import TapeShelf
-from hybridsim.engine.system import System
+from hybridsim.engine.system import modules
+from hybridsim.engine.system.programs.guard_parts import GuardParts
+from hybridsim.engine.system.programs.mode_tables import TapeShelf
+from hybridsim.engine.system.system import System
 
 
 def interrupted_once(function: Callable[..., Any], by: Callable[[], Any]) -> Callable[..., Any]:
@@ -34,7 +34,7 @@ def test_code_that_a_thread_runs_is_not_let_go_by_another(monkeypatch: pytest.Mo
     compile_function = interrupted_once(
         lambda module, name: (object(), name), lambda: overtaking.append(code.address("flow"))
     )
-    monkeypatch.setattr("hybridsim.engine.jit.compile_model_function", compile_function)
+    monkeypatch.setattr("hybridsim.engine.native.kernels.compile_model_function", compile_function)
     late = code.address("flow")
     assert overtaking == [late] == [code._kept["flow"][0]]
 

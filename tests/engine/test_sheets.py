@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from hybridsim.engine.jit import Door, kernel
-from hybridsim.engine.lent_memory import Lender
-from hybridsim.engine.packs import Sheet, packed
+from hybridsim.engine.native.buffer_pool import Lender
+from hybridsim.engine.native.kernels import Door, kernel
+from hybridsim.engine.native.struct_pack import Sheet, packed
 
 
 class Rows(NamedTuple):

@@ -13,8 +13,8 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from hybridsim.engine.signals import Signal
-from hybridsim.engine.timepair import Instant, multiple
+from hybridsim.engine.system.instant import Instant, multiple
+from hybridsim.engine.system.signals import Signal
 from hybridsim.model import Input
 
 EPS = 2.0**-52

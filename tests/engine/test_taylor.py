@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.series import SeriesRun, series_order
-from hybridsim.engine.stepping import Tolerances
-from hybridsim.engine.system import System
-from hybridsim.engine.taylor import rough_inverse_root
-from hybridsim.engine.timepair import Instant
+from hybridsim.engine.series.interpreter import rough_inverse_root
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.series_at import SeriesRun, series_order
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.testing.judge import SCENES
 
 MODELS = [info.name for info in hs.list_models()] + [str(path) for path in sorted(SCENES.glob("*.toml"))]

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hybridsim.engine.timepair import _TWO_PI, Instant, multiple, phase, times, two_product, two_sum
+from hybridsim.engine.system.instant import _TWO_PI, Instant, multiple, phase, times, two_product, two_sum
 
 # far from overflow and underflow, where the error of a sum or a product is itself a double
 doubles = st.floats(-1e100, 1e100, allow_subnormal=False).filter(lambda a: a == 0.0 or abs(a) > 1e-100)

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import hybridsim as hs
-from hybridsim.engine.signals import Signal
-from hybridsim.engine.timepair import Instant, multiple
-from hybridsim.engine.timetable import Timetable
+from hybridsim.engine.system.instant import Instant, multiple
+from hybridsim.engine.system.signals import Signal
+from hybridsim.engine.system.timetable import Timetable
 from hybridsim.model import Discrete, Input, Model, Parameter, Schedule, State
 
 FAR = Instant(1e15)

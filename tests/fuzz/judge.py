@@ -23,8 +23,8 @@ from fuzz import mutated_files, mutated_lines
 from fuzz.watch import watching
 from hybridsim.cli import main
 from hybridsim.cli.output import TRIAL
-from hybridsim.engine.cache import chosen_root
-from hybridsim.model.hygiene import warnings_of
+from hybridsim.engine.native.cache import chosen_root
+from hybridsim.model.checks.doubtful import warnings_of
 
 ROOT = Path(__file__).parents[2]
 MODELS = ROOT / "models"

@@ -10,7 +10,7 @@ import pytest
 
 import hybridsim as hs
 from hybridsim.cli import main
-from hybridsim.engine import leaper
+from hybridsim.engine.run import compiled_loop
 
 
 def rubbing_block(
@@ -63,7 +63,7 @@ def test_a_linear_rate_that_has_no_value_or_too_large_a_one(
 ) -> None:
     """Also where the model is the first of a process, for which the loop is compiled."""
     if is_first:
-        monkeypatch.setattr(leaper, "_compiled", [])
+        monkeypatch.setattr(compiled_loop, "_compiled", [])
     model = hs.Model.from_toml(f"""
 [parameters]
 k = 3

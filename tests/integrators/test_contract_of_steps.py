@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.stepping import Step
-from hybridsim.integrators.base import Integrator
+from hybridsim.engine.run.stepping import Step
+from hybridsim.integrators.contract import Integrator
 from hybridsim.integrators.registry import registered
 
 SHAPES = {

@@ -10,10 +10,10 @@ import pytest
 from integrators.order_conditions import Tree, density, trees
 
 import hybridsim as hs
-from hybridsim.engine.rosenbrock_step import factor, linearise, solve
-from hybridsim.engine.system import System
-from hybridsim.engine.timepair import Instant
-from hybridsim.integrators.rodas5p import TABLEAU
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
+from hybridsim.integrators.rosenbrock.rodas5p import TABLEAU
+from hybridsim.integrators.rosenbrock.step import factor, linearise, solve
 
 # Back to the variables of the order conditions (Hairer and Wanner 1996, section IV.7)
 GAMMA = np.linalg.inv(np.eye(8) / TABLEAU.gamma - TABLEAU.c)
@@ -104,7 +104,7 @@ def test_the_linearisation_is_exact() -> None:
     inputs = system.registers.inputs
     V = np.zeros((system.registers.count, 2))
     V[inputs.constants, 0], V[inputs.parameters, 0] = inputs.values[:, 0], p[inputs.sources]
-    from hybridsim.engine.taylor import advance
+    from hybridsim.engine.series.interpreter import advance
 
     advance(lean.constant_rows, V, 0)
     jacobian, rate = np.empty((3, 3)), np.empty(3)

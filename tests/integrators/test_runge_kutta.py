@@ -10,9 +10,9 @@ import pytest
 from integrators.order_conditions import defects, trees
 
 import hybridsim as hs
-from hybridsim.engine.rk_step import Tableau
-from hybridsim.integrators.dop853 import Dop853
-from hybridsim.integrators.tsit5 import Tsit5
+from hybridsim.integrators.runge_kutta.dop853 import Dop853
+from hybridsim.integrators.runge_kutta.step import Tableau
+from hybridsim.integrators.runge_kutta.tsit5 import Tsit5
 
 BOTH = [Dop853, Tsit5]
 

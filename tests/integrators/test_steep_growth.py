@@ -50,7 +50,7 @@ def test_a_neuron_runs_to_its_peak(integrator: str, peak: float) -> None:
 
 def test_a_step_ends_at_a_double() -> None:
     """At the one next to where it was to end; one of a few ulps of time is no longer than was asked for."""
-    from hybridsim.engine.rk_step import on_the_grid
+    from hybridsim.engine.native.time_grid import on_the_grid
 
     for s in (0.0, 1.0, 11.75, 1e300, 3.3e-5):
         for share in (0.3, 0.6, 1.0, 1.4, 1.6, 2.5, 1e3 + 0.7, 5e3 + 0.7, 1e16):

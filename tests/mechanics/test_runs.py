@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.mechanics.plant import build
 from hybridsim.mechanics.polynomials import TERMS, shift
+from hybridsim.mechanics.series_loop.mechanical_arrays import build
 
 LAWS = {
     "hyperbolic": {"mu": 1.0, "delta": 3.0},

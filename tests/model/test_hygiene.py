@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import hybridsim as hs
-from hybridsim.model.hygiene import Caution, warnings_of
+from hybridsim.model.checks.doubtful import Caution, warnings_of
 from hybridsim.testing.judge import SCENES as FOLDER
 
 SCENES = sorted(FOLDER.glob("*.toml"))

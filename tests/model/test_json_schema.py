@@ -13,9 +13,9 @@ import jsonschema
 import pytest
 
 import hybridsim as hs
-from hybridsim.model.toml_laws import read_laws
-from hybridsim.model.toml_read import open_text
-from hybridsim.model.toml_table import Table
+from hybridsim.model.toml.laws import read_laws
+from hybridsim.model.toml.read import open_text
+from hybridsim.model.toml.table import Table
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = json.loads((ROOT / "docs" / "reference" / "model.schema.json").read_text(encoding="utf-8"))

@@ -9,7 +9,7 @@ import pytest
 import hybridsim as hs
 from hybridsim.analysis.advise.question import watched
 from hybridsim.errors import HybridsimError, ModelError
-from hybridsim.mechanics.as_model import as_model
+from hybridsim.mechanics.declaration.as_model import as_model
 from hybridsim.model.free_name import names_of_model
 
 

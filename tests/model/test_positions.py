@@ -10,7 +10,7 @@ import pytest
 from model.samples import everything
 
 import hybridsim as hs
-from hybridsim.model.positions import positions
+from hybridsim.model.toml.positions import positions
 
 TEXT = """\
 # a comment with [brackets] and "quotes" = 1

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 
 import hybridsim as hs
-from hybridsim.model.component import Corner
-from hybridsim.model.nonsmooth import COMPONENT, KEPT, MODE, POWER, SURFACE, Primitive
-from hybridsim.model.smoothing import MOST, smoothed, smoothing_of
+from hybridsim.model.parts.component import Corner
+from hybridsim.model.smoothing.explicit_corners import MOST, smoothed, smoothing_of
+from hybridsim.model.smoothing.nonsmooth import COMPONENT, KEPT, MODE, POWER, SURFACE, Primitive
 
 
 def moving(rate: str, **more: object) -> hs.Model:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import hybridsim as hs
-from hybridsim.model.hygiene import warnings_of
+from hybridsim.model.checks.doubtful import warnings_of
 
 STATES = '[states]\nx = { start = 1, der = "v" }\nv = { start = 0, der = "-u" }\n'
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 import hybridsim as hs
-from hybridsim.model.units import units_of
+from hybridsim.model.checks.units import units_of
 
 
 @pytest.mark.parametrize(

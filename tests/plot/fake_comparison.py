@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from hybridsim.analysis.comparison import Comparison
-from hybridsim.analysis.errors_against_reference import Errors
-from hybridsim.analysis.mode_sequence import SequenceVerdict
-from hybridsim.analysis.rows import Cost, Row
+from hybridsim.analysis.compare.comparison import Comparison
+from hybridsim.analysis.compare.errors_against_reference import Errors
+from hybridsim.analysis.compare.mode_sequence import SequenceVerdict
+from hybridsim.analysis.compare.rows import Cost, Row
 
 PERIOD = 0.0148
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hybridsim.analysis.closed_forms.coulomb_model import recognise
 from hybridsim.errors import UsageError
 from hybridsim.model import Component, Contact, FrictionLaw, Guard, Mode, Model, Output, State
-from hybridsim.model.component import Choice
+from hybridsim.model.parts.component import Choice
+from hybridsim.reference.closed_forms.coulomb_model import recognise
 
 
 @dataclass(frozen=True)

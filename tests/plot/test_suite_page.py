@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from plot.fake_comparison import comparison
 
-from hybridsim.analysis.rows import Row
+from hybridsim.analysis.compare.rows import Row
 from hybridsim.analysis.suite.result import SceneResult, SuiteComparison
 from hybridsim.analysis.suite.scenes import SCENES
 from hybridsim.plot import regularisation, save, suite_page

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridsim.engine.impulse import Blow
+from hybridsim.engine.events.jumps.impulse import Blow
 
 
 def random_blow(rng: np.random.Generator, normal: int, tangential: int, common: bool = False) -> Blow:

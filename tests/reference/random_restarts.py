@@ -16,10 +16,10 @@ import numpy as np
 from numpy.polynomial.polynomial import polyder, polyfromroots, polyval
 
 import hybridsim as hs
-from hybridsim.engine.decide import judge
-from hybridsim.engine.first_exit import FOUND, NEVER, first_exit
-from hybridsim.engine.system import System
-from hybridsim.engine.timepair import Instant, phase
+from hybridsim.engine.events.choice.verdict import judge
+from hybridsim.engine.roots.first_exit import FOUND, NEVER, first_exit
+from hybridsim.engine.system.instant import Instant, phase
+from hybridsim.engine.system.system import System
 from reference.integer_series import BITS, Flow, fixed, real, text
 from reference.random_trees import random_tree
 from reference.releases import KINDS, MODEL, draw

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 import hybridsim as hs
-from hybridsim.solution import archive
+from hybridsim.solution.files import archive
 
 Header, Arrays = dict[str, Any], dict[str, np.ndarray]
 WHOLE = (-1, -2, 0, 1, 2, 3, 5, 1000, 10**6, 2**31, 2**62, -(2**62))

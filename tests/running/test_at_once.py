@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.at_once import AtOnce
-from hybridsim.engine.exact_leaper import ExactLeaper
-from hybridsim.engine.leaper import Leaper
-from hybridsim.engine.loop import ModeLoop
-from hybridsim.engine.segment import SegmentRun
-from hybridsim.engine.stepping import StepFailure
+from hybridsim.engine.run.at_once import AtOnce
+from hybridsim.engine.run.compiled_loop import Leaper
+from hybridsim.engine.run.mode_loop import ModeLoop
+from hybridsim.engine.run.segment_run import SegmentRun
+from hybridsim.engine.system.failures import StepFailure
 from hybridsim.errors import RunInterrupted
+from hybridsim.integrators.closed_form.compiled_loop import ExactLeaper
 
 ENGINES = ["exact", "taylor", "dop853", "tsit5"]
 ENOUGH = {"seconds": 1e6}  # a run with limits goes through the mode loop from the first call on

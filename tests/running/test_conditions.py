@@ -9,7 +9,7 @@ import pytest
 
 import hybridsim as hs
 from hybridsim.errors import UsageError
-from hybridsim.model.hygiene import jumps_of
+from hybridsim.model.checks.doubtful import jumps_of
 from running.conditions_truth import END, Conditions
 
 METHODS = ["exact", "taylor", "dop853"]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.analysis.multiple_precision import multiple_precision_trajectory
+from hybridsim.reference.multiple_precision import multiple_precision_trajectory
 
 PERIOD = 1.5 * math.pi  # frequency 2 on the right of 0, 1 on the left
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.model.hygiene import warnings_of
+from hybridsim.model.checks.doubtful import warnings_of
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 
 import hybridsim as hs
 from hybridsim.cli import main
-from hybridsim.model.units import rate_of
+from hybridsim.model.checks.units import rate_of
 
 
 def verdicts(explanation: hs.Explanation) -> dict[tuple[str, ...], str]:

@@ -14,8 +14,8 @@ from typing import Any
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine import recent
-from hybridsim.engine.trajectory import Task
+from hybridsim.engine.record.trajectory import Task
+from hybridsim.engine.system import system_cache
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
 PATIENCE = 60.0
@@ -87,7 +87,7 @@ def test_a_lock_that_is_held_meanwhile() -> None:
     assert swing("earlier")
 
     def begin(is_in: threading.Event, may_end: threading.Event) -> None:
-        with recent._lock:
+        with system_cache._lock:
             is_in.set()
             may_end.wait(PATIENCE)
 
@@ -98,7 +98,7 @@ def test_a_lock_that_is_held_meanwhile() -> None:
 def test_a_compiler_that_is_at_work_meanwhile() -> None:
     """numba compiles for one thread at a time."""
     compiler_lock: Any = pytest.importorskip("numba.core.compiler_lock")
-    from hybridsim.engine.jit import ENABLED
+    from hybridsim.engine.native.kernels import ENABLED
 
     if not ENABLED:
         pytest.skip("nothing is compiled")

@@ -9,8 +9,8 @@ import pytest
 
 import hybridsim as hs
 from hybridsim import plot
-from hybridsim.model.nonsmooth import JUMPS, KEPT
-from hybridsim.model.smoothing import smoothing_of
+from hybridsim.model.smoothing.explicit_corners import smoothing_of
+from hybridsim.model.smoothing.nonsmooth import JUMPS, KEPT
 
 METHODS = ["exact", "taylor", "dop853", "tsit5", "rodas5p", "scipy-radau", "cvode-bdf"]
 SMOOTH = METHODS[1:]  # that take rates which are not linear

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine import settle
+from hybridsim.engine.events import resolve
 
 ALL = ["exact", "taylor", "dop853", "tsit5", "scipy-rk45"]
 
@@ -169,8 +169,10 @@ def test_a_cascade_beside_a_body_at_rest_is_counted_once(monkeypatch: pytest.Mon
         ],
     )
     rounds = []
-    transitions = settle.Settling._transitions
-    monkeypatch.setattr(settle.Settling, "_transitions", lambda *args: rounds.append(1) or transitions(*args))
+    transitions = resolve.Settling._transitions
+    monkeypatch.setattr(
+        resolve.Settling, "_transitions", lambda *args: rounds.append(1) or transitions(*args)
+    )
     sol = hs.simulate(model, (0, 2))
     assert sol.status == "cascade" and sol.t_end == pytest.approx(1.0)
     said = int(re.search(r"(\d+) rounds without rest", sol.message)[1])

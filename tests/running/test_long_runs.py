@@ -11,8 +11,8 @@ from reference.arithmetic import multiprecision
 from reference.dfcs_closed_form import Oscillator
 
 import hybridsim as hs
-from hybridsim.engine.system import System
-from hybridsim.engine.timepair import Instant
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
 
 FAR = 10**6  # periods
 NO_STOP = hs.load("dfcs").with_(F0=60, N=40, omega="1.4*sqrt(k/m)")

@@ -11,8 +11,8 @@ from itertools import pairwise
 import pytest
 
 import hybridsim as hs
-from hybridsim.colours import INK, mode_colours
-from hybridsim.notebook import run_html
+from hybridsim.presentation.colours import INK, mode_colours
+from hybridsim.presentation.notebook import run_html
 
 VOID = {"br", "hr", "img"}
 HOSTILE = '<script>alert("x")</script><b>&\''

@@ -7,7 +7,7 @@ import math
 import pytest
 
 import hybridsim as hs
-from hybridsim.model.denominators import denominators
+from hybridsim.model.checks.denominators import denominators
 
 
 def braked(rate: str = "B*(v - r*w)/v") -> hs.Model:

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.jit import ENABLED
-from hybridsim.engine.recent import system_of
+from hybridsim.engine.native.kernels import ENABLED
+from hybridsim.engine.system.system_cache import system_of
 from running.python_flows import ball, height, oscillator
 
 

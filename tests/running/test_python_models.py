@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.recent import system_of
-from hybridsim.engine.timepair import Instant
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system_cache import system_of
 from running.python_flows import ball, bounces, fall, height, oscillator
 
 TAKES_FUNCTIONS = ("dop853", "tsit5", "scipy-dop853", "scipy-rk45", "scipy-radau", "cvode-adams")

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.recent import system_of
+from hybridsim.engine.system.system_cache import system_of
 from hybridsim.integrators.registry import registered
-from hybridsim.integrators.scipy_solvers import ScipyRK45
+from hybridsim.integrators.scipy.solvers import ScipyRK45
 
 SPAN = (0, 0.06)
 METHODS = ["exact", "taylor", "dop853", "scipy-rk45", "rk4-dichotomy"]

@@ -6,8 +6,8 @@ import pytest
 from mpmath import cos, findroot, mp, mpf, sin
 
 import hybridsim as hs
-from hybridsim.engine.locate import polish
-from hybridsim.engine.roots import Crossing
+from hybridsim.engine.roots.roots import Crossing
+from hybridsim.engine.run.locate import polish
 
 METHODS = ["exact", "taylor", "dop853", "scipy-dop853"]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.analysis.multiple_precision import multiple_precision_trajectory
+from hybridsim.reference.multiple_precision import multiple_precision_trajectory
 
 BODY = """
 [states]

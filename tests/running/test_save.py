@@ -11,8 +11,8 @@ import pytest
 
 import hybridsim as hs
 from hybridsim import UsageError
-from hybridsim.engine.block_arrays import put_together, taken_apart
-from hybridsim.engine.lent_memory import Lender
+from hybridsim.engine.native.buffer_pool import Lender
+from hybridsim.solution.block_arrays import put_together, taken_apart
 
 DFCS = hs.load("dfcs")
 PERIOD = 2 * math.pi / DFCS.parameter_values()["omega"]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.analysis.multiple_precision import multiple_precision_trajectory
+from hybridsim.reference.multiple_precision import multiple_precision_trajectory
 
 SLIPS = hs.load_law("static-kinetic")
 HEAVY = {"mu_s": 0.8, "mu_k": 0.3}

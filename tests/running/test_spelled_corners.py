@@ -7,8 +7,8 @@ import math
 import pytest
 
 import hybridsim as hs
-from hybridsim.model.component import Corner
-from hybridsim.model.smoothing import smoothed
+from hybridsim.model.parts.component import Corner
+from hybridsim.model.smoothing.explicit_corners import smoothed
 
 
 def moving(rate: str, start: float) -> hs.Model:

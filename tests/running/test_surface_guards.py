@@ -8,7 +8,7 @@ import random
 import pytest
 
 import hybridsim as hs
-from hybridsim.analysis.multiple_precision import multiple_precision_trajectory
+from hybridsim.reference.multiple_precision import multiple_precision_trajectory
 
 INTEGRATORS = ("exact", "taylor", "dop853", "rodas5p")
 

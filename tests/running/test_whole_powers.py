@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.system import System
-from hybridsim.engine.tangents import TangentTape
-from hybridsim.engine.timepair import Instant
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.tangents import TangentTape
 
 INTEGRATORS = ("taylor", "dop853", "tsit5", "rodas5p", "scipy-rk45", "scipy-radau")
 

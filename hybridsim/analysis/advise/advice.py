@@ -19,7 +19,7 @@ from hybridsim.analysis.provenance import provenance
 from hybridsim.errors import UsageError, nearest
 from hybridsim.files import json_text, write_text
 from hybridsim.model import Model
-from hybridsim.readable import Readable
+from hybridsim.presentation.readable import Readable
 
 if TYPE_CHECKING:
     from hybridsim.analysis.sweep import Sweep

@@ -17,11 +17,11 @@ from hybridsim.analysis.advise.question import NoAnswer, Question, question_of, 
 from hybridsim.analysis.advise.region import over_region
 from hybridsim.analysis.advise.settings import settings
 from hybridsim.analysis.advise.uncertainty import ranges_of, spread
-from hybridsim.analysis.allowance import OutOfTime
+from hybridsim.analysis.compare.comparison_request import mapping, positive, words
+from hybridsim.analysis.compare.timed_runs import Budget
+from hybridsim.analysis.ladder import LADDER, Rung
 from hybridsim.analysis.progress import Progress
-from hybridsim.analysis.race import Budget
-from hybridsim.analysis.rungs import LADDER, Rung
-from hybridsim.analysis.wanted import mapping, positive, words
+from hybridsim.analysis.time_budget import OutOfTime
 from hybridsim.calls import refusing
 from hybridsim.errors import SimulationError, UsageError, nearest
 from hybridsim.model import Model

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from hybridsim.analysis.closed_forms.affine import Affine, NotAffine, affine
-from hybridsim.analysis.rungs import DoesNotApply, Scene
-from hybridsim.analysis.rungs.at_rest import AtRest
-from hybridsim.analysis.rungs.forces import inlined
-from hybridsim.analysis.rungs.no_stop import NoStop, held
+from hybridsim.analysis.ladder import DoesNotApply, Scene
+from hybridsim.analysis.ladder.at_rest import AtRest
+from hybridsim.analysis.ladder.forces import inlined
+from hybridsim.analysis.ladder.no_stop import NoStop, held
 from hybridsim.expr import evaluate, parse, substitute
 from hybridsim.model import Model
+from hybridsim.reference.closed_forms.affine import Affine, NotAffine, affine
 
 _UNIT_BOUND = 1.0  # upper bound of a unit wave, whatever its shape
 

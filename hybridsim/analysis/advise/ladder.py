@@ -10,11 +10,11 @@ from typing import Any
 
 from hybridsim.analysis.advise.certificates import Certificate
 from hybridsim.analysis.advise.question import Answer, NoAnswer, Number, Question, speeds
-from hybridsim.analysis.allowance import Allowance, OutOfTime, Stopwatch
-from hybridsim.analysis.race import Budget
-from hybridsim.analysis.rows import NOT_STARTED, STOPPED
-from hybridsim.analysis.rungs import DoesNotApply, NothingToDrop, Rung, Scene
+from hybridsim.analysis.compare.rows import NOT_STARTED, STOPPED
+from hybridsim.analysis.compare.timed_runs import Budget
+from hybridsim.analysis.ladder import DoesNotApply, NothingToDrop, Rung, Scene
 from hybridsim.analysis.steady.measures import Measures
+from hybridsim.analysis.time_budget import Allowance, OutOfTime, Stopwatch
 from hybridsim.errors import ModelError
 from hybridsim.model import Model
 

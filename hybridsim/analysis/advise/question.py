@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from hybridsim.analysis.allowance import Stopwatch
 from hybridsim.analysis.steady.measures import Measures
+from hybridsim.analysis.time_budget import Stopwatch
 from hybridsim.errors import HybridsimError, UsageError, near, nearest
 from hybridsim.model import Model, Output
 
@@ -201,8 +201,8 @@ class Question:
 
 def _require_limit_cycle(model: Model, steady: SteadyState) -> None:
     """Refuse a vibration of an undamped free system, because its amplitude depends on the start."""
-    from hybridsim.engine.period import system_period
-    from hybridsim.engine.recent import system_of
+    from hybridsim.engine.system.period import system_period
+    from hybridsim.engine.system.system_cache import system_of
 
     if steady.kind != "periodic" or system_period(system_of(model)) is not None:
         return
@@ -314,7 +314,7 @@ def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None,
 
 
 def _names(model: Model, head: str) -> list[str]:
-    from hybridsim.model.units import units_of
+    from hybridsim.model.checks.units import units_of
 
     if head in OF_CONTACT:
         return [contact.name for contact in model.contacts]

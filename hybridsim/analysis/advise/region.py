@@ -23,10 +23,10 @@ from hybridsim.analysis.advise.ladder import (
     scene_of,
 )
 from hybridsim.analysis.advise.question import NoAnswer, Question
-from hybridsim.analysis.allowance import OutOfTime
-from hybridsim.analysis.rows import STOPPED
-from hybridsim.analysis.rungs import Rung
+from hybridsim.analysis.compare.rows import STOPPED
+from hybridsim.analysis.ladder import Rung
 from hybridsim.analysis.sweep import Sweep, sweep
+from hybridsim.analysis.time_budget import OutOfTime
 from hybridsim.errors import SimulationError
 from hybridsim.model import Model
 

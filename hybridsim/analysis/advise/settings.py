@@ -17,8 +17,8 @@ from hybridsim.analysis.advise.ladder import (
     relative_error,
 )
 from hybridsim.analysis.advise.question import Answer, NoAnswer, Number, OverRun, Question
-from hybridsim.analysis.allowance import OutOfTime, Stopwatch
-from hybridsim.analysis.rows import NOT_STARTED, STOPPED
+from hybridsim.analysis.compare.rows import NOT_STARTED, STOPPED
+from hybridsim.analysis.time_budget import OutOfTime, Stopwatch
 from hybridsim.errors import HybridsimError, UsageError
 from hybridsim.model import Model
 from hybridsim.simulate import simulate

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from hybridsim.analysis.advise.ladder import FULL, WITHOUT_TRIAL, duration
 from hybridsim.errors import printable
-from hybridsim.readable import aligned
+from hybridsim.presentation.readable import aligned
 
 if TYPE_CHECKING:
     from hybridsim.analysis.advise.advice import Advice

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.analysis.steady.result import SteadyState
-from hybridsim.readable import Readable
+from hybridsim.presentation.readable import Readable
 
 if TYPE_CHECKING:
     from hybridsim.analysis.steady.motion import Motion

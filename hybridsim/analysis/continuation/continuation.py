@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim import arguments
+from hybridsim.analysis.compare.comparison_request import whole
 from hybridsim.analysis.continuation.branch import Branch, BranchPoint, specials
 from hybridsim.analysis.steady.measures import word_of
 from hybridsim.analysis.steady.motion import Motion, point_at_end
@@ -20,7 +21,6 @@ from hybridsim.analysis.steady.steady_state import steady_state
 from hybridsim.analysis.variations.off_zero import rates_of
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.analysis.variations.sizes import sizes
-from hybridsim.analysis.wanted import whole
 from hybridsim.calls import refusing
 from hybridsim.errors import HybridsimError, UsageError
 
@@ -306,8 +306,8 @@ class _Follower:
 
     def _forced(self, value: float) -> tuple[float, float]:
         """Return the period of the forcing, and its derivative by the parameter."""
-        from hybridsim.engine.period import common_period
-        from hybridsim.engine.recent import system_of
+        from hybridsim.engine.system.period import common_period
+        from hybridsim.engine.system.system_cache import system_of
 
         def period(at: float) -> float:
             found = common_period(system_of(self.model.with_(**{self.parameter: at})))

@@ -15,7 +15,7 @@ from hybridsim.analysis.equilibria.field import INSIDE, Field, is_driven
 from hybridsim.analysis.equilibria.linearize import equilibrium_near
 from hybridsim.calls import refusing
 from hybridsim.errors import SimulationError, UsageError
-from hybridsim.readable import Readable, in_numbers
+from hybridsim.presentation.readable import Readable, in_numbers
 
 if TYPE_CHECKING:
     from hybridsim.model import Model
@@ -103,7 +103,7 @@ def equilibria(
     {'f': 'stick'}
     """
     model = arguments.chosen_model(model, params)
-    from hybridsim.engine.recent import system_of
+    from hybridsim.engine.system.system_cache import system_of
 
     system = system_of(model)
     if model.schedules:

@@ -14,7 +14,7 @@ from hybridsim import arguments
 from hybridsim.analysis.equilibria.field import Field, is_driven, modes_of
 from hybridsim.calls import refusing
 from hybridsim.errors import SimulationError, UsageError
-from hybridsim.readable import Readable, in_numbers
+from hybridsim.presentation.readable import Readable, in_numbers
 
 if TYPE_CHECKING:
     from hybridsim.model import Model
@@ -156,7 +156,7 @@ def linearize(
     (False, 0.586)
     """
     model = arguments.chosen_model(model, params)
-    from hybridsim.engine.recent import system_of
+    from hybridsim.engine.system.system_cache import system_of
 
     system = system_of(model)
     start, _ = arguments.start_values(model, at, "at")

@@ -10,16 +10,16 @@ import numpy as np
 
 from hybridsim import arguments
 from hybridsim.analysis.steady.scales import coupled_sizes, stands_still
-from hybridsim.engine.headway import cost
-from hybridsim.engine.recent import system_of
-from hybridsim.engine.timepair import Instant
+from hybridsim.engine.run.headway import cost
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import SimulationError
 from hybridsim.simulate import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from hybridsim.engine.pieces import Segment
+    from hybridsim.engine.record.segments import Segment
     from hybridsim.model import Model
     from hybridsim.solution import Solution
 
@@ -108,7 +108,7 @@ class Motion:
         self.names = [s.name for s in model.states]
         self.discrete = [d.name for d in model.discrete]
         self.sizes = np.zeros(len(self.names))  # sizes of the states (n,) along the last run
-        # The allowed cost of all runs together, their cost so far (`hybridsim.engine.headway.cost`), and that
+        # The allowed cost of all runs together, their cost so far (`hybridsim.engine.run.headway.cost`), and that
         # of the last run per unit of time. The cost is counted, not timed, so that a search ends at the same
         # place on every machine.
         self.allowance, self._spent, self._pace = math.inf, 0.0, 0.0

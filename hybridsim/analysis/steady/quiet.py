@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridsim.engine.system import CORNER
+from hybridsim.engine.system.system import CORNER
 
 if TYPE_CHECKING:
     from hybridsim.solution import Solution

@@ -14,7 +14,7 @@ from hybridsim.analysis.steady.shooting import multipliers, rates_at_end
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.arguments import whole_number
 from hybridsim.errors import HybridsimError, UsageError
-from hybridsim.readable import Readable
+from hybridsim.presentation.readable import Readable
 
 if TYPE_CHECKING:
     from hybridsim.analysis.steady.orbit import Orbit as Stretch

@@ -32,17 +32,17 @@ from hybridsim.analysis.steady.settling import (
     relative,
 )
 from hybridsim.analysis.steady.shooting import Orbit, followed_closely, shoot
-from hybridsim.analysis.sweep.given import refuse_unknown
+from hybridsim.analysis.sweep.sweep_request import refuse_unknown
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.analysis.variations.sizes import ranges
 from hybridsim.calls import refusing
-from hybridsim.engine.recent import system_of
+from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import UsageError
 from hybridsim.expr import evaluate
 from hybridsim.simulate import simulate
 
 if TYPE_CHECKING:
-    from hybridsim.engine.system import System
+    from hybridsim.engine.system.system import System
     from hybridsim.model import Model
 
 _SETTLE = 32  # periods of the first run
@@ -143,8 +143,8 @@ def steady_state(
     ('periodic', ['slip+', 'slip-', 'stick', 'stick'], 2.0)
     """
     model = arguments.chosen_model(model, params)
-    from hybridsim.engine.period import all_periods, common_period
-    from hybridsim.engine.recent import system_of
+    from hybridsim.engine.system.period import all_periods, common_period
+    from hybridsim.engine.system.system_cache import system_of
 
     tol = arguments.number(tol, "tol")
     if not 0.0 < tol < 1.0:

@@ -9,14 +9,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hybridsim.analysis.comparison import Comparison
-from hybridsim.analysis.rows import NOT_STARTED, STOPPED, Row
+from hybridsim.analysis.compare.comparison import Comparison
+from hybridsim.analysis.compare.comparison_request import positives
+from hybridsim.analysis.compare.rows import NOT_STARTED, STOPPED, Row
+from hybridsim.analysis.compare.table import setting
 from hybridsim.analysis.suite.scenes import Scene
 from hybridsim.analysis.suite.verdict import Verdict, verdict
-from hybridsim.analysis.table import setting
-from hybridsim.analysis.wanted import positives
 from hybridsim.files import json_text, whole_file, write_text
-from hybridsim.readable import Readable
+from hybridsim.presentation.readable import Readable
 
 ACCURACIES = (1e-3, 1e-6, 1e-9, 1e-11)
 

@@ -7,17 +7,23 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from hybridsim.analysis import wanted
-from hybridsim.analysis.bench import Bench
+from hybridsim.analysis.compare import comparison_request
+from hybridsim.analysis.compare.lines import Series, choose_series
+from hybridsim.analysis.compare.prepared_case import Bench
+from hybridsim.analysis.compare.reference import (
+    CLOSED_FORM,
+    MULTIPLE_PRECISION,
+    RUNS,
+    Reference,
+    find_reference,
+)
+from hybridsim.analysis.compare.timed_runs import Budget, Entry, race
 from hybridsim.analysis.progress import Progress, Steps
-from hybridsim.analysis.race import Budget, Entry, race
-from hybridsim.analysis.reference import CLOSED_FORM, MULTIPLE_PRECISION, RUNS, Reference, find_reference
-from hybridsim.analysis.series import Series, choose_series
 from hybridsim.analysis.suite.result import SceneResult, SuiteComparison
 from hybridsim.analysis.suite.scenes import SCENES, Scene, scene_names
 from hybridsim.arguments import callback
 from hybridsim.calls import refusing
-from hybridsim.engine.period import forcing_period
+from hybridsim.engine.system.period import forcing_period
 from hybridsim.errors import UsageError, nearest
 from hybridsim.model import load
 
@@ -72,8 +78,8 @@ def compare_suite(
     >>> suite = hs.compare_suite(scenes=["P1", "belt"], budget=60)  # doctest: +SKIP
     >>> print(suite.table())  # doctest: +SKIP
     """
-    repeat, budget = wanted.whole(repeat, "repeat"), wanted.positive(budget, "budget")
-    rtols, steps = wanted.positives(rtols, "rtols"), wanted.wholes(steps, "steps")
+    repeat, budget = comparison_request.whole(repeat, "repeat"), comparison_request.positive(budget, "budget")
+    rtols, steps = comparison_request.positives(rtols, "rtols"), comparison_request.wholes(steps, "steps")
     spending = Budget(_RUNNING * budget)
     chosen = _chosen(scenes)
     benches = [_bench(scene) for scene in chosen]
@@ -100,7 +106,7 @@ def compare_suite(
 def _chosen(names: Sequence[str] | None) -> tuple[Scene, ...]:
     if names is None:
         return SCENES
-    names = wanted.words(names, "scenes")
+    names = comparison_request.words(names, "scenes")
     for name in names:
         if name not in scene_names():
             raise UsageError(

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from hybridsim.analysis.compare.table import differences, milliseconds, setting, turns, versions
 from hybridsim.analysis.suite.verdict import COMMON, USELESS
-from hybridsim.analysis.table import differences, milliseconds, setting, turns, versions
 from hybridsim.errors import printable
-from hybridsim.readable import aligned
+from hybridsim.presentation.readable import aligned
 
 if TYPE_CHECKING:
     from hybridsim.analysis.suite.result import SuiteComparison

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from enum import Enum
 
-from hybridsim.analysis.rows import NOT_STARTED, STOPPED, Row
+from hybridsim.analysis.compare.rows import NOT_STARTED, STOPPED, Row
 from hybridsim.analysis.suite.scenes import Scene
 
 # The common setting of all verdicts: tight enough to show errors of the method, loose enough for every

@@ -10,19 +10,19 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.analysis.compare.comparison_request import positive, whole
 from hybridsim.analysis.progress import Progress
 from hybridsim.analysis.sweep.axes import Points, points_of
-from hybridsim.analysis.sweep.given import refuse_unknown
-from hybridsim.analysis.sweep.job import Job, Settings, new_token
 from hybridsim.analysis.sweep.result import Sweep
 from hybridsim.analysis.sweep.section import Section, with_section
-from hybridsim.analysis.sweep.work import work
-from hybridsim.analysis.wanted import positive, whole
+from hybridsim.analysis.sweep.sweep_request import refuse_unknown
+from hybridsim.analysis.sweep.work.job import Job, Settings, new_token
+from hybridsim.analysis.sweep.work.measure import work
 from hybridsim.arguments import callback, chosen_model, text
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
 from hybridsim.model import Model
-from hybridsim.model.units import units_of
+from hybridsim.model.checks.units import units_of
 
 UP, DOWN = "up", "down"
 DIRECTION = "direction"

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from hybridsim.analysis.sweep.job import NOT_RUN, Outcome
 from hybridsim.analysis.sweep.readings import Reading
+from hybridsim.analysis.sweep.work.job import NOT_RUN, Outcome
 
 
 class Collected:

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import Any
 
+from hybridsim.analysis.compare.comparison_request import mapping
 from hybridsim.analysis.sweep.result import Sweep
 from hybridsim.analysis.sweep.sweep import sweep
-from hybridsim.analysis.wanted import mapping
 from hybridsim.arguments import chosen_model, text
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError

@@ -21,8 +21,8 @@ from typing import IO, Any
 import numpy as np
 
 from hybridsim.analysis.sweep.identity import identity
-from hybridsim.analysis.sweep.job import Outcome
 from hybridsim.analysis.sweep.readings import Reading
+from hybridsim.analysis.sweep.work.job import Outcome
 from hybridsim.errors import UsageError
 from hybridsim.files import cannot_write, hold, path_text
 

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.analysis.steady.measures import Measures
-from hybridsim.analysis.sweep.job import DONE, Job, Outcome, Settings, Watch
 from hybridsim.analysis.sweep.parameters import Setter
+from hybridsim.analysis.sweep.work.job import DONE, Job, Outcome, Settings, Watch
 from hybridsim.errors import SimulationError, UsageError
 from hybridsim.model import Model
 
 if TYPE_CHECKING:
-    from hybridsim.engine.fleet import LastPeriods
+    from hybridsim.ensemble.runs import LastPeriods
     from hybridsim.solution import Solution
 
 OF_MOTION = ("period", "residual", "word")
@@ -79,8 +79,8 @@ class LastPeriod:
 
         If the watch requests a stop, the outcomes are those of the first points, as far as they were run.
         """
-        from hybridsim.engine.fleet import Fleet, sails
-        from hybridsim.engine.recent import system_of
+        from hybridsim.engine.system.system_cache import system_of
+        from hybridsim.ensemble.runs import Fleet, sails
 
         system = system_of(job.model)
         readers = [_reader(word, system) for word in self.words]
@@ -117,8 +117,8 @@ def period_of(model: Model) -> float:
     If it has none.
         Where it has none.
     """
-    from hybridsim.engine.period import common_period
-    from hybridsim.engine.recent import system_of
+    from hybridsim.engine.system.period import common_period
+    from hybridsim.engine.system.system_cache import system_of
 
     period = common_period(system_of(model))
     if period is None:

@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from hybridsim.analysis.sweep.given import refuse_what_it_does_not_take
-from hybridsim.analysis.sweep.job import Measure
-from hybridsim.analysis.sweep.ready import ready_measure
+from hybridsim.analysis.sweep.named_measures import ready_measure
+from hybridsim.analysis.sweep.sweep_request import refuse_what_it_does_not_take
+from hybridsim.analysis.sweep.work.job import Measure
 from hybridsim.arguments import is_row
 from hybridsim.errors import UsageError
 from hybridsim.model import Model

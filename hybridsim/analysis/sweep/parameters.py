@@ -7,11 +7,11 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from hybridsim.analysis.sweep.job import Settings
+from hybridsim.analysis.sweep.work.job import Settings
 from hybridsim.errors import HybridsimError
 from hybridsim.expr import Expression, evaluate
 from hybridsim.model import Model
-from hybridsim.model.check_values import checked_names
+from hybridsim.model.checks.values import checked_names
 
 
 class Setter:

@@ -15,13 +15,13 @@ import numpy as np
 
 from hybridsim.analysis.provenance import provenance
 from hybridsim.analysis.sweep.axes import POINT
-from hybridsim.analysis.sweep.job import DONE, NOT_RUN
 from hybridsim.analysis.sweep.table import heading, statuses, table
+from hybridsim.analysis.sweep.work.job import DONE, NOT_RUN
 from hybridsim.errors import UsageError, nearest
 from hybridsim.files import json_text, whole_file, write_text
 from hybridsim.model import Model
-from hybridsim.readable import Readable
-from hybridsim.tables import library
+from hybridsim.presentation.readable import Readable
+from hybridsim.presentation.tables import library
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from hybridsim.analysis.steady.motion import Motion, Point, point_at_end
-from hybridsim.engine.period import common_period, system_period
-from hybridsim.engine.recent import system_of
+from hybridsim.engine.system.period import common_period, system_period
+from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import SimulationError, UsageError
 from hybridsim.expr import parse
 from hybridsim.model import Model, Monitor

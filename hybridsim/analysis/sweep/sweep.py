@@ -10,16 +10,16 @@ from os import PathLike
 from typing import Any
 
 from hybridsim import __version__
+from hybridsim.analysis.compare.comparison_request import mapping, whole
 from hybridsim.analysis.progress import Progress
 from hybridsim.analysis.sweep.axes import points_of
-from hybridsim.analysis.sweep.job import Job, new_token
 from hybridsim.analysis.sweep.journal import Journal, fingerprint
 from hybridsim.analysis.sweep.last_period import LastPeriod
 from hybridsim.analysis.sweep.measures import measure_of
-from hybridsim.analysis.sweep.ready import Final, Steady, units_of_readings
+from hybridsim.analysis.sweep.named_measures import Final, Steady, units_of_readings
 from hybridsim.analysis.sweep.result import Sweep
-from hybridsim.analysis.sweep.work import work
-from hybridsim.analysis.wanted import mapping, whole
+from hybridsim.analysis.sweep.work.job import Job, new_token
+from hybridsim.analysis.sweep.work.measure import work
 from hybridsim.arguments import callback, chosen_model, flag
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError

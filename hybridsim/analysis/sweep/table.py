@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.errors import printable
-from hybridsim.readable import aligned
+from hybridsim.presentation.readable import aligned
 
 if TYPE_CHECKING:
     from hybridsim.analysis.sweep.result import Sweep

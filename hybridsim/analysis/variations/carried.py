@@ -43,13 +43,13 @@ from hybridsim.analysis.variations.seeds import rate_slopes, seeds
 from hybridsim.analysis.variations.sizes import sizes
 from hybridsim.analysis.variations.smooth import transition
 from hybridsim.analysis.variations.stretches import Last, Stretch, at_start, stretches_of, time_rounding
-from hybridsim.engine.dual_numbers import differentiated, values_and_slopes, with_slopes
-from hybridsim.engine.tangents import TangentTape
+from hybridsim.engine.series.dual_numbers import differentiated, values_and_slopes, with_slopes
+from hybridsim.engine.system.tangents import TangentTape
 from hybridsim.errors import UsageError
 
 if TYPE_CHECKING:
-    from hybridsim.engine.pieces import Segment
-    from hybridsim.engine.system import System
+    from hybridsim.engine.record.segments import Segment
+    from hybridsim.engine.system.system import System
     from hybridsim.solution import Solution
 
 _ROUNDING = 1e-11  # of a run's length, for a change of its own size: a time that moves by less does not move

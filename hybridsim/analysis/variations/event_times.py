@@ -15,7 +15,7 @@ from hybridsim.errors import UsageError
 from hybridsim.expr import evaluate
 
 if TYPE_CHECKING:
-    from hybridsim.engine.pieces import Occurrence, Segment
+    from hybridsim.engine.record.segments import Occurrence, Segment
 
 _ALIKE = 1e-7  # relative; events at one instant are one event if the derivatives of their times agree
 

@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridsim.analysis.variations.changes import Changed, Changes, Place
-from hybridsim.engine.dual_numbers import Dual, differentiated, values_and_slopes, with_slopes
-from hybridsim.engine.reset_keys import added
-from hybridsim.engine.system import System
-from hybridsim.engine.tangents import TangentTape
+from hybridsim.engine.lowering.reset_keys import added
+from hybridsim.engine.series.dual_numbers import Dual, differentiated, values_and_slopes, with_slopes
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.tangents import TangentTape
 
 _SAME = 1e-9  # of their size: rates on two sides of a guard that differ by less are equal
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from hybridsim.engine.gathering import LIMIT
+from hybridsim.engine.events.zeno.limits import LIMIT
 from hybridsim.errors import UsageError
 from hybridsim.solution.solution import Solution
 

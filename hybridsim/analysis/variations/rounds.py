@@ -11,14 +11,14 @@ import numpy as np
 
 from hybridsim.analysis.variations.changes import Changes, Place
 from hybridsim.analysis.variations.off_zero import OffZero, off_zero, rates_of
-from hybridsim.engine.dual_numbers import Dual, differentiated, values_and_slopes, with_slopes
-from hybridsim.engine.gathering import LIMIT
-from hybridsim.engine.reset_keys import added
-from hybridsim.engine.timepair import Instant
+from hybridsim.engine.events.zeno.limits import LIMIT
+from hybridsim.engine.lowering.reset_keys import added
+from hybridsim.engine.series.dual_numbers import Dual, differentiated, values_and_slopes, with_slopes
+from hybridsim.engine.system.instant import Instant
 
 if TYPE_CHECKING:
-    from hybridsim.engine.pieces import Occurrence, Segment
-    from hybridsim.engine.system import System
+    from hybridsim.engine.record.segments import Occurrence, Segment
+    from hybridsim.engine.system.system import System
 
 _ALIKE = 1e-7  # relative; guards fire together if their delays agree
 

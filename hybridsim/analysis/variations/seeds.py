@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.engine.dual_numbers import differentiated, values_and_slopes, with_slopes
+from hybridsim.engine.series.dual_numbers import differentiated, values_and_slopes, with_slopes
 
 if TYPE_CHECKING:
-    from hybridsim.engine.system import System
-    from hybridsim.engine.timepair import Instant
+    from hybridsim.engine.system.instant import Instant
+    from hybridsim.engine.system.system import System
 
 
 def rate_slopes(system: System, at: Instant) -> np.ndarray:

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridsim.analysis.compare.comparison_request import words
 from hybridsim.analysis.variations.both_sides import agreed
 from hybridsim.analysis.variations.carried import Carrier
 from hybridsim.analysis.variations.directions import Carried, Directions
 from hybridsim.analysis.variations.parameters import start_slopes, value_slopes
 from hybridsim.analysis.variations.refused import refuse_limits
-from hybridsim.analysis.wanted import words
 from hybridsim.arguments import flag
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
-from hybridsim.readable import Readable, aligned
+from hybridsim.presentation.readable import Readable, aligned
 
 if TYPE_CHECKING:
     from hybridsim.solution import Solution

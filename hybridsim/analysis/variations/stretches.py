@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
-from hybridsim.engine.jets import UNIT
+from hybridsim.engine.series.bounded import UNIT
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from hybridsim.engine.pieces import Occurrence, Segment
+    from hybridsim.engine.record.segments import Occurrence, Segment
     from hybridsim.solution import Solution
 
 

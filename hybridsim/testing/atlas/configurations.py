@@ -8,7 +8,7 @@ from typing import Any
 
 import hybridsim as hs
 from hybridsim.errors import UsageError, nearest
-from hybridsim.integrators.base import Integrator
+from hybridsim.integrators.contract import Integrator
 from hybridsim.testing import judge
 from hybridsim.testing.atlas.cooldown import CooldownRK45
 from hybridsim.testing.scene import Scene

@@ -9,9 +9,10 @@ from typing import Any, ClassVar
 import numpy as np
 import scipy.integrate
 
-from hybridsim.engine.stepping import Flow, Stepper, Tolerances, Watch
-from hybridsim.integrators.scipy_native import NativeStepper
-from hybridsim.integrators.scipy_solvers import ScipyRK45
+from hybridsim.engine.run.stepping import Flow, Stepper, Watch
+from hybridsim.engine.system.tolerances import Tolerances
+from hybridsim.integrators.scipy.native import NativeStepper
+from hybridsim.integrators.scipy.solvers import ScipyRK45
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridsim.errors import HybridsimError
 from hybridsim.integrators.registry import registered
-from hybridsim.model.units import time_unit
+from hybridsim.model.checks.units import time_unit
 from hybridsim.testing import judge
 from hybridsim.testing.atlas.cell import SECONDS, STEPS, Cell
 from hybridsim.testing.atlas.configurations import RIVALS, Configuration

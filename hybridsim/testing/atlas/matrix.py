@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from hybridsim.errors import UsageError, nearest
-from hybridsim.integrators.base import Integrator
+from hybridsim.integrators.contract import Integrator
 from hybridsim.integrators.registry import registered
 from hybridsim.testing.atlas.cell import SECONDS, STEPS, Cell, run_cell
 from hybridsim.testing.atlas.configurations import Configuration, chosen

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import hybridsim as hs
-from hybridsim.analysis.closed_forms.forced_coulomb_oscillator import ForcedCoulombOscillator, Motion
+from hybridsim.reference.closed_forms.forced_coulomb_oscillator import ForcedCoulombOscillator, Motion
 from hybridsim.testing.checks import amplitude, exact_stick, no_transition
 from hybridsim.testing.facts import CASES
 from hybridsim.testing.scene import Scene, Truth

@@ -1,0 +1,116 @@
+"""This module prepares one model over one span for the runs of a comparison and for its reference."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from hybridsim.analysis.compare.comparison import Comparison
+from hybridsim.analysis.compare.lines import Series
+from hybridsim.analysis.compare.reference import Reference
+from hybridsim.analysis.compare.regularised import as_set_valued
+from hybridsim.analysis.compare.rows import STOPPED, Cost, Row
+from hybridsim.analysis.compare.trajectory import trajectory_of
+from hybridsim.analysis.provenance import provenance
+from hybridsim.errors import HybridsimError, UsageError
+from hybridsim.model import Model
+
+if TYPE_CHECKING:
+    from hybridsim.solution import Solution
+
+
+class _OutOfTime(Exception):
+    """A run has passed its time limit."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Runs of one model over one span.
+
+    Parameters
+    ----------
+    model : the model with its parameters and initial values.
+    t_span, period : the span of the runs; the period of the forcing or None.
+    """
+
+    model: Model
+    t_span: tuple[float, float]
+    period: float | None
+    _forms: dict[tuple[str, float], Model] = field(default_factory=dict, repr=False, compare=False)
+
+    def simulate(self, integrator: str, *, model: Model | None = None, **options: Any) -> Solution:
+        """Run the model, or another form of it, with an integrator."""
+        from hybridsim.simulate import simulate
+
+        return simulate(model or self.model, self.t_span, integrator=integrator, **options)
+
+    def call(self, line: Series, value: float) -> Callable[[], Solution]:
+        """Return a function that makes the run of a line at a value, for timing."""
+        model, options = self._form(line, value), line.options_at(value)
+        return lambda: self.simulate(line.integrator, model=model, **options)
+
+    def first_run(self, line: Series, value: float, reference: Reference, limit: float = math.inf) -> Row:
+        """Make the run that warms up; its errors and counts go into the row.
+
+        Parameters
+        ----------
+        limit : seconds after which it is stopped; compiling does not count.
+        """
+        options = line.options_at(value)
+        row = Row(line.integrator, line.label, (line.varied, value), options, "failed", form=line.regularized)
+        began: list[float] = []
+
+        def watch(_: float) -> None:
+            began.append(time.perf_counter()) if not began else None
+            if time.perf_counter() - began[0] > limit:
+                raise _OutOfTime
+
+        try:
+            watched: Mapping[str, Any] = {"progress": watch} if limit < math.inf else {}
+            solution = self.simulate(line.integrator, model=self._form(line, value), **options, **watched)
+            if not solution.success:
+                return replace(row, status=solution.status, message=solution.message)
+            found = trajectory_of(solution)
+            if line.regularized:
+                found = as_set_valued(found, {contact.name for contact in self.model.contacts})
+            errors = reference.yardstick.measure(found)
+        except _OutOfTime:
+            return replace(row, status=STOPPED, message=f"not finished after {limit:.2g} s")
+        except HybridsimError as error:
+            return replace(
+                row, status="refused" if isinstance(error, UsageError) else "failed", message=error.message
+            )
+        except Exception as error:  # A third-party integrator may raise anything; it costs its own row only.
+            return replace(row, message=f"{type(error).__name__}: {error}")
+        stats = solution.stats
+        rhs, guards, steps = (int(stats[name]) for name in ("rhs_evaluations", "guard_evaluations", "steps"))
+        cost = Cost((float(stats["wall_time"]),), rhs, guards, steps, float(stats["compile_time"]))
+        return replace(row, status=solution.status, errors=errors, cost=cost)
+
+    def comparison(self, reference: Reference, rows: Sequence[Row], repeat: int) -> Comparison:
+        """Return the rows as a comparison."""
+        return Comparison(
+            title=f"{self.model.name}: {self.model.title}" if self.model.title else self.model.name,
+            t_span=self.t_span,
+            period=self.period,
+            reference=reference.title,
+            uncertainty=reference.uncertainty,
+            rows=tuple(rows),
+            repeat=repeat,
+            provenance=provenance(self.model),
+            warnings=reference.warnings,
+            second_reference=reference.second,
+            difference=reference.difference,
+        )
+
+    def _form(self, line: Series, value: float) -> Model | None:
+        """Return the regularised model of a line, or None for a line without one."""
+        if not line.regularized:
+            return None
+        key = (line.regularized, value)
+        if key not in self._forms:
+            self._forms[key] = self.model.regularized(line.regularized, v0=value)
+        return self._forms[key]

@@ -1,0 +1,37 @@
+"""This module defines the data that a comparison needs of a run, an exact motion or a user's reference."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.errors import UsageError
+from hybridsim.reference.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from hybridsim.solution import Solution
+
+
+def trajectory_of(solution: Solution) -> Trajectory:
+    """Return the trajectory of a run."""
+    return Trajectory(
+        states=solution,
+        t_span=(solution.t_start, solution.t_end),
+        events=tuple(solution.events),
+        initial_modes={name: intervals[0].mode for name, intervals in solution.modes.items() if intervals},
+    )
+
+
+def as_trajectory(value: Any, t_span: tuple[float, float]) -> Trajectory:
+    """Return a trajectory from a Trajectory, an object like a Solution, or a function t -> states."""
+    if isinstance(value, Trajectory):
+        return value
+    if all(hasattr(value, name) for name in ("t_end", "events", "modes")):
+        return trajectory_of(value)
+    if callable(value):
+        return Trajectory(lambda t, side: np.asarray(value(t), dtype=float), t_span)
+    raise UsageError(
+        f"reference is a {type(value).__name__}",
+        remedy="give a Solution, a Trajectory, a function t -> states, 'closed form' or 'runs'",
+    )

@@ -1,0 +1,46 @@
+"""This module defines the simplest rung: nothing moves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from hybridsim.analysis.ladder.rung import DoesNotApply, Rung, Scene, need_contacts
+
+if TYPE_CHECKING:
+    from hybridsim.model import Contact
+
+
+class Rest:
+    """The trivial steady state x = const, with the measures of a steady state; forces are not modelled.
+
+    x : the constant value of each state. period : of the forcing, nan without forcing.
+    """
+
+    def __init__(self, x: dict[str, float], contacts: tuple[Contact, ...]) -> None:
+        self.x = x
+        self.maximum = self.minimum = self.mean = self.final = x
+        self.peak = {name: abs(value) for name, value in x.items()}
+        self.amplitude = dict.fromkeys(x, 0.0)
+        self.dissipated = {contact.name: 0.0 for contact in contacts}
+        self.stick_fraction = {contact.name: 1.0 for contact in contacts if contact.law.is_set_valued}
+        self.energy = {name: 0.0 for name, value in x.items() if value == 0.0}
+
+    def harmonic(self, name: str, k: int) -> complex:
+        """Return the mean for k = 0, and zero for other harmonics."""
+        return complex(self.x[name] if k == 0 else 0.0)
+
+
+class AtRest(Rung):
+    """The rung in which every state keeps its start value."""
+
+    name = "at-rest"
+    title = "nothing moves"
+    drops = "all motion: contacts hold, every state stays where it starts"
+
+    def apply(self, scene: Scene) -> Rest:
+        """Return the trivial motion."""
+        need_contacts(scene.model)
+        start = scene.model.start_values()
+        if scene.model.discrete:
+            raise DoesNotApply("the model has discrete states, which change without motion")
+        return Rest(start, scene.model.contacts)

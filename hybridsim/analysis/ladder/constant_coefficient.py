@@ -1,0 +1,66 @@
+"""This module defines the rungs with a constant coefficient of friction instead of a law of the speed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from hybridsim.analysis.ladder.forces import at_speed, with_contacts, with_law, with_parameters
+from hybridsim.analysis.ladder.rung import DoesNotApply, NothingToDrop, Rung, Scene, need_stick
+from hybridsim.expr import parse
+from hybridsim.model import Contact, Model
+from hybridsim.model.laws.law import SPEED
+
+_MEAN = "mean_speed"
+
+
+def _need_velocity_law(model: Model) -> None:
+    need_stick(model)
+    if any(contact.law.tables or contact.law.slip_backward is not None for contact in model.contacts):
+        raise DoesNotApply("the law of a contact is a table, or differs between forward and backward sliding")
+    if not any(SPEED in contact.law.slip.names for contact in model.contacts):
+        raise NothingToDrop("mu is constant already: no friction force depends on the speed")
+
+
+class ConstantAtRest(Rung):
+    """The rung with slip := stick := slip(0)."""
+
+    name = "constant-mu-at-rest"
+    title = "constant mu, of the force at rest"
+    drops = "how friction changes with speed: the force is the law's at v = 0"
+
+    def apply(self, scene: Scene) -> Model:
+        """Return the model with Coulomb's law at the force of slow sliding."""
+        model = scene.model
+        _need_velocity_law(model)
+        return with_contacts(model, lambda c: _constant(c, "0"), "constant mu (at rest)")
+
+
+class ConstantAtMeanSpeed(Rung):
+    """The rung with slip := stick := slip(mean sliding speed of the full motion)."""
+
+    name = "constant-mu-mean"
+    title = "constant mu, of the force at the mean sliding speed"
+    drops = "how friction changes with speed: the force is the law's at the mean speed of sliding"
+
+    def apply(self, scene: Scene) -> Model:
+        """Return the model with Coulomb's law at the force of the mean speed, a parameter for each contact."""
+        model = scene.model
+        _need_velocity_law(model)
+        if any(not scene.speed.get(contact.name) for contact in model.contacts):
+            raise DoesNotApply("nothing slides in the full motion, so there is no mean speed")
+        wishes = {f"{_MEAN}_{c.name}": scene.speed[c.name] for c in model.contacts}
+        changed, names = with_parameters(model, wishes)
+        return with_contacts(
+            changed, lambda c: _constant(c, _MEAN, names[f"{_MEAN}_{c.name}"]), "constant mu (mean)"
+        )
+
+
+def _constant(contact: Contact, speed: str, parameter: str | None = None) -> Contact:
+    law = contact.law
+    force = at_speed(law.slip, speed)
+    parameters = dict(law.parameters) | ({speed: None} if parameter else {})
+    arguments = dict(contact.arguments) | ({speed: parse(parameter)} if parameter else {})
+    fixed = replace(
+        law, name=f"{law.name}, constant", slip=force, stick=force, stick_backward=None, parameters=parameters
+    )
+    return with_law(replace(contact, arguments=arguments), fixed)

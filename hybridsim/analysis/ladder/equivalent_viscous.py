@@ -1,0 +1,154 @@
+"""This module defines the rung of equivalent viscous damping, by one-term harmonic balance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from hybridsim.analysis.ladder.describing import FirstHarmonic
+from hybridsim.analysis.ladder.forces import with_forces, with_parameters
+from hybridsim.analysis.ladder.linear_response import LinearResponse, NotLinear
+from hybridsim.analysis.ladder.rung import DoesNotApply, Rung, Scene, need_stick
+from hybridsim.errors import HybridsimError
+from hybridsim.expr import parse, substitute
+from hybridsim.model import Model, Output
+
+Response = Callable[[np.ndarray], np.ndarray]
+
+_SOLVED = 1e-12  # relative change of the dampers at convergence
+_MOST, _MOST_RUNS = 5000, 60  # rounds with a linear response, and with runs
+_BELOW, _NO_END = 1e3, 1e15  # start and end of a search, in dampers of the free motion
+_ONE_WAY = 1e-6  # relative to its amplitude: a smaller mean velocity counts as zero
+_DRIFTS = "a contact slides in one direction on average, so that friction does not damp its vibration"
+_NOTHING = "the harmonic balance has no moving solution: it predicts that friction stops everything"
+
+
+class EquivalentViscous(Rung):
+    """The rung f = c_eq v, c_eq = F1(V)/V, with F1 the first harmonic of friction for a cosine of amplitude V.
+
+    For Coulomb friction c_eq = 4 mu N/(pi V), a damper that does the same work per cycle. V is the first
+    harmonic of the relative velocity in the steady motion of the model with these dampers, at the forcing's
+    period. V and c_eq are solved together, for all contacts.
+    """
+
+    name = "viscous"
+    title = "equivalent viscous damping"
+    drops = "stick and all harmonics of friction: a damper takes the same work per cycle at the forcing's frequency"
+
+    def apply(self, scene: Scene) -> Model:
+        """Return the model with a damper in place of each contact."""
+        model = scene.model
+        need_stick(model)
+        period = _period(model)
+        forces = [FirstHarmonic(model, contact) for contact in model.contacts]
+        wishes = {f"c_eq_{c.name}": 0.0 for c in model.contacts}
+        changed, names = with_parameters(model, wishes)
+        dampers = {
+            c.name: substitute(parse("c*(v)"), {"c": parse(names[f"c_eq_{c.name}"]), "v": c.velocity})
+            for c in model.contacts
+        }
+        viscous = with_forces(changed, dampers, "viscous", "equivalent viscous damping")
+        order = [names[wish] for wish in wishes]
+        try:
+            response = LinearResponse(model, 2.0 * math.pi / period)
+            c = _solve(response, forces, _MOST)
+            if (np.abs(response.mean(c)) > _ONE_WAY * np.abs(response(c))).any():
+                raise DoesNotApply(_DRIFTS)
+        except NotLinear:
+            c = _solve(_by_runs(viscous, scene, order), forces, _MOST_RUNS)
+        return viscous.with_(**dict(zip(order, c.tolist(), strict=True)))
+
+
+def _period(model: Model) -> float:
+    from hybridsim.engine.system.period import system_period
+    from hybridsim.engine.system.system_cache import system_of
+
+    period = system_period(system_of(model))
+    if period is None:
+        raise DoesNotApply("the model has no single forcing period for a harmonic balance")
+    return period
+
+
+def _by_runs(viscous: Model, scene: Scene, names: list[str]) -> Response:
+    """Return the response of a nonlinear model, from its steady state."""
+    from hybridsim.analysis.steady import steady_state
+
+    velocities = {f"{n}_v": c.velocity for n, c in zip(names, scene.model.contacts, strict=True)}
+    seen = replace(viscous, outputs=(*viscous.outputs, *(Output(n, e) for n, e in velocities.items())))
+
+    def response(c: np.ndarray) -> np.ndarray:
+        damped = seen.with_(**dict(zip(names, c.tolist(), strict=True)))
+        try:
+            steady = steady_state(damped, tol=1e-9, progress=scene.progress)
+        except HybridsimError as error:
+            raise DoesNotApply(f"the model with dampers has no steady motion: {error.message}") from error
+        if not steady.success or steady.multiple > 1:
+            raise DoesNotApply(
+                f"the model with dampers has no motion of the forcing's period: {steady.message}"
+            )
+        found = np.array([steady.harmonic(name, 1) for name in velocities])
+        for name, wave in zip(velocities, found, strict=True):
+            if abs(steady.mean[name]) > _ONE_WAY * abs(wave):
+                raise DoesNotApply(_DRIFTS)
+        return found
+
+    return response
+
+
+def _solve(response: Response, forces: list[FirstHarmonic], most: int) -> np.ndarray:
+    """Return the dampers (contacts,) that are consistent with the motion they cause.
+
+    The search starts at small dampers, so that it finds the solution with the largest motion. A single damper
+    is found by bisection of log(F1(V(c))/(c V(c))), several by rounds of c <- F1(V(c))/V(c) with half steps
+    in the logarithm.
+    """
+    c = _first(response, forces)
+    if len(c) == 1:
+        return _solve_one(lambda value: _wanted(response, forces, np.array([value]))[0], float(c[0]))
+    largest = _NO_END * c
+    for _ in range(most):
+        wanted = _wanted(response, forces, c)
+        if (np.abs(wanted - c) <= _SOLVED * wanted).all():
+            return wanted
+        c = np.sqrt(c * wanted)
+        if (c > largest).any():
+            raise DoesNotApply(_NOTHING)
+    raise DoesNotApply(f"the harmonic balance did not converge in {most} rounds")
+
+
+def _solve_one(wanted: Callable[[float], float], start: float) -> np.ndarray:
+    from scipy.optimize import brentq
+
+    low = start / _BELOW
+    if wanted(low) < low:
+        raise DoesNotApply(
+            "the harmonic balance has no solution above 1/1000 of the damping of the free motion"
+        )
+    high = 2.0 * low
+    while wanted(high) > high:
+        low, high = high, 2.0 * high
+        if high > _NO_END * start:
+            raise DoesNotApply(_NOTHING)
+    root = brentq(lambda z: math.log(wanted(math.exp(z))) - z, math.log(low), math.log(high), xtol=_SOLVED)
+    return np.array([math.exp(root)])
+
+
+def _wanted(response: Response, forces: list[FirstHarmonic], c: np.ndarray) -> np.ndarray:
+    speeds = np.abs(response(c))
+    if not (np.isfinite(speeds) & (speeds > 0.0)).all():
+        raise DoesNotApply(_NOTHING)
+    return np.array([force(float(v)) / v for force, v in zip(forces, speeds, strict=True)])
+
+
+def _first(response: Response, forces: list[FirstHarmonic]) -> np.ndarray:
+    """Return the dampers of the frictionless motion; if that is unbounded, of a motion with very small damping."""
+    try:
+        found = _wanted(response, forces, np.zeros(len(forces)))
+    except (np.linalg.LinAlgError, DoesNotApply):
+        found = _wanted(response, forces, np.full(len(forces), 1e-6))
+    if not (found > 0.0).all():
+        raise DoesNotApply("a contact without load has no friction that a damper could replace")
+    return found

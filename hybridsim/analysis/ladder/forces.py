@@ -1,0 +1,88 @@
+"""This module rewrites a model for rungs: forces instead of contacts, other laws, more parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from hybridsim.expr import Expression, parse, substitute
+from hybridsim.model import Component, Contact, FrictionLaw, Mode, Model, Parameter
+from hybridsim.model.free_name import free_name, names_of_model
+from hybridsim.model.laws.law import SPEED
+
+_SPEED = parse("abs(u)")
+
+
+def with_forces(model: Model, forces: Mapping[str, Expression], mode: str, title: str) -> Model:
+    """Return the model with each contact replaced by a one-mode component that sets its force.
+
+    Other automata of a contact (lift-off, tables) stay. The states of a law with memory are removed with it.
+    """
+
+    def values(contact: Contact) -> dict[str, Expression]:
+        speed = contact.table_speed
+        force = {contact.name: forces[contact.name]}
+        return force if speed is None else {**force, speed: substitute(_SPEED, {"u": contact.velocity})}
+
+    components = tuple(
+        Component(c.name, (Mode(mode, set=values(c)),)) if part.name == c.name else part
+        for c in model.contacts
+        for part in model.components_of(c)
+        if not _is_copy(c, part)
+    )
+    outputs = tuple(
+        replace(output, modes={p: e for p, e in output.modes.items() if p.split(".")[0] not in forces})
+        for output in model.outputs
+    )
+    return replace(
+        model,
+        contacts=(),
+        components=(*components, *model.components),
+        outputs=outputs,
+        title=f"{model.title or model.name}, {title}",
+    )
+
+
+def _is_copy(contact: Contact, part: Component) -> bool:
+    """Return whether an automaton belongs to one of several copies of a law, whose forces are added."""
+    number = part.name.removeprefix(f"{contact.name}_")
+    return contact.law.copies is not None and number != part.name and number.isdecimal()
+
+
+def with_contacts(model: Model, change: Callable[[Contact], Contact], title: str) -> Model:
+    """Return the model with each contact changed, and a title that states the change."""
+    contacts = tuple(change(contact) for contact in model.contacts)
+    return replace(model, contacts=contacts, title=f"{model.title or model.name}, {title}")
+
+
+def at_speed(slip: Expression, speed: str) -> Expression:
+    """Return the slip force at a speed, which is a number or the name of a parameter of the law."""
+    return substitute(slip, {SPEED: parse(speed)})
+
+
+def with_law(contact: Contact, law: FrictionLaw) -> Contact:
+    """Return the contact with another law, without the parameters that this law does not use."""
+    used = {name for _, expression in law.expressions() for name in expression.names}
+    while more := {n for u in used if (e := law.parameters.get(u)) is not None for n in e.names} - used:
+        used |= more
+    parameters = {name: value for name, value in law.parameters.items() if name in used}
+    arguments = {name: value for name, value in contact.arguments.items() if name in used}
+    return replace(contact, law=replace(law, parameters=parameters), arguments=arguments)
+
+
+def with_parameters(model: Model, wishes: Mapping[str, float]) -> tuple[Model, dict[str, str]]:
+    """Return the model with more parameters, and the unused name chosen for each wish."""
+    taken, names = names_of_model(model), {}
+    for wish in wishes:
+        names[wish] = free_name(taken, wish)
+        taken |= {names[wish]}
+    more = tuple(Parameter(names[wish], value) for wish, value in wishes.items())  # type: ignore[arg-type]  # made an expression
+    return replace(model, parameters=(*model.parameters, *more)), names
+
+
+def inlined(model: Model, expression: Expression) -> Expression:
+    """Return an expression with the model's definitions inserted."""
+    definitions = dict(model.definitions)
+    while used := expression.names & definitions.keys():
+        expression = substitute(expression, {name: definitions[name] for name in used})
+    return expression

@@ -1,0 +1,52 @@
+"""This module defines the rungs with a single-valued friction force: tanh, arctan, and Karnopp's dead band."""
+
+from __future__ import annotations
+
+from hybridsim.analysis.ladder.rung import DoesNotApply, Rung, Scene, need_stick
+from hybridsim.errors import HybridsimError
+from hybridsim.model import Model
+
+SHARE = 0.01  # of the largest sliding speed; makes the regularised region narrow compared with the motion
+
+
+class _Regularised(Rung):
+    """A rung that regularises the force within a width v0 around zero velocity; see `Model.regularized`."""
+
+    def apply(self, scene: Scene) -> Model:
+        """Return the model with every contact regularised."""
+        need_stick(scene.model)
+        v0 = scene.v0
+        if v0 is None:
+            if not scene.peak:
+                raise DoesNotApply(
+                    "nothing slides in the full motion, so that no v0 is small compared with its speed"
+                )
+            v0 = SHARE * scene.peak
+        try:
+            return scene.model.regularized(self.name, v0=v0)
+        except HybridsimError as error:
+            raise DoesNotApply(error.message) from error
+
+
+class Tanh(_Regularised):
+    """The rung with f = slip(|v|) tanh(v/v0)."""
+
+    name = "tanh"
+    title = "regularised, tanh(v/v0)"
+    drops = "stick: under a load the body creeps at a speed of the order of v0"
+
+
+class Arctan(_Regularised):
+    """The rung with f = slip(|v|) (2/pi) atan(v/v0)."""
+
+    name = "arctan"
+    title = "regularised, (2/pi) atan(v/v0)"
+    drops = "stick, and the full force at all speeds: it is reached only slowly"
+
+
+class Karnopp(_Regularised):
+    """The rung in which the body is stopped for |v| < v0."""
+
+    name = "karnopp"
+    title = "Karnopp's dead band |v| < v0"
+    drops = "slow sliding: below v0 the body is stopped"

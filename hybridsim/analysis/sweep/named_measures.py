@@ -1,0 +1,208 @@
+"""This module defines the built-in measures: properties of the steady state, and states at the end of a run."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from hybridsim.analysis.compare.comparison_request import whole
+from hybridsim.analysis.sweep.last_period import OF_MOTION, LastPeriod, MeasuredPeriod, period_of
+from hybridsim.analysis.sweep.sweep_request import refuse_unknown
+from hybridsim.analysis.sweep.work.job import Incomplete
+from hybridsim.errors import SimulationError, UsageError, nearest
+from hybridsim.model import Model
+from hybridsim.model.checks.units import time_unit, units_of
+
+if TYPE_CHECKING:
+    from hybridsim.analysis.steady import SteadyState
+
+STEADY, FINAL, AFTER = "steady", "final", "after"
+# measures of a steady state: of a quantity, of a contact, of the motion
+_OF_QUANTITY = ("amplitude", "peak", "maximum", "minimum", "mean", "energy", "harmonic")
+_OF_CONTACT = ("stick_fraction", "stops_per_period", "dissipated")
+_OF_MOTION = ("period", "multiple", "residual", "newton_steps", "periods", "kind", "word", "stable")
+_TEXTS = ("kind", "word")
+_SQUARED = "energy"
+_PLAIN = ("amplitude", "energy")  # the default measures of each quantity
+
+
+@dataclass(frozen=True)
+class Steady:
+    """Readings of `steady_state`: ``amplitude.x``, ``harmonic.x.3``, ``stick_fraction.f``, ``period``, ``kind``, ...
+
+    A motion that does not repeat has no such measures; its status names its kind.
+    """
+
+    words: tuple[str, ...]
+    options: Mapping[str, Any]
+
+    def nothing(self) -> dict[str, float | str]:
+        """Return the readings of a point without a result."""
+        return {word: "" if word in _TEXTS else math.nan for word in self.words}
+
+    def run(self, model: Model, previous: SteadyState | None) -> SteadyState:
+        """Return the steady state, searched from that of the neighbour if there is one."""
+        from hybridsim.analysis.steady import steady_state
+
+        start = {} if previous is None else _start_of(previous)
+        return steady_state(model, **{**self.options, **start})
+
+    def read(self, result: SteadyState) -> dict[str, Any]:
+        """Return the readings in the order of the words."""
+        if not result.success:
+            known = {name: getattr(result, name) for name in self.words if name in ("kind", "residual")}
+            raise Incomplete(f"{result.kind}: {result.message}", known)
+        return {word: _reading(result, word) for word in self.words}
+
+    def blank(self, result: SteadyState) -> tuple[str, ...]:
+        """Return the readings that do not exist for a result: an equilibrium has no period."""
+        return ("period",) if result.kind == "equilibrium" else ()
+
+
+@dataclass(frozen=True)
+class Final:
+    """States at the end of a run of `simulate`."""
+
+    names: tuple[str, ...]
+    options: Mapping[str, Any]
+
+    def nothing(self) -> dict[str, float | str]:
+        """Return the readings of a point without a result."""
+        return {f"{FINAL}.{name}": math.nan for name in self.names}
+
+    def run(self, model: Model, previous: Any) -> dict[str, float]:
+        """Return the states by name, from a run that starts at the neighbour's end if there is one."""
+        from hybridsim.simulate import simulate
+
+        given = {"save": "nothing", **self.options}
+        if previous is not None:
+            given["x0"] = previous
+        solution = simulate(model, **given)
+        if not solution.success:
+            raise SimulationError(f"{solution.status}: {solution.message}")
+        return dict(zip(solution.names, solution.y[:, -1].tolist(), strict=True))
+
+    def read(self, result: dict[str, float]) -> dict[str, float]:
+        """Return the requested states."""
+        return {f"{FINAL}.{name}": result[name] for name in self.names}
+
+
+def ready_measure(
+    words: str | Sequence[str], model: Model, options: Mapping[str, Any]
+) -> Steady | Final | LastPeriod:
+    """Return a measure given by its name, "steady" or "final", or by the names of its readings.
+
+    Raises
+    ------
+    UsageError
+        For unknown names, or readings of both kinds together.
+    """
+    asked = (words,) if isinstance(words, str) else tuple(words)
+    states = [state.name for state in model.states]
+    from hybridsim.analysis.steady import steady_state
+    from hybridsim.simulate import simulate
+
+    heads = {word.partition(".")[0] for word in asked}
+    if heads == {FINAL}:
+        if "t_span" not in options:
+            raise UsageError(f"measure is {words!r} without t_span", remedy="give t_span=(0, ...)")
+        refuse_unknown([simulate], options)
+        names = states if asked == (FINAL,) else [_of(word, states, "states") for word in asked]
+        return Final(tuple(names), options)
+    if FINAL in heads:
+        raise UsageError(
+            f"measure is {words!r}",
+            remedy="steady states and ends of runs need two sweeps; ask for one of them",
+        )
+    if AFTER in options:
+        refuse_unknown([simulate], {name: value for name, value in options.items() if name != AFTER})
+    else:
+        refuse_unknown([steady_state, simulate], options)
+    known = _known(model, OF_MOTION if AFTER in options else _OF_MOTION)
+    if asked == (STEADY,):
+        asked = tuple(
+            word
+            for word in known
+            if word in ("period", "residual" if AFTER in options else "kind")
+            or word.startswith((*_PLAIN, *_OF_CONTACT))
+        )
+    for word in asked:
+        stem, _, last = word.rpartition(".")
+        is_harmonic = word.startswith("harmonic.") and last.isdecimal()
+        if AFTER in options and word in _OF_MOTION and word not in OF_MOTION:
+            raise UsageError(
+                f"{word} belongs to a steady state, but after= reads one period of an ordinary run",
+                remedy="leave one of them out; residual measures how far a run is from repeating",
+            )
+        if (f"{stem}.1" if is_harmonic else word) not in known:
+            raise UsageError(
+                f"there is no measure {word!r}",
+                remedy=nearest(word, [STEADY, FINAL, *known], kind="measures"),
+            )
+    if AFTER in options:
+        return _last_period(asked, model, dict(options))
+    return Steady(asked, options)
+
+
+def _last_period(words: tuple[str, ...], model: Model, options: dict[str, Any]) -> LastPeriod:
+    after = whole(options.pop(AFTER), AFTER)
+    for name in ("t_span", "save", "t_eval"):
+        if name in options:
+            raise UsageError(
+                f"{name} and after cannot be combined", remedy="leave it out: the last period is kept"
+            )
+    period_of(model)  # an unforced model is refused here, once for all points
+    return LastPeriod(words, after, options, _reading)
+
+
+def units_of_readings(words: Iterable[str], model: Model) -> dict[str, str]:
+    """Return the units of named readings, as far as the model declares them."""
+    known, time = units_of(model), time_unit(model)
+    units = {}
+    for word in words:
+        head, _, rest = word.partition(".")
+        if head == "period":
+            units[word] = time
+        elif head in (*_OF_QUANTITY, FINAL):
+            unit = known.get(rest.rpartition(".")[0] if head == "harmonic" else rest, "")
+            squared = f"({unit})² {time}" if " " in unit or "/" in unit else f"{unit}² {time}"
+            units[word] = (squared.strip() if head == _SQUARED else unit) if unit else ""
+    return {word: unit for word, unit in units.items() if unit}
+
+
+def _known(model: Model, of_motion: Sequence[str]) -> list[str]:
+    """Return every reading of a steady state, with the first harmonic of each quantity."""
+    discrete = {d.name for d in model.discrete}
+    quantities = [name for name in units_of(model) if name not in discrete]
+    contacts = [contact.name for contact in model.contacts]
+    numbered = {"harmonic": ".1"}
+    found = [f"{head}.{name}{numbered.get(head, '')}" for head in _OF_QUANTITY for name in quantities]
+    return [*found, *(f"{head}.{name}" for head in _OF_CONTACT for name in contacts), *of_motion]
+
+
+def _of(word: str, names: Sequence[str], kind: str) -> str:
+    name = word.partition(".")[2]
+    if name not in names:
+        raise UsageError(f"there is no measure {word!r}", remedy=nearest(name, names, kind=kind))
+    return name
+
+
+def _reading(steady: SteadyState | MeasuredPeriod, word: str) -> Any:
+    head, _, rest = word.partition(".")
+    if head == "harmonic":
+        name, _, number = rest.rpartition(".")
+        return steady.harmonic(name, int(number))
+    found = getattr(steady, head)
+    if head == "word":
+        return " ".join(found)
+    return found[rest] if rest else found
+
+
+def _start_of(steady: SteadyState) -> dict[str, Any]:
+    """Return the state and the modes at the start of a steady motion."""
+    run = steady.solution
+    x0 = dict(zip(run.names, run.y[:, 0].tolist(), strict=True))
+    x0 |= {d.name: float(run.output(d.name, run.t_start)) for d in run.model.discrete}
+    return {"x0": x0, "z0": {name: pieces[0].mode for name, pieces in run.modes.items() if pieces}}

@@ -1,0 +1,108 @@
+"""This module runs the points of a sweep on an executor, by default threads, and reports progress."""
+
+from __future__ import annotations
+
+import math
+import time
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from hybridsim.analysis.progress import Progress
+from hybridsim.analysis.sweep.collected import Collected
+from hybridsim.analysis.sweep.journal import Journal
+from hybridsim.analysis.sweep.work.job import Job
+from hybridsim.analysis.sweep.work.pieces import Pieces
+from hybridsim.analysis.sweep.work.sending import Points, Sending, require_sendable, worker_count
+from hybridsim.errors import UsageError
+
+
+def work(
+    job: Job,
+    points: Points,
+    executor: Any,
+    workers: int | None,
+    progress: Progress | None,
+    journal: Journal | None = None,
+) -> tuple[Collected, bool, str]:
+    """Return all results, whether they are complete, and the name of the executor.
+
+    Raises
+    ------
+    UsageError
+        If the executor is invalid, or cannot take the work.
+    """
+    if executor is not None and not isinstance(executor, Executor):
+        raise UsageError(
+            f"executor is {executor!r}",
+            remedy="give a concurrent.futures.Executor; of a dask client, client.get_executor()",
+        )
+    if isinstance(executor, ProcessPoolExecutor):
+        require_sendable(job)
+    count = worker_count(executor, workers)
+    total = math.prod(points.shape)
+    chains = total // points.shape[0] if job.chained else None
+    collected = Collected(total)
+    done = _taken_over(journal, collected, chains) if journal is not None else None
+    pieces = Pieces(total, chains, count, done)
+    sending = Sending(job, points, pieces, collected, _Told(total, progress), journal)
+    if executor is not None:
+        return collected, sending.run(executor, count), f"{type(executor).__name__} ({count})"
+    with ThreadPoolExecutor(count, thread_name_prefix="sweep") as threads:
+        return collected, sending.run(threads, count), f"threads ({count})"
+
+
+def _taken_over(journal: Journal, collected: Collected, chains: int | None) -> np.ndarray:
+    """Return a mask of the points (total,) known from a journal; a chain is known completely or not at all."""
+    total = len(collected.status)
+    known = np.zeros(total, dtype=np.bool_)
+    for line, (numbers, outcomes) in enumerate(journal.known, start=2):
+        in_range = all(0 <= k < total for k in numbers)
+        if in_range and chains is not None:
+            in_range = numbers == list(range(numbers[0], total, chains))[: len(numbers)] if numbers else False
+        elif in_range:  # each point has its own result
+            in_range = len(set(numbers)) == len(numbers) and not known[numbers].any()
+        if not (numbers and in_range and len(numbers) == len(outcomes)):
+            raise UsageError(
+                f"{journal.path}, line {line}: {numbers!r} are not points of this sweep of {total}",
+                remedy="remove the line, or delete the file",
+            )
+        known[numbers] = True
+        if chains is None or len(outcomes) == len(range(numbers[0], total, chains)):
+            collected.put(numbers, outcomes)
+    if chains is not None:
+        by_chain = known.reshape(-1, chains)
+        by_chain &= by_chain.all(axis=0)
+    return known
+
+
+class _Told:
+    """Reports the number of finished points and the remaining time."""
+
+    def __init__(self, total: int, progress: Progress | None) -> None:
+        self._total, self._progress = total, progress
+        self._began: float | None = None
+        self._first = 0
+
+    def __call__(self, done: int) -> None:
+        if self._progress is None:
+            return
+        now = time.monotonic()
+        if (
+            done and self._began is None
+        ):  # the first point includes compiling, so that its time is not representative
+            self._began, self._first = now, done
+        words = f"{done} of {self._total} points"
+        if self._began is not None and self._first < done < self._total:
+            left = (now - self._began) / (done - self._first) * (self._total - done)
+            words += f", {_duration(left)} left"
+        self._progress(done, self._total, words)
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes} min"
+    return f"{minutes} min {rest} s" if minutes else f"{rest} s"

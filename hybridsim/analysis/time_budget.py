@@ -1,0 +1,43 @@
+"""This module limits the time of a computation through its progress callback; compiling does not count."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from hybridsim.engine.native.kernels import seconds_compiling
+
+
+class OutOfTime(Exception):
+    """The time limit of a computation has passed; the text says how long it was."""
+
+
+class Stopwatch:
+    """A stopwatch that starts when made and excludes the time this thread spends compiling."""
+
+    def __init__(self) -> None:
+        self._began, self._compiled = time.perf_counter(), seconds_compiling()
+
+    @property
+    def seconds(self) -> float:
+        """The elapsed seconds."""
+        return time.perf_counter() - self._began - (seconds_compiling() - self._compiled)
+
+
+class Allowance:
+    """A progress callback that raises `OutOfTime` after a given time.
+
+    Parameters
+    ----------
+    seconds : the time limit from now on, without compiling.
+    told : called at each check, to show progress.
+    """
+
+    def __init__(self, seconds: float, told: Callable[[], None] | None = None) -> None:
+        self.seconds, self._told, self._watch = seconds, told, Stopwatch()
+
+    def __call__(self, fraction: float = 0.0) -> None:
+        if self._told is not None:
+            self._told()
+        if self._watch.seconds > self.seconds:
+            raise OutOfTime(f"not finished after {self.seconds:.2g} s")

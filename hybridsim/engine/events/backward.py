@@ -1,0 +1,101 @@
+"""Running backward in time: inside modes and through transversal crossings; anything else has no unique past."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hybridsim.engine.events.choice.verdict import LEAVES
+from hybridsim.engine.events.outcome import Outcome, Situation
+from hybridsim.engine.events.resolve import Settling
+from hybridsim.engine.system.system import System
+
+
+def held(system: System, z: np.ndarray) -> str:
+    """Why a state that is held at a surface has no unique past; empty if none is held."""
+    names = [a.name for a, m in zip(system.automata, z, strict=True) if a.has_surface and m == a.hold]
+    return f"{', '.join(names)} held: many motions come to rest in the same state" if names else ""
+
+
+def said_of_direction(t0: float, t1: float) -> str:
+    """What is to be known of a run backward that did not reach its end, for whom did not mean to run so."""
+    return f"; this run goes backward in time, from t = {t0!r} to {t1!r}: give t_span the other way round to go forward"
+
+
+def entered_here(system: System, z: np.ndarray, fired: tuple[int, ...]) -> str:
+    """Why a guard of a component without a surface cannot be crossed backward; empty if none fired."""
+    for g in fired:
+        automaton = system.automata[int(system.owner[g])]
+        if not (automaton.has_surface or automaton.is_corner):
+            mode = automaton.modes[z[system.owner[g]]]
+            return f"mode {mode} of {automaton.name} began here or came through a transition: its past is not unique"
+    return ""
+
+
+def has_no_past(
+    system: System,
+    z: np.ndarray,
+    fired: tuple[int, ...],
+    stopping: tuple[int, ...],
+    schedules: tuple[int, ...],
+) -> str:
+    """Why what happened where a segment ended has no unique past: guards, stopping monitors and schedules; or empty."""
+    model = system.model
+    resets = [model.schedules[k].name for k in schedules if model.schedules[k].reset]
+    resets += [system.monitor_names[k] for k in stopping if model.monitors[k].reset]
+    if resets:
+        return f"running backward, the reset of {', '.join(resets)} has no unique past"
+    return entered_here(system, z, fired)
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A guard of another mode whose zero may be where the present mode was entered: modes to evaluate it in, number."""
+
+    z: np.ndarray
+    guard: int
+    label: str
+
+
+def entries(system: System, z: np.ndarray) -> tuple[Entry, ...]:
+    """The ways into the present modes by declared transitions that reset nothing."""
+    found = []
+    for c, automaton in enumerate(system.automata):
+        if automaton.has_surface or automaton.is_corner:
+            continue
+        for m, guards in enumerate(automaton.guards):
+            for j, g in enumerate(guards):
+                for number, target in enumerate(automaton.targets[m][j]):
+                    if target == z[c] and m != z[c] and ("choice", c, m, j, number) not in system.resets:
+                        other = z.copy()
+                        other[c] = m
+                        name = f"guard {automaton.guard_names[m][j]} of mode {automaton.modes[m]} ({automaton.name})"
+                        found.append(Entry(other, g, name))
+    return tuple(found)
+
+
+def cross_backward(system: System, at: Situation, fired: tuple[int, ...]) -> Outcome:
+    """Cross a surface backward, if the motion came through it; status ``backward-nonunique`` otherwise.
+
+    The motion is unique when it enters from the other side, leaves on this one, and could not have been
+    held in between: for a force with a limit that is a passage of the velocity through zero.
+    """
+    before = at.z.copy()
+    outcome = Settling(system, at, before, forward=False).run(fired, [])
+    for g in fired:
+        c = int(system.owner[g])
+        automaton = system.automata[c]
+        if automaton.is_corner:
+            continue
+        other = automaton.below if before[c] == automaton.above else automaton.above
+        rest = before.copy()
+        rest[c] = automaton.hold
+        forward = Settling(system, at, rest, forward=True)
+        forward.on_surface[c] = True
+        could_rest = forward.verdict(rest, [c]) != LEAVES
+        if outcome.status or could_rest or outcome.z[c] != other:
+            outcome.status = "backward-nonunique"
+            outcome.message = f"{automaton.name} reaches a surface from which more than one past leads away"
+            break
+    return outcome

@@ -1,0 +1,48 @@
+"""Joint candidates of a cluster at its surfaces, and verdicts on as many of them as a choice needs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridsim.engine.events.choice.verdict import FINE, LEAVES, preference
+
+if TYPE_CHECKING:
+    from hybridsim.engine.events.resolve import Settling
+
+
+def all_verdicts(
+    settling: Settling, members: list[int], candidates: np.ndarray, cluster: tuple[int, ...]
+) -> np.ndarray:
+    """Verdicts on all joint candidates."""
+    found = [settling.verdict(settling.with_modes(members, modes), cluster) for modes in candidates]
+    return np.array(found, dtype=np.int64)
+
+
+def verdicts_on(
+    settling: Settling,
+    members: list[int],
+    candidates: np.ndarray,
+    current: np.ndarray,
+    holds: np.ndarray,
+    cluster: tuple[int, ...],
+) -> tuple[np.ndarray, bool]:
+    """Verdicts on joint candidates in the order in which `choose` prefers them, and whether they are on all of them.
+
+    They end with those that are preferred as much as the first that it takes: the others stand as if they were not
+    admissible. Where a motion has to be the only one, all are judged.
+    """
+    if settling.is_thorough or any(settling.system.automata[c].is_unique for c in members):
+        return all_verdicts(settling, members, candidates, cluster), True
+    count = len(members)
+    ranks = [preference(modes, current, holds, count) for modes in candidates]
+    verdicts, least = np.full(len(candidates), LEAVES, dtype=np.int64), -1
+    for number in sorted(range(len(candidates)), key=ranks.__getitem__, reverse=True):
+        if ranks[number] < least:
+            return verdicts, False
+        verdict = settling.verdict(settling.with_modes(members, candidates[number]), cluster)
+        verdicts[number] = verdict
+        if verdict == FINE or (verdict != LEAVES and ranks[number] >= count * (count + 1)):
+            least = ranks[number]
+    return verdicts, True

@@ -1,0 +1,65 @@
+"""Guards of one mode that come to zero at once: all of them are taken where they lead to one mode."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from hybridsim.engine.lowering.reset_keys import amounts_of
+
+if TYPE_CHECKING:
+    from hybridsim.engine.events.outcome import Situation
+    from hybridsim.engine.events.resolve import Settling
+
+Failure = tuple[str, str]  # status and message
+
+
+def taken_at_once(
+    settling: Settling, given: Situation, component: int, leaving: Sequence[int]
+) -> tuple[list[tuple[int, int]], Failure | None]:
+    """The guards of a mode that are taken, each with the number of its choice; or why none can be.
+
+    leaving: places of the guards that are about to be negative, in the order in which they came to zero. given: what
+    conditions and resets read. Of guards that are negative as the mode begins the first that is declared is taken.
+    """
+    system, mode = settling.system, int(settling.at.z[component])
+    automaton = system.automata[component]
+    guards = automaton.guards[mode]
+    place = settling.rank.get(guards[leaving[0]]) if leaving else None
+    first = [j for j in leaving if settling.fired[guards[j]] and settling.rank.get(guards[j]) == place]
+    first = first or list(leaving[:1])
+    if fatal := next((automaton.fatal[mode][j] for j in first if automaton.fatal[mode][j]), ""):
+        return [], ("inconsistent", str(fatal))
+    numbers = {j: system.choose(component, mode, j, given.s, given.x, given.p, given.z) for j in first}
+    if first and max(numbers.values()) < 0:
+        return [], (
+            "inconsistent",
+            f"guard {automaton.guard_names[mode][first[0]]} of mode {automaton.modes[mode]} ({automaton.name}) would "
+            f"go negative and none of the conditions of its transitions holds",
+        )
+    declared = system.model.all_components()[component].modes[mode].guards
+    found: dict[object, tuple[int, int]] = {}
+    for j, number in numbers.items():
+        if number >= 0:
+            choice = declared[j].then[number]
+            what = (choice.to, tuple((n, e.text) for n, e in choice.reset.items()))
+            # what only sets does the same once more
+            found.setdefault((what, j if amounts_of(choice.reset) else -1), (j, number))
+    taken = list(found.values())
+    apart = _apart(settling, component, taken)
+    return ([], ("nonunique", apart)) if apart else (taken, None)
+
+
+def _apart(settling: Settling, component: int, taken: Sequence[tuple[int, int]]) -> str:
+    """Why several guards cannot be taken at once; empty if they lead to one mode, where resets must agree."""
+    automaton, mode = settling.system.automata[component], int(settling.at.z[component])
+    targets = [automaton.modes[automaton.targets[mode][j][number]] for j, number in taken]
+    if len(set(targets)) <= 1:
+        return ""
+    ways = [
+        f"{automaton.guard_names[mode][j]} leads to {to}" for (j, _), to in zip(taken, targets, strict=True)
+    ]
+    return (
+        f"guards of mode {automaton.modes[mode]} ({automaton.name}) come to zero at once and lead apart: "
+        f"{' and '.join(ways)}; give their choices a `when` that says which one is taken, or one target"
+    )

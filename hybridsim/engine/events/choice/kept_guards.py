@@ -1,0 +1,32 @@
+"""Find located guards that a decision at a surface keeps from going negative: they are no events.
+
+A guard on the velocity of a contact comes to zero with it, by the motion before. Where the contact then sticks, the
+guard stays at zero; where an impact throws the motion back, it only touches zero.
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from hybridsim.engine.events.choice.verdict import LEAVES
+from hybridsim.engine.events.corner_sides import take_corners
+from hybridsim.engine.events.jumps.impact import strike
+
+if TYPE_CHECKING:
+    from hybridsim.engine.events.resolve import Settling
+
+
+def kept(settling: Settling, automata: set[int], surfaces: set[int]) -> set[int]:
+    """The automata whose located guards would not fire if the surfaces were decided first."""
+    ahead = copy(settling)
+    ahead.at = replace(settling.at, z=settling.at.z.copy())
+    ahead.fired, ahead.on_surface = settling.fired.copy(), settling.on_surface.copy()
+    ahead.sides, ahead.orders = settling.sides.copy(), settling.orders.copy()
+    ahead.changes, ahead.warnings, ahead.series = [], [], {}
+    open_ = set(surfaces)
+    if strike(ahead, open_) or ahead.decide(open_):
+        return set()
+    take_corners(ahead)
+    return {c for c in automata if ahead.verdict(ahead.at.z, [c]) != LEAVES}

@@ -1,0 +1,222 @@
+"""Where switching surfaces meet: whether one motion alone is admissible, and whether the surfaces keep it.
+
+On k surfaces at once ds/dt = a + B u with u in [-1, 1]^k. Where all principal minors of -B are positive (a P-matrix),
+one choice of u, among the corners, edges and the inside of that cube, is consistent whatever a is (Cottle, Pang and
+Stone, The Linear Complementarity Problem, SIAM, 2009, doi:10.1137/1.9780898719000). On two surfaces the motion is then
+drawn to where they meet: a turn around it shrinks by ((B12 + B11)**2 - a1**2)/((B12 - B11)**2 - a1**2) times the same
+of the other; surfaces to which all fields point (nodal attractivity) are among these. On more of them it is the one
+that slides, though others may spiral about it. Where -B is no such matrix, a motion that slides along several surfaces
+is one of many.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.engine.events.choice.verdict import FINE
+from hybridsim.engine.events.fatal_guards import said_by_every_mode
+from hybridsim.engine.series.bounded import UNIT
+from hybridsim.model.meanings import Meanings
+
+if TYPE_CHECKING:
+    from hybridsim.engine.events.resolve import Settling
+
+_SAME = 64.0 * UNIT  # two series of one motion differ by the rounding of a few operations
+
+
+def rivals(
+    settling: Settling, members: list[int], candidates: np.ndarray, verdicts: np.ndarray
+) -> np.ndarray:
+    """The admissible joint candidates, where they differ in the mode of a switching surface and in the motion.
+
+    None where they do not. A relay that is just strong enough has one motion in two modes: it may slide, or be on the
+    side that moves no more.
+    """
+    unique = [k for k, c in enumerate(members) if settling.system.automata[c].is_unique]
+    if not unique:
+        return candidates[:0]
+    fine = candidates[verdicts == FINE]
+    if len(np.unique(fine[:, unique], axis=0)) < 2 or is_one_motion(settling, members, fine):
+        return fine[:0]
+    return fine
+
+
+def is_one_motion(settling: Settling, members: list[int], candidates: np.ndarray) -> bool:
+    """Whether the states go on alike in all of these modes, as those of a body at rest between two that slip."""
+    motions = [settling.series_of(settling.with_modes(members, modes)).states for modes in candidates]
+    if not np.isfinite(motions).all():
+        return False
+    sizes = np.abs(motions).max(axis=0)
+    return all((np.abs(other - motions[0]) <= _SAME * sizes).all() for other in motions[1:])
+
+
+def can_hold(settling: Settling, members: list[int], z: np.ndarray) -> bool:
+    """Whether what the modes z hold has values: a speed at rest and a relay that acts on it are not held together."""
+    automata = settling.system.automata
+    if sum(automata[c].has_surface and z[c] == automata[c].hold for c in members) < 2:
+        return True
+    numbers = settling.system.guards_of(z)[members]
+    return bool(np.isfinite(settling.series_of(z).guards[numbers[numbers >= 0], 0]).all())
+
+
+def on_its_side(settling: Settling, members: list[int], candidates: np.ndarray) -> int:
+    """The number of the first of these modes that stay on their sides of all surfaces to the last bit; 0 if none does.
+
+    A body at rest may slip either way to rounding; what holds it there leaves it a speed, or a rate, of some sign.
+    """
+    system, at = settling.system, settling.at
+    for number, modes in enumerate(candidates):
+        z = settling.with_modes(members, modes)
+        x = system.project(at.s, at.x, at.p, z)
+        series = settling.series_of(z, x).surfaces
+        values = np.where(series[:, 0] == 0.0, series[:, 1], series[:, 0])
+        sides = [
+            int(z[c] == system.automata[c].above) - int(z[c] == system.automata[c].below)
+            for c in system.surface_of
+        ]
+        if (np.sign(values) * sides >= 0.0).all():
+            return number
+    return 0
+
+
+def keeps_nothing(settling: Settling, members: list[int], z: np.ndarray) -> str:
+    """Why a motion that slides along several surfaces may not be the only one; empty where it is."""
+    automata = settling.system.automata
+    sliding = [c for c in members if automata[c].is_unique and z[c] == automata[c].hold]
+    if len(sliding) < 2:
+        return ""
+    pull = _pull(settling, sliding, z)
+    if not np.isfinite(pull).all():
+        return ""  # nothing follows from it: the run says what is no number
+    # one whose rate no relay moves is held by the surface of its rate (hybridsim.engine.lowering.second_order)
+    moved = np.flatnonzero(pull.any(axis=1))
+    sliding, pull = [sliding[i] for i in moved], pull[np.ix_(moved, moved)]
+    for size in range(1, len(sliding) + 1):
+        for chosen in combinations(range(len(sliding)), size):
+            block = pull[np.ix_(chosen, chosen)]
+            largest = float(np.prod(np.abs(block).sum(axis=1)))  # no minor is above this
+            if not np.linalg.det(block) > 8.0 * size * UNIT * largest:
+                names = " and ".join(automata[sliding[i]].name for i in chosen)
+                return (
+                    f"the surfaces {names} do not keep a motion that slides along both: it is one of many"
+                    if size > 1
+                    else f"the surface {names} does not attract where others are slid along"
+                )
+    return ""
+
+
+def _pull(settling: Settling, sliding: list[int], z: np.ndarray) -> np.ndarray:
+    """-B: by how much the rate of each surface falls from one side of each to the other."""
+    automata, order = settling.system.automata, settling.system.surface_of
+    rows = [order.index(c) for c in sliding]
+    found = np.empty((len(sliding), len(sliding)))
+    trial = z.copy()
+    trial[sliding] = [automata[c].above for c in sliding]
+    for j, c in enumerate(sliding):
+        rates = []
+        for side in (automata[c].below, automata[c].above):
+            other = trial.copy()
+            other[c] = side
+            series: Any = settling.series_of(other)
+            rates.append(series.surfaces[rows, 1])
+        with np.errstate(invalid="ignore"):  # of two that are infinite
+            found[:, j] = 0.5 * rates[0] - 0.5 * rates[1]  # halved first, so that no difference is too large
+    return found
+
+
+def refused(settling: Settling, members: list[int], message: str) -> tuple[str, str]:
+    """Status and message where no joint candidate is admissible, with what is to be known of switching surfaces."""
+    system = settling.system
+    if said := said_by_every_mode(system, members, settling.sides):
+        return "inconsistent", said
+    unique = [c for c in members if system.automata[c].is_unique]
+    slow = [c for c in unique if c not in system.pins and c not in system.projected]
+    if slow:
+        names = ", ".join(system.automata[c].name for c in slow)
+        return "inconsistent", (
+            f"{message}; {names} acts on higher derivatives of its switching function alone, so that sliding along it "
+            "is of a higher order, which is not followed"
+        )
+    pull = np.diag(_pull(settling, unique, np.maximum(settling.at.z, 0))) if unique else np.ones(0)
+    if (pull < 0.0).any():
+        names = ", ".join(system.automata[c].name for c, own in zip(unique, pull, strict=True) if own < 0.0)
+        return "nonunique", (
+            f"{message}; {names} drives the motion away from its surface: it may spiral away in as many ways as there "
+            "are directions"
+        )
+    return "inconsistent", message
+
+
+def words_on_cascade(settling: Settling) -> str:
+    """What to do about transitions that follow each other without end, where that can be told; else empty."""
+    for words in (_words_on_opposed_modes, _words_on_negative_guard, _words_on_drift):
+        if found := words(settling):
+            return found
+    return ""
+
+
+def _words_on_drift(settling: Settling) -> str:
+    """Of a guard that is a little below zero where a transition leads back to its mode."""
+    system, last = settling.system, settling.changes[-2:]
+    if len(last) < 2 or last[0].component != last[1].component or last[0].source != last[1].target:
+        return ""
+    automaton = system.automata[last[0].component]
+    for change in last:
+        if change.guard not in automaton.guard_names[change.source]:
+            continue
+        number = automaton.guards[change.source][automaton.guard_names[change.source].index(change.guard)]
+        z = settling.with_modes([change.component], np.array([change.source]))
+        value = float(settling.series_of(z).guards[number, 0])
+        if value < 0.0:
+            return (
+                f". Guard {change.guard} is {value:.6g} where a transition leads to {automaton.modes[change.source]}: "
+                "if it should be zero there, the states have drifted by the errors of the integrator; let that "
+                "transition set what the guard depends on, or take a smaller rtol"
+            )
+    return ""
+
+
+def _words_on_negative_guard(settling: Settling) -> str:
+    """Of a guard that is below zero after its own transition."""
+    if not settling.changes:
+        return ""
+    change, system = settling.changes[-1], settling.system
+    automaton, mode = system.automata[change.component], int(settling.at.z[change.component])
+    if change.guard not in automaton.guard_names[mode]:
+        return ""
+    number = automaton.guards[mode][automaton.guard_names[mode].index(change.guard)]
+    value = float(settling.series_of(np.maximum(settling.at.z, 0)).guards[number, 0])
+    if not value < 0.0:
+        return ""
+    return (
+        f". Guard {change.guard} is {value:.6g} in {automaton.modes[mode]} before and after: a guard is positive while "
+        "its mode lasts; turn its sign around, or let its transition change what it depends on"
+    )
+
+
+def _words_on_opposed_modes(settling: Settling) -> str:
+    """Of two modes of an automaton that push against each other across one surface."""
+    model, last = settling.system.model, settling.changes[-2:]
+    if len(last) < 2 or last[0].component != last[1].component or last[0].source != last[1].target:
+        return ""
+    component = model.all_components()[last[0].component]
+    meanings = Meanings(model)
+    guards = [
+        guard
+        for change in last
+        for guard in component.modes[change.source].guards
+        if guard.name == change.guard
+    ]
+    if component.surface or len(guards) != 2:
+        return ""
+    (one, sign), (other, opposite) = (meanings.family(guard.expr.tree) for guard in guards)
+    if one != other or sign != -opposite:
+        return ""
+    names = " and ".join(component.modes[change.source].name for change in last)
+    return (
+        f". Modes {names} push against each other across one surface: the motion slides along it if it is declared as "
+        f'one, [surfaces.NAME] expr = "{guards[0].expr.text}", NAME being +1 on one side and -1 on the other'
+    )

@@ -1,0 +1,83 @@
+"""Which joint candidates have a cause, and whether the one that is taken is the only one where that may fail.
+
+Static friction above kinetic friction makes several combinations admissible: where one contact lets go, the force on
+another changes by a jump. A contact that is below its limit has no cause to let go unless the others leave it none, as
+in `hybridsim.mechanics.series_loop.decision`. Friction that a reaction loads may have several admissible motions by
+itself (P. Painleve, C. R. Acad. Sci. Paris 121 (1895) 112): no rule prefers one of them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridsim.engine.events.choice.candidates import all_verdicts
+from hybridsim.engine.events.choice.surface_intersection import is_one_motion
+from hybridsim.engine.events.choice.verdict import FINE
+
+if TYPE_CHECKING:
+    from hybridsim.engine.events.resolve import Settling
+
+# Components at their surfaces whose other outcomes are all looked at; of more, 3^4 verdicts would be too slow.
+MAX_JOINT_COMPONENTS = 4
+
+
+def with_cause(settling: Settling, members: list[int], candidates: np.ndarray) -> np.ndarray:
+    """Mask of the candidates in which friction that holds, and is certainly below its limits, goes on to hold."""
+    system, at = settling.system, settling.at
+    automata, modes = system.automata, np.maximum(at.z, 0)
+    holding = [
+        k
+        for k, c in enumerate(members)
+        if at.z[c] in (-1, automata[c].hold) and not (automata[c].is_unilateral or automata[c].is_unique)
+    ]
+    mask = np.ones(len(candidates), dtype=np.bool_)
+    if not holding or len(members) == 1:
+        return mask
+    begun = [members[k] for k in holding]
+    modes[begun] = [
+        automata[c].hold for c in begun
+    ]  # at a start, too, a contact on its surface rests if it can
+    series = settling.series_of(modes)
+    values, bounds = series.guards[:, 0], series.guard_bounds[:, 0]
+    for k in holding:
+        c = members[k]
+        guards = list(automata[c].guards[automata[c].hold])
+        if (values[guards] > bounds[guards]).all():
+            mask &= candidates[:, k] == automata[c].hold
+    return mask
+
+
+def other_outcomes(
+    settling: Settling,
+    members: list[int],
+    candidates: np.ndarray,
+    number: int,
+    open_: set[int],
+    cluster: tuple[int, ...],
+) -> np.ndarray:
+    """Admissible candidates with another motion than the one that is taken, where friction is loaded by a reaction.
+
+    Contacts whose mode goes on as it was are not asked about: the present mode stays if it is admissible.
+    """
+    system, at, taken = settling.system, settling.at, candidates[number]
+    automata = system.automata
+    if all(automata[c].is_unilateral for c in cluster):
+        return candidates[:0]
+    landed = {one.component for one in settling.changes if one.guard == "gap"}
+    asked = [
+        k
+        for k, c in enumerate(members)
+        if automata[c].is_unilateral and c in open_ and (at.z[c] < 0 or c in landed or at.z[c] != taken[k])
+    ]
+    if not asked:
+        return candidates[:0]
+    if len(members) > MAX_JOINT_COMPONENTS:
+        names = ", ".join(automata[c].name for c in members)
+        settling.warnings.append(f"{names} were decided together: uniqueness was not examined")
+        return candidates[:0]
+    others = candidates[(candidates[:, asked] != taken[asked]).any(axis=1)]
+    fine = others[all_verdicts(settling, members, others, cluster) == FINE]
+    apart = [one for one in fine if not is_one_motion(settling, members, np.array([taken, one]))]
+    return np.array(apart, dtype=np.int64).reshape(-1, len(members))

@@ -1,0 +1,188 @@
+"""The event decisions, as pure functions of arrays: they call no model code and know no tolerance.
+
+Each guard comes as Taylor coefficients along the flow of a candidate mode, with running error bounds, and with
+the number of leading coefficients that are zero by decree (the set Z of the event contract). A compiled loop
+and the Python driver share these functions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.native.kernels import inlined, kernel
+
+FINE, UNDECIDED, LEAVES = 1, 0, -1  # verdicts on a guard or a candidate
+NONUNIQUE, NONE = -1, -2  # outcomes of a choice that names no candidate
+
+
+@inlined
+def side_after(series: Any, bounds: Any, decreed: int) -> tuple[int, int]:
+    """Sign of a guard just after the instant, and the order that decides it.
+
+    The first coefficient that is beyond its bound decides; those before `decreed` are zero whatever rounding
+    made of them. (0, number of coefficients) where none is beyond its bound, or one before it is no number: the
+    logarithm of a negative number has a slope.
+    """
+    for k in range(decreed, series.shape[0]):
+        if math.isnan(series[k]):
+            break
+        if series[k] > bounds[k]:
+            return 1, k
+        if series[k] < -bounds[k]:
+            return -1, k
+    return 0, series.shape[0]
+
+
+@kernel
+def side_before(series: Any, bounds: Any, decreed: int) -> tuple[int, int]:
+    """Sign of a guard just before the instant: odd orders count with the opposite sign."""
+    side, order = side_after(series, bounds, decreed)
+    if order % 2 == 1:
+        side = -side
+    return side, order
+
+
+@inlined
+def open_question(series: Any, bounds: Any, decreed: int) -> bool:
+    """Whether a guard without a side is a question of rounding (and not zero identically)."""
+    for k in range(decreed, series.shape[0]):
+        if series[k] != 0.0 or bounds[k] != 0.0:
+            return True
+    return False
+
+
+@inlined
+def verdict_with(verdict: int, series: Any, bounds: Any, decreed: int, side: int) -> int:
+    """A candidate's verdict so far, and with one more guard, whose side just after is known."""
+    if side < 0:
+        return LEAVES
+    if side == 0 and verdict == FINE and open_question(series, bounds, decreed):
+        return UNDECIDED
+    return verdict
+
+
+@inlined
+def judge(
+    series: Any, bounds: Any, decreed: Any, active: Any, backward: bool, sides: Any, orders: Any
+) -> int:
+    """Judge the guards of one candidate: LEAVES if any goes negative, UNDECIDED if any is open, else FINE.
+
+    series, bounds (guards, orders); decreed, active, sides, orders (guards,). The sides and orders found are
+    written for the root search that follows.
+    """
+    verdict = FINE
+    for g in range(series.shape[0]):
+        if not active[g]:
+            sides[g], orders[g] = 1, 0
+            continue
+        if backward:
+            side, order = side_before(series[g], bounds[g], decreed[g])
+        else:
+            side, order = side_after(series[g], bounds[g], decreed[g])
+        sides[g], orders[g] = side, order
+        verdict = verdict_with(verdict, series[g], bounds[g], decreed[g], side)
+    return verdict
+
+
+@inlined
+def preference(modes: Any, current: Any, holds: Any, n: int) -> int:
+    """Rank of a joint candidate of n components: most keep their mode, and then most hold; n*(n + 1) if all keep it."""
+    kept, held = 0, 0
+    for i in range(n):
+        kept += modes[i] == current[i]
+        held += modes[i] == holds[i]
+    return held + (n + 1) * kept
+
+
+@inlined
+def choose(modes: Any, verdicts: Any, current: Any, holds: Any) -> int:
+    """Choose among joint candidates: rows of `modes`, one column for each component of the cluster.
+
+    The current modes stay if admissible (undecided counts: what is open keeps its mode); else, among the
+    certainly admissible, those of the highest `preference`; a tie is NONUNIQUE. Candidates that are merely undecided
+    are taken only where none is certain. NONE if there is none at all.
+    """
+    best, best_score, ties = -1, -1, 0
+    n = modes.shape[1]
+    for c in range(modes.shape[0]):
+        if verdicts[c] == LEAVES:
+            continue
+        rank = preference(modes[c], current, holds, n)
+        if rank >= n * (n + 1):
+            return c
+        score = rank + (n + 1) * (n + 1) * (verdicts[c] == FINE)
+        if score > best_score:
+            best, best_score, ties = c, score, 0
+        elif score == best_score:
+            ties += 1
+    if best < 0:
+        return NONE
+    return NONUNIQUE if ties > 0 else best
+
+
+@inlined
+def decreed_zeros(
+    is_first: bool, is_on: bool, is_holding: bool, is_smooth: bool, is_fired: bool, is_gap: bool
+) -> int:
+    """How many leading coefficients of a guard of a candidate mode the event decrees to be zero.
+
+    is_first: the first guard of a mode beside a surface is that surface. is_on: the surface is zero; is_holding: the
+    candidate holds it; is_smooth: the component is released from it and all unknowns stay as they were, so that the
+    surface starts with a zero rate as well. is_gap: the surface is a gap, which is on where its rate is zero too: one
+    more of each. is_fired: the guard was located at zero, its mode goes on, and it is still
+    what was located: `is_decreed`.
+    """
+    if is_first and is_on and not is_holding:
+        return (2 if is_smooth else 1) + (1 if is_gap else 0)
+    return 1 if is_fired else 0
+
+
+@inlined
+def is_decreed(is_holding: bool, continuous: bool) -> bool:
+    """Whether a guard that was located at zero is zero in a candidate in which its mode goes on.
+
+    Those of a holding mode are limits of its unknown, which the jump of another unknown may have taken off the limit.
+    """
+    return continuous or not is_holding
+
+
+@kernel
+def decree_orders(
+    guards_of: Any,
+    holding: Any,
+    on_surface: Any,
+    released: Any,
+    continuous: bool,
+    fired: Any,
+    gaps: Any,
+    decreed: Any,
+) -> None:
+    """Count the leading zeros that the event decrees for the guards of one candidate; see `decreed_zeros`.
+
+    guards_of (components, widest): active guard numbers, -1 where none; holding[c]: component c holds its surface
+    in this candidate; on_surface[c]: its surface is zero; released[c]: c leaves its holding mode here;
+    continuous: every change of this candidate leaves the unknowns as they were; fired[g]: guard g was located at zero
+    and its mode goes on; gaps[c]: the surface of c is a gap.
+    """
+    for c in range(guards_of.shape[0]):
+        for j in range(guards_of.shape[1]):
+            g = guards_of[c, j]
+            if g >= 0:
+                smooth, at_zero = released[c] and continuous, fired[g] and is_decreed(holding[c], continuous)
+                decreed[g] = decreed_zeros(j == 0, on_surface[c], holding[c], smooth, at_zero, gaps[c])
+
+
+def joint_candidates(sizes: Iterable[int]) -> np.ndarray:
+    """All combinations of modes of a cluster, one row each; not to be written to."""
+    return _joint(tuple(sizes))
+
+
+@cache
+def _joint(sizes: tuple[int, ...]) -> np.ndarray:
+    grid = np.indices(sizes).reshape(len(sizes), -1).T
+    return np.ascontiguousarray(grid, dtype=np.int64)

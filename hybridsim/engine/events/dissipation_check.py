@@ -1,0 +1,43 @@
+"""A contact whose force drives its own relative velocity instead of opposing it: a sign slip, refused."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
+from hybridsim.errors import ModelError
+
+_MOST = 64  # starts that a system remembers to have been looked at
+
+
+def refuse_driving(system: System, t0: float, x: np.ndarray, discrete: np.ndarray, z: np.ndarray) -> None:
+    """Refuse a contact whose force pushes its own relative velocity on instead of opposing it."""
+    start = (t0, x.tobytes(), discrete.tobytes(), z.tobytes())
+    if start in system.opposed:
+        return
+    try:
+        effects = system.effects(0.0, x, system.vector(Instant(t0), discrete), np.maximum(z, 0))
+    except (ZeroDivisionError, ValueError, OverflowError):
+        return  # not a number at the start: the run itself says where
+    for c, effect in effects.items():
+        automaton = system.automata[c]
+        if automaton.is_unilateral:
+            if effect <= 0.0:
+                raise ModelError(
+                    f"impact {automaton.name}: the force {automaton.name} pulls its gap shut instead of pushing it "
+                    f"open (its effect on the second derivative is {effect:.6g}, and should be positive)",
+                    place=system.model.all_components()[c].place,
+                    remedy=f"turn the sign of {automaton.name} in the rates round, or that of the gap",
+                )
+        elif effect >= 0.0 and not system.automata[c].is_unique:
+            name = system.automata[c].name
+            place = system.model.all_components()[c].place
+            raise ModelError(
+                f"contact {name}: the force {name} acts along its relative velocity, not against it "
+                f"(its effect on the relative acceleration is {effect:.6g}, and should be negative)",
+                place=place,
+                remedy=f"let {name} enter the derivative of the velocity as '- {name}', or turn the velocity round",
+            )
+    if len(system.opposed) < _MOST:
+        system.opposed.add(start)

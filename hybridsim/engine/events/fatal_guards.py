@@ -1,0 +1,50 @@
+"""What guards say whose zero ends a run, where the model has no mode to go to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridsim.engine.system.system import System
+
+if TYPE_CHECKING:
+    from hybridsim.engine.events.outcome import Outcome
+
+
+def said_by_leaving(system: System, z: np.ndarray, leaving: Iterable[int], sides: np.ndarray) -> str | None:
+    """By the first of the components that leave their modes through such a guard."""
+    for c in leaving:
+        automaton, mode = system.automata[c], int(z[c])
+        for guard, message in zip(automaton.guards[mode], automaton.fatal[mode]):
+            if message and sides[guard] < 0:
+                return message
+    return None
+
+
+def is_only_fatal(system: System, outcome: Outcome) -> bool:
+    """Whether an instant could not be settled because of such a guard alone."""
+    messages = (message for a in system.automata for row in a.fatal for message in row)
+    return bool(outcome.status) and any(message and message == outcome.message for message in messages)
+
+
+def said_by_located(system: System, z: np.ndarray, located: Iterable[int]) -> str | None:
+    """By one that was located at zero, in the modes z before: where nothing is admissible, it says why."""
+    for automaton, mode in zip(system.automata, z.tolist()):
+        if mode >= 0:
+            for guard, message in zip(automaton.guards[mode], automaton.fatal[mode]):
+                if message and guard in located:
+                    return message
+    return None
+
+
+def said_by_every_mode(system: System, components: Iterable[int], sides: np.ndarray) -> str | None:
+    """By the first of the components that has such a guard, just negative, in each of its modes."""
+    for c in components:
+        automaton = system.automata[c]
+        modes = zip(automaton.guards, automaton.fatal)
+        found = [[m for g, m in zip(*mode) if m and sides[g] < 0] for mode in modes]
+        if all(found):
+            return str(found[0][0])
+    return None

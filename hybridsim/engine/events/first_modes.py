@@ -1,0 +1,121 @@
+"""Which modes hold before surfaces are decided: those in which resets read a start, automata that leave in any case."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.engine.events.choice.verdict import side_after, side_before
+from hybridsim.engine.events.corner_sides import sides_along
+from hybridsim.engine.series.bounded import ORDER
+from hybridsim.model.meanings import Meanings
+from hybridsim.model.smoothing.one_sided import names_of
+
+if TYPE_CHECKING:
+    from hybridsim.engine.events.outcome import Situation
+    from hybridsim.engine.events.resolve import Settling
+    from hybridsim.engine.system.system import System
+
+
+_MOST_FLOWS = 3**4  # combinations of modes that are looked at; each costs a series
+
+
+def as_given(system: System, at: Situation, jumped: bool = False) -> Situation:
+    """A situation with the modes and the run-time vector in which conditions and resets read the state as it is.
+
+    At a start some components have no mode yet. They are read on the side of their surface on which the state is, and
+    as holding where it rests there. There, and where a reset or a belt has jumped, none is evaluated from a surface.
+    """
+    is_start = (at.z < 0).any()
+    if not (is_start or jumped):
+        return at
+    z, p = at.z.copy(), at.p.copy()
+    p[system.layout.pin_at] = 0.0
+    if not is_start:
+        return replace(at, p=p)
+    series: Any = system.series(at.s, at.x, p, np.maximum(z, 0), at.x_error, at.s_error, at.is_put)
+    for k, c in enumerate(system.surface_of):
+        if z[c] >= 0:
+            continue
+        automaton = system.automata[c]
+        value, rate = series.surfaces[k, :2]
+        is_off, is_moving = np.abs((value, rate)) > series.surface_bounds[k, :2]
+        if is_off and not automaton.is_unilateral:
+            z[c] = automaton.above if value > 0.0 else automaton.below
+        elif is_off or (is_moving and automaton.is_unilateral):
+            z[c] = automaton.above
+        else:
+            z[c] = automaton.hold
+    return replace(at, z=z, p=p)
+
+
+def certainly_leaving(settling: Settling) -> set[int]:
+    """Automata with a guard that is negative just after, whatever is decided at the surfaces that are at zero.
+
+    Their guards have the sides that this is known of. Where these surfaces have too many combinations of modes, the
+    values alone of guards that no force enters are known.
+    """
+    system = settling.system
+    owners = [c for c in settling.scope if not (system.has_surface[c] or c in system.led)]
+    if not owners:
+        return set()
+    z, on = _resting(settling)
+    modes = [range(len(system.automata[c].modes)) for c in on]
+    if math.prod(map(len, modes)) > _MOST_FLOWS:
+        free = system.code.shared("guards without forces", lambda: _without_forces(system))
+        negative = {g for g in _negative(settling, owners, z, order=0) if free[g][z[system.owner[g]]]}
+    else:
+        negative = set()
+        for number, chosen in enumerate(product(*modes)):
+            z[on] = chosen
+            found = _negative(settling, owners, sides_along(settling, z, settling.at.x)[0])
+            negative = negative & found if number else found
+            if not negative:
+                return set()
+    for g in range(system.guard_count):
+        if system.owner[g] in owners:
+            settling.sides[g] = -1 if g in negative else 1
+    return {int(system.owner[g]) for g in negative}
+
+
+def _resting(settling: Settling) -> tuple[np.ndarray, list[int]]:
+    """The modes, each surface that is off zero in that of its side; and the components whose surfaces are at zero."""
+    at, system = settling.at, settling.system
+    p = at.p.copy()
+    p[system.layout.pin_at] = 0.0
+    z = np.maximum(at.z, 0)
+    series: Any = system.series(at.s, at.x, p, z, at.x_error, at.s_error, at.is_put)
+    values, bounds = series.surfaces[:, 0], series.surface_bounds[:, 0]
+    on = []
+    for k, c in enumerate(system.surface_of):
+        automaton = system.automata[c]
+        if abs(values[k]) <= bounds[k]:
+            on.append(c)
+        elif values[k] > 0.0 or not automaton.is_unilateral:
+            z[c] = automaton.above if values[k] > 0.0 else automaton.below
+    return z, on
+
+
+def _negative(settling: Settling, owners: list[int], z: np.ndarray, order: int = ORDER) -> set[int]:
+    """The guards of some components that are negative just after in the modes z, by coefficients up to an order."""
+    series = settling.series_of(z)
+    side_of = side_after if settling.forward else side_before
+    numbers = [g for c in owners for g in settling.system.automata[c].guards[z[c]]]
+    found = ((g, side_of(series.guards[g], series.guard_bounds[g], 0)) for g in numbers)
+    return {g for g, (side, place) in found if side < 0 and place <= order}
+
+
+def _without_forces(system: System) -> list[list[bool]]:
+    """For each guard number and mode of its component whether no force of a surface enters the guard there."""
+    meanings, components = Meanings(system.model), system.model.all_components()
+    found: list[list[bool]] = [[] for _ in range(system.guard_count)]
+    for automaton, component in zip(system.automata, components, strict=True):
+        for guards, mode in zip(automaton.guards, component.modes, strict=True):
+            for g in {g for numbers in automaton.guards for g in numbers}:
+                own = [guard for number, guard in zip(guards, mode.guards, strict=True) if number == g]
+                found[g].append(all(not names_of(guard.expr.tree) & meanings.forced for guard in own))
+    return found

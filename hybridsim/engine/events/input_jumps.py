@@ -1,0 +1,56 @@
+"""Whether a jump of an input or a corner carries a surface away from where it was: what held on it holds no longer.
+
+A closed gap has its rate as well: a floor that changes its speed at once strikes what lies on it, or leaves it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from hybridsim.engine.events.outcome import Situation
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import Series, System
+
+_JOINED = 3.0  # ulps within which times are due together: `hybridsim.engine.system.timetable`
+
+
+def surfaces_jump(system: System, instant: Instant, at: Situation, forward: bool) -> bool:
+    """Whether surfaces, or rates of closed gaps, differ beyond rounding before and after the inputs' pieces change.
+
+    Times that are due within rounding come together, at the last of them. The pieces before are those before them all.
+    """
+    if not (system.signals and system.surface_of):
+        return False
+    joined = _JOINED * math.ulp(max(abs(float(instant)), math.ulp(1.0)))
+    earlier = instant.plus(-joined if forward else joined)
+    before = system.vector(earlier, system.discrete(at.p), not forward)
+    z = np.maximum(at.z, 0)
+    return _differ(system, at, ((before, z), (at.p.copy(), z)), joined)
+
+
+def gaps_jump(system: System, at: Situation, before: np.ndarray, after: np.ndarray) -> bool:
+    """Whether the rates of closed gaps differ beyond rounding between the sides of corners."""
+    closed = any(
+        system.automata[c].is_unilateral and at.z[c] == system.automata[c].hold for c in system.surface_of
+    )
+    return closed and _differ(system, at, ((at.p.copy(), before), (at.p.copy(), after)))
+
+
+def _differ(
+    system: System, at: Situation, sides: Sequence[tuple[np.ndarray, np.ndarray]], s_error: float = 0.0
+) -> bool:
+    """Whether surfaces or rates of closed gaps differ between two vectors and modes, the states as they are."""
+    values, bounds = [], []
+    for p, z in sides:
+        p[system.layout.pin_at] = 0.0
+        series = system.series(at.s, at.x, p, z, np.zeros(system.n), s_error)
+        assert isinstance(series, Series)  # models with surfaces are made from expressions
+        values.append(series.surfaces[:, :2])
+        bounds.append(series.surface_bounds[:, :2])
+    apart = np.abs(values[1] - values[0]) > bounds[0] + bounds[1]
+    automata = [system.automata[c] for c in system.surface_of]
+    held = [a.is_unilateral and at.z[c] == a.hold for c, a in zip(system.surface_of, automata, strict=True)]
+    return bool(apart[:, 0].any() or apart[held, 1].any())

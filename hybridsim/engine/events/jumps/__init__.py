@@ -1,0 +1,1 @@
+"""This folder computes how states jump at an event: impulses of impacts, and resets."""

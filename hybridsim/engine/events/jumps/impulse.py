@@ -1,0 +1,176 @@
+"""The impact law as a pure function: impulses of contacts struck together, from rates before to rates after.
+
+Of the contacts that take part, some are normal (their rates are those of gaps) and the others tangential:
+
+    u+ = u- + G P
+    normal      0 <= P_i,   u+_i >= e_i max(-u-_i, 0),   and one of the two with equality
+    tangential  -down_i . P <= P_i <= up_i . P,   P_i at the upper end where u+_i > 0, at the lower where u+_i < 0
+
+A friction impulse counts as positive where it opposes a positive velocity, as the force does.
+
+Energy. With p = (P, -P_t) the work of the impulses is p . (u- + u+)/2. For normal impulses it is the sum of
+-(1 - e_i)/2 P_i |u-_i|; for friction without rebound (e = 0) it is -p . G p/2 or less; with friction and rebound
+together it may be positive (Kane's paradox). Then the impulses are taken on the straight way
+from those without rebound to those of the law, as far as no energy is gained: admissible impulses form a convex set, so
+these are admissible too.
+
+Sources: J. J. Moreau, in Nonsmooth Mechanics and Applications (Springer, 1988) 1, doi:10.1007/978-3-7091-2624-0_1;
+C. Glocker, Multibody Syst. Dyn. 29 (2013) 77, doi:10.1007/s11044-012-9316-9, on the energy.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from hybridsim.engine.series.bounded import UNIT
+
+MOST = 3**8  # combinations of contacts that push or do not, that slip or stick
+_OPERATIONS = 64.0  # roundings in a number of the solution, at most, per contact
+_OFF, _ON, _FORWARD, _BACKWARD = range(4)
+
+
+@dataclass(frozen=True)
+class Blow:
+    """Contacts of which one is struck, normal ones first.
+
+    Parameters
+    ----------
+    effects : G (m, m).
+    before : u- (m,), zero where it is known to be.
+    restitution : e (k,) of the k normal ones.
+    up, down : friction at the upper and the lower end for a unit of each normal impulse, (m - k, k).
+    """
+
+    effects: np.ndarray
+    before: np.ndarray
+    restitution: np.ndarray
+    up: np.ndarray
+    down: np.ndarray
+
+    @property
+    def normal(self) -> int:
+        """How many are normal."""
+        return len(self.restitution)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Impulses P (m,), rates after them (m,) with bounds, and which rates are exactly zero by the law."""
+
+    impulses: np.ndarray
+    after: np.ndarray
+    bounds: np.ndarray
+    zero: np.ndarray
+    reduced: bool = False  # there would have been a gain of energy
+
+
+def count(blow: Blow) -> int:
+    """The combinations to be tried."""
+    return 2**blow.normal * 3 ** (len(blow.before) - blow.normal)
+
+
+def answers(blow: Blow) -> list[Answer]:
+    """All the answers of the law that differ in the motion; one where contacts are independent and without friction."""
+    rebound = blow.restitution * np.maximum(-blow.before[: blow.normal], 0.0)
+    found = _answers(blow, rebound)
+    if len(found) != 1 or not _gains(blow, found[0].impulses) or not rebound.any():
+        return found
+    dead = _answers(blow, np.zeros(blow.normal))
+    return [_between(blow, dead[0], found[0])] if len(dead) == 1 else dead
+
+
+def energy(blow: Blow, impulses: np.ndarray) -> tuple[float, float]:
+    """Work of the impulses, and a bound of its rounding error."""
+    n = blow.normal
+    sign = np.where(np.arange(len(impulses)) < n, 1.0, -1.0)
+    p, metric = sign * impulses, blow.effects * sign
+    change = metric @ p
+    terms = np.abs(p) @ (np.abs(blow.before) + 0.5 * np.abs(metric) @ np.abs(p))
+    return float(p @ (blow.before + 0.5 * change)), float(_rounding(blow) * terms)
+
+
+def _gains(blow: Blow, impulses: np.ndarray) -> bool:
+    work, bound = energy(blow, impulses)
+    return work > bound
+
+
+def _rounding(blow: Blow) -> float:
+    return _OPERATIONS * len(blow.before) * UNIT
+
+
+def _answers(blow: Blow, rebound: np.ndarray) -> list[Answer]:
+    """All combinations at once: of each the impulses, and whether the law admits them."""
+    m, n = len(blow.before), blow.normal
+    state = _combinations(blow)
+    matrix, right = np.tile(np.eye(m), (len(state), 1, 1)), np.zeros((len(state), m))
+    on = state == _ON
+    rows, members = np.nonzero(on)
+    matrix[rows, members] = blow.effects[members]
+    right[:, :n] = np.where(on[:, :n], rebound - blow.before[:n], 0.0)
+    right[:, n:] = np.where(on[:, n:], -blow.before[n:], 0.0)
+    for slips, ends in ((_FORWARD, -blow.up), (_BACKWARD, blow.down)):
+        rows, members = np.nonzero(state == slips)
+        matrix[rows, members, :n] = ends[members - n]
+    regular = np.linalg.det(matrix) != 0.0
+    state, on, matrix, right = state[regular], on[regular], matrix[regular], right[regular]
+    inverse = np.linalg.inv(matrix)
+    impulses = np.where(state == _OFF, 0.0, np.einsum("sij,sj->si", inverse, right))
+    unit, sizes = _rounding(blow), np.abs(impulses)
+    off = unit * np.einsum("sij,sjk,sk->si", np.abs(inverse), np.abs(matrix), sizes)
+    impulses[:, :n] = np.where(sizes[:, :n] <= off[:, :n], 0.0, impulses[:, :n])
+    after = blow.before + impulses @ blow.effects.T
+    bounds = unit * (np.abs(blow.before) + sizes @ np.abs(blow.effects).T) + off @ np.abs(blow.effects).T
+    after, bounds = np.where(on, 0.0, after), np.where(on, 0.0, bounds)
+    after[:, :n] = np.where(on[:, :n], rebound, after[:, :n])
+    normal, tangential = impulses[:, :n], impulses[:, n:]
+    most, least = normal @ blow.up.T + off[:, n:], -(normal @ blow.down.T) - off[:, n:]
+    admitted = (normal >= 0.0).all(axis=1) & (after[:, :n] >= rebound - bounds[:, :n]).all(axis=1)
+    admitted &= (~on[:, n:] | ((tangential <= most) & (tangential >= least))).all(axis=1)
+    admitted &= ((state != _FORWARD) | (after >= -bounds)).all(axis=1)
+    admitted &= ((state != _BACKWARD) | (after <= bounds)).all(axis=1)
+    found: list[Answer] = []
+    for k in np.flatnonzero(admitted):
+        zero = on[k] & (after[k] == 0.0)
+        zero[:n] |= np.abs(after[k, :n]) <= bounds[k, :n]
+        one = Answer(impulses[k], np.where(zero, 0.0, after[k]), bounds[k], zero)
+        if not any(_same(one, other) for other in found):
+            found.append(one)
+    return found
+
+
+def _combinations(blow: Blow) -> np.ndarray:
+    """What each contact does, one row each: those that push most come first, and then those that stick."""
+    found = []
+    for normal in product((_ON, _OFF), repeat=blow.normal):
+        pushed = np.array(normal) == _ON
+        loaded = (blow.up[:, pushed] != 0.0).any(axis=1) | (blow.down[:, pushed] != 0.0).any(axis=1)
+        ways = [(_ON, _FORWARD, _BACKWARD) if is_loaded else (_OFF,) for is_loaded in loaded]
+        found += [(*normal, *tangential) for tangential in product(*ways)]
+    return np.array(found, dtype=np.int64)
+
+
+def _same(one: Answer, other: Answer) -> bool:
+    return bool((np.abs(one.after - other.after) <= one.bounds + other.bounds).all())
+
+
+def _between(blow: Blow, dead: Answer, lively: Answer) -> Answer:
+    """The last impulses on the way from one answer to the other whose work is not positive.
+
+    The work is quadratic in the way w, not positive at 0 and positive at 1.
+    """
+    start, end = energy(blow, dead.impulses)[0], energy(blow, lively.impulses)[0]
+    middle = energy(blow, 0.5 * (dead.impulses + lively.impulses))[0]
+    start = min(start, 0.0)
+    square = 2.0 * (start + end - 2.0 * middle)
+    linear = end - start - square
+    root = math.sqrt(max(linear * linear - 4.0 * square * start, 0.0))
+    way = -2.0 * start / (linear + root) if linear + root > 0.0 else 0.0
+    way = min(max(way, 0.0), 1.0) * (1.0 - _rounding(blow))
+    impulses = dead.impulses + way * (lively.impulses - dead.impulses)
+    after = dead.after + way * (lively.after - dead.after)
+    zero = dead.zero & (lively.zero | (way == 0.0))
+    return Answer(impulses, np.where(zero, 0.0, after), dead.bounds + lively.bounds, zero, reduced=True)

@@ -1,0 +1,200 @@
+"""The resets of one instant together: all read the state before; those that add are summed, those that set must agree.
+
+Each new value carries the bound of its error: of what it was made from, and of its own evaluation.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.engine.events.diagnosis import reset_in_words
+from hybridsim.engine.lowering.reset_keys import added, declared_reset, is_added
+from hybridsim.engine.series.bounded import UNIT
+from hybridsim.engine.series.dual_numbers import differentiated, values_and_slopes, with_slopes
+from hybridsim.expr import FunctionExpression, has_rounded_number, rounding_of
+from hybridsim.expr.walk import NoValue
+from hybridsim.model.smoothing.one_sided import names_of
+
+if TYPE_CHECKING:
+    from types import FunctionType
+
+    from hybridsim.engine.events.outcome import Situation
+    from hybridsim.engine.system.system import System
+    from hybridsim.model.parts.model import Model
+
+Key = tuple[Any, ...]
+
+
+@dataclass
+class _Changes:
+    """What the resets of one instant do to one variable: values that are set and amounts that are added."""
+
+    set: list[tuple[Key, float, float]] = field(
+        default_factory=list
+    )  # the reset, the value, the bound of its error
+    added: list[tuple[Key, float, float]] = field(default_factory=list)
+
+
+def merged_resets(
+    system: System,
+    at: Situation,
+    keys: list[Key],
+    x_plus: np.ndarray,
+    p_plus: np.ndarray,
+    x_error: np.ndarray,
+) -> str:
+    """Write what all resets of one instant make of the state; a message where they contradict each other."""
+    changes: dict[str, _Changes] = {}
+    for key in keys:
+        if key not in system.resets:
+            continue
+        amounts = set(system.resets[added(key)][1]) if added(key) in system.resets else set()
+        for part, names in ((key, set(system.resets[key][1]) - amounts), (added(key), amounts)):
+            if not names:
+                continue
+            values, errors = _evaluated(system, at, part)
+            for name in names:
+                place = _place(system, name)
+                if not np.isfinite(values[place]):
+                    state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(system.names, at.x, strict=True))
+                    return f"{reset_in_words(system, key)} sets {name} to no finite number, at {state}"
+                one = changes.setdefault(name, _Changes())
+                (one.set if part is key else one.added).append(
+                    (key, float(values[place]), float(errors[place]))
+                )
+    n, discrete = system.n, system.layout.discrete_at
+    for name, one in changes.items():
+        if clash := _contradiction(system, name, one):
+            return clash
+        place = _place(system, name)
+        if one.set:
+            # those that agree within their bounds: the best known, whatever the order
+            _, value, error = min(one.set, key=lambda c: (c[2], c[1]))
+        else:
+            before, known = (at.x[place], x_error[place]) if place < n else (at.p[discrete + place - n], 0.0)
+            value = math.fsum([before, *(amount for _, amount, _ in one.added)])
+            error = math.fsum([known, *(e for _, _, e in one.added)]) + UNIT * abs(value)
+        if place < n:
+            x_plus[place], x_error[place] = value, error
+        else:
+            p_plus[discrete + place - n] = value
+    return ""
+
+
+def _contradiction(system: System, name: str, one: _Changes) -> str:
+    """Why the changes of one variable at one instant do not go together; empty where they do."""
+    keys = [key for key, _, _ in (*one.set, *one.added)]
+    if len(keys) < 2 or not one.set:
+        return ""
+    remedy = f'; to add at one instant whatever the order, write {name} = "+= amount"'
+    words = " and ".join(dict.fromkeys(reset_in_words(system, key) for key in keys))
+    if one.added:
+        return f"at one instant {words} set {name} and add to it: which comes first is not declared{remedy}"
+    if any(_reads(system.model, key, name) for key in keys):
+        return f"{words} change {name} at one instant, and one of them reads the {name} that it sets{remedy}"
+    (_, low, low_error), *_, (_, high, high_error) = sorted(one.set, key=lambda c: c[1])
+    if high - low > low_error + high_error:
+        return f"two resets at one instant set {name} to {low!r} and to {high!r} ({words}){remedy}"
+    return ""
+
+
+def _place(system: System, name: str) -> int:
+    """Place of a variable among the states and then the discrete states."""
+    if name in system.names:
+        return system.names.index(name)
+    return system.n + [d.name for d in system.model.discrete].index(name)
+
+
+def _reads(model: Model, key: Key, name: str) -> bool:
+    """Whether a reset reads the variable that it sets, by whatever definitions and variables of modes."""
+    value = declared_reset(model, key)[name]
+    if isinstance(value, FunctionExpression):
+        return False  # nobody can look into it
+    behind = {n: [e.tree] for n, e in model.definitions}
+    for component in model.all_components():
+        for mode in component.modes:
+            for n, e in mode.set.items():
+                behind.setdefault(n, []).append(e.tree)
+    seen: set[str] = set()
+    open_ = [value.tree]
+    while open_:
+        for one in names_of(open_.pop()) - seen:
+            seen.add(one)
+            open_ += behind.get(one, [])
+    return name in seen
+
+
+def _evaluated(system: System, at: Situation, key: Key) -> tuple[np.ndarray, np.ndarray]:
+    """What one reset gives to the states and discrete states, with bounds of the errors.
+
+    To first order, from the errors of all that it reads; each is at least its own roundoff.
+    """
+    x, p = at.x.copy(), at.p.copy()
+    system.apply_reset(key, at.s, at.x, at.p, at.z, x, p)
+    values = np.concatenate([x, p[system.layout.discrete_slice]])
+    if not np.isfinite(values).all():
+        return values, UNIT * np.abs(values)
+    x_error = np.maximum(at.x_error, UNIT * np.abs(at.x))
+    errors = np.array([*x_error, *(UNIT * np.abs(at.p)), at.s_error])
+    slopes = _slopes(system, at, key, errors) if system.has_tape else None
+    if slopes is None:
+        slopes = _differences(system, at, key, errors)
+    return values, np.abs(slopes) @ errors + UNIT * np.abs(values) + _of_numbers(system, at, key)
+
+
+def _of_numbers(system: System, at: Situation, key: Key) -> np.ndarray:
+    """What the numbers written in a reset add to the errors of states; nothing where it reads definitions."""
+    found = np.zeros(system.n + len(system.model.discrete))
+    values = dict(zip(system.names, at.x.tolist(), strict=True))
+    discrete = at.p[system.layout.discrete_slice].tolist()
+    values |= {
+        d.name: value for d, value in zip(system.model.discrete, discrete, strict=True)
+    } | system.values
+    declared = declared_reset(system.model, key[1:] if is_added(key) else key)
+    for name, value in declared.items():
+        if name not in system.names or isinstance(value, FunctionExpression) or not has_rounded_number(value):
+            continue
+        if names_of(value.tree) <= values.keys():
+            try:
+                found[_place(system, name)] = rounding_of(value, values, values.keys())
+            except NoValue:
+                continue
+    return found
+
+
+def _slopes(system: System, at: Situation, key: Key, errors: np.ndarray) -> np.ndarray | None:
+    """Derivatives of what a reset of expressions gives, by all that it reads; None where they have no value."""
+    n, size = system.n, len(errors)
+    seeds = np.eye(size)
+    x, p = with_slopes(at.x, seeds[:n]), with_slopes(at.p, seeds[n:-1])
+    out: list[Any] = [*x, *p[system.layout.discrete_slice]]
+    function: FunctionType = system.code.module.reset
+    try:
+        with np.errstate(all="ignore"):
+            differentiated(function)(
+                with_slopes([at.s], seeds[-1:])[0], x, p, np.array([*at.z, system.resets[key][0]]), out
+            )
+    except (ValueError, ArithmeticError):
+        return None
+    slopes = values_and_slopes(out, size)[1]
+    return slopes if np.isfinite(slopes).all() else None
+
+
+def _differences(system: System, at: Situation, key: Key, errors: np.ndarray) -> np.ndarray:
+    """The same by differences over the errors: for functions that are known by their values alone."""
+    n, discrete = system.n, system.layout.discrete_slice
+    columns = []
+    for shift in np.diag(errors):
+        (x, p), (x_on, p_on) = (at.x, at.p), (at.x + shift[:n], at.p + shift[n:-1])
+        results = []
+        for state, vector, s in ((x, p, at.s), (x_on, p_on, at.s + shift[-1])):
+            x_out, p_out = state.copy(), vector.copy()
+            system.apply_reset(key, s, state, vector, at.z, x_out, p_out)
+            results.append(np.concatenate([x_out, p_out[discrete]]))
+        moved, size = results[1] - results[0], float(shift.max(initial=0.0))
+        columns.append(moved / size if size > 0.0 and np.isfinite(moved).all() else np.zeros(len(moved)))
+    return np.array(columns).T

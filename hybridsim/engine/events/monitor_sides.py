@@ -1,0 +1,87 @@
+"""Decide which monitors fire at an instant: those that leave the side of zero that they had before it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.engine.events.choice.verdict import side_after
+
+if TYPE_CHECKING:
+    from hybridsim.engine.events.outcome import Outcome
+    from hybridsim.model.parts.monitor import Monitor
+
+_WANTED = {"up": (1,), "down": (-1,), "both": (1, -1)}
+
+
+@dataclass
+class MonitorSides:
+    """The monitors at one instant, each of which fires there once at most.
+
+    Parameters
+    ----------
+    before : their sides just before it; 0 where they were at zero.
+    leads : the side to which the motion before leads those that are zero there, where it is another one; else 0.
+    is_open : whether rounding hides on which side they are and where they go.
+    fired : those that have fired, with their directions.
+    told : those of them that have been recorded.
+    """
+
+    monitors: Sequence[Monitor]
+    before: np.ndarray
+    leads: np.ndarray
+    is_open: np.ndarray
+    fired: dict[int, int] = field(default_factory=dict)
+    told: set[int] = field(default_factory=set)
+
+    @classmethod
+    def of(cls, monitors: Sequence[Monitor], before: np.ndarray) -> MonitorSides:
+        """Where nothing is known but the sides."""
+        return cls(monitors, before, np.zeros_like(before), np.zeros(len(before), dtype=np.bool_))
+
+    @classmethod
+    def located(
+        cls, monitors: Sequence[Monitor], before: np.ndarray, series: Any, stopping: Sequence[int]
+    ) -> MonitorSides:
+        """By their series just before the instant; stopping: those that were located to change their sides there."""
+        found = cls.of(monitors, before)
+        for k, (value, bound) in enumerate(zip(series.monitors, series.monitor_bounds, strict=True)):
+            if k in stopping:
+                found.leads[k] = -before[k] or side_after(value, bound, 1)[0]
+            elif abs(value[0]) <= bound[0]:
+                side = side_after(value, bound, 1)[0]
+                found.leads[k] = side if side == -before[k] else 0
+                found.is_open[k] = side == 0
+        return found
+
+    def fire(self, outcome: Outcome | None, action: str = "") -> list[int]:
+        """Those of an action, or of any, that fire by what holds after an instant; None: by the motion before it.
+
+        The motion before tells as well where nothing holds after it.
+        """
+        known = outcome is not None and not outcome.status
+        due = []
+        for k, monitor in enumerate(self.monitors):
+            if k in self.fired or action not in ("", monitor.action):
+                continue
+            way = self._left(k, outcome) if outcome is not None and known else int(self.leads[k])
+            if way in _WANTED[monitor.direction]:
+                self.fired[k] = way
+                due.append(k)
+        return due
+
+    def _left(self, k: int, outcome: Outcome) -> int:
+        """In which direction a monitor has left its side: to the other one, or to zero, at which it stays."""
+        before, after = int(self.before[k]), int(outcome.monitor_sides[k])
+        if after == before or (after == 0 and (self.is_open[k] or math.isnan(outcome.monitor_floors[k]))):
+            return 0
+        return -before
+
+    def keep_open(self, outcome: Outcome) -> None:
+        """Keep the sides of monitors for which rounding hides whether they are at zero."""
+        kept = self.is_open & (outcome.monitor_sides == 0)
+        outcome.monitor_sides[kept] = self.before[kept]

@@ -1,0 +1,506 @@
+"""At an event: transitions, resets and joint decisions, repeated until every mode is admissible just after."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from hybridsim.engine.events.choice.candidates import all_verdicts, verdicts_on
+from hybridsim.engine.events.choice.guards_of_one_target import taken_at_once
+from hybridsim.engine.events.choice.kept_guards import kept
+from hybridsim.engine.events.choice.releases import Releases
+from hybridsim.engine.events.choice.surface_intersection import (
+    can_hold,
+    is_one_motion,
+    keeps_nothing,
+    on_its_side,
+    refused,
+    rivals,
+    words_on_cascade,
+)
+from hybridsim.engine.events.choice.uniqueness import other_outcomes, with_cause
+from hybridsim.engine.events.choice.verdict import (
+    LEAVES,
+    NONE,
+    NONUNIQUE,
+    UNDECIDED,
+    choose,
+    decree_orders,
+    joint_candidates,
+    judge,
+    side_after,
+)
+from hybridsim.engine.events.corner_sides import sides_along, take_corners
+from hybridsim.engine.events.corner_start import at_zero, cross, past_zero
+from hybridsim.engine.events.diagnosis import rates_without_value
+from hybridsim.engine.events.fatal_guards import said_by_leaving, said_by_located
+from hybridsim.engine.events.first_modes import as_given, certainly_leaving
+from hybridsim.engine.events.jumps.impact import strike
+from hybridsim.engine.events.jumps.resets import merged_resets
+from hybridsim.engine.events.outcome import Change, Outcome, Situation
+from hybridsim.engine.events.rest_at_stops import together, with_tied
+from hybridsim.engine.series.bounded import ORDER, UNIT
+from hybridsim.engine.system.finite_differences import DifferenceSeries
+from hybridsim.engine.system.system import Series, System
+
+# A legitimate cascade passes each component a few times; what has not come to rest after this many rounds for each
+# mode of the model goes round in circles.
+_ROUNDS_PER_MODE = 8
+_SEVERAL = "several motions are admissible"
+_MOST_CANDIDATES = 3**8  # a cluster of more components needs a complementarity solver, not enumeration
+
+
+class Settling:
+    """One event being settled."""
+
+    is_thorough = False  # judges all candidates, also those that no choice needs
+
+    def __init__(
+        self,
+        system: System,
+        at: Situation,
+        before: np.ndarray,
+        forward: bool,
+        scope: Iterable[int] | None = None,
+        inputs: np.ndarray | None = None,
+    ) -> None:
+        self.system = system
+        # a run-time vector of before, which the first conditions and resets read
+        self.inputs = inputs
+        # the components that are decided here; a method with rules of its own for surfaces leaves those out
+        self.scope = set(range(len(system.automata))) if scope is None else set(scope)
+        self.at = at
+        self.forward = forward
+        self.fired = np.zeros(system.guard_count, dtype=np.bool_)
+        self.on_surface = np.zeros(len(system.automata), dtype=np.bool_)
+        self.changes: list[Change] = []
+        self.warnings: list[str] = []
+        self.jumped = False  # a reset or a jump of an unknown: the field does not go on smoothly
+        self.rounds = 0
+        self.most_rounds = _ROUNDS_PER_MODE * (1 + sum(len(a.modes) for a in system.automata))
+        self.is_kinked = False  # a corner has changed its side: the field goes on, its slope does not
+        # guards in the order in which they came to zero
+        self.rank: dict[int, int] = {}
+        self.releases = Releases(system, before)
+        self.sides = np.ones(system.guard_count, dtype=np.int64)
+        self.orders = np.zeros(system.guard_count, dtype=np.int64)
+        # the series at hand by modes, and what they are the series at: arrays that are replaced, never written to
+        self.series: dict[bytes, Series | DifferenceSeries] = {}
+        self.behind: tuple[object, ...] = (None,) * 4
+
+    # -- the rounds -----------------------------------------------------------------------------------------
+
+    def run(self, fired: Iterable[int] | Mapping[int, int], resets: Iterable[tuple[object, ...]]) -> Outcome:
+        """Settle `fired` guards, located at zero (with the order of their times), and resets that are due, by key."""
+        located = {int(g) for g in fired}
+        lost = said_by_located(self.system, self.at.z, located)
+        self.rank = dict(fired) if isinstance(fired, Mapping) else {int(g): k for k, g in enumerate(fired)}
+        self.fired[list(located)] = True
+        self.releases.locate(located)
+        surfaces = self._surface_components()
+        open_ = self._past_corners({c for c, _, _ in self._fired_guards()})
+        at_surfaces, leaving = self._at_surfaces(open_ & surfaces), open_ - surfaces
+        if leaving and at_surfaces:
+            leaving -= kept(self, leaving, at_surfaces)
+        failure = self._transitions(leaving, list(resets)) or self._first_modes(surfaces)
+        if failure:
+            return self._stop(*failure)
+        open_ = at_surfaces
+        if surfaces and (self.jumped or (self.at.z < 0).any()):
+            self.take_sides(open_)
+        while self._begins_round():
+            failure = strike(self, open_) or self.decide(open_)
+            if failure:
+                return self._stop(*(("inconsistent", lost) if lost else failure))
+            take_corners(self)
+            verdicts = self._judge_all()
+            leaving = {c for c, v in verdicts.items() if v == LEAVES}
+            for c, v in verdicts.items():
+                if v == UNDECIDED:
+                    self._note_undecided(c)
+            if not leaving:
+                return self._done()
+            fatal = said_by_leaving(self.system, self.at.z, leaving, self.sides)
+            if fatal:
+                return self._stop("inconsistent", fatal)
+            failure = self._transitions(leaving - surfaces - set(self.system.led), [])
+            failure = failure or self._first_modes(surfaces)
+            if failure:
+                return self._stop(*failure)
+            open_ = leaving & surfaces
+            if surfaces and self.jumped:
+                self.take_sides(open_)
+        return self._stop(*self._cascade())
+
+    def _begins_round(self) -> bool:
+        """Count a round of transitions or decisions; False where no more of them are allowed at one instant."""
+        self.rounds += 1
+        return self.rounds <= self.most_rounds
+
+    def _cascade(self) -> tuple[str, str]:
+        """Status and message where transitions follow each other without end."""
+        names = ", ".join(
+            f"{a.name}: {a.modes[m]}" for a, m in zip(self.system.automata, self.at.z, strict=True)
+        )
+        guards = ", ".join(
+            sorted({f"{self.system.automata[c.component].name}.{c.guard}" for c in self.changes[-8:]})
+        )
+        return (
+            "cascade",
+            f"transitions follow each other over and over, {self.most_rounds} rounds without rest ({names}); "
+            f"guards that fire: {guards}{words_on_cascade(self)}",
+        )
+
+    def _past_corners(self, open_: set[int]) -> set[int]:
+        """Let corners take their sides first; return the other components whose guards fire on these sides as well.
+
+        What was located by a series past a corner, such as a zero of a guard that turns back there, does not.
+        """
+        others = open_.difference(self.system.led)
+        if not take_corners(self):
+            return others
+        decreed = self._decreed(self.at.z, continuous=False)
+        staying = set()
+        for c in others - self._surface_components():
+            if self._judge(self.at.z, self.at.x, decreed, [c]) != LEAVES:
+                staying.add(c)
+                self.fired[list(self.system.automata[c].guards[self.at.z[c]])] = False
+        return others - staying
+
+    def _first_modes(self, surfaces: set[int]) -> tuple[str, str] | None:
+        """Corners take the sides of a state that has changed; automata leave modes that no decision could keep.
+
+        A contact that is decided in the mode of an automaton that lasts for no time would go on by what held then.
+        """
+        take_corners(self)
+        if not surfaces or not (self.jumped or (self.at.z < 0).any()):
+            return None
+        while leaving := certainly_leaving(self):
+            failure = self._transitions(leaving, []) if self._begins_round() else self._cascade()
+            if failure:
+                return failure
+            take_corners(self)
+        return None
+
+    def take_sides(self, open_: set[int]) -> None:
+        """Give every surface component the mode of the side it is on.
+
+        open_: those to be decided on their surfaces. What a reset has moved off its surface leaves them, and what has
+        come to its surface joins them.
+        """
+        at, system = self.at, self.system
+        free = at.p.copy()
+        free[system.layout.pin_at] = 0.0  # the states as they are, not as a holding mode would have them
+        series = system.series(at.s, at.x, free, np.maximum(at.z, 0), at.x_error, at.s_error, at.is_put)
+        for k, c in enumerate(system.surface_of):
+            automaton, value = system.automata[c], series.surfaces[k, 0]
+            if abs(value) <= series.surface_bounds[k, 0]:
+                if at.z[c] in (-1, automaton.hold) or self.on_surface[c] or automaton.is_unique:
+                    open_.add(c)
+                continue
+            if value < 0.0 and automaton.is_unilateral:
+                open_.add(c)
+                continue
+            open_.discard(c)
+            self.on_surface[c] = False
+            side = automaton.above if value > 0.0 else automaton.below
+            self.fired[automaton.guards[side][0]] = False  # it was located at its surface, before the reset
+            if at.z[c] not in (-1, side):
+                self.changes.append(Change(c, "reset", int(at.z[c]), side, at.x, at.x))
+            at.z[c] = side
+
+    def _surface_components(self) -> set[int]:
+        return {c for c, a in enumerate(self.system.automata) if a.has_surface and c in self.scope}
+
+    def _at_surfaces(self, components: set[int]) -> set[int]:
+        """Those that what fired puts onto their surfaces: a guard on the load of one that slips says nothing of it."""
+        fired = {(c, j) for c, j, _ in self._fired_guards()}
+        holds = [self.system.automata[c].hold for c in range(len(self.at.z))]
+        return {
+            c for c in components if self.at.z[c] == holds[c] or (c, 0) in fired
+        }  # the first is the surface's
+
+    def _fired_guards(self) -> list[tuple[int, int, int]]:
+        """(component, index in its mode, number) of the located guards."""
+        table = self.system.guards_of(self.at.z)
+        return [
+            (c, j, int(g))
+            for c, row in enumerate(table)
+            for j, g in enumerate(row)
+            if g >= 0 and self.fired[g]
+        ]
+
+    def series_of(self, z: np.ndarray, x: np.ndarray | None = None) -> Series | DifferenceSeries:
+        """Series along the flow of the modes z, at the state as it is now or at another."""
+        at = self.at
+        x = at.x if x is None else x
+        behind = (at.s, x, at.p, at.x_error)
+        if not all(a is b for a, b in zip(behind, self.behind, strict=True)):
+            self.behind, self.series = behind, {}
+        key = z.tobytes()
+        if key not in self.series:
+            self.series[key] = self.system.series(at.s, x, at.p, z, at.x_error, at.s_error, at.is_put)
+        return self.series[key]
+
+    def _judge(self, z: np.ndarray, x: np.ndarray, decreed: np.ndarray, components: Iterable[int]) -> int:
+        """Verdict on the guards of some components in the candidate z."""
+        series = self.series_of(z, x)
+        active = np.zeros(self.system.guard_count, dtype=np.bool_)
+        table = self.system.guards_of(z)
+        for c in components:
+            active[table[c][table[c] >= 0]] = True
+        sides, orders = np.empty_like(self.sides), np.empty_like(self.orders)
+        verdict = judge(series.guards, series.guard_bounds, decreed, active, not self.forward, sides, orders)
+        self.sides[active], self.orders[active] = sides[active], orders[active]
+        return int(verdict)
+
+    def _judge_all(self) -> dict[int, int]:
+        decreed = self._decreed(self.at.z, self._continuous(self.at.z, range(len(self.system.automata))))
+        return {c: self._judge(self.at.z, self.at.x, decreed, [c]) for c in sorted(self.scope)}
+
+    def _note_undecided(self, component: int) -> None:
+        automaton = self.system.automata[component]
+        if automaton.is_corner:
+            return  # either side will do
+        mode = automaton.modes[self.at.z[component]]
+        self.warnings.append(f"undecided at rounding: {automaton.name} keeps mode {mode}")
+
+    # -- transitions by declared choices --------------------------------------------------------------------
+
+    def _transitions(self, components: set[int], resets: list[tuple[object, ...]]) -> tuple[str, str] | None:
+        """Take the declared choices of some components and apply resets, everything evaluated at x-."""
+        at, system = self.at, self.system
+        x_plus, p_plus, z_plus = at.x.copy(), at.p.copy(), at.z.copy()
+        x_error = at.x_error.copy()
+        taken: list[tuple[int, str, int, int]] = []
+        given = as_given(system, at, self.jumped)
+        if self.inputs is not None:
+            given, self.inputs = replace(given, p=self.inputs), None
+        for c in sorted(components, key=lambda c: (self._place(c), c)):
+            automaton, mode = system.automata[c], int(at.z[c])
+            guards = automaton.guards[mode]
+            leaving = [j for j, g in enumerate(guards) if self.fired[g] or self.sides[g] < 0]
+            leaving.sort(key=lambda j: (self.rank.get(guards[j], len(self.rank)), j))
+            choices, failure = taken_at_once(self, given, c, leaving)
+            if failure:
+                return failure
+            for j, number in choices:
+                z_plus[c] = automaton.targets[mode][j][number]
+                resets.append(("choice", c, mode, j, number))
+                taken.append((c, automaton.guard_names[mode][j], mode, int(z_plus[c])))
+            self.fired[list(guards)] = False
+            for g in guards:  # modes share the numbers of their guards, and the next mode's were not located
+                self.rank.pop(g, None)
+        if resets:
+            self.fired[system.is_corner[system.owner]] = False
+        clash = merged_resets(system, given, resets, x_plus, p_plus, x_error)
+        if clash:
+            return "inconsistent", clash
+        at.is_put = at.is_put or not np.array_equal(x_plus, at.x)
+        self.changes += [Change(c, n, m, t, at.x, x_plus) for c, n, m, t in taken]
+        self.jumped = self.jumped or bool(taken) or bool(resets)
+        at.x, at.p, at.z, at.x_error = x_plus, p_plus, z_plus, x_error
+        return None
+
+    def _place(self, component: int) -> int:
+        """When the first of a component's guards came to zero, as a place in the order of all."""
+        numbers = self.system.automata[component].guards[self.at.z[component]]
+        return min((self.rank.get(g, len(self.rank)) for g in numbers), default=len(self.rank))
+
+    # -- decisions by admissibility at surfaces -------------------------------------------------------------
+
+    def decide(self, open_: set[int]) -> tuple[str, str] | None:
+        """Decide the clusters in which a component is open: it fired, leaves, or has no mode yet."""
+        for cluster in self.system.clusters:
+            if open_ & set(cluster):
+                failure = self._decide_cluster(cluster, open_)
+                if failure and failure[0] == "inconsistent" and (first := past_zero(self, cluster) - open_):
+                    cross(self, first)
+                    failure = self._decide_cluster(cluster, open_)
+                if failure and failure[0] == "inconsistent" and (more := at_zero(self, cluster) - open_):
+                    failure = self._decide_cluster(cluster, open_ | more)
+                if failure:
+                    return failure
+        return None
+
+    def _decide_cluster(self, cluster: tuple[int, ...], open_: set[int]) -> tuple[str, str] | None:
+        at, automata = self.at, self.system.automata
+        taking_part = with_tied(
+            self.system, [c for c in cluster if c in open_ or at.z[c] == automata[c].hold]
+        )
+        for c in taking_part:
+            self.on_surface[c] = True
+        sizes = [len(automata[c].modes) for c in taking_part]
+        if math.prod(sizes) > _MOST_CANDIDATES:
+            names = ", ".join(automata[c].name for c in taking_part)
+            return "inconsistent", f"{len(sizes)} coupled components at their surfaces at once ({names})"
+        candidates = together(self.system, taking_part, joint_candidates(sizes))
+        at.x = self._pinned(taking_part)
+        at.x_error = np.where(self.pinned_states(taking_part), UNIT * np.abs(at.x), at.x_error)
+        holds = np.array([automata[c].hold for c in taking_part])
+        caused = candidates[with_cause(self, taking_part, candidates)]
+        current = self._current(taking_part, holds)
+        verdicts, is_whole = verdicts_on(self, taking_part, caused, current, holds, cluster)
+        if len(caused) < len(candidates) and (verdicts == LEAVES).all():
+            verdicts, is_whole = verdicts_on(self, taking_part, candidates, current, holds, cluster)
+        else:
+            candidates = caused
+        rival = rivals(self, taking_part, candidates, verdicts)
+        if len(rival):
+            return f"{'' if self.forward else 'backward-'}nonunique", self._say(taking_part, rival, _SEVERAL)
+        number = int(choose(candidates, verdicts, current, holds))
+        if number == NONUNIQUE:
+            verdicts = verdicts if is_whole else all_verdicts(self, taking_part, candidates, cluster)
+            left = np.flatnonzero(verdicts != LEAVES)
+            if not is_one_motion(self, taking_part, candidates[left]):
+                return self._several(taking_part, candidates[left])
+            number = int(left[on_its_side(self, taking_part, candidates[left])])
+        if number == NONE:
+            return refused(self, taking_part, self._say(taking_part, candidates, "no motion is admissible"))
+        others = other_outcomes(self, taking_part, candidates, number, open_, cluster)
+        if len(others):
+            return "nonunique", self._say(taking_part, np.vstack([candidates[number], others]), _SEVERAL)
+        source, x_minus = at.z.copy(), at.x.copy()
+        if reason := keeps_nothing(self, taking_part, self.with_modes(taking_part, candidates[number])):
+            return "nonunique", self._say(taking_part, candidates[number : number + 1], reason)
+        fired = [(c, j) for c, j, _ in self._fired_guards() if source[c] >= 0]
+        guards = {c: automata[c].guard_names[source[c]][j] for c, j in fired}
+        for c, mode in zip(taking_part, candidates[number], strict=True):
+            at.z[c] = mode
+            if source[c] != mode:
+                for g in automata[c].guards[source[c]] if source[c] >= 0 else ():
+                    self.fired[g] = False
+                if source[c] >= 0:
+                    self.changes.append(
+                        Change(c, guards.get(c, ""), int(source[c]), int(mode), x_minus, at.x)
+                    )
+        return None
+
+    def _current(self, components: list[int], holds: np.ndarray) -> np.ndarray:
+        """The modes that stay if nothing speaks against them: at a start on its surface, a contact rests.
+
+        So static friction holds what is at its limit as far as rounding tells.
+        """
+        modes = self.at.z[components]
+        begins = [modes[k] < 0 and not self.system.automata[c].is_unique for k, c in enumerate(components)]
+        return np.where(begins, holds, modes)
+
+    def _several(self, components: list[int], candidates: np.ndarray) -> tuple[str, str]:
+        """Status and message where no joint candidate is preferred: from a rate without a value nothing follows."""
+        at = self.at
+        for modes in candidates:
+            lost = rates_without_value(self.system, at.s, at.x, at.p, self.with_modes(components, modes))
+            if lost:
+                return "step-failure", lost
+        return "nonunique", self._say(components, candidates, _SEVERAL)
+
+    def pinned_states(self, components: list[int]) -> np.ndarray:
+        mask = np.zeros(self.system.n, dtype=np.bool_)
+        mask[[i for c in components for i in self.system.pins.get(c, ())]] = True
+        return mask
+
+    def _pinned(self, components: list[int]) -> np.ndarray:
+        """x with the surfaces of these components exactly zero."""
+        z = np.maximum(self.at.z, 0)
+        for c in components:
+            z[c] = self.system.automata[c].hold
+        return self.system.project(self.at.s, self.at.x, self.at.p, z)
+
+    def with_modes(self, components: list[int], modes: np.ndarray) -> np.ndarray:
+        """Replace the modes of some components; corners take the sides that hold along that motion."""
+        z = self.at.z.copy()
+        z[components] = modes
+        return sides_along(self, np.maximum(z, 0), self.at.x)[0] if self.system.led else np.maximum(z, 0)
+
+    def verdict(self, z: np.ndarray, components: Iterable[int]) -> int:
+        """Whether the guards of some components admit the modes z just after the event."""
+        components = list(components)
+        decreed = self._decreed(z, self._continuous(z, components))
+        found = self._judge(z, self.at.x, decreed, components)
+        return LEAVES if found == UNDECIDED and not can_hold(self, components, z) else found
+
+    def _continuous(self, z: np.ndarray, components: Iterable[int]) -> bool:
+        """Whether every change so far leaves all unknowns as they were."""
+        return not self.jumped and self.releases.leave_unknowns(self.at, z, components)
+
+    def _decreed(self, z: np.ndarray, continuous: bool) -> np.ndarray:
+        system = self.system
+        modes = zip(system.automata, z, strict=True)
+        holding = np.array([a.has_surface and m == a.hold for a, m in modes], dtype=np.bool_)
+        released = np.array([self.releases.has(c, z) for c in range(len(z))], dtype=np.bool_)
+        decreed = np.zeros(system.guard_count, dtype=np.int64)
+        fired = self.fired & (z == self.at.z)[system.owner]
+        decree_orders(
+            system.guards_of(z),
+            holding,
+            self.on_surface,
+            released,
+            continuous,
+            fired,
+            system.is_unilateral,
+            decreed,
+        )
+        return decreed
+
+    def _say(self, components: list[int], candidates: np.ndarray, what: str) -> str:
+        automata = self.system.automata
+        rows = [
+            ", ".join(
+                f"{automata[c].name}: {automata[c].modes[m]}" for c, m in zip(components, row, strict=True)
+            )
+            for row in candidates
+        ]
+        state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.system.names, self.at.x, strict=True))
+        return f"{what} at {state}: {'; or '.join(rows)}"
+
+    # -- results --------------------------------------------------------------------------------------------
+
+    def _done(self) -> Outcome:
+        at = self.at
+        series = self.series_of(np.maximum(at.z, 0), at.x)
+        found = [side_after(v, e, 0) for v, e in zip(series.monitors, series.monitor_bounds, strict=True)]
+        monitor_sides = np.array([f[0] for f in found], dtype=np.int64)
+        monitor_orders = np.array([f[1] for f in found], dtype=np.int64)
+        if not self.forward:
+            monitor_sides = np.where(monitor_orders % 2 == 1, -monitor_sides, monitor_sides)
+        return Outcome(
+            at.x,
+            at.p,
+            at.z,
+            self.sides,
+            np.where(self.orders > ORDER, 0, self.orders),
+            monitor_sides,
+            np.where(monitor_orders > ORDER, 0, monitor_orders),
+            at.x_error,
+            np.where(self.orders > 0, series.guard_bounds[:, 0], 0.0),
+            np.where(monitor_orders > 0, series.monitor_bounds[:, 0], 0.0),
+            self.changes,
+            not self.is_kinked and self._continuous(at.z, range(len(self.system.automata))),
+            "",
+            "",
+            self.warnings,
+        )
+
+    def _stop(self, status: str, message: str) -> Outcome:
+        at = self.at
+        none = np.zeros(len(self.system.monitor_names), dtype=np.int64)
+        return Outcome(
+            at.x,
+            at.p,
+            at.z,
+            self.sides,
+            self.orders,
+            none,
+            none,
+            at.x_error,
+            np.zeros(self.system.guard_count),
+            np.zeros(len(none)),
+            self.changes,
+            False,
+            status,
+            message,
+            self.warnings,
+        )

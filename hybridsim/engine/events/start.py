@@ -1,0 +1,81 @@
+"""How a run starts: the modes and states that hold just after its first instant."""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from hybridsim.engine.events.outcome import Outcome, Situation
+from hybridsim.engine.events.resolve import Settling
+from hybridsim.engine.record.trajectory import Task
+from hybridsim.engine.series.bounded import UNIT
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
+from hybridsim.expr import rounding_of
+
+_CLOSE = 1e-9  # of the largest state: by how much a surface may be missed where a mode is said to be on it
+_MOST = 64  # starts that a system remembers: runs that differ in method, tolerance or span often begin alike
+
+
+def settled_start(system: System, task: Task, origin: Instant, due: tuple[int, ...]) -> Outcome:
+    """What holds just after the start of the run, the schedules due then applied."""
+    key = task.beginning
+    known = system.starts.get(key)
+    if known is None:
+        p = system.vector(origin, task.discrete, task.forward)
+        at = Situation(0.0, task.x0.copy(), p, task.z0.copy(), start_errors(system, task.x0), 0.0, True)
+        resets = [("schedule", k) for k in due]
+        known = Settling(system, at, task.z0.copy(), task.forward).run((), resets)
+        # a corner has no side to change before it has found one
+        known.changes = [change for change in known.changes if not system.is_corner[change.component]]
+        known.warnings = [*known.warnings, *_contradictions(system, task, p, known.z)]
+        if len(system.starts) >= _MOST:
+            system.starts.clear()
+        system.starts[key] = known
+    return known
+
+
+def start_errors(system: System, x0: np.ndarray) -> np.ndarray:
+    """Bounds of the errors of the states at the start.
+
+    Of an expression that of its evaluation and of the numbers in it. Of any other number its own roundoff, as the value
+    of some expression that nobody knows; whole numbers are exact. The bounds of guards count the roundoff of the
+    numbers in them; those of functions, in which nobody can look for numbers, are as if one of the start's size stood
+    beside it.
+    """
+    rounding = np.where(x0 == np.round(x0), 0.0, UNIT * np.abs(x0))
+    errors, declared = rounding.copy(), system.start_state({})
+    for i, state in enumerate(system.model.states):
+        if x0[i] == declared[i] and not isinstance(state.start.tree, ast.Constant):
+            errors[i] = max(errors[i], rounding_of(state.start, system.values))
+    return errors if system.has_tape else errors + rounding
+
+
+def _contradictions(system: System, task: Task, p: np.ndarray, z: np.ndarray) -> Iterator[str]:
+    """A sentence for each mode that was asked for and that the state at the start rules out."""
+    if not any(task.z0[c] >= 0 for c in system.surface_of):
+        return
+    x, free = task.x0, z.copy()
+    for c in system.surface_of:  # where a surface holds, the state would be looked at as it is put onto it
+        free[c] = system.automata[c].above
+    values = system.rows("surfaces", len(system.surface_of), np.zeros(1), x[None], p, free)[0].tolist()
+    near = _CLOSE * np.abs(x).max(initial=0.0)
+    for c, value in zip(system.surface_of, values, strict=True):
+        automaton, mode = system.automata[c], task.z0[c]
+        if mode < 0:
+            continue
+        told = f"{automaton.name} begins in mode {automaton.modes[mode]}, as it was told to"
+        said = f"{told}, though the state at the start "
+        wanted = {automaton.above: 1.0, automaton.below: -1.0}.get(int(mode), math.nan)
+        if mode == automaton.hold:
+            held = free.copy()
+            held[c] = mode
+            there = system.project(0.0, x, p, held)
+            if (np.abs(there - x) > _CLOSE * np.maximum(np.abs(there), np.abs(x))).any():
+                how = f"has its surface at {value:.6g}" if abs(value) > near else "moves off its surface"
+                yield f"{said}{how}: the state was put onto the surface"
+        elif value * wanted < -near:
+            yield f"{said}has its surface at {value:.6g}, where that mode does not hold"

@@ -1,0 +1,4 @@
+"""This folder recognises events that accumulate, and finds the motion that goes on in their limit.
+
+Start with `accumulation`.
+"""

@@ -1,0 +1,378 @@
+"""Accumulation: events that follow each other ever faster, like the terms of a geometric series.
+
+Each component has its own. The events of one turn may be several, at distances of their own: a motion between two
+relays crosses one from either side. So each interval is held against the one a few before it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybridsim.engine.native.kernels import inlined, kernel
+from hybridsim.engine.record.checkpoint import BEGINNING, Pace
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import Automaton
+
+# So many intervals in a row must shrink by one factor before they count as a series: a transient does not.
+_TERMS = 10
+MOST = 4  # events of one turn
+_SEVERAL = 32  # components among whose events each one is followed
+NOBODY = -1  # as the component of events that are of none: resets of monitors
+_KEPT = _TERMS + 2 * MOST  # intervals
+_AHEAD = 16.0  # times its last intervals a series under way is looked ahead in
+_FEW = 2  # intervals more than two turns after which one may be on its way
+# How well the factor must repeat; a bouncing ball's does to rounding, a friction oscillator's decay does not.
+SAME_FACTOR = 1e-3
+# A series whose intervals shrink by less may as well be a motion that settles, such as an oscillation at resonance.
+CLOSING_IN = 0.995
+# A series that has shrunk by so much may come to where rounding hides its events, and end in a stutter of them.
+_FAR_DOWN = 1e-6
+# Events closer than this many ulps of the time, so many in a row, are one, whatever their factor.
+_ULPS = 16.0
+# A series with so few ulps of the time to go has come to its end: states that rounding moves decide what follows.
+_END = 1024.0
+_NO_INTERVALS = np.empty(0)
+
+
+@inlined
+def _follow(
+    gap: float, now: float, i: int, known: int, longest: float, shortest: float, resolution: float, work: Any
+) -> bool:
+    """Take the i-th interval, which ends now; whether the series may have come to its end. See `may_end`."""
+    before, falls, ended = work[0], work[1], False
+    is_nothing = gap <= max(shortest, _ULPS * 2.0**-52 * abs(now))
+    end = max(resolution, _END * 2.0**-52 * abs(now), _FAR_DOWN * longest)
+    for turn in range(min(i + 1, MOST)):
+        earlier = before[(i - turn - 1) % MOST]
+        is_shorter = gap < (1.0 - 0.5 * SAME_FACTOR) * earlier
+        falls[turn] = falls[turn] + 1.0 if is_shorter or is_nothing else 0.0
+        if falls[turn] >= _TERMS and i >= known:
+            ended = ended or is_nothing or gap * gap <= end * (earlier - gap)
+    before[i % MOST] = gap
+    return ended
+
+
+@inlined
+def _goes_on(work: Any) -> bool:
+    """Whether the last intervals are in a series."""
+    for turn in range(MOST):
+        if work[1, turn] >= _TERMS:
+            return True
+    return False
+
+
+@kernel
+def may_end(
+    gaps: Any,
+    at: Any,
+    is_begun: bool,
+    instants: Any,
+    owners: Any,
+    component: int,
+    shortest: float,
+    resolution: float,
+    work: Any,
+    last: Any,
+) -> tuple[bool, int]:
+    """Whether a series of intervals goes on at the last event, or may have come to its end before; how many there are.
+
+    In a series an interval is shorter than the one a turn before it, or next to nothing, many times in a row. It is not
+    at its end as long as the next interval alone, by the factor of the last ones, is more than what ends it.
+    gaps (k,): intervals up to the instant in `at` (2,), if the series is begun. After it those of the instants (E, 2)
+    follow whose owner (E,) is the component; the last of them is left in `at`. work (2, events of a turn at most) is
+    written to, and last (m,): the last intervals of all, number i in place i % m.
+    """
+    longest, known, ended, i = 0.0, gaps.shape[0], False, 0
+    high, low = at[0], at[1]
+    # the last intervals; falls in a row, for turns of 1, 2, ... events
+    work[0, :], work[1, :] = math.inf, 0.0
+    for e in range(-known, instants.shape[0]):
+        if e < 0:
+            gap = gaps[e + known]
+        elif owners[e] != component:
+            continue
+        else:
+            gap = abs((instants[e, 0] - high) + (instants[e, 1] - low))
+            high, low = instants[e, 0], instants[e, 1]
+            if not is_begun:
+                is_begun = True
+                continue
+        longest = max(longest, gap)
+        ended = _follow(gap, high, i, known, longest, shortest, resolution, work) or ended
+        last[i % last.shape[0]] = gap
+        i += 1
+    at[0], at[1] = high, low
+    return ended or _goes_on(work), i
+
+
+@kernel
+def leads_nowhere(instants: Any, fires: Any, owner: Any, components: int, work: Any) -> bool:
+    """Whether the first events of a run, at instants (E, 2), certainly have no limit, of whatever component they are.
+
+    fires (E,): the guards, owner: of each its component. work (2, events of a turn at most) is written to. Where it is
+    not certain, `Accumulation.limit_of_all` finds out.
+    """
+    count = instants.shape[0]
+    if count <= _TERMS:  # a series has more
+        return True
+    if count <= _KEPT + 1 or components > _SEVERAL:
+        return False
+    for c in range(components):
+        work[0, :], work[1, :] = math.inf, 0.0
+        longest, i, last = 0.0, -1, 0
+        for e in range(count):
+            if owner[fires[e]] != c:
+                continue
+            if i >= 0:
+                gap = abs((instants[e, 0] - instants[last, 0]) + (instants[e, 1] - instants[last, 1]))
+                longest = max(longest, gap)
+                if _follow(gap, instants[e, 0], i, 0, longest, 0.0, 0.0, work):
+                    return False
+            last, i = e, i + 1
+        if _goes_on(work):
+            return False
+    return True
+
+
+def turn_of(gaps: Sequence[float], count: int, same: float) -> tuple[int, float]:
+    """Events of a turn, and the factor by which the last `count` intervals and a turn's shrink; (0, 1) if they do not.
+
+    same : how well the factor must repeat.
+    """
+    for turn in range(1, MOST + 1):
+        terms = count + turn - 1  # of every event of the turn
+        if len(gaps) < terms + turn:
+            break
+        if not gaps[-1] < gaps[-1 - turn] * (1.0 - SAME_FACTOR):
+            continue
+        factor = gaps[-1] / gaps[-1 - turn]
+        pairs = zip(gaps[-terms:], gaps[-terms - turn : -turn], strict=True)
+        if all(abs(b - factor * a) <= same * factor * a for b, a in pairs):
+            return turn, factor
+    return 0, 1.0
+
+
+class Limit(NamedTuple):
+    """Where the events of some components accumulate, and how long the last of them before it took."""
+
+    time: float
+    components: tuple[int, ...]
+    passed: float
+
+
+class Accumulation:
+    """Watches the intervals between events of one run, of each component for itself."""
+
+    def __init__(self, resolution: float = 0.0, shortest: float = 0.0, forward: bool = True) -> None:
+        self._sign = 1.0 if forward else -1.0
+        # a rest of the series shorter than this is the end of it, whatever rounding says
+        self.resolution = resolution
+        self.shortest = shortest  # what the method can tell apart; events that close, many in a row, are one
+        self.paces: dict[int, Pace] = {}
+        self._shrinking: set[int] = set()
+        self._unjudged: set[int] = (
+            set()
+        )  # components of which it is not known yet whether they are among these
+
+    @property
+    def _under_way(self) -> set[int]:
+        """The components whose last intervals shrink by one factor."""
+        for c in self._unjudged:
+            self._judge(c)
+        self._unjudged.clear()
+        return self._shrinking
+
+    def is_under_way(self, now: float) -> bool:
+        """Whether the last intervals of a component shrink by one factor."""
+        for c in sorted(self._under_way):
+            limit, rest = self._ahead(self.paces[c])
+            if self._sign * (now - limit) > rest + _END * math.ulp(now):  # it has broken off
+                self._under_way.discard(c)
+        return bool(self._under_way)
+
+    def is_closing_in(self, now: float) -> bool:
+        """Whether one of these shrinks so fast that its events are to be settled one by one."""
+        return self.is_under_way(now) and any(
+            _next_turn(self.paces[c])[1] < CLOSING_IN for c in self._under_way
+        )
+
+    def reach(self, now: float) -> float:
+        """How far ahead to look: what comes in a series under way is not judged by the roundings of a long run."""
+        if not self.is_under_way(now):
+            return math.inf
+        return min(_AHEAD * max(self.paces[c].intervals[-MOST:]) for c in self._under_way)
+
+    def go_on(self, paces: dict[int, Pace]) -> None:
+        """Take up what was known."""
+        self.paces = dict(paces)
+        self._shrinking, self._unjudged = set(), set(paces)
+
+    def forget(self, components: tuple[int, ...]) -> None:
+        """Begin anew with these: what came before has been dealt with."""
+        for c in components:
+            self.paces.pop(c, None)
+            self._shrinking.discard(c)
+            self._unjudged.discard(c)
+
+    def limit_of_all(self, instants: np.ndarray, owners: np.ndarray) -> Limit | None:
+        """Note events (E, 2) in a row, each of one component (E,); the limit as soon as there is one, else None."""
+        count = len(instants)
+        is_short = count <= _KEPT + 1  # a series under way there has forecasts, which are made one by one
+        if count < 2 or (is_short and self.paces):
+            return self._one_by_one(instants, owners)
+        counts = np.bincount(owners).tolist()
+        among = [c for c, events in enumerate(counts) if events]
+        if len(among) > _SEVERAL:  # what fires seldom among so many is in no series that is near its end
+            among = [c for c in among if counts[c] > _TERMS]
+            self.forget(tuple(set(self.paces).difference(among)))
+        paces = []
+        for component in among:
+            may_have_ended, pace = self._paced(instants, owners, component)
+            if may_have_ended or (is_short and _next_turn(pace)[0]):  # worth a closer look
+                kept = np.isin(owners, among)
+                return self._one_by_one(instants[kept], owners[kept])
+            paces.append((component, pace))
+        self.paces.update(paces)
+        self._unjudged.update([component for component, _ in paces])
+        return None
+
+    def _paced(self, instants: np.ndarray, owners: np.ndarray, component: int) -> tuple[bool, Pace]:
+        """Whether a series of a component may end with these events, and what is to be noted of them if none does."""
+        pace = self.paces.get(component, BEGINNING)
+        known = np.array(pace.intervals) if pace.intervals else _NO_INTERVALS
+        at, work, last = np.array(pace.last or (0.0, 0.0)), np.empty((2, MOST)), np.empty(_KEPT)
+        ended, count = may_end(
+            known, at, pace.last is not None, instants, owners, component, self.shortest, self.resolution, work, last
+        )  # fmt: skip
+        newest, oldest = last.tolist(), count % _KEPT
+        intervals = newest[:count] if count <= _KEPT else newest[oldest:] + newest[:oldest]
+        return ended, Pace(Instant(*at.tolist()), tuple(intervals), pace.longest)
+
+    def _one_by_one(self, instants: np.ndarray, owners: np.ndarray) -> Limit | None:
+        for (high, low), c in zip(instants.tolist(), owners.tolist(), strict=True):
+            limit = self.limit(Instant(high, low), (c,))
+            if limit is not None:
+                return limit
+        return None
+
+    def limit(self, instant: Instant, components: tuple[int, ...]) -> Limit | None:
+        """Note an event of these components; the limit once the rest of a series is below the resolution, else None."""
+        times = {c: self._limit_of(instant, c) for c in components}
+        ended = [(self._sign * time, c) for c, time in times.items() if time is not None]
+        return self._shared(self._sign * min(ended)[0], min(ended)[1]) if ended else None
+
+    def expected(self, instant: Instant) -> Limit | None:
+        """The limit of a series so far in whose rest an instant lies that is not in step with it."""
+        for c in sorted(self._under_way):
+            time = _expected(self.paces[c], instant)
+            if time is not None:
+                return self._shared(time, c)
+        return None
+
+    def _shared(self, time: float, first: int) -> Limit:
+        """The limit with all components whose series lead to it."""
+        among = {first}
+        for c in self._under_way:
+            forecast = self.paces[c].forecast
+            if forecast is not None and abs(forecast[0] - time) <= max(forecast[1], _END * math.ulp(time)):
+                among.add(c)
+        passed = max(sum(self.paces[c].intervals[-2:]) for c in among)
+        return Limit(time, tuple(sorted(among)), passed)
+
+    def _note(self, component: int, pace: Pace) -> None:
+        self.paces[component] = pace
+        self._unjudged.discard(component)
+        self._judge(component)
+
+    def _judge(self, component: int) -> None:
+        if _next_turn(self.paces[component])[0]:
+            self._shrinking.add(component)
+        else:
+            self._shrinking.discard(component)
+
+    def _ahead(self, pace: Pace) -> tuple[float, float]:
+        """The limit of a series under way by its last intervals, and how far ahead of its last event it is."""
+        turn, factor = _next_turn(pace)
+        rest = sum(pace.intervals[-turn:]) * factor / (1.0 - factor)
+        assert pace.last is not None
+        return float(pace.last) + self._sign * rest, rest
+
+    def _limit_of(self, instant: Instant, component: int) -> float | None:
+        before = self.paces.get(component, BEGINNING)
+        gaps = before.intervals
+        if before.last is not None:
+            gaps = (*gaps, abs(instant.minus(before.last)))[-_KEPT:]
+        pace = Pace(instant, gaps, before.longest)
+        self._note(component, pace)
+        if len(gaps) <= _TERMS:
+            return None
+        if max(gaps[-_TERMS - 1 :]) <= max(self.shortest, _ULPS * math.ulp(float(instant))):
+            return float(instant)
+        if min(gaps) <= 0.0:
+            return None
+        if component in self._under_way:
+            limit, rest = self._ahead(pace)
+            steadiest = _steadier(before, limit, math.ulp(limit))
+            self.paces[component] = pace._replace(
+                longest=max(before.longest, *gaps), forecast=(limit, rest), steadiest=steadiest
+            )
+            is_steady = turn_of(gaps, _TERMS, SAME_FACTOR)[0] > 0
+            end = max(self.resolution, _END * math.ulp(float(instant)))
+            return steadiest[2] if is_steady and rest <= end else None
+        longest = max(gaps) if gaps[-1] >= gaps[-2] else max(before.longest, *gaps)
+        self.paces[component] = pace._replace(longest=longest)
+        is_far = before.forecast is not None and before.forecast[1] <= _FAR_DOWN * longest
+        return _expected(before, instant) if is_far else None
+
+
+def _next_turn(pace: Pace) -> tuple[int, float]:
+    return turn_of(pace.intervals, _FEW + 1, 2.0 * SAME_FACTOR)
+
+
+def _expected(pace: Pace, instant: Instant) -> float | None:
+    """The limit of the series, where an instant that is not in step with it lies within its rest."""
+    if pace.forecast is None:
+        return None
+    limit, rest = pace.forecast
+    if abs(float(instant) - limit) > rest:
+        return None
+    return pace.steadiest[2] if pace.steadiest else limit
+
+
+def _steadier(before: Pace, limit: float, least: float) -> tuple[float, float, float]:
+    """Which forecast of a series moved least to the next two: (by how much this one moved, how much that, which).
+
+    The first ones miss what the series is not geometric by; in the last ones rounding takes over, where the place at
+    which events happen is not at zero.
+    """
+    if before.forecast is None or before.steadiest is None:
+        return math.inf, math.inf, limit
+    moved = max(abs(limit - before.forecast[0]), least)
+    last, least_so_far, best = before.steadiest
+    spread = max(moved, last)
+    return (moved, spread, limit) if spread <= least_so_far else (moved, least_so_far, best)
+
+
+def accumulated(limit: Limit, automata: Sequence[Automaton], has_rtol: bool) -> str:
+    """What a run says that ends where events accumulate and nothing says what follows."""
+    changed = [automata[c] for c in limit.components if c != NOBODY]
+    names = ", ".join(a.name for a in changed) or "monitors with resets"
+    holding = [f"{a.name}.{a.modes[a.resting]}" for a in changed if a.resting >= 0]
+    head = f"events accumulate at t = {limit.time!r}, of {names}"
+    if not changed:
+        return f"{head}: let a monitor end the run before"
+    if not holding:
+        return f"{head}: declare the limit that they lead to, a mode of their component"
+    other = (
+        "a smaller rtol or another integrator"
+        if has_rtol
+        else "a shorter step or an integrator of higher order"
+    )
+    return (
+        f"{head}, and {' and '.join(holding)} cannot be entered there: take {other}, or let a monitor end the run "
+        "before"
+    )

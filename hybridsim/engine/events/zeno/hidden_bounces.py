@@ -1,0 +1,186 @@
+"""Bounces that rounding hides: where they come to their end.
+
+A guard w is at zero and left with w' = u > 0 and w'' = -g, for a flight of 2 u/g; the next ones take e, e**2, ... of
+it, with e the ratio of the speeds after and before: together 2 u/(g (1 - e)). What a bounce loses, (1 - e) u**2/g of
+the height, comes to be less than rounding: then no crossing that follows is to be told from noise. An error h of w
+changes the times of all that follows by h/u, so the last bounces tell least; the first ones miss how g and e change
+meanwhile. The forecast is that of the first bounce with which all later ones agree within their errors (Lepski's
+rule, Theory Probab. Appl. 35 (1991) 454, doi:10.1137/1135065).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from itertools import islice
+from typing import NamedTuple
+
+import numpy as np
+
+from hybridsim.engine.events.outcome import Outcome
+from hybridsim.engine.events.zeno.accumulation import Limit
+from hybridsim.engine.record.segments import Occurrence
+from hybridsim.engine.record.trajectory import LOOKED_BACK_ON, Trajectory
+from hybridsim.engine.series.bounded import UNIT
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import Automaton, Series, System
+
+_STRIDE = 1.5  # ratio of the speeds of the bounces that are looked at
+_LEAST_LOSS = 1e-4  # of speed in a bounce; with less there are 10**4 of them and more to a digit
+_FEW = 2  # bounces that have to agree where it is no law of impacts that says what they are
+
+
+class Bounce(NamedTuple):
+    """A transition of a component: when, the modes on both sides, the guard that fired, the states on both sides."""
+
+    instant: Instant
+    source: int
+    guard: str
+    target: int
+    x_minus: np.ndarray
+    x_plus: np.ndarray
+
+
+class _Departure(NamedTuple):
+    """How a guard leaves zero: its speed, its time of flight, and by how much of the flight rounding moves its end."""
+
+    speed: float
+    flight: float
+    unknown: float
+
+
+class _Forecast(NamedTuple):
+    """When bounces end, how well that is known, and the part of what a bounce loses that is rounding."""
+
+    limit: float
+    error: float
+    hidden: float
+
+
+def bounces_of(outcome: Outcome, now: Instant, x_minus: np.ndarray) -> dict[int, Bounce]:
+    """The transitions of an event that led to the outcome, of each component the first one."""
+    found: dict[int, Bounce] = {}
+    for change in outcome.changes:
+        bounce = Bounce(now, change.source, change.guard, change.target, x_minus, outcome.x)
+        found.setdefault(change.component, bounce)
+    return found
+
+
+def last_bounces(system: System, happened: Sequence[Occurrence]) -> dict[int, Bounce]:
+    """The one that is the last of what happened."""
+    if not happened:
+        return {}
+    last = happened[-1]
+    c = next(c for c, automaton in enumerate(system.automata) if automaton.name == last.component)
+    return {c: _recorded(system.automata[c], last)}
+
+
+def _recorded(automaton: Automaton, o: Occurrence) -> Bounce:
+    source, target = automaton.modes.index(o.source), automaton.modes.index(o.target)
+    return Bounce(o.instant, source, o.guard, target, o.x_minus, o.x_plus)
+
+
+def limit_of_hidden(
+    system: System, outcome: Outcome, bounces: dict[int, Bounce], record: Trajectory
+) -> Limit | None:
+    """The limit of the components whose last bounces have just come to be hidden; None if there is none."""
+    found = {}
+    for c, departure in _barely_seen(system, outcome, bounces).items():
+        last = bounces[c]
+        forecast = _forecast(system, outcome, c, last, departure)
+        if forecast is not None and forecast.hidden >= 1.0:
+            limit, count = _agreed(system, outcome, c, forecast, departure.speed, last, record)
+            if system.automata[c].is_unilateral or count >= _FEW:
+                found[c] = (limit, departure.flight)
+    if not found:
+        return None
+    limits, flights = zip(*found.values(), strict=True)
+    return Limit(max(limits), tuple(found), max(flights))
+
+
+def may_be_hidden(system: System, outcome: Outcome, happened: Sequence[Occurrence]) -> bool:
+    """Whether there may be a limit of components whose bounces come to be hidden after what happened last."""
+    return bool(_barely_seen(system, outcome, last_bounces(system, happened)))
+
+
+def _barely_seen(system: System, outcome: Outcome, bounces: dict[int, Bounce]) -> dict[int, _Departure]:
+    """Of those after which a flight is so short that rounding may hide what the next one loses, how they leave."""
+    found = {}
+    for c, last in bounces.items() if system.has_tape else ():
+        automaton = system.automata[c]
+        rests = automaton.hold in (last.source, last.target)
+        if automaton.is_corner or rests or (automaton.has_surface and not automaton.is_unilateral):
+            continue
+        departure = _departure(system, outcome, c, last)
+        if departure is not None and departure.unknown >= _LEAST_LOSS:
+            found[c] = departure
+    return found
+
+
+def _agreed(
+    system: System, outcome: Outcome, c: int, best: _Forecast, speed: float, last: Bounce, record: Trajectory
+) -> tuple[float, int]:
+    """The limit by the first bounce that all later ones agree with, and how many of those looked at do."""
+    count = 1
+    for bounce in _backward(system.automata[c], last, record):
+        departure = _departure(system, outcome, c, bounce)
+        if departure is None:
+            break
+        if departure.speed < _STRIDE * speed:
+            continue
+        forecast = _forecast(system, outcome, c, bounce, departure)
+        if forecast is None or abs(forecast.limit - best.limit) > best.error:
+            break
+        best, speed, count = forecast, departure.speed, count + 1
+    return best.limit, count
+
+
+def _departure(system: System, outcome: Outcome, c: int, bounce: Bounce) -> _Departure | None:
+    """How a guard of the new mode leaves zero and turns back; None where none does."""
+    series = _series(system, outcome, c, bounce.instant, bounce.target, bounce.x_plus)
+    for guard in system.automata[c].guards[bounce.target]:
+        (value, rate, curve), bound = series.guards[guard, :3].tolist(), float(series.guard_bounds[guard, 0])
+        if abs(value) <= bound and curve < 0.0 < rate:
+            return _Departure(rate, -rate / curve, -4.0 * (curve / rate) * (bound / rate))
+    return None
+
+
+def _forecast(
+    system: System, outcome: Outcome, c: int, bounce: Bounce, departure: _Departure
+) -> _Forecast | None:
+    """What a bounce tells of the limit; None where there is no loss of speed."""
+    automaton = system.automata[c]
+    names = automaton.guard_names[bounce.source]
+    if bounce.guard not in names:
+        return None
+    guard = automaton.guards[bounce.source][names.index(bounce.guard)]
+    series = _series(system, outcome, c, bounce.instant, bounce.source, bounce.x_minus)
+    approach = -float(series.guards[guard, 1])
+    if not 0.0 < departure.speed < approach:
+        return None
+    loss = 1.0 - departure.speed / approach
+    hidden = departure.unknown / loss
+    rest = departure.flight / loss
+    limit = float(bounce.instant.plus(rest))
+    return _Forecast(limit, rest * min(1.0, hidden) + 4.0 * UNIT * abs(limit), hidden)
+
+
+def _backward(automaton: Automaton, last: Bounce, record: Trajectory) -> Iterator[Bounce]:
+    """The bounces of a component before the last one, backward, until it rested."""
+    blocks = reversed(record.occurrences.blocks)
+    events = (block[i] for block in blocks for i in range(len(block) - 1, -1, -1))
+    for o in islice(events, LOOKED_BACK_ON):
+        if o.component == automaton.name and o.instant != last.instant:
+            bounce = _recorded(automaton, o)
+            if automaton.hold in (bounce.source, bounce.target):
+                return
+            yield bounce
+
+
+def _series(system: System, outcome: Outcome, c: int, instant: Instant, mode: int, x: np.ndarray) -> Series:
+    """Of the guards in a mode of the component, with the others in theirs."""
+    z = outcome.z.copy()
+    z[c] = mode
+    p = system.vector(instant, system.discrete(outcome.p))
+    series = system.series(0.0, x, p, z, outcome.x_error + 4.0 * UNIT * np.abs(x), 0.0)
+    assert isinstance(series, Series)
+    return series

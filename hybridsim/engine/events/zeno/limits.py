@@ -1,0 +1,191 @@
+"""Where events accumulate: from there on the motion slides along their surfaces, rests in contacts, or as declared."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from hybridsim.engine.events.jumps.rest_impulses import loaded, stopped
+from hybridsim.engine.events.outcome import Change, Outcome, Situation
+from hybridsim.engine.events.resolve import Settling
+from hybridsim.engine.events.zeno.accumulation import Limit
+from hybridsim.engine.system.system import System
+
+LIMIT = "limit"  # as the guard of the changes that are made where events accumulate
+_SURE = 2.0**-46  # how well the state at the limit has to be known
+_REACH = (
+    2.0  # a surface this many times as far away as it may move in the time that is left is not the limit's
+)
+
+
+def behind(
+    limit: Limit, system: System, outcome: Outcome, p: np.ndarray, s: float
+) -> tuple[float, Outcome] | None:
+    """What holds from a limit at local time s on: along surfaces, in contacts, or as declared; None if nothing.
+
+    With the local time from which it holds: now, where something else may come before the limit.
+    """
+    found = _gathered(system, outcome, p, s, s + limit.passed, limit.components)
+    return found if found is not None else _at_declared_limit(system, outcome, p, s, limit.components)
+
+
+def _gathered(
+    system: System, outcome: Outcome, p: np.ndarray, s: float, left: float, changed: tuple[int, ...]
+) -> tuple[float, Outcome] | None:
+    """At the limit of crossings or impacts; None if it is none of what can be held.
+
+    It is of the surfaces that their rates and these rates' own may bring to zero within the time `left`, and of the
+    contacts whose gaps and their rates come to zero in it. They are held from here on: on the average, bounces that
+    follow each other ever faster carry the load that a closed contact carries, and crossings to and fro slide. So is
+    friction among those that changed, which has come to rest to rounding. The decision is that of any event
+    (`hybridsim.engine.events.resolve`).
+    """
+    near = _within_reach(system, outcome, p, left, changed)
+    if len(near) < (2 if all(system.automata[c].is_unique for c in near) else 1):
+        return None
+    z = outcome.z.copy()
+    z[near] = [system.automata[c].hold for c in near]
+    start = system.project(0.0, _without_bounces(system, outcome, p, near), p, z)
+    x = _at_the_end(system, start, p, z, s, near)
+    if x is None:
+        s, x = 0.0, start
+    found = _held_at(system, outcome, p, s, near, x, z)
+    return None if found is None else (s, found)
+
+
+def _without_bounces(system: System, outcome: Outcome, p: np.ndarray, near: list[int]) -> np.ndarray:
+    """The state after impulses that end the motion of these contacts, and leave those that are closed so."""
+    automata, modes, of = system.automata, outcome.z, system.surface_of
+    if not system.is_unilateral[near].any():
+        return outcome.x
+    series = system.series(0.0, outcome.x, p, modes, outcome.x_error, 0.0)
+    slopes, changes, loads = system.impulses(0.0, outcome.x, p, modes)
+    sliding = [
+        0
+        if system.is_unilateral[c]
+        else int(modes[c] == automata[c].above) - int(modes[c] == automata[c].below)
+        for c in of
+    ]
+    ends = [
+        k
+        for k, c in enumerate(of)
+        if (system.is_unilateral[c] or loads[:, k].any()) and (c in near or modes[c] == automata[c].hold)
+    ]
+    moving = [
+        series.surfaces[k, 1 if system.is_unilateral[of[k]] else 0] if of[k] in near else 0.0 for k in ends
+    ]
+    return stopped(outcome.x, np.array(moving), slopes[ends], loaded(changes, loads, np.array(sliding))[ends])
+
+
+def _moved(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, s0: float, s: float) -> np.ndarray:
+    """The state at local time s from x at s0, in one step of the classical Runge-Kutta method."""
+    h, middle = s - s0, 0.5 * (s0 + s)
+    a = system.flow(s0, x, p, z)
+    b = system.flow(middle, x + 0.5 * h * a, p, z)
+    c = system.flow(middle, x + 0.5 * h * b, p, z)
+    d = system.flow(s, x + h * c, p, z)
+    return system.project(s, x + h / 6.0 * (a + 2.0 * b + 2.0 * c + d), p, z)
+
+
+def _held_at(
+    system: System, outcome: Outcome, p: np.ndarray, s: float, near: list[int], x: np.ndarray, z: np.ndarray
+) -> Outcome | None:
+    """What is decided at local time s, where x is on these surfaces; None unless switching surfaces stay held."""
+    if not np.isfinite(x).all():
+        return None
+    z = z.copy()
+    z[near] = -1  # no mode yet: the decision takes them as they are at a start
+    at = Situation(s, x, p, z, outcome.x_error.copy(), 0.0)
+    found = Settling(system, at, outcome.z.copy(), forward=True).run((), [])
+    if found.status or any(
+        found.z[c] != system.automata[c].hold for c in near if system.automata[c].is_unique
+    ):
+        return None
+    found.changes = [
+        Change(c, LIMIT, int(outcome.z[c]), int(found.z[c]), outcome.x, found.x) for c in near
+    ] + found.changes
+    found.continuous = False
+    return found
+
+
+def _at_the_end(
+    system: System, start: np.ndarray, p: np.ndarray, z: np.ndarray, s: float, apart: Collection[int]
+) -> np.ndarray | None:
+    """The state at local time s; None where that is not sure to rounding, or something else may happen before."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        whole = _moved(system, start, p, z, 0.0, s)
+        halves = _moved(system, _moved(system, start, p, z, 0.0, 0.5 * s), p, z, 0.5 * s, s)
+        if not (np.abs(whole - halves) <= _SURE * (np.abs(start) + np.abs(halves))).all():
+            return None
+        series = system.series(0.0, start, p, z, np.zeros(system.n), 0.0)
+        held = [system.automata[c].hold for c in system.surface_of]
+        guards = series.guards[system.active(z) & ~np.isin(system.owner, list(apart))]
+        free = [k for k, c in enumerate(system.surface_of) if c not in apart and z[c] != held[k]]
+        values = np.concatenate([guards, series.surfaces[free]])
+        away = np.abs(values[:, 0]) > _REACH * np.abs(values[:, 1:]) @ s ** np.arange(1.0, values.shape[1])
+    return halves if away.all() else None
+
+
+def _at_declared_limit(
+    system: System, outcome: Outcome, p: np.ndarray, s: float, changed: tuple[int, ...]
+) -> tuple[float, Outcome] | None:
+    """At the limit of transitions of these components; None where none says what holds there."""
+    entered = tuple(c for c in changed if c >= 0 and system.automata[c].limit >= 0)
+    if not entered:
+        return None
+    z = outcome.z.copy()
+    z[list(entered)] = [system.automata[c].limit for c in entered]
+    x = _at_the_end(system, outcome.x, p, outcome.z, s, entered)
+    if x is None:
+        s, x = 0.0, outcome.x
+    at = Situation(s, x.copy(), p.copy(), z, outcome.x_error.copy(), 0.0)
+    found = Settling(system, at, outcome.z.copy(), forward=True).run((), [("limit", c) for c in entered])
+    found.changes = [
+        Change(c, LIMIT, int(outcome.z[c]), system.automata[c].limit, x, found.x) for c in entered
+    ] + found.changes
+    found.continuous = False
+    return s, found
+
+
+def closed_now(system: System, outcome: Outcome) -> tuple[int, ...]:
+    """The contacts that an event has closed."""
+    automata = system.automata
+    return tuple(
+        c.component
+        for c in outcome.changes
+        if automata[c.component].is_unilateral and c.target == automata[c.component].hold
+    )
+
+
+def holds_several(system: System, outcome: Outcome) -> bool:
+    """Whether an event ends with several switching surfaces held that were not held before it."""
+    changed = [(system.automata[c.component], c.target) for c in outcome.changes]
+    return sum(automaton.is_unique and target == automaton.hold for automaton, target in changed) > 1
+
+
+@np.errstate(over="ignore")  # what is too large to tell is within reach
+def _within_reach(
+    system: System, outcome: Outcome, p: np.ndarray, left: float, changed: tuple[int, ...]
+) -> list[int]:
+    """The contacts and surfaces that come to zero in this time; friction that they load or move, or that changed."""
+    series = system.series(0.0, outcome.x, p, outcome.z, outcome.x_error, 0.0)
+    found: list[int] = []
+    rubbing: list[int] = []
+    for k, c in enumerate(system.surface_of):
+        automaton = system.automata[c]
+        if outcome.z[c] == automaton.hold:
+            continue
+        (value, rate, curve), bounds = series.surfaces[k, :3], series.surface_bounds[k, :3]
+        is_near = abs(value) <= _REACH * (abs(rate) + abs(curve) * left) * left + bounds[0]
+        if automaton.is_unilateral:
+            is_near = is_near and abs(rate) <= 2.0 * _REACH * abs(curve) * left + bounds[1]
+        if is_near:
+            (found if automaton.is_unilateral or automaton.is_unique else rubbing).append(k)
+    acting = [k for k in found if system.is_unilateral[system.surface_of[k]]]
+    if acting and rubbing:
+        slopes, changes, loads = system.impulses(0.0, outcome.x, p, outcome.z)
+        moved = slopes @ changes[acting].T
+        found += [k for k in rubbing if moved[k].any() or loads[:, k, acting].any()]
+    found += [k for k in rubbing if k not in found and system.surface_of[k] in changed]
+    return [system.surface_of[k] for k in found]

@@ -1,0 +1,141 @@
+"""Segments in closed form, in the arrays that the compiled loop of linear modes wrote them to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.linear.motion import functions_of_time, moved, states_near_start, states_of
+from hybridsim.engine.linear.tables import LinearTables
+from hybridsim.engine.native.kernels import call, kernel
+from hybridsim.engine.record.segments import Segment, end_point
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
+
+
+@kernel
+def closed_form_states(
+    project: Any, pinned: bool, lin: Any, index: Any, s: Any, record: Any, room: Any, out: Any
+) -> None:
+    """States out (m, n) at local times s (m,) of the segments of these numbers; see `ClosedFormBlock`.
+
+    room: for modal coordinates, states, values of atoms, functions of time, and terms near a start.
+    """
+    ends, rows, coordinates, modes, vectors, jumps = record
+    c, x, factors, w, terms = room
+    for m in range(s.shape[0]):
+        i = index[m]
+        if s[m] == 0.0 or s[m] >= ends[i]:
+            side = 0 if s[m] == 0.0 else 1
+            for j in range(x.shape[0]):
+                out[m, j] = jumps[i, side, j]
+            continue
+        moved(lin, rows[i], coordinates[i], s[m], c)
+        states_of(lin, rows[i], c, x)
+        if s[m] < lin.near[rows[i]]:
+            functions_of_time(lin, 0.0, vectors[i], factors, w)
+            states_near_start(lin, rows[i], jumps[i, 0], w, s[m], terms, x)
+        if pinned:
+            call(project, s[m], x, vectors[i], modes[i], out[m])
+        else:
+            for j in range(x.shape[0]):
+                out[m, j] = x[j]
+
+
+@dataclass(frozen=True)
+class ClosedFormBlock(Sequence[Segment]):
+    """N segments from local time 0 on; see `hybridsim.engine.record.blocks.SegmentBlock`.
+
+    Parameters
+    ----------
+    tables, rows : the linear modes, and which of them each segment is in (N,).
+    ends : (N,) local times of the ends.
+    coordinates : (N, J) modal coordinates at the starts.
+    origins, modes, vectors : (N, 2), (N, C), (N, P) of each segment.
+    jumps : (N, 3, n), states at the start, x- and x+ at the end of each segment.
+    """
+
+    system: System
+    tables: LinearTables
+    rows: np.ndarray
+    ends: np.ndarray
+    coordinates: np.ndarray
+    origins: np.ndarray
+    modes: np.ndarray
+    vectors: np.ndarray
+    jumps: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.ends)
+
+    @cached_property
+    def spans(self) -> np.ndarray:
+        """Local times of start and end (N, 2)."""
+        return np.stack([np.zeros(len(self)), self.ends], axis=1)
+
+    @property
+    def until(self) -> Instant:
+        """End of the last segment."""
+        high, low = self.origins[-1].tolist()
+        return Instant(high, low).plus(float(self.ends[-1]))
+
+    def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """States (k, n) in the segments of these numbers, at local times (k,)."""
+        n, pinned = self.system.n, self.system.can_hold
+        out = np.empty((len(s), n))
+        closed_form_states(
+            self.system.address("project" if pinned else "flow"),
+            pinned,
+            self.tables,
+            index,
+            s,
+            (self.ends, self.rows, self.coordinates, self.modes, self.vectors, self.jumps),
+            self._room(),
+            out,
+        )
+        return out
+
+    def _room(self) -> tuple[np.ndarray, ...]:
+        lin, n = self.tables, self.system.n
+        factors = np.ones((2 * len(lin.kinds) + 1, 2))
+        return (
+            np.empty(self.coordinates.shape[1], dtype=complex),
+            np.empty(n),
+            factors,
+            np.empty(len(lin.factors)),
+            np.empty((2, lin.flows.shape[1])),
+        )
+
+    def at_end(self) -> Segment:
+        """The end of the last segment."""
+        return end_point(self.until, self.modes[-1], self.vectors[-1], self.jumps[-1, 1])
+
+    def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Start and end, states there, run-time vector and modes of a segment."""
+        return np.array([0.0, self.ends[i]]), self.jumps[i, :2], self.vectors[i], self.modes[i]
+
+    def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Numbers of segments, local times and states at start and end of each segment."""
+        index = np.repeat(np.arange(len(self)), 2)
+        return index, self.spans.ravel(), self.jumps[:, :2].reshape(len(index), -1)
+
+    def since(self, first: int) -> ClosedFormBlock:
+        """Those from the first on."""
+        rows = (self.rows, self.ends, self.coordinates, self.origins, self.modes, self.vectors, self.jumps)
+        return ClosedFormBlock(self.system, self.tables, *(r[first:] for r in rows))
+
+    def __getitem__(self, i: Any, /) -> Any:
+        if isinstance(i, slice):
+            return [self[k] for k in range(*i.indices(len(self)))]
+        i = range(len(self))[i]
+
+        def dense(s: np.ndarray) -> np.ndarray:
+            return self.states(np.full(len(s), i), np.asarray(s, dtype=float))
+
+        high, low = self.origins[i].tolist()
+        s, x, p, z = self.steps_of(i)
+        return Segment(Instant(high, low), z, p, s, x, dense)

@@ -1,0 +1,279 @@
+"""Which modes are linear, read off the tape: each register as a linear form over states and functions of time.
+
+A register that depends on time alone is a polynomial over atoms: local time, sines and cosines of angles that grow
+linearly, exponentials of linear time, and values that are constant in a segment. Derivatives of such polynomials are
+such polynomials, so the states and the monomials that occur obey one linear system with constant coefficients.
+"""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from hybridsim.engine.linear.recipe import Traced, computed
+from hybridsim.engine.series.tape import (
+    ABS,
+    ADD,
+    COPY,
+    DIV,
+    EXP,
+    MUL,
+    NEG,
+    NOT,
+    SELECT,
+    SIGN,
+    SINCOS,
+    SINHCOSH,
+    SQRT,
+    SUB,
+    TANGENT,
+)
+from hybridsim.engine.system.failures import StepFailure
+
+TIME, VALUE, ANGLE, GROWTH = range(4)  # kinds of atoms
+Factor = tuple[int, int]  # an atom's number; 1 for the cosine of an angle, else 0
+Monomial = tuple[Factor, ...]  # sorted; () is 1
+Key = int | Monomial  # a state's index, or a monomial over atoms
+Form = dict[Key, float]
+Read = Form | float  # a register that is one number is kept as that
+
+_ONE: Monomial = ()
+_PAIRED = (SINCOS, SINHCOSH, TANGENT)
+_SINGLE = (NEG, ABS, SIGN, NOT, EXP, SQRT, SINCOS, SINHCOSH, TANGENT)
+_HIGHEST = 8  # degree of a monomial; beyond it the closure under derivatives would be large
+
+
+class NotLinear(StepFailure):
+    """A rate or a guard that is no linear form; the message says which kind of operation is in the way."""
+
+
+class DividesByZero(NotLinear):
+    """A form over a number that is zero: forces that several holding modes cannot keep apart have no values."""
+
+
+@dataclass(frozen=True)
+class Atom:
+    """An angle or exponent rate*s + offset + sum of weights*p[source], a value, or local time (rate 1)."""
+
+    kind: int
+    rate: float
+    offset: float
+    terms: tuple[tuple[int, float], ...]  # (source in p, weight)
+
+
+class Atoms:
+    """The atoms met so far, numbered; number 0 is local time."""
+
+    def __init__(self) -> None:
+        self.known: list[Atom] = [Atom(TIME, 1.0, 0.0, ())]
+
+    def number(self, atom: Atom) -> int:
+        """The number of an atom, a new one where it has not been met."""
+        if atom not in self.known:
+            self.known.append(atom)
+        return self.known.index(atom)
+
+    def derivative(self, monomial: Monomial) -> Form:
+        """d/dt of a monomial."""
+        result: Form = {}
+        for i, (a, part) in enumerate(monomial):
+            rest, atom = monomial[:i] + monomial[i + 1 :], self.known[a]
+            if atom.kind == TIME:
+                _accumulate(result, rest, 1.0)
+            elif atom.kind == GROWTH:
+                _accumulate(result, monomial, atom.rate)
+            elif atom.kind == ANGLE:
+                other = tuple(sorted((*rest, (a, 1 - part))))
+                _accumulate(result, other, atom.rate if part == 0 else -atom.rate)
+        return result
+
+    def closure(self, monomials: Iterable[Monomial]) -> list[Monomial]:
+        """These monomials and all that their derivatives are made of."""
+        found: list[Monomial] = []
+        waiting = sorted(set(monomials))
+        while waiting:
+            monomial = waiting.pop()
+            if monomial not in found:
+                found.append(monomial)
+                waiting += [m for m in self.derivative(monomial) if isinstance(m, tuple)]
+        return sorted(found, key=lambda m: (len(m), m))
+
+
+def _accumulate(form: Form, key: Key, weight: float) -> None:
+    form[key] = form.get(key, 0.0) + weight
+    if form[key] == 0.0:
+        del form[key]
+
+
+class LinearReader:
+    """Linear forms of the registers of one tape, at given values of the parameters.
+
+    constants: (register, value); parameters: (register, source in p); varying: sources that differ from segment to
+    segment; p: the run-time vector, of which only the other sources are read, as numbers or as numbers of a
+    `hybridsim.engine.linear.recipe`. None: for whatever values. A parameter is then NaN, and so is all that is made
+    of it alone; a condition on that is none that can be read. What is a linear form so is one at any values, since
+    these can only let terms vanish.
+    """
+
+    def __init__(
+        self,
+        atoms: Atoms,
+        time: int,
+        states: Iterable[int],
+        constants: Iterable[tuple[int, float]],
+        parameters: Iterable[tuple[int, int]],
+        varying: range,
+        p: Sequence[float] | None,
+    ) -> None:
+        self.atoms, self.is_open = atoms, p is None
+        self.forms: dict[int, Read | NotLinear] = {time: {((0, 0),): 1.0}}
+        self.forms |= {register: {i: 1.0} for i, register in enumerate(states)}
+        self.forms |= constants
+        for register, source in parameters:
+            if source in varying:
+                value_of = Atom(VALUE, 0.0, 0.0, ((source, 1.0),))
+                self.forms[register] = {((atoms.number(value_of), 0),): 1.0}
+            else:
+                self.forms[register] = math.nan if p is None else p[source]
+
+    def read(self, rows: Iterable[tuple[int, ...]]) -> None:
+        """Add the results of these rows; what is no linear form is kept as the reason."""
+        for op, a, b, c, out in rows:
+            if op == COPY:
+                self.forms[out] = self.forms[a]
+                continue
+            try:
+                found = self._apply(op, a, b, c)
+            except NotLinear as reason:
+                self.forms[out] = reason
+                if op in _PAIRED:
+                    self.forms[out + 1] = reason
+                continue
+            self.forms[out] = found[0]
+            if len(found) > 1:
+                self.forms[out + 1] = found[1]
+
+    def form(self, register: int) -> Form:
+        """The linear form of a register; raises NotLinear."""
+        return _form(self._read(register))
+
+    def _read(self, register: int) -> Read:
+        found = self.forms[register]
+        if isinstance(found, NotLinear):
+            raise found
+        return found
+
+    def _apply(self, op: int, a: int, b: int, c: int) -> tuple[Read, ...]:
+        first = self._read(a)
+        if op == SELECT:
+            if isinstance(first, dict) or (self.is_open and math.isnan(first)):
+                raise NotLinear("a condition that changes")
+            return (self._read(b) if first != 0.0 else self._read(c),)
+        if op in _SINGLE:
+            if isinstance(first, float):
+                return self._evaluated(op, b, c, first)
+            return self._of_form(op, first)
+        second = self._read(b)
+        if isinstance(first, float) and isinstance(second, float):
+            if op in _ARITHMETIC and (op != DIV or second != 0.0):
+                return (_ARITHMETIC[op](first, second),)
+            return self._evaluated(op, b, c, first, second)
+        if op in (ADD, SUB):
+            return (_plain(_sum(_form(first), _form(second), 1.0 if op == ADD else -1.0)),)
+        if op == MUL:
+            return (_plain(_product(_form(first), _form(second))),)
+        if op == DIV and isinstance(first, dict) and isinstance(second, float):
+            if second == 0.0:
+                raise DividesByZero("a quotient by zero")
+            return (_plain({key: weight / second for key, weight in first.items()}),)
+        raise NotLinear(_IN_THE_WAY.get(op, _OTHER))
+
+    def _of_form(self, op: int, form: Form) -> tuple[Read, ...]:
+        """An operation of one operand that is no number."""
+        if op == NEG:
+            return ({key: -weight for key, weight in form.items()},)
+        if op == SINCOS:
+            number = self.atoms.number(_linear_atom(ANGLE, form, self.atoms))
+            return {((number, 0),): 1.0}, {((number, 1),): 1.0}
+        if op == EXP:
+            return ({((self.atoms.number(_linear_atom(GROWTH, form, self.atoms)), 0),): 1.0},)
+        raise NotLinear(_IN_THE_WAY.get(op, _OTHER))
+
+    def _evaluated(self, op: int, b: int, c: int, *values: float) -> tuple[Read, ...]:
+        """An operation on numbers; b and c are flags where there is one operand."""
+        if op == NEG:
+            return (-values[0],)
+        if self.is_open and any(map(math.isnan, values)):
+            return (math.nan, math.nan) if op in _PAIRED else (math.nan,)
+        for value in values:
+            if isinstance(value, Traced):
+                found = value.numbers.operation(op, values, b, c)
+                return found if op in _PAIRED else found[:1]
+        first, second = computed(op, values, b, c)
+        return (first, second) if op in _PAIRED else (first,)
+
+
+_ARITHMETIC = {ADD: operator.add, SUB: operator.sub, MUL: operator.mul, DIV: operator.truediv}
+_OTHER = "a corner, a jump or another function of what moves"
+_IN_THE_WAY = {
+    DIV: "a quotient by what moves",
+    SQRT: "a root of what moves",
+    SINHCOSH: "a hyperbolic function of what moves",
+    TANGENT: "a tangent of what moves",
+}
+
+
+def _form(read: Read) -> Form:
+    if isinstance(read, dict):
+        return read
+    return {_ONE: read} if read != 0.0 else {}
+
+
+def _plain(form: Form) -> Read:
+    """A form that is one number as that."""
+    if not form:
+        return 0.0
+    return form[_ONE] if len(form) == 1 and _ONE in form else form
+
+
+def _sum(a: Form, b: Form, sign: float) -> Form:
+    result = dict(a)
+    for key, weight in b.items():
+        _accumulate(result, key, sign * weight)
+    return result
+
+
+def _product(a: Form, b: Form) -> Form:
+    """The product of two forms, if it is one."""
+    result: Form = {}
+    for left, u in a.items():
+        for right, v in b.items():
+            if isinstance(left, tuple) and isinstance(right, tuple):
+                monomial = tuple(sorted((*left, *right)))
+                if len(monomial) > _HIGHEST:
+                    raise NotLinear(f"a product of more than {_HIGHEST} functions of time")
+                _accumulate(result, monomial, u * v)
+            elif left == _ONE or right == _ONE:
+                _accumulate(result, right if left == _ONE else left, u * v)
+            elif isinstance(left, tuple) or isinstance(right, tuple):
+                raise NotLinear("a product of a state and what changes in time")
+            else:
+                raise NotLinear("a product of states")
+    return result
+
+
+def _linear_atom(kind: int, form: Form, atoms: Atoms) -> Atom:
+    """The atom of an angle or an exponent; it has to be linear in time and free of states."""
+    rate, offset, terms = 0.0, 0.0, []
+    for key, weight in form.items():
+        if key == _ONE:
+            offset = weight
+        elif isinstance(key, tuple) and len(key) == 1 and atoms.known[key[0][0]].kind == TIME:
+            rate = weight
+        elif isinstance(key, tuple) and len(key) == 1 and atoms.known[key[0][0]].kind == VALUE:
+            terms += [(source, weight * w) for source, w in atoms.known[key[0][0]].terms]
+        else:
+            raise NotLinear("a sine or an exponential of what is not linear in time alone")
+    return Atom(kind, rate, offset, tuple(sorted(terms, key=operator.itemgetter(0))))

@@ -1,0 +1,136 @@
+"""Guards of linear modes as series: Taylor coefficients in states and in modal coordinates, with their bounds."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from hybridsim.engine.native.constants import BOUND_TERMS
+from hybridsim.engine.native.kernels import kernel
+from hybridsim.engine.series.bounded import ORDER, UNIT
+
+_FACTORIAL = float(math.factorial(BOUND_TERMS))
+FARTHEST = 8.0  # in units of the fastest rate: the bound by so few terms ends before
+_ROUNDINGS = (
+    8.0  # of a coefficient when it is read off the tape: a chain of that many operations is a long one
+)
+
+
+@kernel
+def guard_series(A: Any, rows: Any, series: Any, roundings: Any) -> None:
+    """Of rows (K, G, m), functions of y with y' = A y: Taylor coefficients, and what rounding makes of each entry.
+
+    rows are used up; A (K, m, m); series, roundings (K, G, ORDER + 1, m).
+    """
+    modes, guards, size = rows.shape
+    for k in range(modes):
+        for g in range(guards):
+            row, is_zero = rows[k, g], True
+            for m in range(size):
+                series[k, g, 0, m] = row[m]
+                roundings[k, g, 0, m] = abs(row[m])
+                is_zero = is_zero and row[m] == 0.0
+            if is_zero:  # a guard of other modes
+                series[k, g, :, :] = 0.0
+                roundings[k, g, :, :] = 0.0
+                continue
+            for order in range(ORDER):
+                for m in range(size):
+                    total = bound = 0.0
+                    for i in range(size):
+                        total += series[k, g, order, i] * A[k, i, m]
+                        bound += roundings[k, g, order, i] * abs(A[k, i, m])
+                    series[k, g, order + 1, m] = total / (order + 1)
+                    roundings[k, g, order + 1, m] = bound / (order + 1)
+            for m in range(size):
+                for order in range(ORDER + 1):
+                    roundings[k, g, order, m] *= (size + (order + 1) * (_ROUNDINGS + size)) * UNIT
+
+
+@kernel
+def modal_guards(
+    rows: Any,
+    flows: Any,
+    gamma: Any,
+    terms: Any,
+    sizes: Any,
+    rests: Any,
+    farthest: Any,
+    grown: Any,
+    turning: Any,
+    waves: Any,
+) -> None:
+    """Of Re(gamma c) with gamma = row basis along c' = B c: coefficients, bounds of |c|'s factors, reach, waves.
+
+    flows: `hybridsim.engine.linear.modal.Modals` with |B**BOUND_TERMS|; gamma (J,) is room. The rest is what
+    `hybridsim.engine.linear.tables` describes, prepared for guards that are zero.
+    """
+    counts, values, upper, ends, basis = flows.counts, flows.values, flows.upper, flows.ends, flows.full_basis
+    modes, guards, size = rows.shape
+    for k in range(modes):
+        for g in range(guards):
+            is_zero = True
+            for m in range(size):
+                is_zero = is_zero and rows[k, g, m] == 0.0
+            if is_zero:  # a guard of other modes: all is as it was prepared
+                continue
+            for j in range(counts[k]):
+                total = 0.0 + 0.0j
+                for m in range(size):
+                    total += rows[k, g, m] * basis[k, m, j]
+                gamma[j] = total
+            # an entry of the basis is known to rounding of the largest one of its row, if it is not zero for certain
+            known = 0.0
+            for m in range(size):
+                largest = 0.0
+                for j in range(counts[k]):
+                    largest = max(largest, abs(basis[k, m, j]))
+                known += abs(rows[k, g, m]) * largest
+            waves[k, g] = _wave(gamma, counts[k], values[k], upper[k])
+            first = 0
+            fastest = growing = 0.0
+            while first < counts[k]:
+                end, square = ends[k, first], 0.0
+                # what a guard does not see now it may see later, of another coordinate of the block
+                for j in range(first, end):
+                    square += gamma[j].real ** 2 + gamma[j].imag ** 2
+                for j in range(first, end):
+                    sizes[k, g, j] = math.sqrt(square)
+                    rests[k, g, j] = sizes[k, g, j] * flows.powers[k, j] / _FACTORIAL
+                    if square > 0.0:
+                        sizes[k, g, j] = max(sizes[k, g, j], known)
+                    if rests[k, g, j] > 0.0:
+                        fastest, growing = max(fastest, flows.speeds[k, j]), max(growing, flows.growth[k, j])
+                        turning[k, g] = max(turning[k, g], growing, abs(values[k, j].imag))
+                for order in range(BOUND_TERMS):
+                    for j in range(first, end):
+                        terms[k, g, j, 0, order], terms[k, g, j, 1, order] = gamma[j].real, gamma[j].imag
+                    for j in range(end - 1, first - 1, -1):  # B is triangular
+                        total = gamma[j] * values[k, j]
+                        for i in range(first, j):
+                            total += gamma[i] * upper[k, i, j]
+                        gamma[j] = total / (order + 1)
+                first = end
+            if fastest > 0.0:
+                farthest[k, g] = FARTHEST / fastest
+            if growing > 0.0:
+                farthest[k, g], grown[k, g] = min(farthest[k, g], math.log(2.0) / growing), 2.0
+
+
+@kernel
+def _wave(gamma: Any, count: int, values: Any, upper: Any) -> int:
+    """The coordinate that turns, where Re(gamma c) is a constant and one undamped wave; else -1."""
+    found = -1
+    for j in range(count):
+        if gamma[j] == 0.0:
+            continue
+        for i in range(count):
+            if upper[j, i] != 0.0:  # what others drive is no wave
+                return -1
+        if values[j] != 0.0:
+            if found >= 0:
+                return -1
+            found = j
+    if found >= 0 and values[found].real == 0.0 and values[found].imag > 0.0:
+        return found
+    return -1

@@ -1,0 +1,216 @@
+"""Whether the modes of a system are linear, and their rates and guards as linear forms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import product
+
+import numpy as np
+
+from hybridsim.engine.linear.form import Atoms, DividesByZero, Form, LinearReader, Monomial, NotLinear
+from hybridsim.engine.system.system import System
+from hybridsim.errors import UsageError
+from hybridsim.model.toml.automata import SINGLE
+
+_KEPT = 64  # answers of a structure, one for each set of parameter values
+
+
+class LinearMode:
+    """Forms of the rates and active guards of one vector of modes; raises NotLinear with what is in the way.
+
+    p: the run-time vector, or None for whatever values.
+    """
+
+    def __init__(self, system: System, atoms: Atoms, z: np.ndarray, p: Sequence[float] | None) -> None:
+        tape, reader = system.code.data["tape"], _reader(system, atoms, z, p)
+        self.rates: list[Form] = []
+        for name, register in zip(system.names, tape["derivatives"], strict=True):
+            self.rates.append(_named(reader, register, f"the rate of {name}"))
+        self.guards: dict[int, Form] = {}
+        for g in map(int, np.flatnonzero(system.active(z))):
+            self.guards[g] = _named(reader, tape["guards"][g], system.guard_title(g, z))
+
+    def monomials(self) -> set[Monomial]:
+        """The functions of time in it."""
+        forms = [*self.rates, *self.guards.values()]
+        return {key for form in forms for key in form if isinstance(key, tuple)}
+
+
+def _reader(system: System, atoms: Atoms, z: np.ndarray, p: Sequence[float] | None) -> LinearReader:
+    """The forms of all registers in one vector of modes."""
+    tape, layout = system.code.data["tape"], system.layout
+    varying = range(layout.discrete_at, layout.size)
+    parameters = [(r, s) for r, s in tape["parameters"] if s != layout.pin_at]
+    constants = [(r, v) for r, v, _ in tape["constants"]]
+    constants += [(r, 1.0) for r, s in tape["parameters"] if s == layout.pin_at]
+    reader = LinearReader(atoms, tape["time"], tape["states"], constants, parameters, varying, p)
+    reader.read(system.mode_rows(z))
+    return reader
+
+
+def _named(reader: LinearReader, register: int, title: str) -> Form:
+    try:
+        return reader.form(register)
+    except NotLinear as reason:
+        raise type(reason)(f"{title} has {reason}") from None
+
+
+class NoMode:
+    """In the place of a vector of modes that has no motion: its rates are no numbers."""
+
+    def __init__(self, system: System) -> None:
+        self.rates: list[Form] = [{(): math.nan} for _ in system.names]
+        self.guards: dict[int, Form] = {}
+
+    def monomials(self) -> set[Monomial]:
+        """It has no functions of time."""
+        return set()
+
+
+def modes_of(
+    system: System, atoms: Atoms, met: np.ndarray, p: Sequence[float] | None, first: int = 0
+) -> list[LinearMode | NoMode]:
+    """The forms of vectors of modes (K, components) of one run, some of which may only be neighbours of what it met.
+
+    first: those before it are left out.
+    """
+    found: list[LinearMode | NoMode] = []
+    for z in met[first:]:
+        try:
+            found.append(LinearMode(system, atoms, z, p))
+        except DividesByZero:
+            if len(met) == 1:
+                raise
+            found.append(NoMode(system))
+    return found
+
+
+def single_changes(system: System) -> np.ndarray:
+    """Vectors of modes: the first of each component, and those that differ from it in one."""
+    first = np.zeros(len(system.automata), dtype=np.int64)
+    vectors = [first]
+    for c, automaton in enumerate(system.automata):
+        for m in range(1, len(automaton.modes)):
+            vectors.append(first.copy())
+            vectors[-1][c] = m
+    return np.array(vectors)
+
+
+def is_always_linear(system: System) -> bool:
+    """Whether a model is linear in each of its modes whatever the values of its parameters."""
+    return bool(system.code.shared("is linear", lambda: _first_reason(system, None) is None))
+
+
+def holds_constants(system: System) -> bool:
+    """Whether each surface is a multiple of one state and a constant, at any values: what is held there is a number.
+
+    On another surface the held state follows other states, or time, and is none of the modal coordinates.
+    """
+    return bool(system.code.shared("holds constants", lambda: _holds_constants(system)))
+
+
+def _holds_constants(system: System) -> bool:
+    reader = _reader(system, Atoms(), np.zeros(len(system.automata), dtype=np.int64), None)
+    for register in system.code.data["tape"]["surfaces"]:
+        try:
+            form = reader.form(register)
+        except NotLinear:
+            return False
+        states = [key for key in form if isinstance(key, int)]
+        if len(states) != 1 or form.keys() - {*states, ()}:
+            return False
+    return True
+
+
+def what_is_not_linear(system: System) -> str | None:
+    """What keeps a model from being linear in each of its modes, in words; None where nothing does.
+
+    Each mode of each component is looked at; other combinations of modes are when they are entered. Most models are
+    linear at any values of their parameters or at none; the others are looked at for each set of values.
+    """
+    if is_always_linear(system):
+        return None
+    known: dict[tuple[float, ...], str | None] = system.code.shared("what is not linear", dict)
+    values = tuple(system.values.values())
+    reason = known.get(values, "")
+    if reason == "":  # not looked at yet
+        reason = _first_reason(system, values)
+        if len(known) >= _KEPT:
+            known.clear()
+        known[values] = reason
+    return reason
+
+
+def _first_reason(system: System, p: Sequence[float] | None) -> str | None:
+    vectors, of_mode = {"": np.zeros(len(system.automata), dtype=np.int64)}, {}
+    for c, automaton in enumerate(system.automata):
+        for m, mode in enumerate(automaton.modes):
+            name = f"mode {mode}" if automaton.name == SINGLE else f"{automaton.name}.{mode}"
+            z = vectors[f"in {name} "] = vectors[""].copy()
+            z[c], of_mode[f"in {name} "] = m, (c, m)
+    for cluster in system.clusters:  # what several hold together is solved for with what all of them act by
+        names = " and ".join(system.automata[c].name for c in cluster)
+        hold = "hold together" if len(cluster) > 1 else "holds"
+        z = vectors[f"where {names} {hold} "] = vectors[""].copy()
+        z[list(cluster)] = [max(system.automata[c].hold, 0) for c in cluster]
+    reasons: dict[str, str] = {}
+    for place, z in reversed(vectors.items()):
+        try:
+            LinearMode(system, Atoms(), z, p)
+        except DividesByZero:
+            continue  # no such motion
+        except NotLinear as reason:
+            reasons[place] = str(reason)
+    if not reasons:
+        return None
+    # the mode with which none is linear: others may only stand beside it
+    to_blame = (
+        place
+        for place, (c, m) in of_mode.items()
+        if all(other in reasons for other, z in vectors.items() if z[c] == m)
+    )
+    place = next(to_blame, next(iter(reasons)))
+    return (
+        reasons[place] if " in mode " in reasons[place] else f"{place}{reasons[place]}"
+    )  # a guard's title has it
+
+
+def is_linear_beside_corners(system: System) -> bool:
+    """Whether each mode is linear on both sides of each corner as well, at the values of the parameters."""
+    known: dict[tuple[float, ...] | None, bool] = system.code.shared("is linear beside corners", dict)
+    for p in (None, tuple(system.values.values())):
+        if p not in known:
+            if len(known) >= _KEPT:
+                known.clear()
+            known[p] = _is_linear_beside_corners(system, p)
+        if known[p]:
+            return True
+    return False
+
+
+def _is_linear_beside_corners(system: System, p: Sequence[float] | None) -> bool:
+    counts = [len(automaton.modes) for automaton in system.automata]
+    corners = [c for c, automaton in enumerate(system.automata) if automaton.is_corner]
+    for k, c in product(corners, range(len(counts))):
+        for side, mode in product(range(1, counts[k]), range(1, counts[c])):
+            z = np.zeros(len(counts), dtype=np.int64)
+            z[k], z[c] = side, mode
+            try:
+                LinearMode(system, Atoms(), z, p)
+            except DividesByZero:
+                continue  # no such motion
+            except NotLinear:
+                return False
+    return True
+
+
+def refuse_nonlinear(system: System) -> None:
+    """Refuse a model of which some mode is not linear."""
+    reason = what_is_not_linear(system)
+    if reason is not None:
+        raise UsageError(
+            f"exact cannot run {system.model.name}: a closed form takes modes that are linear in the states, "
+            f"and {reason}",
+            remedy="choose dop853" if system.has_corners else "choose taylor or dop853",
+        )

@@ -1,0 +1,436 @@
+"""Linear modes in compiled code: functions of time, exponentials of blocks, guards' series, first zeros of guards.
+
+Arrays are those of `hybridsim.engine.linear.tables`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.linear.form import ANGLE, GROWTH, TIME
+from hybridsim.engine.linear.guards import FARTHEST
+from hybridsim.engine.native.constants import BOUND_TERMS
+from hybridsim.engine.native.kernels import allocating_kernel, call_apart, inlined, kernel
+from hybridsim.engine.native.loop_hints import few
+from hybridsim.engine.native.simd_products import LANES, dot, product, times
+from hybridsim.engine.native.simd_vectors import WIDTH, load, splat, store
+from hybridsim.engine.roots.certify import (
+    falls_over,
+    past_dip,
+    safe_step,
+    stays_positive,
+    zero_of_terms,
+)
+from hybridsim.engine.roots.first_exit import FOUND, NEVER, OPEN
+from hybridsim.engine.series.bounded import ORDER, UNIT
+
+_SPREAD = 2.0  # norm up to which the exponential of a block less its mean is summed in one piece
+_PARTS = 10**6  # of that size: a second's work
+_ITERATIONS = 100
+_TERMS = 30  # of a series near its start, at most, beyond as many as there are states
+# From so many points a guard is followed: a second; a run that is to be stopped must not wait for more. A block of many
+# coordinates moves as much more slowly as it has entries.
+POINTS = 10**6
+# A row's rounding is at least ten units of the row in absolute values: what errors of y make of it, in terms of that.
+_IN_UNITS = 0.125 / UNIT
+# What is damped grows going back: by exp(1) at most over this share of how far a polynomial is used ahead.
+_TURNED = 2.0  # roundings, in the speed and in its product with the time
+_BACK, _BACKWARD = 1.0 / FARTHEST, 4.0
+
+
+@inlined
+def size_of(z: complex) -> float:
+    """A bound of a complex number's modulus, at most 1.5 times too large and cheaper than a root."""
+    return abs(z.real) + abs(z.imag)
+
+
+@inlined
+def functions_of_time(lin: Any, s: float, p: Any, factors: Any, w: Any) -> None:
+    """Monomials at local time s. factors: room for values of atoms, (2 A + 1, 2) with one at its end, and behind each
+    a bound of what its argument errs by, but for s."""
+    for a in range(lin.kinds.shape[0]):
+        kind, rate, angle = lin.kinds[a], lin.rates[a], lin.offsets[a]
+        value, other = factors[2 * a], factors[2 * a + 1]
+        if kind == TIME:
+            value[0] = s
+            continue
+        error = UNIT * abs(angle)
+        first = lin.term_start[a]
+        for i in range(first, lin.term_start[a + 1]):
+            few()
+            source, weight = lin.sources[i], lin.weights[i]
+            term = weight * p[source]
+            angle += term
+            if lin.phases[0] <= source < lin.phases[1]:
+                error += 2.0 * UNIT * abs(term)
+            if weight != 1.0 or i > first:
+                error += 2.0 * UNIT * abs(term)
+        turned = rate * s
+        angle += turned
+        if rate != 0.0:
+            error += UNIT * (abs(turned) + abs(angle))
+        value[1] = error
+        if kind == ANGLE:
+            value[0], other[0] = math.sin(angle), math.cos(angle)
+        elif kind == GROWTH:
+            value[0] = math.inf if angle >= 709.0 else math.exp(angle)  # math.exp raises beyond
+        else:
+            value[0] = angle
+    for m in range(w.shape[0]):
+        few()
+        product, row = 1.0, lin.factors[m]
+        for i in range(row.shape[0]):
+            few()
+            product *= factors[row[i], 0]
+        w[m] = product
+
+
+@inlined
+def errors_of_time(lin: Any, s_error: float, factors: Any, w_error: Any) -> None:
+    """Bounds of the errors of `functions_of_time`, which was asked last, at a local time good to s_error."""
+    for a in range(lin.kinds.shape[0]):
+        kind, value, other = lin.kinds[a], factors[2 * a], factors[2 * a + 1]
+        if kind == TIME:
+            value[1] = s_error
+            continue
+        error = value[1] + abs(lin.rates[a]) * s_error
+        if kind == ANGLE:
+            one, two, rest = abs(value[0]), abs(other[0]), 0.5 * error * error
+            value[1] = two * error + rest + 2.0 * UNIT * one
+            other[1] = one * error + rest + 2.0 * UNIT * two
+        elif kind == GROWTH:
+            value[1] = value[0] * (error + 2.0 * UNIT)
+        else:
+            value[1] = error
+    for m in range(w_error.shape[0]):
+        few()
+        product, error, row = 1.0, 0.0, lin.factors[m]
+        for i in range(row.shape[0]):
+            few()
+            factor = factors[row[i]]
+            v, e = factor[0], factor[1]
+            error = error * (abs(v) + e) + abs(product) * e
+            product *= v
+            if i > 0:
+                error += UNIT * abs(product)
+        w_error[m] = error
+
+
+@inlined
+def linear_coefficient(
+    lin: Any, k: int, g: int, order: int, x: Any, x_error: Any, work: Any
+) -> tuple[float, float]:
+    """A Taylor coefficient of a guard of the modes in row k at y = (x, w), with its bound."""
+    w, w_error, sizes, w_sizes, bound = work.w, work.w_error, work.sizes, work.w_sizes, 0.0
+    for m in range(x.shape[0]):
+        few()
+        sizes[m] = abs(x[m]) + x_error[m]
+        bound += abs(lin.series[k, g, order, m]) * x_error[m]
+    n = lin.series.shape[3] - w.shape[0]
+    n -= n % LANES
+    for m in range(w.shape[0]):
+        few()
+        w_sizes[m] = abs(w[m]) + w_error[m]
+        bound += abs(lin.series[k, g, order, n + m]) * w_error[m]
+    value = dot(lin.series, (k, g, order), (x, w))
+    return value, bound + dot(lin.roundings, (k, g, order), (sizes, w_sizes))
+
+
+@inlined
+def size_of_point(x: Any, x_error: Any, w: Any, w_error: Any) -> float:
+    """Of y = (x, w): a coefficient's bound is at most the largest of its roundings times this."""
+    size = 0.0
+    for m in range(x.shape[0]):
+        few()
+        size += abs(x[m]) + _IN_UNITS * x_error[m]
+    for m in range(w.shape[0]):
+        few()
+        size += abs(w[m]) + _IN_UNITS * w_error[m]
+    return size
+
+
+@inlined
+def clear_sign(lin: Any, k: int, g: int, order: int, x: Any, w: Any, size: float) -> int:
+    """Sign of a Taylor coefficient of a guard of the modes in row k at y = (x, w), of that size; 0 where in doubt."""
+    value = dot(lin.series, (k, g, order), (x, w))
+    if not abs(value) > lin.largest[k, g, order] * size:
+        return 0
+    return 1 if value > 0.0 else -1
+
+
+@kernel
+def linear_side(
+    lin: Any, k: int, g: int, decreed: int, x: Any, x_error: Any, work: Any
+) -> tuple[int, int, bool]:
+    """As `hybridsim.engine.events.choice.verdict.side_after`.
+
+    Coefficient by coefficient; and whether it is a question of rounding.
+    """
+    is_open, size = False, size_of_point(x, x_error, work.w, work.w_error)
+    for order in range(decreed, ORDER + 1):
+        sign = clear_sign(lin, k, g, order, x, work.w, size)
+        if sign != 0:  # far beyond its bound
+            return sign, order, False
+        value, bound = linear_coefficient(lin, k, g, order, x, x_error, work)
+        if value > bound:
+            return 1, order, False
+        if value < -bound:
+            return -1, order, False
+        is_open = is_open or value != 0.0 or bound != 0.0
+    return 0, ORDER + 1, is_open
+
+
+@inlined
+def to_modal(lin: Any, k: int, x: Any, w: Any, c: Any) -> None:
+    """Modal coordinates of y = (x, w)."""
+    for q in range(lin.inverse.shape[1]):
+        few()
+        a, b, d, e = times(lin.inverse, (k, q), (x, w))
+        c[2 * q], c[2 * q + 1] = complex(a, b), complex(d, e)
+
+
+@inlined
+def moved(lin: Any, k: int, c: Any, d: float, out: Any) -> None:
+    """Modal coordinates after a time d: exp(B d) c."""
+    j = 0
+    values, ends, count = lin.values[k], lin.ends[k], lin.counts[k]
+    while j < count:
+        few()
+        end = ends[j]
+        if end == j + 1:
+            value = values[j]
+            if value == 0.0:
+                out[j] = c[j]
+            else:
+                size = math.exp(min(value.real * d, 709.0)) if value.real != 0.0 else 1.0
+                angle = value.imag * d
+                out[j] = c[j] * complex(size * math.cos(angle), size * math.sin(angle))
+        else:
+            call_apart(_move_block, (lin, k, j, end, c, d, out))
+        j = end
+    while j < out.shape[0]:  # what others left there
+        few()
+        out[j] = 0.0
+        j += 1
+
+
+@allocating_kernel
+def _move_block(lin: Any, k: int, first: int, end: int, c: Any, d: float, out: Any) -> None:
+    """A block of several coordinates: exp(mean d) times the series of the rest; NaN where that takes too many parts."""
+    size = end - first
+    mean = 0.0 + 0.0j
+    for j in range(first, end):
+        mean += lin.values[k, j] / size
+    spread = 0.0
+    for j in range(first, end):
+        row = abs(lin.values[k, j] - mean)
+        for i in range(j + 1, end):
+            row += abs(lin.upper[k, j, i])
+        spread = max(spread, row)
+    if not spread * abs(d) <= _SPREAD * _PARTS:
+        for j in range(first, end):
+            out[j] = complex(math.nan, math.nan)
+        return
+    parts = max(1, math.ceil(spread * abs(d) / _SPREAD))
+    h = d / parts
+    factor = np.exp(mean * h)
+    term, total = np.empty(size, dtype=np.complex128), np.empty(size, dtype=np.complex128)
+    for j in range(size):
+        out[first + j] = c[first + j]
+    for _ in range(parts):
+        for j in range(size):
+            total[j] = term[j] = out[first + j]
+        for order in range(1, _ITERATIONS):
+            grown, whole = 0.0, 0.0
+            for j in range(size):  # upper triangular: row j needs no term before it
+                value = (lin.values[k, first + j] - mean) * term[j]
+                for i in range(j + 1, size):
+                    value += lin.upper[k, first + j, first + i] * term[i]
+                term[j] = value * (h / order)
+                total[j] += term[j]
+                grown, whole = grown + size_of(term[j]), whole + size_of(total[j])
+            if not grown > 0.125 * UNIT * whole:
+                break
+        for j in range(size):
+            out[first + j] = factor * total[j]
+
+
+@inlined
+def states_of(lin: Any, k: int, c: Any, x: Any) -> None:
+    """States at modal coordinates c."""
+    product(lin.states, k, (c,), x)
+
+
+@kernel
+def states_near_start(lin: Any, k: int, x: Any, w: Any, s: float, terms: Any, out: Any) -> None:
+    """States a short time s after y = (x, w), each to rounding of itself: the Taylor series, summed term by term.
+
+    Modal coordinates know a state to rounding of the largest one alone, and one that grows from zero is less than that
+    at first. terms (2, n + M): room. See `LinearTables.near`.
+    """
+    n, size = x.shape[0], terms.shape[1]
+    term, following = terms[0], terms[1]
+    for i in range(size):
+        term[i] = x[i] if i < n else w[i - n]
+    for i in range(n):
+        out[i] = x[i]
+    for order in range(1, size + _TERMS):
+        is_small = order > size  # until then a state may have no term yet
+        for i in range(size):
+            total = 0.0
+            for j in range(size):
+                if lin.flows[k, i, j] != 0.0:
+                    total += lin.flows[k, i, j] * term[j]
+            following[i] = total * (s / order)
+        for i in range(size):
+            term[i] = following[i]
+        for i in range(n):
+            out[i] += term[i]
+            is_small = is_small and abs(term[i]) <= 0.125 * UNIT * abs(out[i])
+        if is_small:
+            break
+
+
+@inlined
+def slopes_of(lin: Any, k: int, x: Any, w: Any, out: Any) -> None:
+    """Rates of the states at y = (x, w)."""
+    product(lin.slopes, k, (x, w), out)
+
+
+@inlined
+def state_sizes(lin: Any, k: int, before: Any, after: Any, larger: Any, scale: Any) -> None:
+    """What the states are summed from, in size, with modal coordinates before and after at the ends of a segment.
+
+    larger: room for their sizes.
+    """
+    for j in range(before.shape[0]):
+        few()
+        larger[j] = max(size_of(before[j]), size_of(after[j]))
+    product(lin.spreads, k, (larger,), scale)
+
+
+@inlined
+def guard_terms(lin: Any, k: int, g: int, c: Any, terms: Any) -> tuple[float, float]:
+    """Taylor coefficients of a guard at c into `terms`; (a bound of its size, of the first coefficient left out).
+
+    The latter holds from here on as long as no block grows: |gamma| |B**m| |c|/m!, block by block.
+    """
+    size, rest = 0.0, 0.0
+    first, second = splat(0.0), splat(0.0)  # BOUND_TERMS are two vectors
+    at = (k * lin.terms.shape[1] + g) * lin.terms.shape[2] * 2 * BOUND_TERMS
+    for j in range(lin.counts[k]):
+        few()
+        real, imaginary = c[j].real, c[j].imag
+        modulus = abs(real) + abs(imaginary)
+        size += lin.sizes[k, g, j] * modulus
+        rest += lin.rests[k, g, j] * modulus
+        x, y = splat(real), splat(imaginary)
+        first = first + (load(lin.terms, at) * x - load(lin.terms, at + BOUND_TERMS) * y)
+        second = second + (load(lin.terms, at + WIDTH) * x - load(lin.terms, at + BOUND_TERMS + WIDTH) * y)
+        at += 2 * BOUND_TERMS
+    store(terms, 0, first)
+    store(terms, WIDTH, second)
+    return size, rest
+
+
+@inlined
+def first_zero_of_wave(lin: Any, k: int, g: int, c: Any, bound: float) -> tuple[int, float]:
+    """As `first_zero`, for a guard a + r cos(omega s + phase), positive now; OPEN where it hardly gets below zero."""
+    j, terms = lin.waves[k, g], lin.terms
+    level, size = 0.0, 0.0
+    for i in range(lin.counts[k]):
+        size += lin.sizes[k, g, i] * size_of(c[i])
+        if i != j:
+            level += terms[k, g, i, 0, 0] * c[i].real - terms[k, g, i, 1, 0] * c[i].imag
+    u, v = terms[k, g, j, 0, 0], terms[k, g, j, 1, 0]
+    real, imaginary = u * c[j].real - v * c[j].imag, u * c[j].imag + v * c[j].real
+    error = (16.0 + 2.0 * lin.counts[k]) * UNIT * size
+    radius = math.sqrt(real * real + imaginary * imaginary)
+    if level > radius + error:
+        return NEVER, bound
+    steepness = (radius - level) * (radius + level)  # the square of its slope at the zero, over omega**2
+    # beyond the zero the guard has to go below what its error could hide
+    if not (level + real > error and steepness > 0.0 and 8.0 * error * abs(level) <= steepness):
+        return OPEN, 0.0
+    angle = math.acos(-level / radius) - math.atan2(imaginary, real)
+    if angle <= 0.0:
+        angle += 2.0 * math.pi
+    s = angle / lin.values[k, j].imag
+    return (FOUND, s) if s <= bound else (NEVER, bound)
+
+
+@kernel
+def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, room: Any) -> tuple[int, float]:
+    """When a guard first goes negative on (0, bound]: (NEVER, bound), (FOUND, s), or (OPEN, s): a question of rounding.
+
+    The guard is positive just after 0; its first `orders` coefficients are zero by decree, to within `floors`. starts,
+    row i: its Taylor coefficients at 0, and behind them the bounds that come with them. hints: where it may be zero (0:
+    no idea); if it is, and positive up to there for certain, that is the zero. Else, from point to point, the guard is
+    bounded from below by its Taylor polynomial less the largest remainder, so that no zero is jumped over; once the
+    polynomial holds to rounding up to the zero, that is the polynomial's.
+    """
+    side, order, floor = state.sides[g], state.orders[g], state.floors[g]
+    c, v, start, hint, terms, lower = (
+        room.c,
+        room.v,
+        room.starts[i],
+        room.hints[k, g],
+        room.terms[0],
+        room.terms[1],
+    )
+    size, rest = start[BOUND_TERMS], start[BOUND_TERMS + 1]
+    if not size < math.inf:
+        return OPEN, 0.0
+    if size == 0.0 and side >= 0:
+        return NEVER, bound
+    if side <= 0 or order >= BOUND_TERMS - 3 or not start[order] > 0.0:
+        return OPEN, 0.0
+    farthest, grown, margin = lin.farthest[k, g], lin.grown[k, g], (16.0 + 2.0 * lin.counts[k]) * UNIT
+    turning = _TURNED * UNIT * lin.turning[k, g]
+    is_due = 0.0 < hint <= min(bound, farthest)
+    if not is_due and bound <= farthest and stays_positive(start, order, grown * rest, bound, margin * size):
+        return NEVER, bound
+    if is_due:
+        moved(lin, k, c, hint, v)
+        size_there, rest_there = guard_terms(lin, k, g, v, terms)
+        margin_there = margin + turning * hint
+        error = margin_there * size_there + floor
+        rest_there *= _BACKWARD * grown
+        d = zero_of_terms(terms, rest_there, size_there, lower)
+        if d == d and 16.0 * error * abs(terms[2]) <= terms[1] * terms[1]:
+            width = falls_over(terms, rest_there, min(hint, _BACK * farthest))
+            if abs(d) < width and (
+                width == hint or stays_positive(start, order, grown * rest, hint - width, margin_there * size)
+            ):
+                return (FOUND, hint + d) if hint + d <= bound else (NEVER, bound)
+    for i in range(BOUND_TERMS):
+        terms[i] = start[i]
+    s, error, widest = 0.0, margin * size + floor, 1
+    for j in range(lin.counts[k]):
+        widest = max(widest, lin.ends[k, j] - j)
+    for _ in range(POINTS // (widest * widest)):
+        room.points[0] += widest * widest
+        reach = min(bound - s, farthest)
+        d = past_dip(terms, order, reach, error, lower)
+        if d == 0.0 or not stays_positive(terms, order, grown * rest, d, margin * size):
+            d = safe_step(terms, order, grown * rest, reach, margin * size, lower)
+        if d >= bound - s:
+            return NEVER, bound
+        if not s + d > s:
+            return OPEN, s
+        s += d
+        moved(lin, k, c, s, v)
+        size, rest = guard_terms(lin, k, g, v, terms)
+        margin = (16.0 + 2.0 * lin.counts[k]) * UNIT + turning * s
+        error = margin * size + floor
+        order, floor = 0, 0.0
+        d = zero_of_terms(terms, grown * rest, size, lower)
+        # beyond the zero the guard has to go below what its error could hide
+        if d == d and 16.0 * error * abs(terms[2]) <= terms[1] * terms[1]:
+            return (FOUND, s + d) if s + d <= bound else (NEVER, bound)
+        if not terms[0] > error:
+            return OPEN, s
+    return OPEN, s

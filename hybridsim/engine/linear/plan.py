@@ -1,0 +1,161 @@
+"""Where the numbers of linear modes come from: what is read off the tape once, for all values that are alike."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.linear.form import Atoms, Form, Monomial
+from hybridsim.engine.linear.modes import LinearMode, NoMode, modes_of, single_changes
+from hybridsim.engine.linear.recipe import Numbers, Recipe
+from hybridsim.engine.system.system import System
+from hybridsim.forks import SharedLock
+
+_MOST = 16  # plans of a structure for the same modes; more of them differ in zeros or conditions
+_MOST_VECTORS = 64  # sets of modes that plans are kept for
+
+Entries = np.ndarray  # (2, entries): where each goes, and the register that has its value
+
+_lock = SharedLock()
+
+
+class LinearPlan:
+    """Matrices of some vectors of modes (K, components) as entries whose values are registers of a recipe.
+
+    begun: a plan of the first of these vectors, at values for which it holds; the others are read in addition to it.
+    """
+
+    def __init__(
+        self, system: System, met: np.ndarray, p: np.ndarray, begun: LinearPlan | None = None
+    ) -> None:
+        if begun is None:
+            self._numbers, self._atoms = Numbers(p[: system.layout.parameters].tolist()), Atoms()
+            self._modes: list[LinearMode | NoMode] = []
+            known = self._first_read(system, met)
+        else:
+            self._numbers, self._atoms, self._modes = begun._numbers, begun._atoms, list(begun._modes)
+            known = begun._monomials
+        numbers, atoms, modes = self._numbers, self._atoms, self._modes
+        read = modes_of(system, atoms, met, numbers.inputs, len(modes))
+        modes += read
+        monomials = atoms.closure({*known, *(m for mode in read for m in mode.monomials())})
+        n, guards = system.n, system.guard_count
+        size = n + len(monomials)
+        place: dict[Any, int] = {i: i for i in range(n)} | {m: n + k for k, m in enumerate(monomials)}
+        motion = [(place[m], atoms.derivative(m)) for m in monomials]  # the same in all modes
+
+        def entries(rows: Iterable[tuple[int, Form]]) -> Entries:
+            """Places in a matrix of `size` columns, and registers."""
+            found = [(row * size + place[k], numbers.place(w)) for row, form in rows for k, w in form.items()]
+            return np.array(found, dtype=np.int64).reshape(-1, 2).T.copy()
+
+        self._shapes = (len(met), size, size), (len(met), guards, size)
+        self._monomials: list[Monomial] = monomials
+        first, self._flow, self._guards = 0, entries(()), entries(())
+        if begun is not None and begun._monomials == monomials:
+            first, self._flow, self._guards = begun._shapes[0][0], begun._flow, begun._guards
+        new = [(k, modes[k]) for k in range(first, len(met))]
+        flow = entries(
+            (k * size + row, form) for k, mode in new for row, form in [*enumerate(mode.rates), *motion]
+        )
+        active = entries((k * guards + g, form) for k, mode in new for g, form in mode.guards.items())
+        self._flow = np.concatenate([self._flow, flow], axis=1)
+        self._guards = np.concatenate([self._guards, active], axis=1)
+        used = sorted({a for m in monomials for a, _ in m})
+        met_atoms = [atoms.known[a] for a in used]
+        terms = [term for a in met_atoms for term in a.terms]
+        self._computed = {
+            name: np.array([numbers.place(value) for value in values], dtype=np.int64)
+            for name, values in (
+                ("rates", [a.rate for a in met_atoms]),
+                ("offsets", [a.offset for a in met_atoms]),
+                ("weights", [weight for _, weight in terms]),
+            )
+        }
+        self._fixed = {
+            "kinds": np.array([a.kind for a in met_atoms], dtype=np.int64),
+            "term_start": np.cumsum([0, *(len(a.terms) for a in met_atoms)]).astype(np.int64),
+            "sources": np.array([source for source, _ in terms], dtype=np.int64),
+            "factors": _factors(
+                [[2 * used.index(a) + part for a, part in m] for m in monomials], 2 * len(met_atoms)
+            ),
+        }
+        self.recipe: Recipe = Recipe(numbers, None if begun is None else begun.recipe)
+
+    def _first_read(self, system: System, met: np.ndarray) -> Iterable[Monomial]:
+        """Functions of time that do not depend on which modes a run meets first: the order of sums hangs on them.
+
+        Where all vectors of modes are met they are read in their order; else those that differ in one component come
+        first, in which there is nearly all that the others have.
+        """
+        if len(met) == math.prod(len(a.modes) for a in system.automata):
+            return ((),)
+        read = modes_of(system, self._atoms, single_changes(system), self._numbers.inputs)
+        return {(), *(m for mode in read for m in mode.monomials())}
+
+    def matrices(self, registers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """A (K, m, m) of the flows y' = A y, and rows (K, G, m) of the guards as functions of y.
+
+        registers: (R,), or (points, R) for as many of each.
+        """
+        lead = registers.shape[:-1]
+        A, rows = (np.zeros(lead + shape) for shape in self._shapes)
+        for matrix, (places, sources) in ((A, self._flow), (rows, self._guards)):
+            matrix.reshape(*lead, -1)[..., places] = registers[..., sources]
+        return A, rows
+
+    def atoms(self, registers: np.ndarray) -> dict[str, np.ndarray]:
+        """The atoms and monomials as arrays; registers as for `matrices`."""
+        return self._fixed | {name: registers[..., places] for name, places in self._computed.items()}
+
+
+def _factors(monomials: Sequence[Sequence[int]], one: int) -> np.ndarray:
+    """What each is a product of, filled up with ones."""
+    factors = np.full((len(monomials), max(map(len, monomials))), one, dtype=np.int64)
+    for row, monomial in zip(factors, monomials, strict=True):
+        row[: len(monomial)] = monomial
+    return factors
+
+
+def plan_of(system: System, met: np.ndarray, p: np.ndarray) -> tuple[LinearPlan, np.ndarray]:
+    """The plan of these vectors of modes that holds at the parameters in p, and its registers there."""
+    kept: dict[bytes, list[LinearPlan]] = system.code.shared("linear plans", dict)
+    inputs = p[: system.layout.parameters]
+    with _lock:
+        while len(kept) >= _MOST_VECTORS and met.tobytes() not in kept:
+            del kept[next(iter(kept))]
+        plans = kept.setdefault(met.tobytes(), [])
+        found = _that_holds(plans, inputs)
+        if found is None:
+            begun = _begun(kept, met, inputs)
+            found = _with_values(LinearPlan(system, met, p, begun), inputs)
+            if found is None:  # what is new is otherwise at the values of the plan that was begun
+                found = _with_values(LinearPlan(system, met, p), inputs)
+                assert found is not None  # the comparisons are those of these inputs
+            if len(plans) >= _MOST:
+                plans.clear()
+            plans.append(found[0])
+    return found
+
+
+def _with_values(plan: LinearPlan, inputs: np.ndarray) -> tuple[LinearPlan, np.ndarray] | None:
+    registers = plan.recipe.values(inputs)
+    return None if registers is None else (plan, registers)
+
+
+def _that_holds(plans: Iterable[LinearPlan], inputs: np.ndarray) -> tuple[LinearPlan, np.ndarray] | None:
+    """The first of some plans that holds at these inputs, and its registers there."""
+    return next((found for plan in plans if (found := _with_values(plan, inputs)) is not None), None)
+
+
+def _begun(kept: dict[bytes, list[LinearPlan]], met: np.ndarray, inputs: np.ndarray) -> LinearPlan | None:
+    """The plan of as many as possible of the first vectors: what a run meets grows by a few at the end, many times."""
+    whole = met.tobytes()
+    for key in sorted((key for key in kept if whole.startswith(key)), key=len, reverse=True):
+        found = _that_holds(kept[key], inputs)
+        if found is not None:
+            return found[0]
+    return None

@@ -1,0 +1,168 @@
+"""Arithmetic on numbers written down while it is done, to be done again with other numbers in compiled code.
+
+What is done may depend on the numbers: whether one is zero, whether two are equal. Such comparisons are written down
+with their results, and a recipe holds for other numbers where all of them come out the same.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.native.kernels import kernel
+from hybridsim.engine.series.interpreter import advance
+from hybridsim.engine.series.tape import ADD, DIV, MUL, NEG, SUB
+
+_PLAIN = {ADD: operator.add, SUB: operator.sub, MUL: operator.mul}  # the same in Python, and faster
+
+
+def computed(op: int, values: Sequence[float], b: int, c: int) -> tuple[float, float]:
+    """An operation of the tape on numbers: the second result is 0 for most. b and c are flags for a single operand."""
+    if op in _PLAIN:
+        return _PLAIN[op](values[0], values[1]), 0.0
+    V = np.zeros((4, 1))
+    V[: len(values), 0] = values
+    advance(np.array([[op, 0, 1 if len(values) > 1 else b, c, 2]], dtype=np.int64), V, 0)
+    return float(V[2, 0]), float(V[3, 0])
+
+
+class Numbers:
+    """The registers of a recipe in the making: inputs first, then constants and results as they come."""
+
+    def __init__(self, inputs: Sequence[float]) -> None:
+        self.values = list(inputs)
+        self.rows: list[tuple[int, int, int, int, int]] = []
+        self.comparisons: list[tuple[int, int, bool]] = []
+        self._constants: dict[str, int] = {}
+        self.inputs = [Traced(value, self, i) for i, value in enumerate(self.values)]
+
+    def place(self, value: float) -> int:
+        """The register of a number; one that was not computed here is a constant."""
+        if isinstance(value, Traced):
+            return value.register
+        name = float(value).hex()  # tells zeros by their signs
+        if name not in self._constants:
+            self._constants[name] = len(self.values)
+            self.values.append(value)
+        return self._constants[name]
+
+    def operation(self, op: int, values: Sequence[float], b: int = 0, c: int = 0) -> tuple[Traced, Traced]:
+        """An operation of the tape on numbers; b and c are flags where there is one operand."""
+        places, out = [self.place(value) for value in values], len(self.values)
+        self.rows.append((op, places[0], places[1] if len(places) > 1 else b, c, out))
+        self.values += computed(op, [self.values[i] for i in places], b, c)
+        return Traced(self.values[out], self, out), Traced(self.values[out + 1], self, out + 1)
+
+    def equal(self, a: float, b: float) -> bool:
+        """Whether two numbers are equal, written down."""
+        i, j = self.place(a), self.place(b)
+        found = self.values[i] == self.values[j]
+        self.comparisons.append((i, j, found))
+        return found
+
+
+class Traced(float):
+    """A number that knows its register."""
+
+    __slots__ = ("numbers", "register")
+    numbers: Numbers
+    register: int
+
+    def __new__(cls, value: float, numbers: Numbers, register: int) -> Traced:
+        """The number in a register."""
+        self = super().__new__(cls, value)
+        self.numbers, self.register = numbers, register
+        return self
+
+    def __add__(self, other: float) -> Traced:
+        return self.numbers.operation(ADD, (self, other))[0]
+
+    def __radd__(self, other: float) -> Traced:
+        return self.numbers.operation(ADD, (other, self))[0]
+
+    def __sub__(self, other: float) -> Traced:
+        return self.numbers.operation(SUB, (self, other))[0]
+
+    def __rsub__(self, other: float) -> Traced:
+        return self.numbers.operation(SUB, (other, self))[0]
+
+    def __mul__(self, other: float) -> Traced:
+        return self.numbers.operation(MUL, (self, other))[0]
+
+    def __rmul__(self, other: float) -> Traced:
+        return self.numbers.operation(MUL, (other, self))[0]
+
+    def __truediv__(self, other: float) -> Traced:
+        return self.numbers.operation(DIV, (self, other))[0]
+
+    def __rtruediv__(self, other: float) -> Traced:
+        return self.numbers.operation(DIV, (other, self))[0]
+
+    def __neg__(self) -> Traced:
+        return self.numbers.operation(NEG, (self,))[0]
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, float) and self.numbers.equal(self, other)
+
+    def __ne__(self, other: object) -> bool:
+        return not self == other
+
+    __hash__ = float.__hash__
+    # a decision that is not written down must not be taken
+    __bool__ = __lt__ = __le__ = __gt__ = __ge__ = None  # type: ignore[assignment]  # refused by being no function
+
+
+# registers, rows, and of comparisons both registers and how they came out
+_NOTHING = np.empty((0, 1)), np.empty((0, 5), dtype=np.int64), np.empty((0, 3), dtype=np.int64)
+
+
+class Recipe:
+    """What was written down, for other inputs; begun: of what the same numbers were some operations ago."""
+
+    def __init__(self, numbers: Numbers, begun: Recipe | None = None) -> None:
+        self._inputs = len(numbers.inputs)
+        parts = _NOTHING if begun is None else begun._parts
+        written: tuple[Sequence[Any], ...] = (numbers.values, numbers.rows, numbers.comparisons)
+        self._parts: tuple[np.ndarray, ...] = tuple(
+            _gone_on_with(part, lines) for part, lines in zip(parts, written, strict=True)
+        )
+        self._start, self._rows, compared = self._parts
+        self._left, self._right, self._found = compared[:, 0], compared[:, 1], compared[:, 2] != 0
+
+    def values(self, inputs: Any) -> np.ndarray | None:
+        """All registers at these inputs; None where a comparison comes out otherwise than it did."""
+        V = self._start.copy()
+        V[: self._inputs, 0] = inputs
+        advance(self._rows, V, 0)
+        registers = V[:, 0]
+        same = (registers[self._left] == registers[self._right]) == self._found
+        return registers if same.all() else None
+
+    def values_at(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """All registers (points, R) at the inputs of many points; where (points,) the comparisons come out alike."""
+        found = np.empty((len(inputs), len(self._start)))
+        _replay(self._rows, self._start[:, 0].copy(), inputs, np.empty_like(self._start), found)
+        same = (found[:, self._left] == found[:, self._right]) == self._found
+        return found, same.all(axis=1)
+
+
+def _gone_on_with(known: np.ndarray, written: Sequence[Any]) -> np.ndarray:
+    """What was written as an array (entries, width), of which the first entries are known."""
+    new = np.array(written[len(known) :], dtype=known.dtype).reshape(-1, known.shape[1])
+    return np.concatenate([known, new])
+
+
+@kernel
+def _replay(rows: Any, start: Any, inputs: Any, V: Any, out: Any) -> None:
+    """Carry the operations out for each row of inputs; V (R, 1): room."""
+    for i in range(inputs.shape[0]):
+        for r in range(start.shape[0]):
+            V[r, 0] = start[r]
+        for j in range(inputs.shape[1]):
+            V[j, 0] = inputs[i, j]
+        advance(rows, V, 0)
+        for r in range(start.shape[0]):
+            out[i, r] = V[r, 0]

@@ -1,0 +1,37 @@
+"""Which modes keep the flow of a lowered model linear in its states."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from hybridsim.engine.lowering.lower import Lowering
+
+
+def affine_modes(
+    lowering: Lowering, der: list[Any], definitions: dict[Any, Any], surfaces: dict[int, Any]
+) -> dict[str, tuple[bool, ...]]:
+    """Which modes keep the flow linear in the states (unknowns that are solved for included)."""
+    free = set(lowering.states) | {
+        lowering.symbols[n] for c in lowering.components for m in c.modes for n in m.set
+    }
+    free |= {lowering.symbols[c.surface.unknown] for c in lowering.components if c.surface}
+
+    def affine(e: Any) -> bool:
+        inner = sorted(e.free_symbols & free, key=str)
+        return all(not lowering.sp.diff(e, a).free_symbols & free for a in inner)
+
+    def linear(c: int, m: Any) -> bool:
+        surface = lowering.components[c].surface
+        if surface and m.name == surface.hold and not affine(surfaces[c]):
+            return False
+        return all(
+            affine(lowering.inline(lowering.convert(e), definitions))
+            for e in [*m.set.values(), *m.der.values()]
+        )
+
+    base = all(affine(lowering.inline(d, definitions)) for d in der)
+    return {
+        component.name: tuple(base and linear(c, m) for m in component.modes)
+        for c, component in enumerate(lowering.components)
+    } | {"": (base,)}

@@ -1,0 +1,64 @@
+"""Which contacts act on each other, and by how much normal forces load friction: the data of joint solves."""
+
+from __future__ import annotations
+
+from collections.abc import Container
+from typing import TYPE_CHECKING, Any
+
+from hybridsim.engine.lowering.program_names import declared_name
+from hybridsim.errors import ModelError
+from hybridsim.expr.simplify import simplified
+
+if TYPE_CHECKING:
+    from hybridsim.engine.lowering.lower import Lowering
+
+
+def normal_loads(
+    lowering: Lowering, unknown: dict[int, Any], definitions: dict[Any, Any]
+) -> dict[tuple[int, int], dict[str, Any]]:
+    """By how much the force of slip of a contact grows with a normal force, by (contact, impact) and mode.
+
+    A normal force that a contact's guards alone use has an entry without modes.
+    """
+    normal = {u: d for d, u in unknown.items() if lowering.components[d].surface.is_unilateral}
+    found: dict[tuple[int, int], dict[str, Any]] = {}
+    for c, component in enumerate(lowering.components):
+        if c in normal.values() or not normal:
+            continue
+        for m in component.modes:
+            values = {n: lowering.inline(lowering.convert(e), definitions) for n, e in m.set.items()}
+            guards = [lowering.inline(lowering.convert(g.expr), definitions) for g in m.guards]
+            used = {u for e in (*values.values(), *guards) for u in e.free_symbols} & normal.keys()
+            for u in used:
+                slopes = {n: simplified(lowering.sp.diff(e, u)) for n, e in values.items() if e.has(u)}
+                own = unknown.get(c)
+                if set(slopes) - {declared_name(own) if own is not None else None} or any(
+                    e.free_symbols & set(unknown.values()) for e in slopes.values()
+                ):
+                    raise ModelError(
+                        f"{component.name} uses the normal force {declared_name(u)} of an impact otherwise than as a "
+                        "load that friction of slip and stick is proportional to",
+                        place=component.place,
+                        remedy="take a law of slip and stick that is linear in its load; write rates with "
+                        f"{declared_name(u)} in them as the rates of states",
+                    )
+                if own is not None:
+                    by_mode = found.setdefault((c, normal[u]), {})
+                    if slopes:
+                        by_mode[m.name] = slopes[declared_name(own)]
+    return found
+
+
+def clusters_of(
+    order: list[int], effect: dict[tuple[int, int], Any], loads: Container[tuple[int, int]]
+) -> list[list[int]]:
+    """Components whose unknowns act on each other's surface, or load each other, in groups."""
+
+    def act(c: int, d: int) -> bool:
+        return effect[c, d] != 0 or (c, d) in loads
+
+    clusters: list[list[int]] = []
+    for c in order:
+        linked = [g for g in clusters if any(act(c, d) or act(d, c) for d in g)]
+        clusters = [g for g in clusters if g not in linked] + [sorted([c, *(d for g in linked for d in g)])]
+    return clusters

@@ -1,0 +1,83 @@
+"""What a generated module says of impacts: what impulses do to the states, to gaps and to velocities; restitutions.
+
+For m surfaces in the order of the module and n states, behind each other: d(u_k)/dx (m, n), u_k the rate of a gap or a
+relative velocity; d(rates)/d(unknown_k) (m, n); by how much a unit of the load d lets the friction force k grow at the
+onset of slip, forward and backward (m, m) each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from hybridsim.expr.symbolic import to_sympy
+from hybridsim.model.parts.impact import SPEED
+
+if TYPE_CHECKING:
+    from hybridsim.engine.lowering.lower import Lowering
+
+Rows = list[tuple[str, Any]]
+
+
+def speed_name(k: int) -> str:
+    """Name in the program of the speed of approach at the surface k."""
+    return f"speed_{k}"
+
+
+def impulses(lowering: Lowering) -> Rows:
+    """The rows of the function ``impulses``; none without unilateral contacts."""
+    if not _unilateral(lowering):
+        return []
+    return [(f"out[{i}]", value) for i, value in enumerate(_values(lowering))]
+
+
+def gap_slopes(lowering: Lowering) -> Rows:
+    """The rows of the function ``gap_slopes``: d(gap)/dx (m, n) of the surfaces; only those of gaps are set."""
+    n = len(lowering.states)
+    gaps = [(k, lowering.inlined(lowering.components[c].surface.function)) for k, c in _unilateral(lowering)]
+    return [
+        (f"out[{k * n + i}]", slope)
+        for k, gap in gaps
+        for i, x in enumerate(lowering.states)
+        if (slope := lowering.sp.diff(gap, x)) != 0
+    ]
+
+
+def restitutions(lowering: Lowering) -> Rows:
+    """The rows of the function ``restitutions``, one for each surface; speeds of approach stand behind the states."""
+    rows = []
+    for k, c in _unilateral(lowering):
+        names = {**lowering.symbols, SPEED: lowering.sp.Symbol(speed_name(k), real=True)}
+        rows.append((f"out[{k}]", to_sympy(lowering.components[c].surface.restitution, names)))
+    return rows
+
+
+def _unilateral(lowering: Lowering) -> list[tuple[int, int]]:
+    """Place among the surfaces, and component."""
+    order = enumerate(lowering.held_rates)
+    return [(k, c) for k, c in order if lowering.components[c].surface.is_unilateral]
+
+
+def _values(lowering: Lowering) -> Iterator[Any]:
+    sp = lowering.sp
+    for rate in lowering.held_rates.values():
+        yield from (sp.diff(rate, x) for x in lowering.states)
+    for u in lowering.unknown.values():
+        yield from (sp.diff(rate, u) for rate in lowering.open_rates)
+    for backward in (False, True):
+        for c in lowering.held_rates:
+            onset = _onset(lowering, c, backward)
+            for d, u in lowering.unknown.items():
+                is_load = c != d and lowering.components[d].surface.is_unilateral
+                yield sp.diff(onset, u) if is_load else sp.Integer(0)
+
+
+def _onset(lowering: Lowering, c: int, backward: bool) -> Any:
+    """Friction force at the onset of slip, but for terms without a load: the limit of stick less what it drops by."""
+    component = lowering.components[c]
+    surface = component.surface
+    if surface.unique or surface.is_unilateral:
+        return lowering.sp.Integer(0)
+    guards = component.mode(surface.hold).guards
+    jump = lowering.inlined(surface.jump_below if backward else surface.jump_above)
+    return lowering.inlined(guards[1 if backward else 0].expr) + (jump if backward else -jump)

@@ -1,0 +1,497 @@
+"""From a declared model to a program: angles in local time, held states, unknowns of holding modes solved for."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from hybridsim.engine.lowering.affine_modes import affine_modes
+from hybridsim.engine.lowering.clusters import clusters_of, normal_loads
+from hybridsim.engine.lowering.elimination import eliminated
+from hybridsim.engine.lowering.held_states import HeldStates
+from hybridsim.engine.lowering.nonlinear import refuse_powers
+from hybridsim.engine.lowering.products import Products
+from hybridsim.engine.lowering.program import Assign, Item, Switch, changed, ordered
+from hybridsim.engine.lowering.program_names import declared_name, user
+from hybridsim.engine.lowering.second_order import Partner, attraction, partners
+from hybridsim.engine.lowering.shared_rates import kept_rates, refuse_changed_rates
+from hybridsim.engine.lowering.stop_coupling import Tie, help_of_ties, ties, without_share
+from hybridsim.engine.series.layout import SIGNAL_SLOTS, Layout
+from hybridsim.errors import ModelError, Place
+from hybridsim.expr.simplify import is_short, simplified, written_out
+from hybridsim.expr.symbolic import to_sympy, without_distributions
+from hybridsim.model.parts.switching import ATTRACTION
+
+if TYPE_CHECKING:
+    from hybridsim.expr.parse import Expression
+    from hybridsim.model.parts.model import Model
+
+
+@dataclass
+class Program:
+    """The lowered model: items in order, and the names under which results are found in it."""
+
+    model: Model
+    components: tuple[Any, ...]
+    items: list[Item]
+    derivatives: list[str]
+    surfaces: list[tuple[int, str]]  # (component, name of s)
+    pins: dict[int, tuple[int, ...]]  # component -> indices of the states that its holding mode evaluates
+    projected: dict[int, tuple[int, ...]]  # component -> those that its holding mode projects instead
+    rates: list[Any]  # SymPy, parameters only
+    clusters: list[list[int]]  # surface components whose unknowns act on each other's surface
+    ties: list[Tie]  # gaps with contacts along them
+    jumps: list[tuple[int, Any, Any]]  # (component, jump above, jump below)
+    linear: dict[str, tuple[bool, ...]]  # component -> which of its modes have a flow linear in the states
+    conditions: dict[tuple[int, int, int], tuple[Any, ...]] = field(default_factory=dict)
+    layout: Layout = field(init=False)
+
+    def __post_init__(self) -> None:
+        model = self.model
+        self.layout = Layout(len(model.parameters), len(model.discrete), len(self.rates), len(model.inputs))
+
+
+class Lowering:
+    """The steps from a `Model` to a `Program`; holds the symbol table while they run."""
+
+    def __init__(self, model: Model) -> None:
+        import sympy as sp
+
+        self.sp = sp
+        self.model = model
+        self.components: tuple[Any, ...] = tuple(model.all_components())
+        names = [p.name for p in model.parameters] + [s.name for s in model.states]
+        names += [d.name for d in model.discrete] + [i.name for i in model.inputs]
+        names += [n for n, _ in model.definitions] + ["t"]
+        names += sorted({n for c in self.components for m in c.modes for n in m.set})
+        names += [c.surface.unknown for c in self.components if c.surface]
+        names += [ATTRACTION + c.surface.unknown for c in self.components if c.surface and c.surface.unique]
+        self.symbols = {n: sp.Symbol(user(n), real=True) for n in names}
+        self.s = sp.Symbol("s", real=True)
+        self.t = self.symbols["t"]
+        self.parameters = {self.symbols[p.name] for p in model.parameters}
+        self.states = [self.symbols[s.name] for s in model.states]
+        self.rates: list[Any] = []
+        self.unknown: dict[int, Any] = {}  # of each surface
+        self.definitions: dict[Any, Any] = {}
+        self.effects: list[Any] = []  # of each unknown on the rate of its own surface
+        # what each unknown acts on the rate of: a surface, or the rate of a gap
+        self.held_rates: dict[int, Any] = {}
+        self.open_rates: list[Any] = []  # of the states, over the unknowns
+        # components whose unknown does not act on the rate of their surface
+        self.never_held: set[int] = set()
+        self.partners: dict[int, Partner] = {}  # of those that are held by the surface of their rate
+        self.ties: list[Tie] = []
+        self.effect: dict[tuple[int, int], Any] = {}  # of unknowns on what is held
+        self.angles = self._defined_angles()
+
+    def _defined_angles(self) -> dict[Any, Any]:
+        """Definitions that grow linearly in time, such as theta = omega*t, written out for their sine and cosine."""
+        waiting = {self.symbols[n]: to_sympy(e, self.symbols) for n, e in self.model.definitions}
+        found: dict[Any, Any] = {}
+        while True:
+            written_out = {name: e.subs(found) for name, e in waiting.items() if name not in found}
+            grow = {name: e for name, e in written_out.items() if self._rate(e) is not None}
+            if not grow:
+                return found
+            found |= grow
+
+    def _rate(self, e: Any) -> Any:
+        """de/dt where it is a parameter's worth and not zero, else None."""
+        if self.t not in e.free_symbols:
+            return None
+        rate = self.sp.diff(e, self.t)
+        return None if rate == 0 or rate.free_symbols - self.parameters else rate
+
+    def convert(self, expression: Expression) -> Any:
+        """A declared expression in SymPy, angles that grow in time written in local time."""
+        sp = self.sp
+        value = to_sympy(expression, self.symbols)
+        if value.has(sp.I, sp.nan, sp.zoo, sp.oo):
+            simplified = re.sub(rf"\b{user('')}", "", str(value))
+            raise expression.error(
+                f"'{expression.text}' is no finite real number: it simplifies to {simplified}",
+                remedy="look for a root or a logarithm of something negative, or a division by zero.",
+            )
+        return self._local_angles(value)
+
+    def _local_angles(self, e: Any) -> Any:
+        sp = self.sp
+        if not e.free_symbols & {self.t, *self.angles}:
+            return e
+
+        def rewrite(argument: Any, kind: Any) -> Any:
+            argument = self._local_angles(argument) if argument.has(sp.sin, sp.cos, sp.tan) else argument
+            written_out = argument.subs(self.angles)
+            rate = self._rate(written_out)
+            if rate is None:
+                return kind(argument)
+            argument = written_out
+            if rate not in self.rates:
+                self.rates.append(rate)
+            phase = sp.Symbol(f"phase_{self.rates.index(rate)}", real=True)
+            return kind(phase + rate * self.s + argument.subs(self.t, 0))
+
+        for kind in (sp.sin, sp.cos, sp.tan):
+            e = e.replace(kind, lambda a, k=kind: rewrite(a, k))
+        return e
+
+    def signal(self, index: int) -> Any:
+        """The current piece of an input as an expression of local time."""
+        sp = self.sp
+        kind = self.model.inputs[index].kind
+        c = [sp.Symbol(f"signal_{index}_{j}", real=True) for j in range(SIGNAL_SLOTS)]
+        d = self.s - c[4]
+        if kind == "step":
+            return c[0]
+        if kind == "table" or (kind == "wave" and self.model.inputs[index].shape != "sine"):
+            return c[0] + d * (c[1] + d * (c[2] + d * c[3]))
+        return c[5] + c[3] * sp.sin(c[0] + d * (c[1] + d * c[2]))
+
+    def lower(self) -> Program:
+        """Run all the steps."""
+        model, sp = self.model, self.sp
+        self.definitions = definitions = {self.symbols[n]: self.convert(e) for n, e in model.definitions}
+        # a circle could not be put in without end
+        ordered([Assign(k.name, e) for k, e in definitions.items()])
+        signals = {self.symbols[i.name]: self.signal(k) for k, i in enumerate(model.inputs)}
+        der = [self.convert(s.der) for s in model.states]
+        items: list[Item] = [Assign(user("t"), sp.Symbol("origin", real=True) + self.s)]
+        items += [Assign(k.name, e) for k, e in (signals | definitions).items()]
+        surfaces = {
+            c: self.inline(self.convert(comp.surface.function), definitions | signals)
+            for c, comp in enumerate(self.components)
+            if comp.surface
+        }
+        self._check_surfaces(surfaces)
+        gap_rates = self._gap_rates(surfaces, der, definitions | signals)
+        self.ties = ties(self, surfaces, gap_rates)
+        unknown_items, clusters = self._unknowns(surfaces | gap_rates, der, definitions)
+        constraints = {(c, 0): s for c, s in surfaces.items() if c not in self.never_held}
+        held = HeldStates(self, constraints | {(c, 1): rate for c, rate in gap_rates.items()})
+        items += held.items()
+        items += self._mode_variables()
+        items += unknown_items
+        derivative_items, derivatives = self._derivatives(der, held)
+        turning_items, derivatives = held.turned(derivatives)
+        items += derivative_items + turning_items
+        items += [Assign(f"surface_{c}", s) for c, s in surfaces.items()]
+        guard_items, conditions = self._guards()
+        items += guard_items
+        self._count_phases()
+        program = Program(
+            model,
+            self.components,
+            [changed(item, without_distributions) for item in ordered(items)],
+            derivatives,
+            [(c, f"surface_{c}") for c in surfaces],
+            held.by_component(held.pins),
+            held.by_component(held.projected),
+            self.rates,
+            clusters,
+            self.ties,
+            [self._jump(c) for c in surfaces],
+            affine_modes(self, der, definitions, surfaces),
+            conditions,
+        )
+        return program
+
+    def _gap_rates(
+        self, surfaces: dict[int, Any], der: list[Any], definitions: dict[Any, Any]
+    ) -> dict[int, Any]:
+        """Rates of the gaps of unilateral contacts, by component, over states, t and parameters."""
+        found: dict[int, Any] = {}
+        for c, s in surfaces.items():
+            if not self.components[c].surface.is_unilateral:
+                continue
+            slopes = [(self.sp.diff(s, x), d) for x, d in zip(self.states, der, strict=True)]
+            rate = self._rate_in_time(s) + sum(a * self.inline(d, definitions) for a, d in slopes if a != 0)
+            wrong = sorted(map(declared_name, self._foreign(rate)))
+            if wrong or rate == 0:
+                fault = f"uses {', '.join(wrong)}, which depends on a mode" if wrong else "is zero"
+                raise ModelError(
+                    f"impact {self.components[c].name}: the rate of its gap '{self.written(c)}' {fault}",
+                    place=self.place(c),
+                    remedy="write the gap over positions, whose rates are velocities; forces change these",
+                )
+            found[c] = rate
+        return found
+
+    def inlined(self, expression: Expression) -> Any:
+        """A declared expression in SymPy with the definitions put in."""
+        return self.inline(self.convert(expression), self.definitions)
+
+    def _rate_in_time(self, s: Any) -> Any:
+        """The rate of an expression while the states stay."""
+        return self.sp.diff(s, self.s) + self.sp.diff(s, self.t)
+
+    def inline(self, e: Any, definitions: dict[Any, Any]) -> Any:
+        """An expression with definitions put in, and those that these use."""
+        while e.free_symbols & definitions.keys():
+            e = e.subs(definitions)
+        return e
+
+    def _check_surfaces(self, surfaces: dict[int, Any]) -> None:
+        for c, s in surfaces.items():
+            if wrong := self._foreign(s):
+                names = ", ".join(sorted(n.name.removeprefix("v_") for n in wrong))
+                raise ModelError(
+                    f"{self.components[c].name}: its {self.title(c)} '{self.written(c)}' uses {names}, which "
+                    "depends on a mode",
+                    place=self.place(c),
+                    remedy="write it over states, inputs, parameters and t",
+                )
+
+    def _foreign(self, e: Any) -> list[Any]:
+        """The names in an expression that depend on a mode."""
+        allowed = self.parameters | set(self.states) | {self.t, self.s}
+        allowed |= {self.symbols[d.name] for d in self.model.discrete}
+        return [n for n in e.free_symbols - allowed if n.name.startswith("v_")]
+
+    def title(self, c: int, plural: bool = False) -> str:
+        """What a surface's function is called."""
+        one, many = "relative velocity", "relative velocities"
+        if self.components[c].surface.unique:
+            one, many = "switching function", "switching functions"
+        elif self.components[c].surface.is_unilateral:
+            one, many = "gap", "gaps"
+        return many if plural else one
+
+    def written(self, c: int) -> str:
+        """A surface's function as it was written."""
+        return " ".join(str(self.components[c].surface.function.text).split())
+
+    def place(self, c: int) -> Place | None:
+        """Where a surface's function was written."""
+        component = self.components[c]
+        return component.surface.function.place or component.place
+
+    def _mode_variables(self) -> list[Item]:
+        items: list[Item] = []
+        for c, component in enumerate(self.components):
+            unknown = component.surface.unknown if component.surface else None
+            for name in sorted({n for m in component.modes for n in m.set} - {unknown}):
+                branches = tuple((Assign(user(name), self.convert(m.set[name])),) for m in component.modes)
+                items.append(Switch(c, branches))
+        return items
+
+    def _unknowns(
+        self, surfaces: dict[int, Any], der: list[Any], definitions: dict[Any, Any]
+    ) -> tuple[list[Item], list[list[int]]]:
+        """Mode values of the unknowns; in a holding mode the one that keeps ds/dt = 0, solved jointly."""
+        sp = self.sp
+        order = list(surfaces)
+        unknown = {c: self.symbols[self.components[c].surface.unknown] for c in order}
+        self.held_rates, self.unknown = surfaces, unknown
+        refuse_changed_rates(self, surfaces)
+        all_unknown = set(unknown.values())
+        blends = self._blends()
+        rate: dict[int, Any] = {}
+        effect: dict[tuple[int, int], Any] = {}
+        self.effect = effect
+        self.products = products = Products(self, unknown)
+        totals: dict[int, Any] = {}
+        for c in order:
+            s = surfaces[c]
+            totals[c] = self._rate_in_time(s)
+            for x, d in zip(self.states, der, strict=True):
+                slope = sp.diff(s, x)
+                if slope != 0:
+                    totals[c] += slope * self._inline_unknown(d, definitions | blends, all_unknown)
+        for c in order:
+            row = {d: simplified(sp.diff(totals[c], unknown[d])) for d in order}
+            row, rate[c] = products.linear(c, totals, row)
+            effect |= {(c, d): slope for d, slope in row.items()}
+            self.effects.append(effect[c, c])
+            if effect[c, c] == 0:
+                if not self.components[c].surface.unique:
+                    raise ModelError(
+                        f"{declared_name(unknown[c])} does not act on its own {self.title(c)} "
+                        f"'{self.written(c)}' ({self.components[c].name}): it can never hold it",
+                        place=self.place(c),
+                        remedy=f"use {declared_name(unknown[c])} in the derivative of the velocity state",
+                    )
+                self.never_held.add(c)
+        self.partners = partners(self, surfaces, rate, effect)
+        self.never_held -= self.partners.keys()
+        self.open_rates = [self._inline_unknown(d, definitions | blends, all_unknown) for d in der]
+        switching = {c: u for c, u in unknown.items() if self.components[c].surface.unique}
+        if switching:
+            refuse_powers(self, switching, self.open_rates)
+        loads = normal_loads(self, unknown, definitions)
+        clusters = clusters_of(order, effect, {*loads, *products.known})
+        items: list[Item] = products.items()
+        for cluster in clusters:
+            items += self._solve(cluster, unknown, rate, effect, loads)
+        for c in order:
+            if c in self.partners:
+                items.append(attraction(self, c, self.partners[c], effect))
+            elif self.components[c].surface.unique:
+                pull = sp.Integer(-1) if c in self.never_held else products.not_together(c, -effect[c, c])
+                items.append(Assign(user(ATTRACTION + self.components[c].surface.unknown), pull))
+        return items, clusters
+
+    def _blends(self) -> dict[Any, Any]:
+        """Variables that surfaces set, as they are in any of their modes: over the unknowns."""
+        found: dict[Any, Any] = {}
+        for component in self.components:
+            if component.surface and component.surface.unique:
+                hold = component.mode(component.surface.hold)
+                found |= {self.symbols[n]: self.convert(e) for n, e in hold.set.items()}
+        return found
+
+    def _inline_unknown(self, e: Any, definitions: dict[Any, Any], unknown: set[Any]) -> Any:
+        inner = {k: d for k, d in definitions.items() if self.inline(d, definitions).free_symbols & unknown}
+        return self.inline(e, inner)
+
+    def _solve(
+        self,
+        cluster: list[int],
+        unknown: dict[int, Any],
+        rate: dict[int, Any],
+        effect: dict[tuple[int, int], Any],
+        loads: dict[tuple[int, int], dict[str, Any]],
+    ) -> list[Item]:
+        sp = self.sp
+        items: list[Item] = []
+
+        branches = self.in_modes
+        if len(cluster) == 1:
+            c = cluster[0]
+            if c in self.never_held:
+                return [branches(c, unknown[c].name, sp.Integer(0))]
+            value = -rate[c] / effect[c, c]
+            if value.count_ops() < 200 and is_short(value):
+                value = written_out(value)
+            value = value.xreplace({sp.zoo: sp.nan})  # where a sign in the effect is zero: it cannot be held
+            return [branches(c, unknown[c].name, value)]
+        # joint solve: rows of components that do not hold read "unknown = its declared value", less what that has from
+        # normal forces among the unknowns; it is 0 in the mode of one that never holds, which is not entered
+        matrix: dict[tuple[int, int], Any] = {}
+        right: dict[int, Any] = {}
+        for c in cluster:
+            given = {unknown[d]: 0 for d in cluster if (c, d) in loads}
+            partner = self.partners.get(c)
+            for d in cluster:
+                by_mode = loads.get((c, d), {})
+                entry = partner.share(c, d, sp) if partner else effect[c, d]
+                entry = self.products.diagonal(c, entry) if c == d and not partner else entry
+                if entry == 0 and c != d and not by_mode:
+                    continue
+                name = f"effect_{c}_{d}"
+                off = {m.name: -by_mode.get(m.name, sp.Integer(0)) for m in self.components[c].modes}
+                off = dict.fromkeys(off, sp.Integer(1)) if c == d else off
+                held = off[self.components[c].surface.hold] if c in self.never_held else entry
+                more, held = without_share(self, self.ties, c, d, held, sp.Integer(1 if c == d else 0))
+                items += more
+                items.append(branches(c, name, held, off))
+                matrix[c, d] = sp.Symbol(name, real=True)
+            hold = sp.Integer(0) if c in self.never_held or partner else -rate[c]
+            more, hold = without_share(self, self.ties, c, -1, hold, sp.Integer(0))
+            items += more
+            items.append(branches(c, f"right_{c}", hold, without=given))
+            right[c] = sp.Symbol(f"right_{c}", real=True)
+        return items + eliminated(cluster, unknown, matrix, right)
+
+    def in_modes(self, c: int, name: str, in_hold: Any, otherwise: Any = None, without: Any = None) -> Switch:
+        """A name with one value in the holding mode; in the others another, or what they declare for the unknown.
+
+        otherwise : by mode. without : values of names in what is declared.
+        """
+        component = self.components[c]
+        surface = component.surface
+        rows = []
+        for m in component.modes:
+            value = in_hold
+            if m.name != surface.hold:
+                value = self.convert(m.set[surface.unknown]) if otherwise is None else otherwise[m.name]
+                if without:
+                    value = self.inline(value, self.definitions).subs(without)
+            rows.append((Assign(name, value),))
+        return Switch(c, tuple(rows))
+
+    def _derivatives(self, der: list[Any], held: HeldStates) -> tuple[list[Item], list[str]]:
+        items: list[Item] = []
+        names = [f"d_{i}" for i in range(len(der))]
+        for i, (name, e) in enumerate(zip(names, der, strict=True)):
+            state = self.model.states[i].name
+            for c, rate in kept_rates(self, i, der, held):
+                component, kept = self.components[c], self.sp.Symbol(f"kept_{c}", real=True)
+                branches = [rate if m.name == component.surface.hold else e for m in component.modes]
+                items.append(Switch(c, tuple((Assign(kept.name, value),) for value in branches)))
+                e = kept
+            overriding = [
+                c for c, comp in enumerate(self.components) if any(state in m.der for m in comp.modes)
+            ]
+            holding = held.holding(i)
+            overriding += holding[:1]
+            if not overriding:
+                items.append(Assign(name, e))
+                continue
+            if len(overriding) > 1:
+                raise ModelError(
+                    f"the derivative of {state} is changed by modes of both "
+                    f"{' and '.join(self.components[c].name for c in overriding)}",
+                    place=self.components[overriding[-1]].place,
+                    remedy="let one component change it",
+                )
+            free = self.sp.Piecewise((0, self.sp.Symbol("pin", real=True) > 0), (e, True))
+            for c in holding or overriding:  # no two that hold one state do so at once
+                component = self.components[c]
+                hold = component.surface.hold if holding else None
+                target = name if c == (holding or overriding)[-1] else f"{name}_{c}"
+                branches = []
+                for m in component.modes:
+                    value = self.convert(m.der[state]) if state in m.der else e
+                    branches.append((Assign(target, free if m.name == hold else value),))
+                items.append(Switch(c, tuple(branches)))
+                e = self.sp.Symbol(target, real=True)
+        return items, names
+
+    def _guards(self) -> tuple[list[Item], dict[tuple[int, int, int], tuple[Any, ...]]]:
+        items: list[Item] = []
+        conditions: dict[tuple[int, int, int], tuple[Any, ...]] = {}
+        for c, component in enumerate(self.components):
+            widest = max(len(m.guards) for m in component.modes)
+            helping, most = help_of_ties(self, self.ties, c, self.effect)
+            items += helping
+            for g in range(widest):
+                branches = []
+                for m, mode in enumerate(component.modes):
+                    if g < len(mode.guards):
+                        guard = mode.guards[g]
+                        value = self.convert(guard.expr)
+                        if helping and mode.name == component.surface.hold:
+                            value += most
+                        conditions[c, m, g] = tuple(
+                            None if choice.when is None else self.convert(choice.when)
+                            for choice in guard.then
+                        )
+                    else:
+                        value = self.sp.Integer(1)
+                    branches.append((Assign(f"guard_{c}_{g}", value),))
+                items.append(Switch(c, tuple(branches)))
+        items += [Assign(f"monitor_{k}", self.convert(m.expr)) for k, m in enumerate(self.model.monitors)]
+        return items, conditions
+
+    def _count_phases(self) -> None:
+        """Meet the frequencies that resets and outputs alone have: they are written out when phases are counted."""
+        choices = [c for k in self.components for m in k.modes for g in m.guards for c in g.then]
+        choices += [k.limit for k in self.components if k.limit]
+        for part in (*choices, *self.model.monitors, *self.model.schedules):
+            for e in part.reset.values():
+                self.convert(e)
+        for output in self.model.outputs:
+            for e in (output.expr, *output.modes.values()):
+                self.convert(e)
+
+    def _jump(self, c: int) -> tuple[int, Any, Any]:
+        """Jumps of the unknown on release, simplified so that equal limits give an exact zero."""
+        sp = self.sp
+        surface = self.components[c].surface
+
+        def reduced(e: Any) -> Any:
+            return simplified(sp.nsimplify(self.convert(e), rational=True))
+
+        return c, reduced(surface.jump_above), reduced(surface.jump_below)

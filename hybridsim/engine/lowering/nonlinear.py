@@ -1,0 +1,53 @@
+"""Forces and relays that enter the rates nonlinearly: refused, with what to write instead."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from hybridsim.engine.lowering.program_names import declared_name
+from hybridsim.errors import ModelError
+from hybridsim.expr.simplify import simplified
+
+if TYPE_CHECKING:
+    from hybridsim.engine.lowering.lower import Lowering
+
+
+def refuse_powers(lowering: Lowering, unknown: dict[int, Any], rates: list[Any]) -> None:
+    """Refuse a surface's name where it is not linear: Filippov's rates lie between those of the sides."""
+    for c, u in unknown.items():
+        for x, rate in zip(lowering.states, rates, strict=True):
+            component = lowering.components[c]
+            if u in simplified(lowering.sp.diff(rate, u)).free_symbols:
+                name = declared_name(u)
+                raise ModelError(
+                    f"surface {component.name}: {name} enters the rate of {declared_name(x)} nonlinearly",
+                    place=lowering.place(c),
+                    remedy=f"let {name} enter the rates linearly, or give whole fields as above and below of it",
+                )
+
+
+def nonlinear(lowering: Lowering, c: int, d: int, others: set[Any]) -> ModelError:
+    """The fault of an unknown that acts on a surface together with itself or others."""
+    unknown = lowering.symbols[lowering.components[d].surface.unknown]
+    name, component = declared_name(unknown), lowering.components[c]
+    if not component.surface.unique:
+        return ModelError(
+            f"{name} enters the motion of {component.name} nonlinearly: it cannot be solved for",
+            place=lowering.place(c),
+            remedy="let the force enter the derivative of the velocity linearly",
+        )
+    partners = sorted({name, *map(declared_name, others)})
+    if len(partners) == 1:
+        message = f"{name} enters the rate of the switching function '{lowering.written(c)}' nonlinearly"
+        remedy = (
+            f"let {name} enter the rates linearly, or give whole fields as above and below of the surface"
+        )
+    else:
+        message = (
+            f"{' and '.join(partners)} multiply each other in the rate of the switching function "
+            f"'{lowering.written(c)}': where their surfaces meet, the sliding motion is not unique"
+        )
+        remedy = (
+            "let the rates be sums of what each surface switches, or write the regions as modes with guards"
+        )
+    return ModelError(f"surface {component.name}: {message}", place=lowering.place(c), remedy=remedy)

@@ -1,0 +1,82 @@
+"""Unknowns that multiply each other in the rate of a surface: linear for given values of all but one of them.
+
+An unknown whose own surface no other acts on is known beforehand, in sliding as well. Where at most one of the other
+factors holds its surface, they have the values that their modes declare, and the rate is linear in that one. With g for
+these values (0 for what holds) every product is replaced by its tangent there: u*w by g_w u + g_u w - g_u g_w, which is
+the product itself as long as one of the two does not hold. Where both hold, the motion is not determined by the rates
+on the sides: such modes are not admitted.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from hybridsim.engine.lowering.nonlinear import nonlinear
+from hybridsim.engine.lowering.program import Assign, Item, Switch
+
+if TYPE_CHECKING:
+    from hybridsim.engine.lowering.lower import Lowering
+
+
+class Products:
+    """What the modes give of unknowns that are multiplied with others, and which of them never hold together."""
+
+    def __init__(self, lowering: Lowering, unknown: dict[int, Any]) -> None:
+        self.lowering, self.unknown = lowering, unknown
+        self.number = {u: c for c, u in unknown.items()}
+        self.pairs: set[tuple[int, int]] = set()
+        self.known: set[tuple[int, int]] = set()  # a surface, and an unknown that is known in its rate
+
+    def linear(self, c: int, totals: dict[int, Any], row: dict[int, Any]) -> tuple[dict[int, Any], Any]:
+        """The effects of all unknowns on the rate of the surface c, and the rest of it, linear as modes are given.
+
+        totals : the rates of all surfaces over the unknowns. row : the derivatives of this one with respect to them.
+        """
+        multiplied: set[int] = set()
+        for d, slope in row.items():
+            others = {self.number[u] for u in slope.free_symbols & self.number.keys()}
+            surfaces = [self.lowering.components[e].surface for e in (d, *others)]
+            if d in others or (others and not any(surface.unique for surface in surfaces)):
+                raise nonlinear(self.lowering, c, d, slope.free_symbols & self.number.keys())
+            multiplied |= others
+        known = {d for d in multiplied if totals[d].free_symbols & self.number.keys() <= {self.unknown[d]}}
+        self.known |= {(c, d) for d in known}
+        slopes = {d: slope.free_symbols & self.number.keys() for d, slope in row.items() if d not in known}
+        free = set().union(*slopes.values()) - {self.unknown[d] for d in known}
+        self.pairs |= {(d, self.number[u]) for d, factors in slopes.items() for u in factors & free}
+        given = {u: self._given(self.number[u]) for u in free}
+        effects = {
+            d: self.lowering.sp.Integer(0) if d in known else slope.subs(given) for d, slope in row.items()
+        }
+        zero = {u: 0 for d, u in self.unknown.items() if d not in known}
+        rest = totals[c].subs(given).subs(zero)
+        return effects, rest - sum(value * effects[self.number[u]] for u, value in given.items())
+
+    def items(self) -> list[Item]:
+        """The values that modes give, and whether they hold."""
+        found: list[Item] = []
+        for d in sorted({d for pair in self.pairs for d in pair}):
+            component = self.lowering.components[d]
+            found.append(self.lowering.in_modes(d, self._given(d).name, self.lowering.sp.Integer(0)))
+            holds = [self.lowering.sp.Integer(m.name == component.surface.hold) for m in component.modes]
+            found.append(Switch(d, tuple((Assign(self._holds(d).name, value),) for value in holds)))
+        return found
+
+    def not_together(self, c: int, pull: Any) -> Any:
+        """How strongly the surface c attracts, below zero while what its unknown is multiplied with holds, too."""
+        for d in sorted({e for pair in self.pairs if c in pair for e in pair} - {c}):
+            pull = pull * (1 - self._holds(d)) - self._holds(d)
+        return pull
+
+    def diagonal(self, c: int, entry: Any) -> Any:
+        """The effect on its own surface, with a value where what it is multiplied with holds as well."""
+        return entry + sum(
+            self._holds(c) * self._holds(d)
+            for d in sorted({e for p in self.pairs if c in p for e in p} - {c})
+        )
+
+    def _given(self, d: int) -> Any:
+        return self.lowering.sp.Symbol(f"given_{d}", real=True)
+
+    def _holds(self, d: int) -> Any:
+        return self.lowering.sp.Symbol(f"holds_{d}", real=True)

@@ -1,0 +1,73 @@
+"""Relays that act on the second derivative of their function: held where that and its rate are zero.
+
+Where du/dt = k w for the functions u and w of two relays and a number k, the motion that stays at u = 0 stays at
+w = 0 as well. There dw/dt = a + b U + c W with both relays anywhere between -1 and 1: Filippov's rates hold both at
+zero as long as |a| <= |b| + |c| (sliding of second order, as that of a twisting controller: A. Levant, Int. J. Control
+58 (1993) 1247, doi:10.1080/00207179308923053). What each relay gives is not determined by that, only what they give
+together; here both give the same share of what they can.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from hybridsim.engine.lowering.program import Assign, Item, Switch
+from hybridsim.engine.lowering.program_names import user
+from hybridsim.expr.simplify import simplified
+from hybridsim.model.parts.switching import ATTRACTION
+
+if TYPE_CHECKING:
+    from hybridsim.engine.lowering.lower import Lowering
+
+
+@dataclass(frozen=True)
+class Partner:
+    """The surface of the rate of another: du/dt = factor * w.
+
+    Parameters
+    ----------
+    component : of w.
+    factor : k, a number that is not zero.
+    """
+
+    component: int
+    factor: Any
+
+    def share(self, c: int, d: int, sp: Any) -> Any:
+        """The row of the joint solve that gives the relay c the share of its partner: its entry for component d."""
+        if d == c:
+            return sp.Integer(1)
+        return -sp.sign(self.factor) if d == self.component else sp.Integer(0)
+
+
+def partners(
+    lowering: Lowering, surfaces: dict[int, Any], rate: dict[int, Any], effect: dict[tuple[int, int], Any]
+) -> dict[int, Partner]:
+    """The partners of the relays that act on no rate of their own; those that have none can never be held.
+
+    rate : of each surface's function without any relay. effect : of each relay (second) on each such rate (first).
+    """
+    found = {}
+    for c in sorted(lowering.never_held):
+        if any(effect[c, d] != 0 for d in surfaces):
+            continue
+        written_out = lowering.inline(rate[c], lowering.definitions)
+        for d in surfaces:
+            is_relay = lowering.components[d].surface.unique
+            if not is_relay or d in lowering.never_held or effect[d, c] == 0:
+                continue
+            factor = simplified(written_out / surfaces[d])
+            if factor.is_number and factor.is_real and factor != 0:
+                found[c] = Partner(d, factor)
+                break
+    return found
+
+
+def attraction(lowering: Lowering, c: int, partner: Partner, effect: dict[tuple[int, int], Any]) -> Item:
+    """How strongly the relay c pulls to its surface: by its effect on the second derivative, its partner held."""
+    sp, other = lowering.sp, lowering.components[partner.component]
+    name = user(ATTRACTION + lowering.components[c].surface.unknown)
+    pull = -partner.factor * effect[partner.component, c]
+    branches = [pull if m.name == other.surface.hold else sp.Integer(-1) for m in other.modes]
+    return Switch(partner.component, tuple((Assign(name, value),) for value in branches))

@@ -1,0 +1,52 @@
+"""What a generated module says of contacts to time stepping, in models with impacts: rates, effects and loads.
+
+For m surfaces in the order of the module and n states, behind each other: u_k (m,), the rate of a gap or a relative
+velocity; d(u_k)/dx (m, n); d(rates)/d(unknown_k) (m, n); and by how much a unit of the normal force d lets the friction
+force k grow that slips above and below, and its upper and lower limit of stick, (m, m) each.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from hybridsim.engine.lowering.lower import Lowering
+
+
+def stepped(lowering: Lowering) -> list[tuple[str, Any]]:
+    """The rows of the function ``stepped``; none without unilateral contacts."""
+    if not any(lowering.components[c].surface.is_unilateral for c in lowering.unknown):
+        return []
+    return [(f"out[{i}]", value) for i, value in enumerate(_values(lowering))]
+
+
+def _values(lowering: Lowering) -> Iterator[Any]:
+    sp = lowering.sp
+    yield from lowering.held_rates.values()
+    for rate in lowering.held_rates.values():
+        yield from (sp.diff(rate, x) for x in lowering.states)
+    for u in lowering.unknown.values():
+        yield from (sp.diff(rate, u) for rate in lowering.open_rates)
+    for bound in range(4):
+        for c in lowering.unknown:
+            force = _bound(lowering, c, bound)
+            for d, u in lowering.unknown.items():
+                is_load = c != d and lowering.components[d].surface.is_unilateral
+                yield sp.diff(force, u) if is_load else sp.Integer(0)
+
+
+def _bound(lowering: Lowering, c: int, bound: int) -> Any:
+    """A friction force in terms of normal forces: of slip above, below, at the upper, at the lower limit of stick.
+
+    A guard of stick is the distance to its limit: what it has beside the force itself is the limit.
+    """
+    component = lowering.components[c]
+    surface = component.surface
+    if surface.unique or surface.is_unilateral:
+        return lowering.sp.Integer(0)
+    if bound < 2:
+        mode = component.mode(surface.below if bound else surface.above)
+        return lowering.inlined(mode.set[surface.unknown])
+    distance = lowering.inlined(component.mode(surface.hold).guards[bound - 2].expr)
+    return distance if bound == 2 else -distance

@@ -1,0 +1,104 @@
+"""Friction along a gap: a contact whose relative velocity goes with the rate of a gap, as of a block that meets a stop.
+
+Both would hold one velocity. Where that is the same at rest (the rate of the gap is a*v), nothing says which part of a
+push the friction takes. While both hold, the stop takes all of it here, and what pulls the bodies apart counts against
+the friction: the gap opens where that is beyond the limit of stick. The motion is the same for any other share. Where
+the velocities differ (a stop beside a belt) the two never hold at once.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from hybridsim.engine.lowering.program import Assign, Item, Switch
+from hybridsim.errors import ModelError
+from hybridsim.expr.simplify import simplified
+
+if TYPE_CHECKING:
+    from hybridsim.engine.lowering.lower import Lowering
+
+
+class Tie(NamedTuple):
+    """A gap of a unilateral contact and a friction contact along it, as numbers of components."""
+
+    gap: int
+    along: int
+    factor: Any  # rate of the gap over the relative velocity; a number, not zero
+    is_one: bool  # the gap rests where the contact sticks
+
+
+def ties(lowering: Lowering, surfaces: dict[int, Any], gap_rates: dict[int, Any]) -> list[Tie]:
+    """All pairs of a gap and a contact whose velocities have one direction."""
+    sp, found = lowering.sp, []
+    for p, rate in gap_rates.items():
+        for c, velocity in surfaces.items():
+            surface = lowering.components[c].surface
+            if c == p or surface.is_unilateral or surface.unique:
+                continue
+            slopes = [(sp.diff(rate, x), sp.diff(velocity, x)) for x in lowering.states]
+            factors = {simplified(a / b) for a, b in slopes if b != 0}
+            if len(factors) != 1 or any(a != 0 for a, b in slopes if b == 0):
+                continue
+            (factor,) = factors
+            if factor.is_Number and factor != 0:
+                apart = simplified(rate - factor * velocity)
+                found.append(Tie(p, c, factor, apart == 0))
+    return found
+
+
+def without_share(
+    lowering: Lowering, pairs: list[Tie], c: int, d: int, entry: Any, of_held: Any
+) -> tuple[list[Item], Any]:
+    """Items and name of what stands in the row of contact c: `of_held` while a gap that it is along is closed."""
+    items: list[Item] = []
+    for tie in pairs:
+        if tie.along == c:
+            name = f"tied_{tie.gap}_{c}_{d}" if d >= 0 else f"tied_{tie.gap}_{c}_right"
+            modes = lowering.components[tie.gap].modes
+            hold = lowering.components[tie.gap].surface.hold
+            branches = tuple((Assign(name, of_held if m.name == hold else entry),) for m in modes)
+            items.append(Switch(tie.gap, branches))
+            entry = lowering.sp.Symbol(name, real=True)
+    return items, entry
+
+
+def help_of_ties(
+    lowering: Lowering, pairs: list[Tie], p: int, effect: dict[tuple[int, int], Any]
+) -> tuple[list[Item], Any]:
+    """Items and value of what friction in stick adds to the force at which a closed gap opens."""
+    sp, total = lowering.sp, lowering.sp.Integer(0)
+    items: list[Item] = []
+    for tie in pairs:
+        if tie.gap != p or not tie.is_one:
+            continue
+        component, unknown = lowering.components[tie.along], lowering.unknown[tie.along]
+        held = component.mode(component.surface.hold)
+        guard = held.guards[0 if tie.factor > 0 else 1]
+        limit = lowering.inlined(guard.expr).subs(unknown, 0)
+        if limit.free_symbols & set(lowering.unknown.values()):
+            raise ModelError(
+                f"the load of {component.name} depends on the normal force of an impact, and {component.name} acts "
+                f"along the gap of {lowering.components[p].name}",
+                place=component.place,
+                remedy="run an hs.MechanicalSystem with moreau",
+            )
+        share = -sp.sign(tie.factor) * effect[p, tie.along] / effect[p, p]
+        name = f"help_{p}_{tie.along}"
+        values = tuple(
+            (Assign(name, share * limit if m.name == held.name else sp.Integer(0)),) for m in component.modes
+        )
+        items.append(Switch(tie.along, values))
+        total += sp.Symbol(name, real=True)
+    return items, total
+
+
+def told(lowering: Lowering, pairs: list[Tie]) -> dict[Any, Any]:
+    """Forces as they are told of, by name: a stop does not pull, what does is the friction's."""
+    sp, found = lowering.sp, {}
+    for tie in pairs:
+        if tie.is_one:
+            p, f = lowering.unknown[tie.gap], lowering.unknown[tie.along]
+            share = lowering.effect[tie.gap, tie.gap] / lowering.effect[tie.gap, tie.along]
+            found[p] = sp.Max(p, 0)
+            found[f] = found.get(f, f) + share * sp.Min(p, 0)
+    return found

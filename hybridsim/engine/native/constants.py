@@ -1,0 +1,16 @@
+"""Constants that several floors share, each with its unit and its reason."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    pass
+
+EXACTLY = 3  # order of states up to which events are judged: they are divided by their order
+
+
+# So many steps in a row, each shorter than this share of local time, stand still: near a singularity they get too short
+# to move the state, or go back and forth within the tolerance.
+STANDSTILL, IN_A_ROW = 2e-11, 10000
+BOUND_TERMS = 16  # terms of the series that bounds a guard of a linear mode from below; a power of two

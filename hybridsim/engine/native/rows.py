@@ -1,0 +1,32 @@
+"""Kernels that evaluate a model function at many points at once."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hybridsim.engine.native.kernels import allocating_kernel, call, kernel
+
+
+@kernel
+def evaluate(function: Any, t: float, x: Any, p: Any, z: Any, out: Any) -> None:
+    """One evaluation: out = function(t, x)."""
+    call(function, t, x, p, z, out)
+
+
+@kernel
+def evaluate_rows(function: Any, times: Any, states: Any, p: Any, z: Any, out: Any) -> None:
+    """out[k] = function(times[k], states[k]) for every row."""
+    for k in range(times.shape[0]):
+        call(function, times[k], states[k], p, z, out[k])
+
+
+@allocating_kernel
+def project_and_evaluate(
+    project: Any, function: Any, times: Any, states: Any, p: Any, z: Any, out: Any
+) -> None:
+    """Put held states on their constraints in place, then evaluate a function there."""
+    work = states[0].copy()
+    for k in range(times.shape[0]):
+        work[:] = states[k]
+        call(project, times[k], work, p, z, states[k])
+        call(function, times[k], states[k], p, z, out[k])

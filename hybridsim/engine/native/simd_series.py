@@ -1,0 +1,104 @@
+"""Powers of a step and sums of series over them as machine code, four terms at a time.
+
+The same as by `tabulate` and `sum_sizes` of `hybridsim.engine.series.interpreter`, to the last bit.
+"""
+
+from __future__ import annotations
+
+from hybridsim.engine.native.llvm_text import ONE, Lines, number
+
+
+class Powers:
+    """a**k for k = 0..order as `tabulate` of `engine.series.interpreter` makes them, and sums of series with them.
+
+    Powers and terms are worked out four at a time, from the last ones on; the first order % 4 are by themselves.
+    """
+
+    def __init__(self, code: Lines, a: str, order: int) -> None:
+        self.code, self.order = code, order
+        square = code.op("fmul", a, a)
+        self._first = [ONE, a, square, code.op("fmul", a, square), code.op("fmul", square, square)]
+        self._fourth = self._vector([self._first[4]] * 4)
+        self._fours: dict[int, str] = {1: self._vector(self._first[1:])}
+        self.begins = list(range(order - 3, 0, -4))
+
+    def _vector(self, elements: list[str]) -> str:
+        vector = "poison"
+        for i, element in enumerate(elements):
+            vector = self.code.value(
+                "insertelement <4 x double> {}, double {}, i64 " + str(i), vector, element
+            )
+        return vector
+
+    def _constants(self, values: list[float]) -> str:
+        return "<" + ", ".join(f"double {number(value)}" for value in values) + ">"
+
+    def four(self, k: int) -> str:
+        """Powers k to k + 3."""
+        if k not in self._fours and k > 4:
+            self._fours[k] = self._of_two("fmul", self.four(k - 4), self._fourth)
+        elif k not in self._fours:
+            places = ", ".join(f"i32 {k - 1 + i}" for i in range(4))
+            form = "shufflevector <4 x double> {}, <4 x double> {}, <4 x i32> <" + places + ">"
+            self._fours[k] = self.code.value(form, self.four(1), self.four(5))
+        return self._fours[k]
+
+    def store(self, array: str) -> None:
+        """Write all powers."""
+        for k in range(self.order % 4 + 1):
+            self.code.store(self._first[k], array, k)
+        for k in self.begins:
+            place = self.code.value("getelementptr inbounds double, ptr {}, i64 " + str(k), array)
+            self.code.put(f"  store <4 x double> {self.four(k)}, ptr {place}, align 8")
+
+    def _load(self, array: str, i: int) -> str:
+        place = self.code.value("getelementptr inbounds double, ptr {}, i64 " + str(i), array)
+        return self.code.value("load <4 x double>, ptr {}, align 8", place)
+
+    def _of_two(self, name: str, a: str, b: str) -> str:
+        return self.code.value(name + " <4 x double> {}, {}", a, b)
+
+    def _fused(self, a: str, b: str, c: str) -> str:
+        form = "call <4 x double> @llvm.fmuladd.v4f64(<4 x double> {}, <4 x double> {}, <4 x double> {})"
+        return self.code.value(form, a, b, c)
+
+    def _size(self, a: str) -> str:
+        return self.code.value("call <4 x double> @llvm.fabs.v4f64(<4 x double> {})", a)
+
+    def _together(self, a: str) -> str:
+        """The sum of the four of a vector."""
+        form = "shufflevector <4 x double> {}, <4 x double> poison, <2 x i32> <i32 {first}, i32 {second}>"
+        halves = [self.code.value(form.format("{}", first=i, second=i + 1), a) for i in (0, 2)]
+        two = self.code.value("fadd <2 x double> {}, {}", *halves)
+        return self.code.op(
+            "fadd", *(self.code.value("extractelement <2 x double> {}, i64 " + str(i), two) for i in (0, 1))
+        )
+
+    def sum(self, array: str, at: int, is_size: bool) -> str:
+        """sum_k c_k a**k, or of |c_k|, over k > 0, of the series that begins at a place of an array."""
+        code, total = self.code, self._constants([0.0] * 4)
+        for k in self.begins:
+            c = self._load(array, at + k)
+            total = self._fused(self._size(c) if is_size else c, self.four(k), total)
+        found = self._together(total)
+        for k in range(self.order % 4, 0, -1):
+            c = code.load(array, at + k)
+            c = code.call("llvm.fabs.f64", c) if is_size else c
+            found = code.fused(c, self._first[k], found)
+        return found
+
+    def terms(self, array: str, at: int) -> tuple[str, str, str]:
+        """Over k > 0 the sums of the terms c_k a**k, of k times them, and of their sizes."""
+        code, zero = self.code, self._constants([0.0] * 4)
+        value, slope, size = zero, zero, zero
+        for k in self.begins:
+            term = self._of_two("fmul", self._load(array, at + k), self.four(k))
+            value = self._of_two("fadd", value, term)
+            slope = self._fused(self._constants([k + i for i in range(4)]), term, slope)
+            size = self._of_two("fadd", size, self._size(term))
+        value, slope, size = self._together(value), self._together(slope), self._together(size)
+        for k in range(self.order % 4, 0, -1):
+            term = code.op("fmul", code.load(array, at + k), self._first[k])
+            value, slope = code.op("fadd", value, term), code.fused(number(k), term, slope)
+            size = code.op("fadd", size, code.call("llvm.fabs.f64", term))
+        return value, slope, size

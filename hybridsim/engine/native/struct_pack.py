@@ -1,0 +1,240 @@
+"""Many arrays for a kernel behind one pointer.
+
+A kernel that is given a tuple of arrays gets seven words for each of them, copied at every call, and counts references
+to each; with a hundred arrays that costs more than the kernel's own work, and most of its compilation. A packed tuple
+is the address of a table of the arrays' addresses and shapes. In a kernel its fields are read as those of the tuple.
+Whoever calls the kernel holds the arrays meanwhile.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import cache, lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.engine.native.buffer_pool import Lender
+from hybridsim.engine.native.kernels import ENABLED, kernel
+
+_WORDS = 6  # of an array in the table: its address, and up to five lengths
+ALIGNED = 64  # bytes; numbers of any kind may begin there
+_LARGE, LARGEST = 1 << 18, 1 << 21  # bytes of blocks that are handed on when they are free
+_RETURNED = 2  # first blocks that a sheet keeps at hand
+_REST = [(0,) * (_WORDS - 1 - dimensions) for dimensions in range(_WORDS)]
+
+if ENABLED:
+    from llvmlite import ir
+    from numba import types
+    from numba.core import cgutils
+    from numba.core.typing.templates import AttributeTemplate
+    from numba.extending import (
+        NativeValue,
+        infer_getattr,
+        intrinsic,
+        lower_getattr_generic,
+        models,
+        register_model,
+        typeof_impl,
+        unbox,
+    )
+    from numba.np.arrayobj import populate_array
+    from numba.np.numpy_support import from_dtype
+
+    class Packed:
+        """A named tuple of C-contiguous arrays, as kernels take it: by the table of their addresses and shapes."""
+
+        def __init__(self, arrays: Any, table: np.ndarray, numba_type: PackType, address: int) -> None:
+            self.arrays, self.table, self.numba_type, self.address = arrays, table, numba_type, address
+            if arrays is not None:
+                vars(self).update(arrays._asdict())  # read as those of the tuple
+
+        if TYPE_CHECKING:
+
+            def __getattr__(self, name: str) -> Any: ...
+
+    class PackType(types.Type):
+        """Type of a packed tuple: its name, and (name, dtype, dimensions) of each field."""
+
+        def __init__(self, title: str, fields: tuple[tuple[str, str, int], ...]) -> None:
+            self.title, self.fields = title, fields
+            super().__init__(name=f"Pack({title}, {fields})")
+
+        def place(self, name: str) -> int:
+            """Row of a field in the table."""
+            return [field[0] for field in self.fields].index(name)
+
+        def array(self, name: str) -> Any:
+            """Type of a field."""
+            _, dtype, dimensions = self.fields[self.place(name)]
+            return types.Array(from_dtype(np.dtype(dtype)), dimensions, "C")
+
+    @cache
+    def _type_of_arrays(kind: Any, fields: tuple[tuple[str, int], ...]) -> PackType:
+        named = zip(kind._fields, fields, strict=True)
+        return PackType(kind.__name__, tuple((name, str(np.dtype(char)), n) for name, (char, n) in named))
+
+    @typeof_impl.register(Packed)
+    def _type_of(value: Packed, context: Any) -> PackType:
+        return value.numba_type
+
+    @register_model(PackType)
+    class _PackModel(models.PrimitiveModel):
+        def __init__(self, manager: Any, kind: PackType) -> None:
+            super().__init__(manager, kind, ir.IntType(64))
+
+    @unbox(PackType)
+    def _unbox(kind: PackType, given: Any, c: Any) -> Any:
+        attribute = c.pyapi.object_getattr_string(given, "address")
+        address = c.pyapi.long_as_longlong(attribute)
+        c.pyapi.decref(attribute)
+        return NativeValue(address, is_error=cgutils.is_not_null(c.builder, c.pyapi.err_occurred()))
+
+    @infer_getattr
+    class _PackAttribute(AttributeTemplate):
+        key = PackType
+
+        def generic_resolve(self, kind: PackType, name: str) -> Any:
+            return kind.array(name) if name in [field[0] for field in kind.fields] else None
+
+    @lower_getattr_generic(PackType)
+    def _field(context: Any, builder: Any, kind: PackType, address: Any, name: str) -> Any:
+        array_type, word = kind.array(name), ir.IntType(64)
+        row = kind.place(name) * _WORDS
+        constant = builder.module.add_metadata([])
+
+        def loaded(i: int) -> Any:
+            place = builder.add(address, word(8 * (row + i)))
+            value = builder.load(builder.inttoptr(place, ir.PointerType(word)))
+            value.set_metadata("invariant.load", constant)  # nobody moves the arrays while a kernel runs
+            return value
+
+        array = context.make_array(array_type)(context, builder)
+        size = context.get_abi_sizeof(context.get_data_type(array_type.dtype))
+        shape = [loaded(1 + i) for i in range(array_type.ndim)]
+        strides: list[Any] = []
+        step = word(size)
+        for length in reversed(shape):
+            strides.insert(0, step)
+            step = builder.mul(step, length)
+        data = builder.inttoptr(loaded(0), context.get_data_type(array_type.dtype).as_pointer())
+        populate_array(array, data=data, shape=shape, strides=strides, itemsize=word(size), meminfo=None)
+        return array._getvalue()
+
+    @intrinsic
+    def pack_at(typingctx: Any, address: Any, like: Any) -> Any:
+        """The pack whose table is at an address, of the type of another."""
+        return like(types.int64, like), lambda context, builder, signature, arguments: arguments[0]
+
+else:
+
+    def pack_at(address: int, like: Any) -> Any:
+        """Nothing is compiled: there are no addresses."""
+        raise NotImplementedError
+
+
+def packed(arrays: Any) -> Any:
+    """A named tuple of arrays as kernels take it; the tuple itself where the compiler is switched off."""
+    if not ENABLED:
+        return arrays
+    words: list[int] = []
+    for array in arrays:
+        assert array.flags.c_contiguous
+        words += (array.__array_interface__["data"][0], *array.shape, *_REST[array.ndim])
+    kind: Any = type(arrays)
+    form = _type_of_arrays(kind, tuple((a.dtype.char, a.ndim) for a in arrays))
+    table = np.array(words, dtype=np.int64)
+    return Packed(arrays, table, form, table.__array_interface__["data"][0])
+
+
+@kernel
+def _lay_out(words: Any, steps: Any, owners: Any, skipped: Any, blocks: Any, table: Any) -> int:
+    """The table of arrays in some blocks; its address. See `Sheet`."""
+    for k in range(words.shape[0]):
+        for i in range(words.shape[1]):
+            table[k, i] = words[k, i] + skipped[k] * steps[k, i]
+        table[k, 0] += blocks[owners[k]].ctypes.data
+    address: int = table.ctypes.data
+    return address
+
+
+@lru_cache(64)
+def _whole_numbers(numbers: tuple[int, ...]) -> np.ndarray:
+    return np.array(numbers, dtype=np.int64)
+
+
+class Sheet:
+    """Arrays of rows that lie one behind the other in a few blocks of memory.
+
+    Where each lies is worked out once; a fresh block is a single allocation, and a pack of all a few sums. A block goes
+    when the last array in it does: what is needed for different lengths of time belongs into different ones.
+
+    Parameters
+    ----------
+    kind : type of the named tuple.
+    fields : dtype, shape and number of the block of each array.
+    """
+
+    def __init__(self, kind: Any, fields: Sequence[tuple[Any, tuple[int, ...], int]]) -> None:
+        self._kind = kind
+        self._places: list[tuple[tuple[int, ...], np.dtype[Any], int, int]] = []
+        self._sizes = [0] * (1 + max(block for *_, block in fields))
+        # the table, but for the blocks' addresses
+        self._words = np.zeros((len(fields), _WORDS), dtype=np.int64)
+        self._steps = np.zeros_like(self._words)  # what a row that is skipped adds to it
+        self._owners = np.array([block for *_, block in fields], dtype=np.int64)
+        for k, (name, shape, block) in enumerate(fields):
+            dtype, offset = np.dtype(name), self._sizes[block]
+            row = dtype.itemsize * math.prod(shape[1:])
+            self._places.append((shape, dtype, block, offset))
+            self._words[k, : 1 + len(shape)] = offset, *shape
+            self._steps[k, :2] = row, -1
+            self._sizes[block] += -(-row * shape[0] // ALIGNED) * ALIGNED
+        self._lenders = [Lender(size) if _LARGE <= size <= LARGEST else None for size in self._sizes]
+        form = tuple((dtype.char, len(shape)) for shape, dtype, *_ in self._places)
+        self._type: Any = _type_of_arrays(kind, form) if ENABLED else None
+        self._returned: list[np.ndarray] = []
+        self._from_the_first = np.zeros(len(fields), dtype=np.int64)
+
+    def blank(self) -> tuple[np.ndarray, ...]:
+        """Blocks that nobody holds, with anything in them."""
+        try:
+            first = self._returned.pop()
+        except IndexError:  # asked beforehand, another thread may take the last one
+            first = self._block(0)
+        return first, *map(self._block, range(1, len(self._sizes)))
+
+    def _block(self, k: int) -> np.ndarray:
+        lender = self._lenders[k]
+        return np.empty(self._sizes[k], dtype=np.uint8) if lender is None else lender.block()
+
+    def take_back(self, block: np.ndarray) -> None:
+        """A first block of which nobody holds any part: the next one."""
+        if len(self._returned) < _RETURNED:
+            self._returned.append(block)
+
+    def packed(self, blocks: tuple[np.ndarray, ...], skipped: Sequence[int] | None = None) -> Any:
+        """The arrays as kernels take them, without so many rows of each at the beginning."""
+        if not ENABLED:
+            arrays = self.rows(blocks)
+            first = skipped or self._from_the_first
+            return self._kind(*(a[k:] for a, k in zip(arrays, first, strict=True)))
+        rows = self._from_the_first if skipped is None else _whole_numbers(tuple(skipped))
+        table = np.empty_like(self._words)
+        address = _lay_out(self._words, self._steps, self._owners, rows, blocks, table)
+        return Packed(None, table, self._type, address)
+
+    def rows(self, blocks: tuple[np.ndarray | None, ...]) -> Any:
+        """The arrays; None in place of those of blocks that are missing."""
+        return self._kind(
+            *[
+                None if blocks[k] is None else np.ndarray(shape, dtype, blocks[k], offset)
+                for shape, dtype, k, offset in self._places
+            ]
+        )
+
+    def row(self, blocks: tuple[np.ndarray, ...], name: str, i: int) -> np.ndarray:
+        """A copy of a row of the array of a name."""
+        shape, dtype, k, offset = self._places[self._kind._fields.index(name)]
+        return np.ndarray(shape, dtype, blocks[k], offset)[i].copy()

@@ -1,0 +1,219 @@
+"""All segments and all occurrences of a run, in blocks, and how much of them is kept."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any, TypeVar, overload
+
+import numpy as np
+
+from hybridsim.engine.record.blocks import Block, SegmentList
+from hybridsim.engine.record.checkpoint import damaged
+from hybridsim.engine.record.segments import Segment
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
+
+Item = TypeVar("Item")
+
+_LOOSE = 16  # items in a list that is forgotten as a whole
+
+
+class Chain(Sequence[Item]):
+    """All items of a run in order, in blocks.
+
+    Parameters
+    ----------
+    loose : makes an empty list for items that come one by one; it is a block as well.
+    window : how long back, in the unit of t, items are kept: what is older is forgotten as newer blocks come. The last
+        block stays in any case; with None nothing is kept at all but the `least`.
+    least : so many of the last items are kept however old they are.
+    """
+
+    def __init__(self, loose: Callable[[], Any], window: float | None = math.inf, least: int = 0) -> None:
+        self.blocks: list[Any] = []
+        self._loose, self.window, self._least = loose, window, least
+        self.forgotten = 0  # blocks
+
+    def append(self, item: Item) -> None:
+        """One more item."""
+        if self.window is None and not self._least:
+            return
+        limit = math.inf if self.window == math.inf else max(_LOOSE, self._least // 4)
+        last = self.blocks[-1] if self.blocks else None
+        if not isinstance(last, list) or len(last) >= limit:
+            self.blocks.append(last := self._loose())
+        last.append(item)
+        self._forget()
+
+    def extend(self, items: Iterable[Item]) -> None:
+        """More items."""
+        for item in items:
+            self.append(item)
+
+    def add(self, block: Block[Item]) -> None:
+        """A whole block."""
+        if (self.window is not None or self._least) and len(block):
+            self.blocks.append(block)
+            if len(self.blocks) > 1:
+                self._forget()
+
+    def _forget(self) -> None:
+        """Let go of the blocks that lie further back than the window."""
+        if self.window == math.inf or len(self.blocks) == 1:
+            return
+        now, window, spare = self.blocks[-1].until, self.window or 0.0, len(self) - self._least
+        while len(self.blocks) > 1 and abs(now.minus(self.blocks[0].until)) > window:
+            spare -= len(self.blocks[0])
+            if spare < 0:
+                return
+            del self.blocks[0]
+            self.forgotten += 1
+
+    def keep_only(self, item: Item) -> None:
+        """This item in place of all."""
+        self.forgotten += len(self.blocks)
+        last = self._loose()
+        last.append(item)
+        self.blocks = [last]
+
+    def drop(self, count: int) -> None:
+        """Let go of the first items."""
+        while self.blocks and count >= len(self.blocks[0]):
+            count -= len(self.blocks.pop(0))
+        if count:
+            self.blocks[0] = self.blocks[0].since(count)
+
+    def mark(self) -> tuple[int, int]:
+        """A place after the last item, for `since_mark`."""
+        blocks = self.blocks
+        return self.forgotten + len(blocks), len(blocks[-1]) if blocks else 0
+
+    def since_mark(self, mark: tuple[int, int]) -> int:
+        """How many items came after a mark."""
+        number, length = mark[0] - self.forgotten, mark[1]
+        rest = len(self.blocks[number - 1]) - length if number > 0 else 0
+        return rest + sum(map(len, self.blocks[max(number, 0) :]))
+
+    def without_last(self, count: int) -> list[Any]:
+        """The blocks without so many items at the end, to go on with."""
+        blocks = list(self.blocks)
+        while blocks and count >= len(blocks[-1]):
+            count -= len(blocks.pop())
+        if (
+            blocks and count and not isinstance(blocks[-1], list)
+        ):  # a run goes on where a block in arrays ends
+            raise damaged("how much of the run stays")
+        if blocks and isinstance(blocks[-1], list):
+            last = self._loose()
+            last.extend(blocks[-1][: len(blocks[-1]) - count])
+            blocks[-1] = last
+        return blocks
+
+    def starts(self) -> np.ndarray:
+        """Number of the first item of each block, and of all items."""
+        return np.cumsum([0, *map(len, self.blocks)])
+
+    def __bool__(self) -> bool:
+        return bool(self.blocks)  # none is empty
+
+    def __len__(self) -> int:
+        return sum(map(len, self.blocks))
+
+    def __iter__(self) -> Iterator[Item]:
+        for block in self.blocks:
+            yield from block
+
+    @overload
+    def __getitem__(self, i: int, /) -> Item: ...
+    @overload
+    def __getitem__(self, i: slice, /) -> list[Item]: ...
+    def __getitem__(self, i: int | slice, /) -> Item | list[Item]:
+        count = len(self)
+        if isinstance(i, slice):
+            return [self[k] for k in range(*i.indices(count))]
+        place = i + count if i < 0 else i
+        if not 0 <= place < count:
+            raise IndexError(f"{i} is beyond {count} items")
+        for block in self.blocks:
+            if place < len(block):
+                return block[place]
+            place -= len(block)
+        raise AssertionError("the blocks hold fewer items than they say")
+
+
+class SegmentChain(Chain[Segment]):
+    """All segments of a run."""
+
+    def __init__(self, system: System, window: float | None = math.inf) -> None:
+        super().__init__(lambda: SegmentList(system), window)
+        self._shape = (system.n, len(system.automata))
+
+    def origins(self) -> np.ndarray:
+        """Origins of local time (N, 2)."""
+        return _joined([block.origins for block in self.blocks])
+
+    def spans(self) -> np.ndarray:
+        """First and last local times (N, 2)."""
+        return _joined([block.spans for block in self.blocks])
+
+    def modes(self) -> np.ndarray:
+        """Modes (N, C)."""
+        none = np.empty((0, self._shape[1]), dtype=np.int64)
+        return np.concatenate([none, *(block.modes for block in self.blocks)])
+
+    @property
+    def is_end_alone(self) -> bool:
+        """Whether nothing is wanted but where the run ends."""
+        return self.window == 0.0
+
+    def keep_end(self) -> None:
+        """Where the last segment ends in place of all, unless that is all there is."""
+        last = self.blocks[-1]
+        if len(self.blocks) > 1 or len(last) > 1 or not isinstance(last, list) or len(last[0].s) > 1:
+            self.keep_only(last.at_end())
+
+    def cut(self, instant: Instant) -> None:
+        """Let go of all that lies before an instant; the segment that holds it begins there from now on."""
+        origins, spans = self.origins(), self.spans()
+        moved = (origins[:, 0] - instant.high) + (origins[:, 1] - instant.low) + spans[:, 0]
+        sign = 1.0 if spans[-1, 1] >= spans[-1, 0] else -1.0
+        first = max(int(np.searchsorted(sign * moved, 0.0, side="right")) - 1, 0)
+        self.drop(first)
+        held, s = self[0], instant.minus(Instant(*origins[first].tolist()))
+        if sign * s <= sign * held.s[0]:
+            return
+        x = self.states(np.array([0]), np.array([s]))
+        later = sign * held.s > sign * s
+        knots, states = np.append(s, held.s[later]), np.concatenate([x, held.x[later]])
+        self.drop(1)
+        head = self._loose()
+        head.append(Segment(held.origin, held.z, held.p, knots, states, held.dense))
+        self.blocks.insert(0, head)
+
+    def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """States (k, n) in the segments of these numbers, at local times (k,)."""
+        if len(self.blocks) == 1:
+            return self.blocks[0].states(index, s)
+        starts = self.starts()
+        owner = np.searchsorted(starts, index, side="right") - 1
+        out = np.empty((len(s), self._shape[0]))
+        for b in np.unique(owner):
+            chosen = np.flatnonzero(owner == b)
+            out[chosen] = self.blocks[b].states(index[chosen] - starts[b], s[chosen])
+        return out
+
+    def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The run's own steps: numbers of segments (m,), local times (m,), states (m, n)."""
+        index, s, x = [np.empty(0, dtype=np.int64)], [np.empty(0)], [np.empty((0, self._shape[0]))]
+        for block, start in zip(self.blocks, self.starts().tolist(), strict=False):
+            numbers, times, states = block.knots()
+            index.append(numbers + start)
+            s.append(times)
+            x.append(states)
+        return np.concatenate(index), np.concatenate(s), np.concatenate(x)
+
+
+def _joined(pairs: list[np.ndarray]) -> np.ndarray:
+    """Pairs of all blocks (N, 2); those of a single one as they are."""
+    return pairs[0] if len(pairs) == 1 else np.concatenate([np.empty((0, 2)), *pairs])

@@ -1,0 +1,18 @@
+"""Counters of the work that a run has cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass
+class Counters:
+    """What a run has cost, summed over all restarts."""
+
+    steps: int = 0
+    rejected: int = 0
+    rhs_evaluations: int = 0
+    guard_evaluations: int = 0
+    events: int = 0
+    restarts: int = 0
+    kernel_time: float = 0.0  # seconds in the compiled mode loop

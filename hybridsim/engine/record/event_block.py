@@ -1,0 +1,199 @@
+"""The ordinary events of a compiled loop, as it wrote them down: one guard of one component fires at each."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from copy import copy
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.engine.native.kernels import Door, kernel
+from hybridsim.engine.record.segments import Occurrence
+from hybridsim.engine.system.instant import Instant
+
+if TYPE_CHECKING:
+    from hybridsim.engine.system.system import System
+
+
+@kernel
+def _taking_part(
+    fired: Any, before: Any, after: Any, owner: Any, has_surface: Any, places: Any
+) -> tuple[int, bool]:
+    """How many changes of mode there are, and resets that change none; whether there is one at each event.
+
+    places (2, m): of which event and component each is, as far as there is room.
+    """
+    count, is_plain = 0, True
+    for e in range(fired.shape[0]):
+        for c in range(before.shape[1]):
+            if before[e, c] != after[e, c] or (c == owner[fired[e]] and not has_surface[c]):
+                if count < places.shape[1]:
+                    places[0, count], places[1, count] = e, c
+                count += 1
+        is_plain = is_plain and count == e + 1
+    return count, is_plain
+
+
+@kernel
+def _times_at(instants: Any, places: Any, first: int, component: int, times: Any) -> int:
+    """Times of the occurrences of a component, from that number on, and how many there are."""
+    count = 0
+    for i in range(first, places.shape[1]):
+        if places[1, i] == component:
+            e = places[0, i]
+            times[count] = instants[e, 0] + instants[e, 1]
+            count += 1
+    return count
+
+
+@kernel
+def _states_at(states: Any, places: Any, first: int, component: int, side: int, out: Any) -> int:
+    """States at the occurrences of a component, from that number on, on one side, and how many there are."""
+    count = 0
+    for i in range(first, places.shape[1]):
+        if places[1, i] == component:
+            for j in range(out.shape[1]):
+                out[count, j] = states[places[0, i], side, j]
+            count += 1
+    return count
+
+
+_take_part, _times_of_one = Door(_taking_part), Door(_times_at)
+
+
+class Crossings(Sequence[Occurrence]):
+    """E events in arrays; each is an occurrence for every component that changes its mode or is reset.
+
+    Parameters
+    ----------
+    instants : (E, 2), high and low.
+    fired : (E,), number of the guard that fired.
+    before, after : (E, C), modes on both sides.
+    states : (E, 2, n), x- and x+.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        instants: np.ndarray,
+        fired: np.ndarray,
+        before: np.ndarray,
+        after: np.ndarray,
+        states: np.ndarray,
+    ) -> None:
+        self._system, self._instants, self._fired = system, instants, fired
+        self._before, self._after, self._states = before, after, states
+        self._first = 0
+        places = np.empty((2, len(fired)), dtype=np.int64)
+        found = _take_part(fired, before, after, system.owner, system.has_surface, places)
+        self._count, self._is_plain = found
+        if self._count != len(fired):
+            places = np.empty((2, self._count), dtype=np.int64)
+            _take_part(fired, before, after, system.owner, system.has_surface, places)
+        self._all_places = places
+
+    def __len__(self) -> int:
+        return self._count - self._first
+
+    @property
+    def _places(self) -> np.ndarray:
+        """Event and component (2, occurrences) of each occurrence."""
+        return self._all_places[:, self._first :]
+
+    @property
+    def until(self) -> Instant:
+        """Time of the last one."""
+        return Instant(*self._instants[-1].tolist())
+
+    @property
+    def times(self) -> np.ndarray:
+        """Times rounded to doubles."""
+        times = self._instants[:, 0] + self._instants[:, 1]
+        return times[self._first :] if self._is_plain else times[self._places[0]]
+
+    def times_of(self, component: str, kind: str | None) -> np.ndarray:
+        """Times of those of a component; all are transitions, or changes of a corner's side."""
+        for c, automaton in enumerate(self._system.automata):
+            if automaton.name == component and kind in (None, automaton.kind):
+                times = np.empty(len(self))
+                count = _times_of_one(self._instants, self._all_places, self._first, c, times)
+                return times if count == len(times) else times[:count]
+        return np.empty(0)
+
+    def states_of(self, component: str, kind: str | None, side: int) -> np.ndarray:
+        """States (k, n) at the same, before (side 0) or after (1) them, in an array of their own."""
+        for c, automaton in enumerate(self._system.automata):
+            if automaton.name == component and kind in (None, automaton.kind):
+                states = np.empty((len(self), self._system.n))
+                # by no door: of some loops the states are a part of longer rows
+                count = _states_at(self._states, self._all_places, self._first, c, side, states)
+                return states if count == len(states) else states[:count]
+        return np.empty((0, self._system.n))
+
+    def kinds(self) -> Counter[str]:
+        """How many there are of each kind."""
+        found: Counter[str] = Counter()
+        for automaton, count in zip(self._system.automata, np.bincount(self._places[1]).tolist()):
+            found[automaton.kind] += count
+        return +found
+
+    def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
+        """Instants and states of those that are transitions, from that number on."""
+        has_corners = len(self._system.declared) < len(self._system.automata)
+        if self._is_plain and not has_corners:
+            return self._instants[self._first + first :], self._states[self._first + first :]
+        events, components = self._places[:, first:]
+        if has_corners:
+            events = events[~self._system.is_corner[components]]
+        return self._instants[events], self._states[events]
+
+    def since(self, first: int) -> Crossings:
+        """Those from the first on."""
+        later = copy(self)
+        later._first += first
+        return later
+
+    def __getitem__(self, i: Any, /) -> Any:
+        if isinstance(i, slice):
+            return list(self._made(i))
+        e, c = self._places[:, range(len(self))[i]].tolist()
+        fired, source, target = int(self._fired[e]), int(self._before[e, c]), int(self._after[e, c])
+        x_minus, x_plus = self._states[e]
+        return self._occurrence(c, fired, source, target, self._instants[e].tolist(), x_minus, x_plus)
+
+    def __iter__(self) -> Iterator[Occurrence]:
+        return self._made(slice(None))
+
+    def _made(self, chosen: slice) -> Iterator[Occurrence]:
+        e, c = (places[chosen] for places in self._places)
+        rows = zip(
+            c.tolist(),
+            self._fired[e].tolist(),
+            self._before[e, c].tolist(),
+            self._after[e, c].tolist(),
+            self._instants[e].tolist(),
+            self._states[e],
+            strict=True,
+        )
+        for component, fired, source, target, instant, (x_minus, x_plus) in rows:
+            yield self._occurrence(component, fired, source, target, instant, x_minus, x_plus)
+
+    def _occurrence(
+        self,
+        component: int,
+        fired: int,
+        source: int,
+        target: int,
+        instant: list[float],
+        x_minus: np.ndarray,
+        x_plus: np.ndarray,
+    ) -> Occurrence:
+        automaton, guard, modes = self._system.automata[component], "", self._system.automata[component].modes
+        if component == self._system.owner[fired]:
+            guard = automaton.guard_names[source][automaton.guards[source].index(fired)]
+        at = Instant(*instant)
+        return Occurrence(
+            at, automaton.kind, automaton.name, guard, modes[source], modes[target], -1, x_minus, x_plus
+        )

@@ -1,0 +1,27 @@
+"""A block of segments whose steps have Taylor series of the flow at both ends."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+
+from hybridsim.engine.record.hermite import (
+    fit_all,
+    right_system,
+    shift_matrix,
+)
+from hybridsim.engine.record.series_block import SeriesBlock
+
+TERMS = 4  # coefficients of the flow at each end of a step: the dense output has degree 7
+
+
+class HermiteBlock(SeriesBlock):
+    """Segments whose steps have the flow's series at both ends: series (steps, n, 2 K), left and then right."""
+
+    @cached_property
+    def polynomials(self) -> np.ndarray:
+        """The two-point Hermite polynomials, made when they are asked for."""
+        out = np.empty_like(self.series)
+        fit_all(self.steps, self.series, shift_matrix(TERMS), right_system(TERMS), out)
+        return out

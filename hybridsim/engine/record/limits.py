@@ -1,0 +1,74 @@
+"""Limits of a run: how much it may cost before it stops with what it has."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from math import inf
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from hybridsim.engine.record.counters import Counters
+
+_OFTEN = 64  # looks at the clock and the counters for one at the memory, which takes a call of the system
+
+
+class LimitReached(Exception):
+    """A run has cost what it may; the message says what."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The most events, steps, seconds by the clock, and megabytes that the process grows by, in one call."""
+
+    events: float = inf
+    steps: float = inf
+    seconds: float = inf
+    megabytes: float = inf
+
+
+UNLIMITED = Limits()
+
+
+class Gauge:
+    """Holds one run against its limits."""
+
+    def __init__(self, limits: Limits, counters: Counters) -> None:
+        self.limits, self.counters = limits, counters
+        self._events, self._steps = counters.events, counters.steps
+        self._began = perf_counter()
+        self._size = resident_megabytes() if limits.megabytes < inf else 0.0
+        self._looks = 0
+
+    def check(self) -> None:
+        """Raise LimitReached where a limit is passed."""
+        limits, counters = self.limits, self.counters
+        if counters.events - self._events >= limits.events:
+            raise LimitReached(f"{counters.events - self._events} events, and {limits.events:g} were allowed")
+        if counters.steps - self._steps >= limits.steps:
+            raise LimitReached(f"{counters.steps - self._steps} steps, and {limits.steps:g} were allowed")
+        seconds = perf_counter() - self._began
+        if seconds >= limits.seconds:
+            raise LimitReached(f"{seconds:.3g} s, and {limits.seconds:g} were allowed")
+        if limits.megabytes < inf:
+            if self._looks % _OFTEN == 0 and (grown := resident_megabytes() - self._size) >= limits.megabytes:
+                raise LimitReached(
+                    f"{grown:.0f} MB more than at the start, and {limits.megabytes:g} were allowed"
+                )
+            self._looks += 1
+
+
+def resident_megabytes() -> float:
+    """Memory of this process: what it holds where the system tells (Linux), else the most that it has held."""
+    try:
+        with open("/proc/self/statm") as file:
+            pages = int(file.read().split()[1])
+        import resource
+
+        return pages * resource.getpagesize() / 1e6
+    except OSError:
+        import resource
+
+        most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        return most / 1e6 if sys.platform == "darwin" else most / 1e3

@@ -1,0 +1,78 @@
+"""What a trajectory is made of: segments with dense output, and occurrences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from hybridsim.engine.system.instant import Instant
+
+Dense = Callable[[np.ndarray], np.ndarray]  # local times (k,) -> states (k, n)
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One piece of trajectory in one z: knots at local times s (m+1,), states x (m+1, n), dense output between."""
+
+    origin: Instant
+    z: np.ndarray
+    p: np.ndarray
+    s: np.ndarray
+    x: np.ndarray
+    dense: Dense
+
+    @property
+    def start(self) -> Instant:
+        """Where it begins."""
+        return self.origin.plus(float(self.s[0]))
+
+    @property
+    def end(self) -> Instant:
+        """Where it ends."""
+        return self.origin.plus(float(self.s[-1]))
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Dense output made of one interpolant for each step."""
+
+    knots: np.ndarray
+    interpolants: tuple[Dense, ...]
+
+    def __call__(self, s: np.ndarray) -> np.ndarray:
+        """States (k, n) at local times (k,)."""
+        ascending = self.knots[-1] >= self.knots[0]
+        inner = self.knots[1:-1] if ascending else -self.knots[1:-1]
+        index = np.searchsorted(inner, s if ascending else -s, side="right")
+        parts = [(i, np.flatnonzero(index == i)) for i in np.unique(index)]
+        first = self.interpolants[parts[0][0]](s[parts[0][1]])
+        out = np.empty((len(s), first.shape[1]))
+        out[parts[0][1]] = first
+        for i, chosen in parts[1:]:
+            out[chosen] = self.interpolants[i](s[chosen])
+        return out
+
+
+class Occurrence(NamedTuple):
+    """An event as the engine records it; names are resolved by the solution."""
+
+    instant: Instant
+    kind: str  # transition, monitor, scheduled, near-grazing
+    component: str
+    guard: str
+    source: str
+    target: str
+    direction: int
+    x_minus: np.ndarray
+    x_plus: np.ndarray
+
+
+def end_point(origin: Instant, z: np.ndarray, p: np.ndarray, x: np.ndarray) -> Segment:
+    """A segment of no length: the state after an event with which a run ends."""
+    states = x[None].copy()
+    return Segment(
+        origin, z.copy(), p.copy(), np.zeros(1), states, lambda s: np.repeat(states, len(s), axis=0)
+    )

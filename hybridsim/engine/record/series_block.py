@@ -1,0 +1,207 @@
+"""Segments whose dense output is Taylor series, in the arrays that the compiled mode loop wrote them to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.native.kernels import allocating_kernel, call, inlined, kernel
+from hybridsim.engine.native.simd_vectors import WIDTH, load, splat, store
+from hybridsim.engine.record.segments import Segment, end_point
+from hybridsim.engine.series.interpreter import polynomials
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
+
+
+@dataclass(frozen=True)
+class SeriesPieces:
+    """Dense output made of one Taylor series for each step: knots (m + 1,), coefficients (m, n, order + 1)."""
+
+    knots: np.ndarray
+    coefficients: np.ndarray
+
+    def __call__(self, s: np.ndarray) -> np.ndarray:
+        """States (k, n) at local times (k,)."""
+        s = np.asarray(s, dtype=float)
+        index = np.searchsorted(self.knots[1:-1], s, side="right")
+        out = np.empty((len(s), self.coefficients.shape[1]))
+        for i in np.unique(index):
+            chosen = np.flatnonzero(index == i)
+            part = np.empty((len(chosen), out.shape[1]))
+            polynomials(self.coefficients[i], s[chosen] - self.knots[i], part)
+            out[chosen] = part
+        return out
+
+
+@inlined
+def _step_at(steps: Any, first: int, last: int, s: float) -> int:
+    """Which of the steps of a segment, from the first to the last, holds a local time."""
+    while first < last:
+        middle = (first + last + 1) // 2
+        if steps[middle, 0] <= s:
+            first = middle
+        else:
+            last = middle - 1
+    return first
+
+
+@allocating_kernel
+def series_states(
+    project: Any, pinned: bool, index: Any, s: Any, ends: Any, steps: Any, series: Any, record: Any, out: Any
+) -> None:
+    """States at local times s of the segments of these numbers; see `SeriesBlock`.
+
+    Up to eight times that follow each other and lie in one step are taken at once.
+    """
+    modes, vectors, jumps = record
+    n, order = series.shape[1], series.shape[2] - 1
+    since, x, one = np.empty(WIDTH), np.empty((n, WIDTH)), np.empty(n)
+    k, total, i, step = 0, s.shape[0], -1, 0
+    while k < total:
+        if index[k] != i:
+            i = index[k]
+            step, last = ends[i], ends[i + 1] - 1
+            end = steps[last, 0] + steps[last, 1]
+        if s[k] >= end:
+            for j in range(n):
+                out[k, j] = jumps[i, 0, j]
+            k += 1
+            continue
+        if step < last and steps[step + 1, 0] <= s[k]:
+            step += 1
+        if s[k] < steps[step, 0] or (step < last and steps[step + 1, 0] <= s[k]):
+            step = _step_at(steps, ends[i], last, s[k])
+        begin, until, count = steps[step, 0], end if step == last else steps[step + 1, 0], 1
+        while count < WIDTH and k + count < total and index[k + count] == i and begin <= s[k + count] < until:
+            count += 1
+        for m in range(WIDTH):
+            since[m] = s[k + min(m, count - 1)] - begin
+        d = load(since, 0)
+        for j in range(0, n, 2):  # two at a time: neither waits for the other's sum
+            other = min(j + 1, n - 1)
+            value, beside = splat(series[step, j, order]), splat(series[step, other, order])
+            for m in range(order - 1, -1, -1):
+                value = value * d + splat(series[step, j, m])
+                beside = beside * d + splat(series[step, other, m])
+            store(x, other * WIDTH, beside)
+            store(x, j * WIDTH, value)
+        for m in range(count):
+            if pinned:
+                for j in range(n):
+                    one[j] = x[j, m]
+                call(project, s[k + m], one, vectors[i], modes[i], out[k + m])
+            else:
+                for j in range(n):
+                    out[k + m, j] = x[j, m]
+        k += count
+
+
+@kernel
+def _spans_of(ends: Any, steps: Any, spans: Any) -> None:
+    """First and last local times of segments."""
+    for i in range(spans.shape[0]):
+        last = ends[i + 1] - 1
+        spans[i, 0], spans[i, 1] = steps[ends[i], 0], steps[last, 0] + steps[last, 1]
+
+
+@dataclass(frozen=True)
+class SeriesBlock(Sequence[Segment]):
+    """N segments of several steps each; see `hybridsim.engine.record.blocks.SegmentBlock`.
+
+    Parameters
+    ----------
+    ends : (N + 1,), rows of the steps at which each segment begins and the last one ends.
+    steps, series : (steps, 2) local time at which a step begins and its length; (steps, n, order + 1) coefficients.
+    origins, modes, vectors : (N, 2), (N, C), (N, P) of each segment.
+    jumps : (N, 2, n), x- and x+ at the end of each segment.
+    """
+
+    system: System
+    ends: np.ndarray
+    steps: np.ndarray
+    series: np.ndarray
+    origins: np.ndarray
+    modes: np.ndarray
+    vectors: np.ndarray
+    jumps: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.ends) - 1
+
+    @property
+    def polynomials(self) -> np.ndarray:
+        """Coefficients of the dense output in powers of the time since the step's start (steps, n, degree + 1)."""
+        return self.series
+
+    @cached_property
+    def spans(self) -> np.ndarray:
+        """Local times of start and end (N, 2)."""
+        spans = np.empty((len(self), 2))
+        _spans_of(self.ends, self.steps, spans)
+        return spans
+
+    @property
+    def until(self) -> Instant:
+        """End of the last segment."""
+        high, low = self.origins[-1].tolist()
+        s, h = self.steps[self.ends[-1] - 1].tolist()
+        return Instant(high, low).plus(s + h)
+
+    def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """States (k, n) in the segments of these numbers, at local times (k,)."""
+        out, pinned = np.empty((len(s), self.system.n)), self.system.can_hold
+        project = self.system.address("project" if pinned else "flow")
+        record = (self.modes, self.vectors, self.jumps)
+        series_states(project, pinned, index, s, self.ends, self.steps, self.polynomials, record, out)
+        return out
+
+    def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Numbers of segments, local times and states where steps begin, and at the end of each segment."""
+        count = len(self)
+        index = np.repeat(np.arange(count), np.diff(self.ends) + 1)
+        s = np.empty(len(index))
+        at_end = self.ends[1:] - self.ends[0] + np.arange(count)
+        begins = np.ones(len(index), dtype=np.bool_)
+        begins[at_end] = False
+        s[begins], s[at_end] = self.steps[self.ends[0] : self.ends[-1], 0], self.spans[:, 1]
+        return index, s, self.states(index, s)
+
+    def since(self, first: int) -> SeriesBlock:
+        """Those from the first on."""
+        rows = (self.origins, self.modes, self.vectors, self.jumps)
+        ends, gone = self.ends[first:], self.ends[first]
+        steps, series = self.steps[gone:], self.series[gone:]
+        return type(self)(self.system, ends - gone, steps, series, *(r[first:] for r in rows))
+
+    def __getitem__(self, i: Any, /) -> Any:
+        if isinstance(i, slice):
+            return [self[k] for k in range(*i.indices(len(self)))]
+        i = range(len(self))[i]
+        one = self._alone(i) if len(self) > 1 else self
+        s, *_ = self.steps_of(i)
+        x = one.states(np.zeros(len(s), dtype=np.int64), s)
+        high, low = self.origins[i].tolist()
+        dense = SeriesPieces(s, one.polynomials)
+        return Segment(Instant(high, low), self.modes[i], self.vectors[i], s, x, dense)
+
+    def _alone(self, i: int) -> SeriesBlock:
+        """A block of one segment."""
+        first, last = self.ends[i], self.ends[i + 1]
+        rows = (self.origins, self.modes, self.vectors, self.jumps)
+        ends = np.array([0, last - first])
+        steps, series = self.steps[first:last], self.series[first:last]
+        return type(self)(self.system, ends, steps, series, *(r[i : i + 1] for r in rows))
+
+    def at_end(self) -> Segment:
+        """The end of the last segment."""
+        return end_point(self.until, self.modes[-1], self.vectors[-1], self.jumps[-1, 0])
+
+    def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Knots (m + 1,), states where steps begin (m, n), run-time vector and modes of a segment."""
+        steps, first, last = self.steps, self.ends[i], self.ends[i + 1]
+        s = np.append(steps[first:last, 0], steps[last - 1, 0] + steps[last - 1, 1])
+        return s, self.series[first:last, :, 0], self.vectors[i], self.modes[i]

@@ -1,0 +1,244 @@
+"""Guards along a polynomial dense output: each gets its own series, stretch by stretch, and its first exit."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from hybridsim.engine.native.kernels import call_apart, call_series, inlined, kernel
+from hybridsim.engine.record.hermite import fit_in_time
+from hybridsim.engine.roots.defect_check import keeps_up, sum_at
+from hybridsim.engine.roots.earliest_exit import earliest_exit, parts_for_exit
+from hybridsim.engine.roots.first_exit import FOUND, NEVER, OPEN
+from hybridsim.engine.series.bounded import UNIT
+from hybridsim.engine.series.interpreter import advance, reach, sum_sizes, tabulate
+
+_SHORTER = 0.25
+_LONGER = 4.0
+_ROUNDING = 16.0 * UNIT  # of a Bernstein coefficient, relative to all that is summed for it
+_SHORTEST = 2.0**-40  # of a step: a stretch on which a guard's series says nothing
+_MOST_STRETCHES = (
+    4096  # of a step: near a point without a value they get so short that there is no end of them
+)
+
+
+@inlined
+def shifted(coefficients: Any, q: float, out: Any) -> None:
+    """Polynomials (n, m) about a point q of theirs; zeros above."""
+    n, m = coefficients.shape
+    for i in range(n):
+        for j in range(m):
+            out[i, j] = coefficients[i, j]
+        for j in range(m, out.shape[1]):
+            out[i, j] = 0.0
+        if q != 0.0:
+            for j in range(m - 1):
+                for k in range(m - 2, j - 1, -1):
+                    out[i, k] += q * out[i, k + 1]
+
+
+@inlined
+def series_along(
+    code: int, rows: Any, inputs: Any, s: float, x: Any, watched: Any, V: Any, W: Any, out: Any
+) -> None:
+    """Coefficients of the watched functions, a row each, from local time s on along states with the coefficients x.
+
+    rows: what the functions need of the tape. V, W: with its constants in their registers. code: address of a function
+    that does the same (`along` of `hybridsim.engine.series.emit_series`); 0 for none.
+    """
+    if code != 0:
+        call_series(code, s, 0.0, x, out, W, out)
+        return
+    time, states, size = inputs.time[0], inputs.states, out.shape[1]
+    for i in range(states.shape[0]):
+        for j in range(size):
+            V[states[i], j] = x[i, j]
+    if time >= 0:
+        V[time, 0], V[time, 1] = s, 1.0
+    for j in range(size):
+        call_apart(advance, (rows, V, j))
+    for i in range(watched.shape[0]):
+        for j in range(size):
+            out[i, j] = V[watched[i], j]
+
+
+@inlined
+def guards_at(
+    code: int, rows: Any, inputs: Any, s: float, x: Any, watched: Any, W: Any, rates: Any, out: Any
+) -> None:
+    """Values of the watched functions at (s, x); code.
+
+    As `values` of `hybridsim.engine.series.emit_series`, writes rates.
+    """
+    if code != 0:
+        call_series(code, s, 0.0, x, out, W, rates)
+        return
+    time, states = inputs.time[0], inputs.states
+    for i in range(states.shape[0]):
+        W[states[i], 0] = x[i]
+    if time >= 0:
+        W[time, 0] = s
+    call_apart(advance, (rows, W, 0))
+    for j in range(watched.shape[0]):
+        out[j] = W[watched[j], 0]
+
+
+@inlined
+def begin_positive(sides: Any, orders: Any, floors: Any) -> None:
+    """Every guard is positive where the next step or stretch begins."""
+    for g in range(sides.shape[0]):
+        sides[g], orders[g], floors[g] = 1, 0, 0.0
+
+
+@kernel
+def stays_positive(left: Any, right: Any, order: int, floor: float, d: float, weights: Any) -> bool:
+    """Whether a polynomial of degree 2 K - 1 is certainly positive on (0, d]: its Bernstein coefficients are.
+
+    left, right (K,): its Taylor coefficients at both ends, the first `order` of which are zero by decree on the left,
+    where it is known to the floor. weights (K, K): from these to the K Bernstein coefficients next to an end.
+    """
+    size, power = 0.0, 1.0
+    for k in range(left.shape[0]):
+        size += (abs(left[k]) + abs(right[k])) * power
+        power *= d
+    error = _ROUNDING * size + floor
+    for j in range(left.shape[0]):
+        low, high, power = 0.0, 0.0, 1.0
+        for k in range(j + 1):
+            if k >= order:
+                low += weights[j, k] * left[k] * power
+            high += weights[j, k] * right[k] * (power if k % 2 == 0 else -power)
+            power *= d
+        if not ((low > error or j < order) and high > error):
+            return False
+    return True
+
+
+@kernel
+def first_linear_guard(
+    tapes: Any, k: int, count: int, d: float, hermite: Any, room: Any
+) -> tuple[int, int, float]:
+    """As `first_guard` for guards that are linear in states and time: along a step they are polynomials themselves.
+
+    room: the numbers of the watched guards, `guards_left` and `guards_right` (G, K), their Taylor coefficients at the
+    ends of the step, and their sides, orders and floors.
+    """
+    left, right, numbers = room.guards_left, room.guards_right, room.numbers
+    sides, orders, floors = room.sides, room.orders, room.floors
+    is_positive = True
+    for i in range(count):
+        g = numbers[i]
+        is_positive = (
+            is_positive
+            and sides[g] > 0
+            and stays_positive(left[i], right[i], orders[g], floors[g], d, hermite.weights)
+        )
+    outcome, g, at = NEVER, -1, d
+    if not is_positive:
+        polynomials, watched, V = room.polynomials, room.watched, room.V
+        left, right = left[:count], right[:count]
+        if not fit_in_time(left, right, d, hermite.shift, hermite.inverse, room.lack, polynomials[:count]):
+            return OPEN, -1, 0.0
+        degree = polynomials.shape[1] - 1
+        for i in range(count):
+            for j in range(degree + 1):
+                V[watched[i], j] = polynomials[i, j]
+            for j in range(degree + 1, degree + 3):  # nothing is left out: so much for the error of a series
+                V[watched[i], j] = 0.0
+        tabulate(d, degree + 2, room.powers)
+        watched = watched[:count]
+        for i in range(count):
+            room.totals[i] = sum_sizes(V, watched[i], degree + 2, room.powers)
+        outcome, g, at = earliest_exit(
+            tapes,
+            k,
+            degree + 2,
+            d,
+            V,
+            watched,
+            room.powers,
+            room.totals,
+            parts_for_exit(room),
+            room.bernstein,
+        )
+    if outcome == NEVER:
+        begin_positive(sides, orders, floors)
+    return outcome, g, at
+
+
+@kernel
+def likely_reach(V: Any, watched: Any, order: int, rtol: float) -> float:
+    """A length beyond that over which the series of some functions hold, to look for that from."""
+    longest = math.inf
+    for j in range(watched.shape[0]):
+        r = watched[j]
+        for k in (0, 1):
+            if V[r, k] != 0.0 and V[r, order] != 0.0:
+                w = (rtol * abs(V[r, k] / V[r, order])) ** (1.0 / (order - k))
+                longest = min(longest, _LONGER * w)
+    return longest
+
+
+@kernel
+def first_guard(
+    tapes: Any,
+    k: int,
+    rows: Any,
+    inputs: Any,
+    codes: Any,
+    order: int,
+    rtol: float,
+    s: float,
+    d: float,
+    atol: Any,
+    watched: Any,
+    room: Any,
+) -> tuple[int, int, float]:
+    """The guard of mode row k that first goes negative on a step: (FOUND, guard, time from s), (NEVER, -1, d), OPEN.
+
+    rows: what the guards need of the tape; codes: `EndsCodes`. room: `polynomial` (n, m), the states in powers of the
+    time from s; V and W with the constants of the tape in their registers; sides, orders, floors of the guards just
+    after s, as in `earliest_exit`, moved on. The series of a guard serves as far as its last terms stay below rtol of
+    its largest and it meets the guard at its end; there the next stretch begins.
+    """
+    along, values_code = codes.along[k], codes.values[k]
+    x, U, values, y, rates = room.states, room.guard_series, room.values, room.ahead, room.rates
+    everyone = room.everyone[: watched.shape[0]]
+    none = everyone[:0]
+    q = 0.0
+    for _ in range(_MOST_STRETCHES):
+        if not q < d:
+            return NEVER, -1, d
+        shifted(room.polynomial, q, x)
+        series_along(along, rows, inputs, s + q, x, watched, room.V, room.W, U)
+        left = d - q
+        longest = min(left, likely_reach(U, everyone, order, rtol))
+        w = call_apart(
+            reach, (0, U, none, U, everyone, order, rtol, atol, 1.0, longest, room.powers, room.totals)
+        )
+        if not w > _SHORTEST * d:
+            return OPEN, -1, q
+        outcome, g, at = earliest_exit(
+            tapes, k, order, w, U, everyone, room.powers, room.totals, parts_for_exit(room), room.bernstein
+        )
+        if outcome == OPEN:
+            return OPEN, g, q + at
+        while True:
+            for i in range(x.shape[0]):
+                y[i] = x[i, order]
+                for j in range(order - 1, -1, -1):
+                    y[i] = y[i] * at + x[i, j]
+            guards_at(values_code, rows, inputs, s + q + at, y, watched, room.W, rates, values)
+            tabulate(at, order, room.powers)
+            for j in range(watched.shape[0]):
+                room.sums[j] = sum_at(U, j, order, room.powers)
+            if keeps_up(U, everyone, order, room.powers, rtol, values, room.sums):
+                break
+            at, outcome = _SHORTER * at, NEVER
+            if not at > _SHORTEST * d:
+                return OPEN, g, q
+        if outcome == FOUND:
+            return FOUND, g, q + at
+        q = d if at >= left else q + at
+        begin_positive(room.sides, room.orders, room.floors)
+    return (OPEN, -1, q) if q < d else (NEVER, -1, d)

@@ -1,0 +1,54 @@
+"""The first zero of all guards of a mode along one step."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from hybridsim.engine.native.kernels import inlined, kernel
+from hybridsim.engine.roots.first_exit import FOUND, NEVER, OPEN, first_exit
+from hybridsim.engine.series.bounded import UNIT
+
+
+@inlined
+def parts_for_exit(room: Any) -> Any:
+    """What `earliest_exit` needs of a room: sides, orders and floors of all guards, and scratch arrays."""
+    return (room.sides, room.orders, room.floors), (room.a, room.b, room.stack)
+
+
+@kernel
+def earliest_exit(
+    tapes: Any, k: int, order: int, h: float, U: Any, watched: Any, powers: Any, totals: Any, parts: Any, bernstein: Any
+) -> tuple[int, int, float]:  # fmt: skip
+    """(NEVER, -1, h), or the guard of the mode that first goes negative in a step of length h: (FOUND, guard, time).
+
+    watched: rows of U with the series of the mode's guards. powers (order + 1,): h**k. totals: see `reach`. parts: see
+    `parts_for_exit`. bernstein: see `first_exit`, by the number of leading zeros.
+    """
+    (sides, orders, floors), (a, b, stack) = parts
+    found, best, begin = -1, 1.0, tapes.active_start[k]
+    for i in range(watched.shape[0]):
+        g = tapes.active[begin + i]
+        r = watched[i]
+        total, first = totals[i], U[r, 0]
+        if not total < math.inf:
+            return OPEN, g, 0.0
+        if total == 0.0 and sides[g] >= 0:
+            continue  # zero all along: neither a side nor a change of it
+        if sides[g] <= 0:
+            return OPEN, g, 0.0
+        last = abs(U[r, order]) * powers[order] + abs(U[r, order - 1]) * powers[order - 1]
+        error, floor = 2.0 * last + 8.0 * UNIT * total, floors[g]
+        if not error + floor < math.inf:  # nothing is below what is not a number, and halving would not end
+            return OPEN, g, 0.0
+        if orders[g] == 0 and first - (total - abs(first)) > error + floor + 64.0 * UNIT * total:
+            continue  # the first term outweighs all others
+        for j in range(order + 1):
+            a[j] = U[r, j] * powers[j]
+        code = bernstein[orders[g]] if orders[g] < bernstein.shape[0] else 0
+        outcome, theta = first_exit(a[: order + 1], error, floor, orders[g], b, stack, code)
+        if outcome == OPEN:
+            return OPEN, g, theta * h
+        if outcome == FOUND and (found < 0 or theta < best):
+            found, best = g, theta
+    return (FOUND, found, best * h) if found >= 0 else (NEVER, -1, h)

@@ -1,0 +1,373 @@
+"""Leaps of the compiled mode loop as the general one sees them: segments and events in, the state after them out."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from time import perf_counter
+from typing import Any, ClassVar
+
+import numpy as np
+
+from hybridsim.engine.events.compiled.after_segment import reach_settling
+from hybridsim.engine.events.compiled.scratch import functions_of, work_space
+from hybridsim.engine.events.outcome import Outcome
+from hybridsim.engine.events.zeno.accumulation import MOST, leads_nowhere
+from hybridsim.engine.linear.tables import no_tables
+from hybridsim.engine.native.kernels import Door
+from hybridsim.engine.native.struct_pack import ALIGNED, LARGEST, Sheet, packed
+from hybridsim.engine.record.blocks import SegmentBlock
+from hybridsim.engine.record.checkpoint import damaged
+from hybridsim.engine.record.counters import Counters
+from hybridsim.engine.record.series_block import SeriesBlock
+from hybridsim.engine.record.trajectory import Trajectory
+from hybridsim.engine.roots.defect_check import room_ahead
+from hybridsim.engine.run.desk import Desk, Laid, laid_out
+from hybridsim.engine.run.kernel_run import Leapt
+from hybridsim.engine.run.leap import LEAST, Record, Room, leap
+from hybridsim.engine.run.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Landing, Leaps
+from hybridsim.engine.system.failures import StepFailure
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.programs.code_shelf import CodeShelf
+from hybridsim.engine.system.programs.mode_code import most_fading
+from hybridsim.engine.system.programs.mode_tables import automata_of, shelf_of
+from hybridsim.engine.system.programs.series_shelf import SeriesShelf
+from hybridsim.engine.system.series_at import series_order
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.tolerances import Tolerances
+
+_SEGMENTS = 1024  # room for one call
+_ROOM = LARGEST // 8  # doubles for the steps of one call, those of a block that is handed on
+_NONE = np.zeros(0, dtype=np.int64)
+_TIGHTEST = 1e-15
+NOT_LINEAR = no_tables()  # for kernels that take their modes by series
+
+
+Maker = Callable[[System, Tolerances, float], Leaps]  # for a run whose segments are no longer than that
+
+_compiled: list[Maker] = []
+
+
+def compile_leaps(system: System, make: Maker) -> None:
+    """Have ready what leaps call: functions of this system, and their loop, the same for all, once a process."""
+    functions_of(system)
+    if make in _compiled or not system.n:
+        return
+    leaper = make(system, Tolerances(1e-3, np.full(system.n, 1e-3)), math.inf)
+    nowhere, none = Instant(0.0), np.zeros(0, dtype=np.int64)
+    guards, n = system.guard_count, system.n
+    modes = np.zeros(len(system.automata), dtype=np.int64)
+    p = system.vector(nowhere, np.zeros(system.layout.discrete))
+    still = Outcome(
+        np.zeros(n),
+        p,
+        modes,
+        np.ones(guards, dtype=np.int64),
+        np.zeros(guards, dtype=np.int64),
+        none,
+        none,
+        np.zeros(n),
+        np.zeros(guards),
+        np.zeros(0),
+    )
+    # such as a rate without a value; it is for the run to tell, and compiles by itself
+    with suppress(StepFailure):
+        leaper.leap(nowhere, still, p, nowhere, Trajectory(system))
+        leads_nowhere(np.empty((0, 2)), none, system.owner, len(system.automata), np.empty((2, MOST)))
+        _compiled.append(make)
+
+
+class Leaper(ABC):
+    """Leaps of one run; what differs between kernels is left open.
+
+    Parameters
+    ----------
+    columns : of what the kernel records of each step and state.
+    kind : names the scratch arrays, which are handed on from run to run; each leap takes a pair of its own.
+    """
+
+    is_looked_at: ClassVar[bool] = (
+        False  # whether steps are looked at after a leap, even if they are not kept
+    )
+    codes: CodeShelf  # machine code of the modes
+    taken: tuple[Any, Any]  # the tapes of the last call, and their codes
+
+    def __init__(self, system: System, columns: int, kind: str) -> None:
+        self.system, self.columns, layout = system, columns, system.layout
+        self.shelf, self.automata = shelf_of(system), automata_of(system)
+        self.functions = functions_of(system)
+        self.inputs = system.registers.inputs
+        self.places = (
+            system.rates,
+            layout.origin_at,
+            layout.phases_at,
+        )
+        self.spare: deque[Any] = system.code.shared(f"scratch for {kind}", deque)
+        self.leapt: Leapt | None = None  # a call that was made ahead, for the next leap to begin with
+        beside = (_SEGMENTS + 1) * (layout.size + 1) + ALIGNED
+        self.steps = max((_ROOM - beside) // (system.n * columns + 2), LEAST)  # that there is room for
+        self._renew()
+
+    def anew(self) -> Leaps:
+        """The same for another run."""
+        other: Leaps = object.__new__(type(self))
+        vars(other).update(vars(self))
+        return other
+
+    @abstractmethod
+    def _room(self) -> Any:
+        """Scratch arrays of the kernel for one leap."""
+
+    @abstractmethod
+    def _go(
+        self,
+        to: np.ndarray,
+        clock: np.ndarray,
+        state: Any,
+        work: Any,
+        room: Any,
+        rows: Any,
+    ) -> tuple[int, int, int]:
+        """Run the kernel, which writes to rows of the record: why it ended, how many steps and segments there are."""
+
+    @abstractmethod
+    def _cost(self, room: Any) -> Any:
+        """What a call has cost beyond its steps."""
+
+    @abstractmethod
+    def _count(self, counters: Counters, steps: int, cost: Any) -> None:
+        """Count what so many steps have cost, beside themselves."""
+
+    def _block(self, *arrays: np.ndarray) -> SegmentBlock:
+        """The segments in the arrays of a `SeriesBlock`."""
+        return SeriesBlock(self.system, *arrays)
+
+    def _renew(self) -> None:
+        """Fresh arrays to write to; blocks that were committed go on using the former ones."""
+        self.used = (0, 0)  # rows of steps, rows of segments
+        self.sheet = self._sheet()
+        self.memory: tuple[np.ndarray, ...] | None = None  # what the sheet describes, once it is needed
+
+    def _sheet(self) -> Sheet:
+        """What the kernel writes to; the trajectory keeps it, events longer than steps."""
+        system, steps, columns = self.system, self.steps, self.columns
+
+        def made() -> Sheet:
+            return Sheet(
+                Record,
+                (
+                    (float, (steps, 2), 0),
+                    (float, (steps, system.n, columns), 0),
+                    # one row more: where each begins and where the last one ends
+                    (np.int64, (_SEGMENTS + 1,), 0),
+                    (float, (_SEGMENTS + 1, 2), 1),
+                    (np.int64, (_SEGMENTS + 1, len(system.automata)), 1),
+                    (float, (_SEGMENTS, system.layout.size), 0),
+                    (np.int64, (_SEGMENTS,), 1),
+                    (float, (_SEGMENTS, 2, system.n), 1),
+                ),
+            )
+
+        sheet: Sheet = system.code.shared(f"sheet for {steps} steps of {columns} columns", made)
+        return sheet
+
+    @property
+    def place(self) -> tuple[np.ndarray, ...]:
+        """How far the rows are written, and how many there are: where the next call has to pause."""
+        return (np.array([*self.used, self.steps], dtype=float),)
+
+    @place.setter
+    def place(self, place: np.ndarray) -> None:
+        if not (place.shape == (3,) and ((place >= 0.0) & (place <= max(_ROOM, self.steps))).all()):
+            raise damaged("how far the rows of the run are written")
+        rows, segments, steps = (int(number) for number in place)
+        if not (1 <= steps <= self.steps and rows <= steps and segments <= _SEGMENTS + 1):
+            raise damaged("how far the rows of the run are written")
+        if steps != self.steps:
+            self.steps = steps
+            self._renew()
+        self.used = (rows, segments)
+
+    def go(self, origin: Instant, laid: Laid, target: Instant) -> Leapt:
+        """Call the kernel."""
+        self.shelf.surround(laid.part("z"))
+        try:
+            desk = self.spare.pop()
+        except IndexError:
+            desk = Desk.of(laid, work_space(self.system), self._room())
+            reach_settling(
+                self.automata, self.shelf.tapes, self.inputs, NOT_LINEAR, desk.as_packed, desk.work
+            )
+        desk.take_up(laid)
+        clock, to = desk.clock, desk.target
+        clock[0], clock[1] = origin
+        to[0], to[1] = target
+        # before the leap: another thread may put the very modes on the shelf that this one lacks
+        known = len(self.shelf.tapes.modes)
+        rows, began = self._rows(), perf_counter()
+        code, steps, count = self._go(to, clock, desk.as_packed, desk.work, desk.room, rows)
+        seconds = perf_counter() - began
+        self.shelf.look()
+        self.codes.look(*self.taken)
+        cost = self._cost(desk.room)
+        end, at = desk.leave(), clock.tolist()
+        self.spare.append(desk)
+        self.shelf.surround(end.part("z"))
+        has_news = len(self.shelf.tapes.modes) != known
+        assert self.memory is not None
+        first_step, first = self.used
+        return Leapt(
+            self.system,
+            self.sheet,
+            self.memory,
+            first,
+            code,
+            steps,
+            count,
+            at,
+            end,
+            has_news,
+            seconds,
+            (first_step, cost),
+        )
+
+    def leap(
+        self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
+    ) -> Landing:
+        """As far as ordinary events and the room for them go."""
+        leapt, self.leapt = self.leapt or self.go(origin, laid_out(outcome, p), target), None
+        instants: list[np.ndarray] = []
+        owners: list[np.ndarray] = []
+        while True:
+            self.memory = leapt.memory
+            self.count(leapt, record.counters)
+            is_full = leapt.is_full
+            if leapt.count:
+                self._commit(leapt, record)
+                instants.append(leapt.instants)
+                owners.append(leapt.owners)
+            if is_full:
+                self._renew()
+            if is_full or not leapt.has_news:
+                break
+            leapt = self.go(Instant(*leapt.clock), leapt.end, target)
+        end = PAUSED if is_full else (ARRIVED if leapt.is_at_target else BEFORE_SOMETHING)
+        if len(instants) == 1:
+            return Landing(Instant(*leapt.clock), leapt.after, end, instants[0], owners[0])
+        all_instants = np.concatenate([np.empty((0, 2)), *instants])
+        return Landing(
+            Instant(*leapt.clock), leapt.after, end, all_instants, np.concatenate([_NONE, *owners])
+        )
+
+    def count(self, leapt: Leapt, counters: Counters) -> None:
+        """Add what a call has cost."""
+        leapt.count_in(counters)
+        self._count(counters, leapt.steps, leapt.beside[1])
+
+    def forget_segments(self, leapt: Leapt) -> bool:
+        """Let go of all segments but the end of the last one, unless their steps are looked at."""
+        if self.is_looked_at:
+            return False
+        leapt.forget_segments()
+        self.memory = None
+        return True
+
+    def _rows(self) -> Any:
+        """The rows that the next call writes to."""
+        steps, first = self.used
+        if self.memory is None:
+            self.memory = self.sheet.blank()
+        return self.sheet.packed(self.memory, (steps, steps, first + 1, *(first,) * 5))
+
+    def segments_of(self, leapt: Leapt) -> SegmentBlock:
+        """The segments of a call that has some, and has let go of none."""
+        first_step, first = leapt.beside[0], leapt.first
+        lengths, series, ends, origins, modes, vectors, _, jumps = leapt.rows
+        steps, begun = slice(first_step, first_step + leapt.steps), slice(first, first + leapt.count)
+        ends[first] = 0
+        return self._block(
+            ends[first : first + leapt.count + 1],
+            lengths[steps],
+            series[steps],
+            origins[begun],
+            modes[begun],
+            vectors[begun],
+            jumps[begun],
+        )
+
+    def _commit(self, leapt: Leapt, record: Trajectory) -> None:
+        """Leave what one call has written to the trajectory: its segments and events."""
+        self.used = (leapt.beside[0] + leapt.steps, leapt.first + leapt.count + 1)
+        if record.segments.is_end_alone and not self.is_looked_at:
+            record.segments.keep_only(leapt.last_end)
+        else:
+            record.segments.add(self.segments_of(leapt))
+        if leapt.crossings is not None:
+            record.occurrences.add(leapt.crossings)
+
+
+_leap = Door(leap)
+
+
+class TaylorLeaper(Leaper):
+    """Leaps of Taylor series."""
+
+    def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
+        rtol = max(tolerances.rtol, _TIGHTEST)
+        self.order = series_order(rtol, system.is_linear)
+        super().__init__(system, self.order + 1, f"order {self.order}")
+        self.codes: SeriesShelf = system.code.shared(
+            f"series of order {self.order}", lambda: SeriesShelf(system, self.order)
+        )
+        self.control = (rtol, tolerances.atol, self.order, tolerances.max_step, longest)
+
+    def _room(self) -> Any:
+        system, order, n = self.system, self.order, self.system.n
+        registers, guards = system.registers.count, system.guard_count
+        room: Room = packed(
+            Room(
+                V=np.zeros((registers, order + 1)),
+                W=np.zeros((registers, order + 1)),
+                guard_series=np.zeros((guards + most_fading(system), order + 1)),
+                ahead=np.empty(room_ahead(order, n, guards)),
+                sizes=np.empty(order + 1 + guards + most_fading(system)),
+                numbers=np.arange(guards, dtype=np.int64),
+                everyone=np.arange(n, dtype=np.int64),
+                a=np.empty(order + 1),
+                b=np.empty(order + 1),
+                stack=np.empty((64, order + 3)),
+                floors=np.empty(guards),
+                pace=np.empty(3),
+                largest=np.empty(guards),
+                scale=np.empty(n),
+                **{name: np.empty(guards, dtype=np.int64) for name in ("sides", "orders", "watched")},
+            )
+        )
+        return room
+
+    def _go(
+        self,
+        to: np.ndarray,
+        clock: np.ndarray,
+        state: Any,
+        work: Any,
+        room: Any,
+        rows: Any,
+    ) -> tuple[int, int, int]:
+        tapes = self.shelf.tapes  # another thread may put more on the shelf
+        codes = self.codes.of(tapes)
+        code, steps, count = _leap(
+            self.functions, self.automata, tapes, self.inputs, NOT_LINEAR, codes, self.places, self.control,
+            to, clock, state, work, room, rows,
+        )  # fmt: skip
+        self.taken = tapes, codes
+        return code, steps, count
+
+    def _cost(self, room: Any) -> None:
+        """Nothing."""
+
+    def _count(self, counters: Counters, steps: int, cost: None) -> None:
+        counters.rhs_evaluations += 2 * steps  # one series a step, and the check at its end

@@ -1,0 +1,276 @@
+"""What is known of an event as it was located: the state with bounds of its errors, and what is zero together."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.events.choice.verdict import side_after, side_before
+from hybridsim.engine.events.compiled.after_segment import spread
+from hybridsim.engine.events.monitor_sides import MonitorSides
+from hybridsim.engine.events.outcome import Situation
+from hybridsim.engine.run.segment_run import Arrival, SegmentRun
+from hybridsim.engine.series.bounded import UNIT
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
+
+
+def situation(system: System, arrival: Arrival, segment: SegmentRun) -> Situation:
+    """The state before an event with bounds of its rounding: of the states, the instant, the residual."""
+    flow, s_error = segment.flow, 2.0 * math.ulp(arrival.s)
+    zero, asked = np.zeros(system.n), segment.tolerances
+    slopes = np.abs(system.flow(arrival.s, arrival.x, flow.p, flow.z)) if system.n else zero
+    located: list[Any] = []
+    if arrival.fired or arrival.stopping:
+        series = system.series(arrival.s, arrival.x, flow.p, flow.z, zero, 0.0)
+        # of a corner either side will do within its bound: its instant does not make the states worse than asked for
+        fine = asked.atol + asked.rtol * np.abs(arrival.x)
+        fired = [
+            g
+            for g in arrival.fired
+            if not system.is_corner[system.owner[g]]
+            or (distance_of_zero(series.guards[g]) * slopes <= fine).all()
+        ]
+        located = [*series.guards[fired], *series.monitors[list(arrival.stopping)]]
+    # where a speed dies out below all that is asked for, value and rate are both noise, and tell of no time
+    least = UNIT * float(asked.atol.min(initial=math.inf))
+    for series_of_zero in located:
+        if np.abs(series_of_zero[:2]).max() > least:
+            s_error = max(s_error, distance_of_zero(series_of_zero))
+    x_error = segment.rounding() + s_error * slopes
+    holding = system.evaluated(flow.z)
+    x_error[holding] = UNIT * np.abs(arrival.x[holding])
+    return Situation(arrival.s, arrival.x.copy(), flow.p, flow.z.copy(), x_error, s_error)
+
+
+def distance_of_zero(series: Any) -> float:
+    """How far in time the zero of a function is, by its Taylor coefficients; 0 where they do not tell.
+
+    A function that only touches zero has a slope that tells nothing: a double zero is sqrt(2 |g/g''|) away.
+    """
+    value, slope, bend = (abs(float(c)) for c in series[:3])
+    by_slope = value / slope if slope > 0.0 else math.inf
+    by_bend = math.sqrt(value / bend) if bend > 0.0 else math.inf
+    distance = min(by_slope, by_bend)
+    return distance if math.isfinite(distance) else 0.0
+
+
+def time_error(series: Any, bounds: Any) -> float:
+    """How well the time of a zero is known, by the bound of the function's value there."""
+    return distance_of_zero((bounds[0], *series[1:]))
+
+
+@dataclass(frozen=True)
+class Located:
+    """One instant at which a segment ended.
+
+    Parameters
+    ----------
+    at : the state just before it.
+    fired : guards that are zero and leave, with the order of their times.
+    monitors : their sides just before it, and those to which the motion leads them.
+    is_met : whether what is due beforehand falls on it.
+    inputs : the run-time vector with the inputs as they were before a jump; None where `at` has them so.
+    waiting : components whose loads are zero and wait for schedules that are due.
+    """
+
+    at: Situation
+    fired: dict[int, int]
+    monitors: MonitorSides
+    is_met: bool
+    inputs: np.ndarray | None = None
+    waiting: frozenset[int] = frozenset()
+
+    def scope(self, system: System) -> set[int]:
+        """The components that are decided before what is due."""
+        return set(range(len(system.automata))) - self.waiting
+
+
+def coincident(
+    system: System, origin: Instant, at: Situation, fired: tuple[int, ...], known: Any = None
+) -> dict[int, int]:
+    """The located guards and those that are zero with them and leave, with the order of their times.
+
+    known: the series there, if they are at hand.
+    """
+    series = known or system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
+    together: dict[int, float] = {}
+    for g in map(int, np.flatnonzero(system.active(at.z))):
+        value, bound = series.guards[g], series.guard_bounds[g]
+        leaves = abs(value[0]) <= bound[0] and side_after(value, bound, 1)[0] < 0
+        if g in fired or leaves:
+            together[g] = math.copysign(distance_of_zero(value), float(value[0]))
+    # guards within one ulp of the time are at one place of the order
+    ulp = math.ulp(max(abs(float(origin.plus(at.s))), math.ulp(1.0)))
+    order: dict[int, int] = {}
+    place, last = -1, -math.inf
+    for g in sorted(together, key=lambda g: together[g]):
+        if together[g] - last > ulp:
+            place, last = place + 1, together[g]
+        order[g] = place
+    return order
+
+
+def located(
+    system: System, origin: Instant, arrival: Arrival, segment: SegmentRun, target: float, is_due: bool
+) -> Located:
+    """What is zero where a segment ended, and what is to be settled there.
+
+    is_due: something is due at the local time `target`, which may be this very instant.
+    """
+    at, is_met = situation(system, arrival, segment), False
+    series = system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
+    if is_due:  # at a known time it counts how well the motion is known there
+        wide, known = as_stepped(system, at, arrival, segment)
+        zeros = [(known.guards[g], known.guard_bounds[g]) for g in arrival.fired]
+        zeros += [(known.monitors[k], known.monitor_bounds[k]) for k in arrival.stopping]
+        late = max((time_error(value, bound) for value, bound in zeros), default=0.0)
+        known_at = math.ulp(float(origin.plus(target)))  # it is a number in doubles
+        is_met = abs(target - arrival.s) <= at.s_error + late + known_at
+        if is_met:
+            if arrival.s != target:  # by as much as rounding may have moved it
+                shift, arrival = abs(target - arrival.s), segment.carry_on(arrival, target)
+                at = situation(system, arrival, segment)
+                at.s_error += shift
+                wide, known = as_stepped(system, at, arrival, segment)
+            at, series = _as_due(system, origin, wide, known, arrival, known_at)
+    share = spread(len(segment.knots), segment.method.rounding)
+    if not is_met and others_near(system, at, series, arrival, share):
+        wide, known = as_stepped(system, at, arrival, segment)
+        if others_near(system, wide, known, arrival, 1.0):
+            at, series = wide, known
+    fired = coincident(system, origin, at, arrival.fired, series)
+    sides = _before_instant(series, arrival, segment)
+    segment.grazings = [
+        grazing
+        for grazing in segment.grazings
+        if grazing[0] not in fired or not _is_near(series, arrival, *grazing[:2])
+    ]
+    monitors = MonitorSides.located(system.model.monitors, sides, series, arrival.stopping)
+    return Located(at, fired, monitors, is_met)
+
+
+def as_stepped(system: System, at: Situation, arrival: Arrival, segment: SegmentRun) -> tuple[Situation, Any]:
+    """The state at an event with bounds that count what the steps to it have rounded away, and the series there."""
+    with np.errstate(invalid="ignore"):  # a state may have grown beyond all bounds
+        wide, way = replace(at), np.abs(np.diff([*segment.states, arrival.x], axis=0)).sum(axis=0)
+    add_steps(system, wide, segment.scale + way, len(segment.knots), segment.method.rounding * way)
+    return wide, system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
+
+
+def _as_due(
+    system: System, origin: Instant, at: Situation, series: Any, arrival: Arrival, known_at: float
+) -> tuple[Situation, Any]:
+    """The state where something is due, with a bound for the rounding of that time, if more is zero within it."""
+    slopes = np.abs(system.flow(at.s, at.x, at.p, at.z)) if system.n else 0.0
+    wide = replace(at, x_error=at.x_error + known_at * slopes, s_error=at.s_error + known_at)
+    known = system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
+    fewer = _number_at_zero(system, origin, at, arrival, series)
+    return (wide, known) if _number_at_zero(system, origin, wide, arrival, known) > fewer else (at, series)
+
+
+def others_near(system: System, at: Situation, series: Any, arrival: Arrival, share: float) -> bool:
+    """Whether something that has not fired is zero within so many times its bound, as steps may have rounded it."""
+    active = set(map(int, np.flatnonzero(system.active(at.z) & ~system.is_corner[system.owner])))
+    monitors = set(range(len(series.monitors))) - set(arrival.stopping)
+    values = [(series.guards[g][0], series.guard_bounds[g][0]) for g in active.difference(arrival.fired)]
+    values += [(series.monitors[k][0], series.monitor_bounds[k][0]) for k in monitors]
+    return any(0.0 < bound < math.inf and abs(value) <= share * bound for value, bound in values)
+
+
+def _number_at_zero(system: System, origin: Instant, at: Situation, arrival: Arrival, series: Any) -> int:
+    """How many guards leave at an event, and how many monitors are zero there."""
+    watched = zip(series.monitors, series.monitor_bounds, strict=True)
+    monitors = sum(abs(value[0]) <= bound[0] for value, bound in watched)
+    return len(coincident(system, origin, at, arrival.fired, series)) + monitors
+
+
+def _is_near(series: Any, arrival: Arrival, guard: int, s: float) -> bool:
+    """Whether what was taken for a touch of a guard is its zero at the event itself."""
+    return abs(arrival.s - s) <= 2.0 * time_error(series.guards[guard], series.guard_bounds[guard])
+
+
+def _before_instant(series: Any, arrival: Arrival, segment: SegmentRun) -> np.ndarray:
+    """Sides of the monitors just before an instant; those that are zero within rounding have not crossed yet.
+
+    Where they were seen to cross, the sighting is taken back: the sides before and after the instant decide.
+    """
+    sides, watch = segment.locator.monitor_sides.copy(), segment.watch
+    for k, (value, bound) in enumerate(zip(series.monitors, series.monitor_bounds, strict=True)):
+        is_zero = abs(value[0]) <= bound[0]
+        before = side_before(value, bound, 1)[0] if is_zero else 0
+        if is_zero and before == 0 and watch.monitor_sides[k] == 0:  # it has stayed at zero
+            sides[k] = 0
+        near = 2.0 * time_error(value, bound)
+        if before == 0 or (
+            watch.monitor_orders[k] > 0 and abs(arrival.s) <= near
+        ):  # it still leaves the last zero
+            continue
+        sides[k] = before
+        segment.sightings = [
+            seen for seen in segment.sightings if seen.number != k or abs(arrival.s - seen.s) > near
+        ]
+    return sides
+
+
+def located_backward(system: System, origin: Instant, arrival: Arrival, segment: SegmentRun) -> Located:
+    """The same backward in time, where an instant has no further changes."""
+    at = situation(system, arrival, segment)
+    fired = coincident(system, origin, at, arrival.fired) if arrival.fired else {}
+    sides = segment.locator.monitor_sides
+    monitors = MonitorSides.of(system.model.monitors, sides)
+    monitors.leads[list(arrival.stopping)] = -sides[list(arrival.stopping)]
+    return Located(at, fired, monitors, True)
+
+
+def errors_when_due(
+    system: System, target: Instant, at: Situation, steps: int, rounding: float, before: np.ndarray
+) -> np.ndarray:
+    """Errors of the states at a time known beforehand that a compiled loop has reached, by so many steps.
+
+    rounding: of the method; before: the states where the loop began.
+    """
+    way = np.abs(at.x - before)
+    scale = np.maximum(np.abs(before), np.abs(at.x)) + way
+    slopes = np.abs(system.flow(at.s, at.x, at.p, at.z)) if system.n else 0.0
+    at.x_error = at.x_error + 4.0 * UNIT * scale + math.ulp(float(target)) * slopes
+    add_steps(system, at, scale, steps, rounding * way)
+    return at.x_error
+
+
+def with_evaluated(
+    system: System, before: np.ndarray, x: np.ndarray, p: np.ndarray, z: np.ndarray, error: np.ndarray
+) -> np.ndarray:
+    """Errors of the states where something is due, with those of what the modes until then evaluate.
+
+    That was evaluated at a local time of the run-time vector `before` and is judged at the origin of p: both times are
+    rounded.
+    """
+    held, error = system.evaluated(z), error.copy()
+    if held:
+        origin, now = before[system.layout.origin_at], p[system.layout.origin_at]
+        rounding = 2.0 * math.ulp(max(abs(origin), abs(now)))
+        early, late = (system.project(now - origin + d, x, before, z) for d in (-rounding, rounding))
+        error[held] = UNIT * np.abs(x[held]) + np.abs(late - early)[held]
+    return error
+
+
+def add_steps(system: System, at: Situation, scale: np.ndarray, steps: int, stages: np.ndarray) -> None:
+    """Add to the errors of the states what so many steps have rounded away.
+
+    A step is a sum of terms, each rounded. scale: of the states and of the way they went. stages: that way, times what
+    the stages of the method add up to, which cancel each other.
+    """
+    held = system.evaluated(at.z)
+    at.x_error = at.x_error + UNIT * (16.0 * steps * scale + stages)
+    at.x_error[held] = UNIT * np.abs(at.x[held])
+
+
+def without_fatal(system: System, found: Located) -> Located:
+    """What is located at the end of a run, where nothing has to go on: without guards that would only end it there."""
+    modes = zip(system.automata, found.at.z.tolist(), strict=True)
+    fatal = {g for a, m in modes if m >= 0 for g, message in zip(a.guards[m], a.fatal[m]) if message}
+    return replace(found, fired={g: place for g, place in found.fired.items() if g not in fatal})

@@ -1,0 +1,643 @@
+"""The mode loop: integrate to the first event, settle it, go on; it knows no method and no law."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from hybridsim.engine.events.backward import cross_backward, has_no_past, held, said_of_direction
+from hybridsim.engine.events.diagnosis import advice_on_sizes, in_the_way
+from hybridsim.engine.events.fatal_guards import is_only_fatal
+from hybridsim.engine.events.input_jumps import surfaces_jump
+from hybridsim.engine.events.monitor_sides import MonitorSides
+from hybridsim.engine.events.outcome import Outcome, Situation
+from hybridsim.engine.events.resolve import Settling
+from hybridsim.engine.events.zeno.accumulation import NOBODY, Accumulation, Limit, accumulated
+from hybridsim.engine.events.zeno.hidden_bounces import bounces_of, last_bounces, limit_of_hidden
+from hybridsim.engine.events.zeno.limits import behind, closed_now, holds_several
+from hybridsim.engine.record.checkpoint import Checkpoint, damaged
+from hybridsim.engine.record.limits import UNLIMITED, Gauge, LimitReached
+from hybridsim.engine.record.segments import Occurrence
+from hybridsim.engine.record.trajectory import Task, Trajectory
+from hybridsim.engine.run.headway import Headway, NoHeadway, TakenOver
+from hybridsim.engine.run.located import (
+    Located,
+    errors_when_due,
+    located,
+    located_backward,
+    with_evaluated,
+    without_fatal,
+)
+from hybridsim.engine.run.monitor_crossings import seen_on_the_way
+from hybridsim.engine.run.new_pieces import on_new_pieces
+from hybridsim.engine.run.notices import Notices
+from hybridsim.engine.run.segment_run import Arrival, SegmentRun
+from hybridsim.engine.run.setup import plan_of
+from hybridsim.engine.run.standing import Standing
+from hybridsim.engine.run.stepping import ARRIVED, PAUSED, Leaps, Method, Watch
+from hybridsim.engine.system.failures import Collapsed, StepFailure
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.timetable import Appointment, Timetable
+
+_NEAR = 1e-6  # of a time
+
+
+class ModeLoop:
+    """One run of a system with one stepping method; leaper: a compiled loop that has been called ahead."""
+
+    def __init__(
+        self,
+        system: System,
+        method: Method,
+        task: Task,
+        progress: Callable[[float], None] | None = None,
+        leaper: Leaps | None = None,
+    ) -> None:
+        self.system, self.method, self.task = system, method, task
+        self.forward = task.forward
+        self.record = task.record or Trajectory(system, task.keep)
+        self.gauge = None if task.limits is UNLIMITED else Gauge(task.limits, self.record.counters)
+        self.plan = plan = plan_of(system, method, task)
+        self.origin, self.end, self.renewal = plan.origin, plan.end, plan.renewal
+        self.timetable = Timetable(system, self.end)
+        self.adopted: Instant | None = None  # the last instant at which an event was settled
+        self.standing: Standing  # what holds at the origin
+        self.accumulation = Accumulation(forward=self.forward)
+        self.last_limits: dict[int, float] = {}  # by component
+        self.headway = Headway(system, self.record.counters, self.origin, self.end)
+        self.leaper = leaper or plan.leaper()
+        self._led = set(system.led)
+        watched = self.headway if task.successor is not None and method is not task.successor else None
+        self.notices = Notices(system, method, task, self.record, watched, self.leaper is not None)
+        self._told = progress
+
+    @property
+    def outcome(self) -> Outcome:
+        """What holds at the origin."""
+        return self.standing.outcome
+
+    @property
+    def p(self) -> np.ndarray:
+        """The run-time vector there."""
+        return self.standing.p
+
+    def _stand(self, instant: Instant, make: Callable[[], Outcome]) -> None:
+        """Take what is made for what holds at an instant."""
+        self.standing = Standing(self.system, instant, self.forward, make)
+
+    def _progress(self, instant: Instant) -> None:
+        """So far the run has come; raises LimitReached."""
+        self._tell(instant)
+        if self.gauge is not None:
+            self.gauge.check()
+
+    def _stepped(self, instant: Instant, run: SegmentRun) -> None:
+        """The same after a step in Python; raises NoHeadway and TakenOver."""
+        self._progress(instant)
+        self.headway.step(instant, run)
+        if self.notices.look_on_the_way(run):
+            raise TakenOver
+
+    def _take_over(self) -> None:
+        """Go on by the stiff method."""
+        assert self.task.successor is not None
+        self.method = self.notices.method = self.task.successor
+        self.leaper, self.notices.takes_over = None, False
+        if self.record.taken_over is None:
+            self.record.taken_over = (self.task.successor.name, float(self.origin))
+
+    def _tell(self, instant: Instant) -> None:
+        if self._told is not None:
+            self._told((float(instant) - self.task.t0) / (self.task.t1 - self.task.t0))
+
+    def run(self) -> Trajectory:
+        """Integrate to the end, or to where the run stops; what was computed is kept in any case."""
+        try:
+            self._run()
+        except StepFailure as failure:
+            self.record.status = "step-failure"
+            why = in_the_way(self.system, self.record, self.outcome, self.origin, self.p)
+            if isinstance(failure, NoHeadway):
+                why = f"{failure.advice}; {why}" if why else failure.advice
+            elif not why and isinstance(failure, Collapsed):
+                why = advice_on_sizes(self.system)
+            reached = self.record.segments[-1].end if self.record.segments else self.origin
+            self.record.message = f"after t = {float(reached)!r}: {failure}" + (f"; {why}" if why else "")
+        except LimitReached as reached:
+            self.record.stop_early("limit", str(reached), self.task.t0)
+        except KeyboardInterrupt:
+            self.record.stop_early("interrupted", "", self.task.t0)
+        if not self.forward and self.record.status in ("backward-nonunique", "step-failure"):
+            self.record.message += said_of_direction(self.task.t0, self.task.t1)
+        if self.adopted == self.origin:
+            self.record.finish(
+                self.origin, self.outcome.z, self.p, self.outcome.x, self.system.layout.discrete_slice
+            )
+        self.record.seal()
+        return self.record
+
+    def _run(self) -> None:
+        task = self.task
+        checkpoint = self.record.checkpoint
+        if checkpoint is not None:
+            stop, step_size = False, self._go_on_from(checkpoint)
+        else:
+            due = self.timetable.due_at_start(self.origin) if self.forward else ()
+            self.timetable.kept(self.origin)
+            self.standing, self.adopted, stop = self.plan.start(task, due), self.origin, False
+            if not self.plan.begins_silently:
+                stop = self._adopt(self.origin, self.outcome, task.x0.copy(), due)
+            step_size = task.tolerances.first_step
+        while not stop and self.origin != self.end:
+            self._mark(step_size)
+            appointment = self.timetable.next(self.origin, self.forward)
+            target = appointment.instant if appointment else self.end
+            if self.leaper is not None and not self.accumulation.is_closing_in(float(self.origin)):
+                before = self.origin
+                arrived, stop = self._leap(self.leaper, target, appointment)
+                if not (arrived or stop or self.notices.takes_over) and self._reach() == self.renewal:
+                    # compiled code takes no segment longer than that, which may be its only obstacle here
+                    nearer, renewal = self._no_farther(target, appointment)
+                    if nearer != target:
+                        arrived, stop = self._leap(self.leaper, nearer, renewal)
+                if stop:
+                    continue
+                if self.origin != before:
+                    step_size = None
+                    self._mark(None)
+                self._progress(self.origin)
+                self.headway.leapt(self.origin)
+                if self.notices.takes_over:
+                    self._take_over()
+                if arrived:
+                    continue
+            target, appointment = self._no_farther(target, appointment)
+            segment = self._segment_run()
+            bound = target.minus(self.origin)
+            found: Located | None = None
+            try:
+                arrival = self._arrival(segment, bound, step_size)
+                if arrival.is_bare and arrival.s != bound:  # another method goes on from there
+                    bound, target = arrival.s, self.origin.plus(arrival.s)
+                    appointment = Appointment(target, (), is_renewal=True)
+                at_target = arrival.s == bound
+                # the end is a known time as well; far from it nothing is that rounding may put there
+                is_over = appointment is None and bound - arrival.s <= _NEAR * max(bound, abs(float(target)))
+                is_due = is_over or (appointment is not None and not appointment.is_renewal)
+                if self.forward and not (
+                    arrival.is_bare and is_over and segment.is_clear_at_end(float(target))
+                ):
+                    found = located(self.system, self.origin, arrival, segment, bound, is_due)
+                    at_target = at_target or found.is_met
+                    if at_target and appointment is None:
+                        found = without_fatal(self.system, found)
+                        found = found if self._is_event(found) else None
+            finally:
+                self._keep(segment)
+                self.notices.look()
+            instant = target if at_target else self.origin.plus(arrival.s)
+            stop = self._settle(instant, arrival, appointment if at_target else None, segment, found)
+            step_size = segment.last_step if self.outcome.continuous else None
+            if self.notices.takes_over:
+                self._take_over()
+
+    def _reach(self) -> float:
+        """How long a segment may be from here on."""
+        return min(self.renewal, self.accumulation.reach(float(self.origin)))
+
+    def _no_farther(
+        self, target: Instant, appointment: Appointment | None
+    ) -> tuple[Instant, Appointment | None]:
+        """The target and what is due there, or the end of the longest segment allowed if the target is farther."""
+        reach = self._reach()
+        if abs(target.minus(self.origin)) <= reach:
+            return target, appointment
+        target = self.origin.plus(reach if self.forward else -reach)
+        return target, Appointment(target, (), is_renewal=True)
+
+    def _arrival(self, segment: SegmentRun, bound: float, step_size: float | None) -> Arrival:
+        """Where a segment ends, or is broken off for another method to go on."""
+        try:
+            return segment.run(bound, step_size)
+        except TakenOver:
+            return segment.cut()
+
+    def _mark(self, step_size: float | None) -> None:
+        """Note a state from which the run could go on, where an event has just been settled."""
+        if self.adopted != self.origin:
+            return
+        standing, origin = self.standing, self.origin
+        settled, paces = self.timetable.settled, dict(self.accumulation.paces)
+        headway, taken_over = self.headway.place, self.record.taken_over
+        place = None if self.leaper is None else self.leaper.place
+
+        def checkpoint(segments: int, occurrences: int) -> Checkpoint:
+            size = math.nan if step_size is None else step_size
+            arrays = standing.outcome.arrays() | {"step_size": np.array(size), "headway": headway}
+            if taken_over is not None:
+                arrays["taken_over"] = np.array(taken_over[1])
+            if place is not None:
+                arrays["place"] = np.concatenate(place)
+            return Checkpoint(origin, arrays, settled, paces, segments, occurrences)
+
+        self.record.mark(checkpoint)
+
+    def _go_on_from(self, checkpoint: Checkpoint) -> float | None:
+        """Take a noted state up; the step size to begin with."""
+        arrays = checkpoint.arrays
+        if "step_size" not in arrays:  # of a method with fixed steps
+            raise damaged("the place where it goes on")
+        self.origin = self.adopted = checkpoint.instant
+        if checkpoint.settled is not None:
+            self.timetable.kept(checkpoint.settled)
+        self.accumulation.go_on(checkpoint.paces)
+        self._stand(self.origin, lambda: Outcome.of_arrays(arrays))
+        if self.leaper is not None and "place" in arrays:
+            self.leaper.place = arrays["place"]
+        if "headway" in arrays:
+            self.headway.go_on(arrays["headway"])
+        if "taken_over" in arrays and self.task.successor is not None:
+            self.record.taken_over = (self.task.successor.name, float(arrays["taken_over"]))
+            self._take_over()
+        step_size = float(arrays["step_size"])
+        return None if math.isnan(step_size) else step_size
+
+    def _leap(self, leaper: Leaps, target: Instant, appointment: Appointment | None) -> tuple[bool, bool]:
+        """Over ordinary events in compiled code; whether the target was reached, and whether the run stops there."""
+        steps, x_before = self.record.counters.steps, self.standing.read()[0].x.copy()
+        while True:
+            landing = leaper.leap(self.origin, *self.standing.read(), target, self.record)
+            self.origin = landing.origin
+            self._stand(self.origin, landing.outcome)
+            self.notices.look()
+            arrived = landing.end == ARRIVED
+            if len(landing.instants):
+                self.adopted = Instant(*landing.instants[-1].tolist())
+            limit = self.accumulation.limit_of_all(landing.instants, landing.owners)
+            if limit is None and len(landing.owners) and not self.system.has_surface[landing.owners[-1]]:
+                blocks = self.record.occurrences.blocks
+                last = last_bounces(self.system, blocks[-1] if blocks else ())
+                limit = limit_of_hidden(self.system, self.outcome, last, self.record)
+            if self._ends_at(limit):
+                return arrived, True
+            if landing.end != PAUSED or self.notices.takes_over:
+                break
+            self._mark(None)
+            self._progress(self.origin)
+            self.headway.leapt(self.origin)
+        if not arrived:
+            return False, False
+        if appointment is None:
+            self._tell(self.origin)
+            return True, True
+        x, error = self.outcome.x, self.outcome.x_error
+        if not appointment.is_renewal:
+            self.timetable.kept(target)
+            at, steps = self._at_target(target), self.record.counters.steps - steps
+            errors = errors_when_due(self.system, target, at, steps, self.method.rounding, x_before)
+            error = np.maximum(error, errors)
+        settled = self._settle_appointment(target, self.outcome, x, appointment.schedules, error)
+        return True, self._adopt(target, settled, x, appointment.schedules)
+
+    def _at_target(self, target: Instant) -> Situation:
+        """The state just before an instant that a compiled loop has reached."""
+        outcome = self.outcome
+        p = self.system.vector(target, self.system.discrete(outcome.p), not self.forward)
+        return Situation(0.0, outcome.x.copy(), p, outcome.z.copy(), outcome.x_error.copy(), 0.0)
+
+    def _is_event(self, found: Located) -> bool:
+        """Whether something happens at the end of the run: corners alone decide nothing there."""
+        owners = set(self.system.owner[list(found.fired)].tolist())
+        return bool(owners - self._led) or bool(found.monitors.leads.any())
+
+    def _segment_run(self) -> SegmentRun:
+        system, outcome = self.system, self.outcome
+        numbers = np.flatnonzero(system.active(outcome.z))
+        watch = Watch(
+            numbers,
+            outcome.sides,
+            outcome.orders,
+            outcome.monitor_sides,
+            outcome.monitor_orders,
+            outcome.x_error,
+            outcome.guard_floors,
+            outcome.monitor_floors,
+        )
+        run = SegmentRun(
+            system,
+            self.method,
+            self.origin,
+            self.p,
+            outcome.z,
+            outcome.x,
+            watch,
+            self.task.tolerances,
+            self.record.counters,
+            self.forward,
+            self._stepped,
+        )
+        origin, progress = run.origin, self._progress  # not the run: it would hold itself
+        run.flow.look = lambda s: progress(origin.plus(s))
+        return run
+
+    def _keep(self, run: SegmentRun) -> None:
+        """Append a segment and what was seen on the way."""
+        record = self.record
+        if len(run.knots) > 1:
+            record.segments.append(run.segment())
+        record.occurrences.extend(seen_on_the_way(self.system, self.origin, run, record))
+        for k in sorted(run.undefined):
+            name = self.system.monitor_names[k]
+            record.warn(f"monitor {name} is not a number on a part of the run: no crossing is seen there")
+
+    # -- events ---------------------------------------------------------------------------------------------
+
+    def _settle(
+        self,
+        instant: Instant,
+        arrival: Arrival,
+        appointment: Appointment | None,
+        segment: SegmentRun,
+        found: Located | None,
+    ) -> bool:
+        """Settle what happens where a segment ended; True where the run stops."""
+        schedules = appointment.schedules if appointment else ()
+        if arrival.entered:
+            self.origin = instant
+            self.record.status = "backward-nonunique"
+            self.record.message = (
+                f"at t = {float(instant)!r}: {arrival.entered} is zero: the mode may have begun here"
+            )
+            return True
+        if found is None and appointment is None and (self.forward or arrival.is_bare):
+            self.origin = instant
+            return True
+        if found is None:
+            refused = has_no_past(self.system, self.outcome.z, arrival.fired, arrival.stopping, schedules)
+            if refused:
+                self.origin = instant
+                self.record.status, self.record.message = "backward-nonunique", refused
+                return True
+            found = located_backward(self.system, self.origin, arrival, segment)
+        monitors, x_minus, error, s_error = found.monitors, found.at.x.copy(), segment.rounding(), 0.0
+        if appointment and not appointment.is_renewal and (found.fired or monitors.leads.any()):
+            found = on_new_pieces(self.system, instant, found, schedules, self.forward)
+            monitors, s_error = found.monitors, math.ulp(float(instant))
+        # corners decide nothing: where something is due at their instant they take their sides with it
+        has_only_corners = appointment is not None and set(self.system.owner[list(found.fired)]) <= self._led
+        if has_only_corners:  # or nothing, where what was located only touches zero
+            error = np.maximum(error, found.at.x_error)
+        fired = {} if has_only_corners else found.fired
+        resets = self._resets_of_monitors(instant, found, fired, appointment, error, s_error)
+        if fired or resets or appointment is None:
+            outcome = self._settle_located(instant, found, fired, resets)
+            # surfaces that are taken together, within rounding, short of where their crossings accumulate
+            is_early = appointment is None and holds_several(self.system, outcome)
+            limit = self.accumulation.expected(instant) if is_early else None
+            stop = None if limit is None else self._gathered(limit)
+            if stop is not None:
+                return stop
+            if appointment is None:
+                outcome = self._apply_crossed(outcome, found.at.s, monitors)
+            if self._adopt(instant, outcome, x_minus, (), monitors, appointment is None):
+                return True
+            x_minus, error = outcome.x, outcome.x_error
+        if appointment:
+            if not appointment.is_renewal:
+                self.timetable.kept(instant)
+            # what is located at the same instant comes first: it belongs to the signals as they were before it
+            outcome = self._settle_appointment(instant, self.outcome, x_minus, schedules, error, s_error)
+            outcome = self._apply_crossed(outcome, 0.0, monitors)
+            return self._adopt(instant, outcome, x_minus, schedules, monitors)
+        return self._accumulated(instant, found.at.x, arrival.fired)
+
+    def _resets_of_monitors(
+        self,
+        instant: Instant,
+        found: Located,
+        fired: dict[int, int],
+        appointment: Appointment | None,
+        error: np.ndarray,
+        s_error: float,
+    ) -> list[tuple[object, ...]]:
+        """Resets of the monitors that fire as they come to zero: they read what guards that are zero with them read.
+
+        What guards, schedules and inputs make of the instant decides which fire; the resets of monitors do not.
+        """
+        monitors, outcome = found.monitors, None
+        acting = [k for k, m in enumerate(monitors.monitors) if m.action == "reset" and monitors.leads[k]]
+        if self.forward and (fired or appointment):
+            if not acting:
+                return []
+            outcome = self._settle_located(instant, found, fired, []) if fired else self.outcome
+            if appointment and not outcome.status:
+                x, error = (outcome.x, outcome.x_error) if fired else (found.at.x, error)
+                outcome = self._settle_appointment(instant, outcome, x, appointment.schedules, error, s_error)
+        firing = monitors.fire(outcome)
+        return [("monitor", k) for k in firing if k in acting]
+
+    def _settle_located(
+        self, instant: Instant, found: Located, fired: dict[int, int], resets: list[tuple[object, ...]]
+    ) -> Outcome:
+        """Settle the located guards and resets of monitors on a copy of the state."""
+        at = replace(found.at, x=found.at.x.copy(), z=found.at.z.copy())
+        if fired and not self.forward:
+            return cross_backward(self.system, at, tuple(fired))
+        scope = found.scope(self.system)
+        settling = Settling(self.system, at, at.z.copy(), self.forward, scope, found.inputs)
+        settling.jumped = found.inputs is not None and surfaces_jump(self.system, instant, at, True)
+        return settling.run(fired, resets)
+
+    def _apply_crossed(self, outcome: Outcome, s: float, monitors: MonitorSides) -> Outcome:
+        """Apply the resets of monitors that an event moved off their sides, and those that such resets move in turn."""
+        changes = list(outcome.changes)
+        while not outcome.status and self.forward and (due := monitors.fire(outcome, "reset")):
+            monitors.fire(outcome)
+            at = Situation(s, outcome.x.copy(), outcome.p, outcome.z.copy(), outcome.x_error, math.ulp(s))
+            resets = [("monitor", k) for k in due]
+            outcome = Settling(self.system, at, at.z.copy(), self.forward).run((), resets)
+            changes += outcome.changes
+            outcome.continuous = False
+        outcome.changes = changes
+        return outcome
+
+    def _settle_appointment(
+        self,
+        instant: Instant,
+        before: Outcome,
+        x_minus: np.ndarray,
+        schedules: tuple[int, ...],
+        error: np.ndarray,
+        s_error: float = 0.0,
+    ) -> Outcome:
+        """Settle a scheduled instant, inputs as they are from then on.
+
+        before: what holds until then. s_error: how well the zeros of what was located there are known. An event that
+        was settled within two roundings of the instant has its zero there as well.
+        """
+        system, z, discrete = self.system, before.z, self.system.discrete(before.p)
+        rounding = math.ulp(float(instant))
+        if self.adopted is not None and abs(instant.minus(self.adopted)) <= 2.0 * rounding:
+            s_error = max(s_error, rounding)
+        p = system.vector(instant, discrete, self.forward)
+        error = with_evaluated(system, before.p, x_minus, p, z, error)
+        at = Situation(0.0, x_minus.copy(), p, z.copy(), error, max(s_error, math.ulp(0.0)))
+        resets = [("schedule", k) for k in schedules]
+        settling = Settling(system, at, z.copy(), self.forward)
+        settling.jumped = surfaces_jump(system, instant, at, self.forward)
+        return settling.run((), resets)
+
+    def _accumulated(self, instant: Instant, x_minus: np.ndarray, fired: tuple[int, ...]) -> bool:
+        """Whether events follow each other ever faster; then the run ends, saying where that leads."""
+        closed = closed_now(self.system, self.outcome)
+        self.accumulation.forget(closed)  # a contact that has closed bounces no more
+        changed = {c.component for c in self.outcome.changes}.difference(closed)
+        if closed and not changed:
+            return False
+        changed = changed or {int(self.system.owner[g]) for g in fired} or {NOBODY}
+        limit = self.accumulation.limit(instant, tuple(sorted(changed)))
+        bounces = bounces_of(self.outcome, instant, x_minus)
+        hidden = limit_of_hidden(self.system, self.outcome, bounces, self.record)
+        if hidden and limit is None and self.system.is_unilateral[list(hidden.components)].all():
+            return bool(self._gathered(hidden))  # where it may not close yet, it bounces on
+        return self._ends_at(hidden or limit)
+
+    def _ends_at(self, limit: Limit | None) -> bool:
+        """Whether the run ends at this limit of events, if it is one; it does where there is nothing that goes on."""
+        stop = False if limit is None else self._gathered(limit)
+        if limit is None or stop is not None:
+            return bool(stop)
+        self.record.status = "accumulation"
+        self.record.message = accumulated(limit, self.system.automata, "adaptive" not in self.method.lacks)
+        return True
+
+    def _gathered(self, limit: Limit) -> bool | None:
+        """Go on behind a limit: along surfaces, in contacts, or as it is declared; whether the run stops there.
+
+        None where there is nothing that goes on.
+        """
+        is_again = any(self.last_limits.get(c) == limit.time for c in limit.components)
+        if not self.forward or is_again:  # it leads back into its own series
+            return None
+        appointment = self.timetable.next(self.origin, self.forward)
+        target = appointment.instant if appointment else self.end
+        room = target.minus(self.origin)
+        ahead = min(max(Instant(limit.time).minus(self.origin), 0.0), room)  # what is due until then is due
+        before = self.outcome
+        if (after := behind(limit, self.system, before, self.p, ahead)) is None:
+            return None
+        ahead, found = after
+        series = [c for c in limit.components if c != NOBODY] or [c.component for c in found.changes]
+        self.notices.accumulated([self.system.automata[c].name for c in series])
+        ended = {*limit.components, *(c.component for c in found.changes)}
+        self.accumulation.forget(tuple(ended))
+        self.last_limits.update(dict.fromkeys(ended, limit.time))
+        monitors = MonitorSides.of(self.system.model.monitors, before.monitor_sides)
+        found = self._apply_crossed(found, ahead, monitors)
+        instant = target if ahead == room else self.origin.plus(ahead)
+        stop = self._adopt(instant, found, before.x, (), monitors)
+        if stop or appointment is None or ahead < room:
+            return stop
+        self.timetable.kept(target)
+        x, schedules = self.outcome.x, appointment.schedules
+        monitors = replace(monitors, before=self.outcome.monitor_sides)
+        settled = self._settle_appointment(target, self.outcome, x, schedules, self.outcome.x_error)
+        return self._adopt(target, settled, x, schedules, monitors)
+
+    def _adopt(
+        self,
+        instant: Instant,
+        outcome: Outcome,
+        x_minus: np.ndarray,
+        schedules: tuple[int, ...],
+        monitors: MonitorSides | None = None,
+        is_last: bool = True,
+    ) -> bool:
+        """Make the state after an event the start of the next segment and record the event; True to stop.
+
+        is_last: nothing follows at this instant; else only the monitors whose resets are applied are recorded yet.
+        """
+        system, record = self.system, self.record
+        self.origin = self.adopted = instant
+        self._stand(instant, lambda: outcome)
+        for warning in outcome.warnings:
+            record.warn(warning)
+        for change in outcome.changes:
+            automaton = system.automata[change.component]
+            self._occur(
+                instant,
+                automaton.kind,
+                automaton.name,
+                change.guard,
+                automaton.modes[change.source],
+                automaton.modes[change.target],
+                -1,
+                x_minus,
+                outcome.x,
+            )
+            record.counters.events += 1
+        terminated = []
+        for k in schedules:
+            schedule = system.model.schedules[k]
+            self._occur(instant, "scheduled", schedule.name, "", "", "", 0, x_minus, outcome.x)
+            terminated += [schedule.name] if schedule.terminate else []
+        ended = self._fired_monitors(instant, outcome, x_minus, monitors, is_last) if monitors else []
+        # a run that is ended here needs no modes that hold behind it
+        is_over = self.forward and instant == self.end and is_only_fatal(system, outcome)
+        if outcome.status and not (ended or terminated or is_over):
+            record.status, record.message = outcome.status, f"at t = {float(instant)!r}: {outcome.message}"
+            return True
+        if terminated or ended:
+            record.status, record.message = (
+                "terminated",
+                f"ended by {(terminated + ended)[0]} at t = {float(instant)!r}",
+            )
+            return True
+        if not self.forward and held(system, outcome.z):
+            record.status = "backward-nonunique"
+            record.message = f"at t = {float(instant)!r}: {held(system, outcome.z)}"
+            return True
+        return False
+
+    def _fired_monitors(
+        self,
+        instant: Instant,
+        outcome: Outcome,
+        x_minus: np.ndarray,
+        monitors: MonitorSides,
+        is_last: bool,
+    ) -> list[str]:
+        """Record the monitors that fire at an instant; return those that end the run."""
+        is_last = is_last or bool(outcome.status)
+        if is_last:
+            monitors.fire(outcome)
+            monitors.keep_open(outcome)
+        ended = []
+        for k, direction in sorted(monitors.fired.items()):
+            monitor = monitors.monitors[k]
+            if k in monitors.told or not (is_last or monitor.action == "reset"):
+                continue
+            monitors.told.add(k)
+            self._occur(instant, "monitor", monitor.name, "", "", "", direction, x_minus, outcome.x)
+            ended += [monitor.name] if monitor.action == "terminate" else []
+        return ended
+
+    def _occur(
+        self,
+        instant: Instant,
+        kind: str,
+        component: str,
+        guard: str,
+        source: str,
+        target: str,
+        direction: int,
+        x_minus: np.ndarray,
+        x_plus: np.ndarray,
+    ) -> None:
+        self.record.occurrences.append(
+            Occurrence(instant, kind, component, guard, source, target, direction, x_minus, x_plus)
+        )

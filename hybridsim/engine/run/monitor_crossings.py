@@ -1,0 +1,43 @@
+"""What a segment passed without ending there: monitors that only record, and guards that it nearly grazed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybridsim.engine.record.segments import Occurrence
+from hybridsim.engine.record.trajectory import Trajectory
+from hybridsim.engine.run.segment_run import SegmentRun, Sighting
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
+
+
+def seen_on_the_way(system: System, origin: Instant, run: SegmentRun, record: Trajectory) -> list[Occurrence]:
+    """In the order of time; the record is warned of near-grazings."""
+    passed = [(seen.s, _sighting(system, origin, seen)) for seen in run.sightings]
+    declared = [g for g in run.grazings if not system.is_corner[system.owner[g[0]]]]
+    if declared:
+        times = np.array([s for _, s, _ in declared])
+        states = run.flow.project(times, run.segment().dense(times))
+        passed += [
+            (s, _grazing(system, origin, run, guard, s, x, record))
+            for (guard, s, _), x in zip(declared, states, strict=True)
+        ]
+    return [occurrence for _, occurrence in sorted(passed, key=lambda o: abs(o[0]))]
+
+
+def _sighting(system: System, origin: Instant, seen: Sighting) -> Occurrence:
+    name = system.monitor_names[seen.number]
+    return Occurrence(origin.plus(seen.s), "monitor", name, "", "", "", seen.direction, seen.x, seen.x)
+
+
+def _grazing(
+    system: System, origin: Instant, run: SegmentRun, guard: int, s: float, x: np.ndarray, record: Trajectory
+) -> Occurrence:
+    c = int(system.owner[guard])
+    automaton, number = system.automata[c], int(run.flow.z[c])
+    mode = automaton.modes[number]
+    name = automaton.guard_names[number][automaton.guards[number].index(guard)]
+    record.warn(
+        f"near-grazing: guard {name} of {automaton.name} in mode {mode} comes within rounding of zero"
+    )
+    return Occurrence(origin.plus(s), "near-grazing", automaton.name, name, mode, mode, 0, x, x)

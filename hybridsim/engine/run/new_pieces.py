@@ -1,0 +1,66 @@
+"""What is located where inputs or schedules change something, judged on what begins there: a load that touches zero.
+
+An event is where a guard is negative just after. Located by the slope before a knot, it may turn back there, or stay.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from hybridsim.engine.events.choice.verdict import side_after, side_before
+from hybridsim.engine.events.corner_sides import take_corners
+from hybridsim.engine.events.resolve import Settling
+from hybridsim.engine.run.located import Located
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
+
+
+def on_new_pieces(
+    system: System, instant: Instant, found: Located, schedules: tuple[int, ...], forward: bool
+) -> Located:
+    """What was located at the instant of an appointment and is to be settled before it.
+
+    What does not leave on the pieces of inputs that begin there as well is left out. The rest is settled on these;
+    conditions and resets read the inputs as they were before a jump. A load at zero waits for schedules that are due.
+    """
+    if schedules:
+        waiting = _loads_at_zero(system, found)
+        fired = {g: n for g, n in found.fired.items() if system.owner[g] not in waiting}
+        found = replace(found, fired=fired, waiting=waiting)
+    if not system.signals:
+        return found
+    discrete, error = system.discrete(found.at.p), math.ulp(float(instant))
+    p, before = (system.vector(instant, discrete, side) for side in (forward, not forward))
+    at = replace(found.at, s=0.0, p=p, s_error=max(found.at.s_error, error))
+    settling = Settling(system, replace(at, z=at.z.copy()), at.z.copy(), forward)
+    settling.fired[list(found.fired)] = True
+    take_corners(settling)
+    series, side_of = settling.series_of(settling.at.z), side_after if forward else side_before
+    is_open = ~system.active(settling.at.z) | np.isin(
+        system.owner, system.led
+    )  # what corners decide by themselves
+    fired = {
+        g: place
+        for g, place in found.fired.items()
+        if is_open[g] or side_of(series.guards[g], series.guard_bounds[g], 0)[0] < 0
+    }
+    for k in np.flatnonzero(found.monitors.leads):
+        if side_of(series.monitors[k], series.monitor_bounds[k], 0)[0] == found.monitors.before[k]:
+            found.monitors.leads[k] = 0  # it turns back
+    return replace(found, at=at, fired=fired, inputs=before)
+
+
+def _loads_at_zero(system: System, found: Located) -> frozenset[int]:
+    """The components at whose zero the run would end."""
+    modes = zip(system.automata, found.at.z.tolist())
+    ends = [
+        c
+        for c, (automaton, mode) in enumerate(modes)
+        if any(
+            message and g in found.fired for g, message in zip(automaton.guards[mode], automaton.fatal[mode])
+        )
+    ]
+    return frozenset(ends)

@@ -1,0 +1,486 @@
+"""One segment: steps of a method from an event to the next, each searched for events, the event time refined."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NoReturn
+
+import numpy as np
+
+from hybridsim.engine.events.backward import Entry, entries
+from hybridsim.engine.events.choice.verdict import side_after, side_before
+from hybridsim.engine.native.constants import IN_A_ROW, STANDSTILL
+from hybridsim.engine.record.counters import Counters
+from hybridsim.engine.record.segments import Dense, Pieces, Segment
+from hybridsim.engine.roots.roots import POINTS, find_roots
+from hybridsim.engine.run.locate import Findings, Hit, Locator, polish
+from hybridsim.engine.run.stepping import Flow, Method, Step, Stepper, Watch
+from hybridsim.engine.series.bounded import ORDER, UNIT
+from hybridsim.engine.system.failures import Creeping, StepFailure
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.tolerances import Tolerances
+from hybridsim.errors import UsageError
+
+_NEIGHBOURHOOD = 0.125  # share of a step within which an event time is corrected
+_CORRECTIONS = 5  # of an event time; they converge quadratically from the accuracy of the dense output
+_DIRECTIONS = {"up": 1, "down": -1, "both": 0}
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """A monitor that changed its side, and the state there."""
+
+    s: float
+    x: np.ndarray
+    number: int
+    direction: int
+
+
+@dataclass(frozen=True)
+class Arrival:
+    """The end of a segment: local time and state, the guards located there and the monitors that stop the run.
+
+    entered names, backward in time, a guard through which the present mode may have been entered.
+    """
+
+    s: float
+    x: np.ndarray
+    fired: tuple[int, ...] = ()
+    stopping: tuple[int, ...] = ()
+    entered: str = ""
+
+    @property
+    def is_bare(self) -> bool:
+        """Whether nothing happens there."""
+        return not (self.fired or self.stopping or self.entered)
+
+
+# Of a step that says otherwise than the field at its start this part is tried: the first tenth of it is a step of
+# its own, and what it finds there is found again.
+_SHORTER = 0.1
+
+
+class Still:
+    """The stepper of a model without continuous states: one step to the bound, nothing moves."""
+
+    def __init__(self, bound: float) -> None:
+        self.bound = bound
+
+    def step(self) -> Step:
+        """The whole segment."""
+        return Step(0.0, self.bound, np.zeros(0), np.zeros(0), lambda s: np.zeros((len(s), 0)))
+
+    def restep(self, step: Step, s: float) -> Step:
+        """The same up to s."""
+        return Step(step.s0, s, step.x0, step.x1, step.dense)
+
+
+class SegmentRun:
+    """Integrates one segment and keeps what it passed."""
+
+    def __init__(
+        self,
+        system: System,
+        method: Method,
+        origin: Instant,
+        p: np.ndarray,
+        z: np.ndarray,
+        x: np.ndarray,
+        watch: Watch,
+        tolerances: Tolerances,
+        counters: Counters,
+        forward: bool,
+        progress: Callable[[Instant, SegmentRun], None] | None,
+    ) -> None:
+        self.system, self.method, self.origin = system, method, origin
+        self.tolerances, self.counters, self.progress = tolerances, counters, progress
+        self.watch = watch
+        self.flow = Flow(system, p, z, counters, forward)
+        self.locator = Locator(self.flow, watch)
+        self.monitors = system.model.monitors
+        self.knots, self.states = [0.0], [x]
+        self.interpolants: list[Dense] = []
+        self.scale = np.abs(x)  # largest size of each state on the segment: what rounding is relative to
+        self.sightings: list[Sighting] = []
+        self.grazings: list[tuple[int, float, float]] = []  # guard, local time, distance
+        self.undefined: set[int] = set()  # monitors that were not a number somewhere
+        self.last_step: float | None = None
+        self.short, self.since = 0, 0.0  # steps in a row that hardly moved on, and where they began
+        self.entries = () if forward else entries(system, z)
+
+    def run(self, bound: float, first_step: float | None) -> Arrival:
+        """Step to the first event, or to the bound."""
+        undecided = self.watch.guards[np.isnan(self.watch.guard_floors[self.watch.guards])]
+        # rates are told of by the stepper
+        if len(undecided) and np.isfinite(self.flow.rhs(0.0, self.states[0])).all():
+            self._refuse_undefined(int(undecided[0]), 0.0)
+        stepper = self._start(bound, first_step)
+        self.counters.restarts += 1
+        while True:
+            try:
+                step = stepper.step()
+            except Creeping as failure:
+                self._collapse(failure.since, str(failure))
+            self.counters.steps += 1
+            if self.counters.steps == 1:
+                self._check_shape(step)
+            if not np.isfinite(step.x1).all():
+                raise StepFailure(f"the state is not finite at the end of a step of {step.s1 - step.s0:.3g}")
+            self.last_step = abs(step.s1 - step.s0)
+            self._refuse_standstill(step)
+            whole, known = step.s1, self.scale
+            self.scale = np.maximum(known, np.abs(step.x1))
+            if step.roots is None:
+                step, arrival = self._examine(stepper, step)
+            else:
+                arrival = self._take_roots(step)
+            if self.entries:
+                step, arrival = self._look_for_entries(step, arrival)
+            if step.s1 != whole:  # it may be a small part of the step, at whose end the states are far larger
+                parts = np.array([step.s0, 0.5 * (step.s0 + step.s1), step.s1])
+                self.scale = np.maximum(known, np.abs(step.dense(parts)).max(axis=0))
+            self.knots.append(step.s1)
+            self.states.append(step.x1)
+            self.interpolants.append(step.dense)
+            if self.progress:
+                self.progress(self.origin.plus(step.s1), self)
+            if arrival:
+                return arrival
+            if step.s1 == bound:
+                return Arrival(step.s1, self._projected(step))
+
+    def cut(self) -> Arrival:
+        """The end of the last step, as far as the segment goes where it is broken off."""
+        s = self.knots[-1]
+        return Arrival(s, self.flow.project(np.array([s]), self.states[-1][None, :])[0])
+
+    def _refuse_standstill(self, step: Step) -> None:
+        """Stop a run that would not come to an end; what it did at a standstill is left out."""
+        length = abs(step.s1 - step.s0)
+        if length >= STANDSTILL * abs(step.s1):
+            self.short = 0
+            return
+        if self.short == 0:
+            self.since = step.s0
+        self.short += 1
+        if self.short == IN_A_ROW:
+            self._collapse(
+                self.since,
+                f"{IN_A_ROW} steps in a row, which are left out, were shorter than {STANDSTILL:g} of local time "
+                f"{step.s1!r}, the last {length:.3g}",
+            )
+
+    def _collapse(self, since: float, how: str) -> NoReturn:
+        """End the run where its steps began to lead nowhere."""
+        self._go_back(since)
+        raise Creeping(f"the step size collapsed at t = {float(self.origin.plus(since))!r}: {how}", since)
+
+    def _go_back(self, s: float) -> None:
+        """Forget what came after the end of a step."""
+        kept = self.knots.index(s)
+        del self.knots[kept + 1 :], self.states[kept + 1 :], self.interpolants[kept:]
+        self.sightings = [seen for seen in self.sightings if seen.s <= s]
+        self.grazings = [grazing for grazing in self.grazings if grazing[1] <= s]
+
+    def _check_shape(self, step: Step) -> None:
+        """Refuse dense output of another shape than the contract has; its times are not as many as there are states."""
+        n = self.system.n
+        times = np.linspace(step.s0, step.s1, 2 if n != 2 else 3)
+        try:
+            shape = np.shape(step.dense(times))
+        except (TypeError, ValueError, IndexError) as error:
+            found = f"fails for an array of times ({type(error).__name__}: {error})"
+        else:
+            found = f"gives an array of shape {shape} for {len(times)} times and {n} states"
+            if shape == (len(times), n):
+                return
+        raise UsageError(
+            f"the dense output of a step of {getattr(self.method, 'name', 'the integrator')} {found}",
+            remedy="step.dense(times) takes an array of k local times to states of shape (k, n), a row for each time",
+        )
+
+    def carry_on(self, arrival: Arrival, s: float) -> Arrival:
+        """The end moved on to a time so near that rounding alone is between."""
+        if not self.interpolants:
+            return arrival
+        before, after = self.interpolants[-1](np.array([arrival.s, s]))
+        self.knots[-1], self.states[-1] = s, self.states[-1] + (after - before)
+        x = self.flow.project(np.array([s]), (arrival.x + (after - before))[None, :])[0]
+        return replace(arrival, s=s, x=x)
+
+    def is_clear_at_end(self, t: float) -> bool:
+        """Whether guards and monitors are far from zero where the last step ends, at time t, by samples of it."""
+        s = self.knots[-1]
+        return len(self.knots) > 1 and self.locator.is_clear(s - self.knots[-2], max(s, abs(t)))
+
+    def rounding(self) -> np.ndarray:
+        """How well the states are known on the segment: its own rounding and what the last event left over."""
+        return 4.0 * UNIT * self.scale + self.watch.x_error
+
+    def segment(self) -> Segment:
+        """The finished piece of trajectory."""
+        knots, flow = np.array(self.knots), self.flow
+        states = flow.project(knots, np.array(self.states).reshape(len(knots), -1))
+        return Segment(self.origin, flow.z, flow.p, knots, states, Pieces(knots, tuple(self.interpolants)))
+
+    def _start(self, bound: float, first_step: float | None) -> Stepper:
+        if self.system.n == 0:
+            return Still(bound)
+        if not np.isfinite(self.states[0]).all():
+            raise StepFailure("the state is not finite where a mode begins")
+        if first_step is not None:
+            first_step = min(first_step, abs(bound))
+        return self.method.start(self.flow, self.states[0], bound, self.tolerances, first_step, self.watch)
+
+    def _projected(self, step: Step) -> np.ndarray:
+        return self.flow.project(np.array([step.s1]), step.x1[None, :])[0]
+
+    # -- events that the engine locates ---------------------------------------------------------------------
+
+    def _examine(self, stepper: Stepper, step: Step) -> tuple[Step, Arrival | None]:
+        """Search a step; where something stops the segment, return the step up to there and the arrival."""
+        found = self.locator.search(step, self.rounding)
+        first = self._first_stop(found)
+        if first is not None and self._has_not_moved(step, *first):
+            return self._examine(stepper, stepper.restep(step, step.s0 + _SHORTER * (step.s1 - step.s0)))
+        passed = [hit for hit in found.crossings if self._is_recorded(hit, first)]
+        located = []
+        for hit, is_monitor in [*((hit, True) for hit in passed), *([first] if first else [])]:
+            ended, is_reached = self._refine(stepper, step, hit, is_monitor)
+            if not is_reached:
+                return self._examine(stepper, ended)
+            located.append(ended)
+        for hit, ended in zip(passed, located, strict=False):
+            self.sightings.append(Sighting(ended.s1, self._projected(ended), hit.number, hit.direction))
+        limit = first[0].theta if first else 1.0
+        for theta, g in found.guard_gaps:
+            if first is None or theta < limit:
+                self._refuse_undefined(g, step.s0 + theta * (step.s1 - step.s0))
+        self.undefined |= {k for theta, k in found.monitor_gaps if theta <= limit}
+        for g, grazing in found.grazings:
+            if grazing.theta < limit:
+                self.grazings.append((g, step.s0 + grazing.theta * (step.s1 - step.s0), grazing.distance))
+        if first is not None:
+            (hit, is_monitor), ended = first, located[-1]
+            x = self._projected(ended)
+            self._remember_monitors(found, hit.theta)
+            if is_monitor:
+                return ended, Arrival(ended.s1, x, stopping=(hit.number,))
+            return ended, Arrival(ended.s1, x, fired=(hit.number,))
+        return self._at_step_end(stepper, step, found)
+
+    def _has_not_moved(self, step: Step, hit: Hit, is_monitor: bool) -> bool:
+        """Whether a guard leaves early in the first step, where its own series has not taken it from zero yet.
+
+        The step says otherwise than the field at its start, as a long step of a stiff method does where the motion
+        grows away from the surface: a shorter one is to be searched.
+        """
+        order = 0 if is_monitor else int(self.watch.orders[hit.number])
+        if step.s0 != 0.0 or order == 0 or hit.theta >= _SHORTER or self.method.dense_is_accurate:
+            return False
+        x = self.flow.project(np.zeros(1), step.x0[None, :])[0]
+        series = self.system.series(0.0, x, self.flow.p, self.flow.z, 4.0 * UNIT * self.scale, 0.0)
+        leading, rounding = abs(series.guards[hit.number, order]), series.guard_bounds[hit.number, 0]
+        found, shorter = abs(hit.theta * step.s1), abs(_SHORTER * step.s1)
+        # a step no longer than what rounding hides would say nothing either
+        return bool(leading * found**order <= rounding < leading * shorter**order)
+
+    def _refuse_undefined(self, guard: int, s: float) -> None:
+        t = float(self.origin.plus(s))
+        raise StepFailure(
+            f"{self.system.guard_title(guard, self.flow.z)} is not a number from t = {t!r} on: "
+            f"write it so that it has a value on both sides of its zero"
+        )
+
+    def _wanted(self, monitor: int, direction: int) -> bool:
+        want = _DIRECTIONS[self.monitors[monitor].direction]
+        return want in (0, direction)
+
+    def _is_recorded(self, hit: Hit, first: tuple[Hit, bool] | None) -> bool:
+        """Whether a monitor is only to be recorded, before the first stop."""
+        is_before = first is None or hit.theta < first[0].theta
+        recorded = self.monitors[hit.number].action == "record"
+        return is_before and recorded and self._wanted(hit.number, hit.direction)
+
+    def _first_stop(self, found: Findings) -> tuple[Hit, bool] | None:
+        stops = [(hit, False) for hit in found.exits]
+        stops += [
+            (hit, True)
+            for hit in found.crossings
+            if self.monitors[hit.number].action != "record" and self._wanted(hit.number, hit.direction)
+        ]
+        return min(stops, key=lambda stop: stop[0].theta, default=None)
+
+    def _remember_monitors(self, found: Findings, theta: float) -> None:
+        """Sides of the monitors just before a stop."""
+        for hit in found.crossings:
+            if hit.theta < theta:
+                self.locator.monitor_sides[hit.number] = hit.direction
+
+    def _at_step_end(self, stepper: Stepper, step: Step, found: Findings) -> tuple[Step, Arrival | None]:
+        """Sides for the next step; a zero at the end of this one belongs to it.
+
+        A guard that the search left open and that is negative beyond rounding at the end was zero before it.
+        """
+        locator = self.locator
+        start = dict(vars(locator))
+        open_guards = [int(g) for g in self.watch.guards if found.guard_ends[g] == 0]
+        open_monitors = [k for k in range(len(self.monitors)) if found.monitor_ends[k] == 0]
+        locator.sides, locator.orders = found.guard_ends.copy(), np.zeros_like(locator.orders)
+        locator.floors, locator.monitor_floors = np.zeros(len(locator.sides)), np.zeros(len(self.monitors))
+        before = locator.monitor_sides.copy()
+        for hit in found.crossings:
+            before[hit.number] = hit.direction
+        locator.monitor_sides, locator.monitor_orders = found.monitor_ends.copy(), np.zeros_like(before)
+        if not open_guards and not open_monitors:
+            return step, None
+        x = self._projected(step)
+        errors = self.rounding()
+        series = self.system.series(step.s1, x, self.flow.p, self.flow.z, errors, math.ulp(step.s1))
+        side_of = side_after if self.flow.forward else side_before
+        fired: list[int] = []
+        passed: list[int] = []
+        stopping: list[int] = []
+        for g in open_guards:
+            locator.sides[g], order = side_of(series.guards[g], series.guard_bounds[g], 0)
+            locator.orders[g] = order if order <= ORDER else 0
+            locator.floors[g] = series.guard_bounds[g, 0] if order > 0 else 0.0
+            if locator.sides[g] < 0:
+                (passed if order == 0 else fired).append(g)
+        if passed:
+            hit = min((locator.exit(step, g) for g in passed), key=lambda hit: hit.theta)
+            ended, is_reached = self._refine(stepper, step, hit, is_monitor=False)
+            if not is_reached:
+                vars(locator).update(start)
+                return self._examine(stepper, ended)
+            return ended, Arrival(ended.s1, self._projected(ended), fired=(hit.number,))
+        for k in open_monitors:
+            side, order = side_of(series.monitors[k], series.monitor_bounds[k], 0)
+            locator.monitor_sides[k], locator.monitor_orders[k] = side, order if order <= ORDER else 0
+            locator.monitor_floors[k] = series.monitor_bounds[k, 0] if order > 0 else 0.0
+            if math.isnan(series.monitors[k, 0]):
+                locator.monitor_sides[k] = 0
+            elif side == 0:
+                locator.monitor_sides[k] = before[k]
+            elif before[k] != 0 and side != before[k] and self._wanted(k, side):
+                if self.monitors[k].action == "record":
+                    self.sightings.append(Sighting(step.s1, x, k, side))
+                else:
+                    stopping.append(k)
+                    locator.monitor_sides[k] = before[k]  # which decides the direction that is recorded
+        if fired or stopping:
+            return step, Arrival(step.s1, x, tuple(fired), tuple(stopping))
+        return step, None
+
+    def _refine(self, stepper: Stepper, step: Step, hit: Hit, is_monitor: bool) -> tuple[Step, bool]:
+        """The step up to the event, with the method's own accuracy there, and True; or a shorter one, and False.
+
+        Where the dense output is less accurate than the method, the step is repeated to the event time and
+        that time corrected by Newton's method until the guard is zero to rounding. An event of a step whose error
+        there is not within the tolerance is none: a shorter step is to be searched in its place.
+        """
+        s = step.s0 + hit.theta * (step.s1 - step.s0) if hit.theta < 1.0 else step.s1
+        if self.method.dense_is_accurate or s == step.s0:
+            if step.holds is not None and s != step.s0 and not step.holds(s):
+                return stepper.restep(step, s), False
+            x = step.dense(np.array([s]))[0]
+            return Step(step.s0, s, step.x0, x, step.dense), True
+        on_dense = s
+        # the dense output errs by a small part of a step: what Newton's method finds further off is another zero
+        window = _NEIGHBOURHOOD * abs(step.s1 - step.s0)
+        low = max(min(step.s0, step.s1), s - window)
+        high = min(max(step.s0, step.s1), s + window)
+        ended = stepper.restep(step, s)
+        for _ in range(_CORRECTIONS):
+            if ended.s1 != s:
+                return ended, False
+            x = self._projected(ended)
+            zero = np.zeros(self.system.n)
+            series = self.system.series(s, x, self.flow.p, self.flow.z, zero, 0.0)
+            value, slope = (series.monitors if is_monitor else series.guards)[hit.number, :2].tolist()
+            shift = -value / slope if slope != 0.0 else math.nan
+            if not math.isfinite(shift) or abs(shift) <= 2.0 * math.ulp(s):
+                break
+            corrected = min(max(s + shift, low), high)
+            if corrected in (s, step.s0):
+                break
+            s = corrected
+            ended = stepper.restep(step, s)
+        if ended.s1 != s:
+            return ended, False
+        if self._is_zero(ended, hit.number, is_monitor):
+            return ended, True
+        # the dense output crosses zero and the repeated step does not reach it: go by the dense output
+        return Step(step.s0, on_dense, step.x0, step.dense(np.array([on_dense]))[0], step.dense), True
+
+    def _is_zero(self, step: Step, number: int, is_monitor: bool) -> bool:
+        """Whether a guard or monitor is zero at the end of a step, within the rounding of state and time."""
+        x = self._projected(step)
+        errors = 2.0 * self.rounding() + np.abs(self.flow.rhs(step.s1, x)) * 8.0 * math.ulp(step.s1)
+        series = self.system.series(step.s1, x, self.flow.p, self.flow.z, errors, 8.0 * math.ulp(step.s1))
+        values = series.monitors if is_monitor else series.guards
+        bounds = series.monitor_bounds if is_monitor else series.guard_bounds
+        return bool(abs(values[number, 0]) <= bounds[number, 0])
+
+    def _look_for_entries(self, step: Step, arrival: Arrival | None) -> tuple[Step, Arrival | None]:
+        """Backward in time: stop where the present mode may have been entered through a guard of another."""
+        for entry in self.entries:
+            sample = self._entry_sampler(step, entry)
+            found, *_ = find_roots(sample, sample(POINTS), 0, 0, 0, lambda: 0.0, lambda _: 0.0, 0.0)
+            if found:
+                s = step.s0 + (step.s1 - step.s0) * polish(sample, found[0])
+                step = Step(step.s0, s, step.x0, step.dense(np.array([s]))[0], step.dense, step.roots)
+                arrival = Arrival(s, self._projected(step), entered=entry.label)
+        return step, arrival
+
+    def _entry_sampler(self, step: Step, entry: Entry) -> Callable[[np.ndarray], np.ndarray]:
+        system, p = self.system, self.flow.p
+
+        def sample(theta: np.ndarray) -> np.ndarray:
+            times = step.s0 + (step.s1 - step.s0) * theta
+            states = np.ascontiguousarray(step.dense(times))
+            return system.rows("guards", system.guard_count, times, states, p, entry.z)[:, entry.guard]
+
+        return sample
+
+    # -- events that the method locates itself --------------------------------------------------------------
+
+    def _take_roots(self, step: Step) -> Arrival | None:
+        if not step.roots:
+            values = self.flow.guards(np.array([step.s1]), step.x1[None, :])[0]
+            for g in self.watch.guards[np.isnan(values[self.watch.guards])]:
+                self._refuse_undefined(int(g), step.s1)
+            return None
+        x = self._projected(step)
+        series = self.system.series(
+            step.s1, x, self.flow.p, self.flow.z, self.rounding(), 2.0 * math.ulp(step.s1)
+        )
+        direction = 1.0 if self.flow.forward else -1.0
+        located = [r.number for r in step.roots if not r.is_monitor and r.direction < 0]
+        rising = [g for g in located if series.guards[g, 1] * direction > series.guard_bounds[g, 1]]
+        fired = tuple(g for g in located if g not in rising)
+        for g in rising:
+            # a corner has one value on both sides, so that the noise about its zero decides nothing
+            if not self.system.is_corner[self.system.owner[g]]:
+                raise StepFailure(
+                    f"{self.system.guard_title(g, self.flow.z)} is reported to fall where it rises: events "
+                    f"follow each other more closely than the method's tolerances tell apart"
+                )
+        stopping = []
+        for root in step.roots:
+            if not root.is_monitor:
+                continue
+            wanted = self._wanted(root.number, root.direction)
+            if wanted and self.monitors[root.number].action != "record":
+                # its side before the event decides the direction that is recorded
+                stopping.append(root.number)
+                continue
+            self.locator.monitor_sides[root.number] = root.direction
+            if wanted:
+                self.sightings.append(Sighting(step.s1, x, root.number, root.direction))
+        if fired or stopping:
+            return Arrival(step.s1, x, fired, tuple(stopping))
+        return None

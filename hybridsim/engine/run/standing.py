@@ -1,0 +1,54 @@
+"""What holds at the origin of a segment, made when somebody asks for it: a run of one leap never does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from hybridsim.engine.events.outcome import Outcome
+    from hybridsim.engine.system.instant import Instant
+    from hybridsim.engine.system.system import System
+
+
+class Standing:
+    """The outcome of the last event, and the run-time vector at an instant.
+
+    Parameters
+    ----------
+    make : makes the outcome.
+    shared : both as they are kept elsewhere, for who only reads them.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        instant: Instant,
+        forward: bool,
+        make: Callable[[], Outcome],
+        shared: tuple[Outcome, np.ndarray] | None = None,
+    ) -> None:
+        self._system, self._instant, self._forward, self._make, self._shared = (
+            system,
+            instant,
+            forward,
+            make,
+            shared,
+        )
+
+    @cached_property
+    def outcome(self) -> Outcome:
+        """What holds."""
+        return self._make()
+
+    @cached_property
+    def p(self) -> np.ndarray:
+        """The run-time vector."""
+        return self._system.vector(self._instant, self._system.discrete(self.outcome.p), self._forward)
+
+    def read(self) -> tuple[Outcome, np.ndarray]:
+        """Outcome and run-time vector, which are not to be changed."""
+        return self._shared or (self.outcome, self.p)

@@ -1,0 +1,48 @@
+"""Power series to Bernstein form as straight code, for the few degrees that series of one order have.
+
+The sums are those of `to_bernstein` in `hybridsim.engine.roots.first_exit`, to the last bit, without the loops around
+them.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from hybridsim.engine.native.cache import model_folder
+from hybridsim.engine.native.kernels import compile_series
+from hybridsim.engine.native.llvm_text import Lines, function, number
+
+LEADING = 4  # so many numbers of leading coefficients that are zero by decree
+
+
+@cache
+def bernstein_code(order: int) -> tuple[list[int], Any]:
+    """Addresses of functions for the series of an order, without 0, 1, .. of their first coefficients; what keeps them.
+
+    The functions are void f(., ., a, ., ., b), as of series: coefficients of powers, and where those of Bernstein go.
+    """
+    names = [f"bernstein_{size}" for size in range(order + 1, order + 1 - LEADING, -1)]
+    folder = model_folder()
+    kept = None if folder is None else folder / f"bernstein{order}"
+    return compile_series(kept, names, lambda: bernstein_text(order))
+
+
+def bernstein_text(order: int) -> str:
+    """A module with these functions."""
+    sizes = range(order + 1, order + 1 - LEADING, -1)
+    return "".join(_function(f"bernstein_{size}", size) for size in sizes)
+
+
+def _function(name: str, size: int) -> str:
+    code, n, share = Lines(), size - 1, 1.0
+    b = [code.load("%x", 0)]
+    for k in range(1, size):
+        share *= k / (n - k + 1.0)
+        b.append(code.op("fmul", code.load("%x", k), number(share)))
+    for k in range(1, size):
+        for j in range(n, k - 1, -1):
+            b[j] = code.op("fadd", b[j], b[j - 1])
+    for j in range(size):
+        code.store(b[j], "%out", j)
+    return function(name, code.lines)

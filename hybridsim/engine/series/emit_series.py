@@ -1,0 +1,416 @@
+"""The series of one vector of modes as straight code: every operation of its lean tape written out, order by order.
+
+An interpreter of a tape spends more on finding out what to do next than on doing it. Here each coefficient is a value
+of its own, equal ones are worked out once, and what nobody asks for falls away. Each operation is that of
+`hybridsim.engine.series.interpreter`, so that both give the same to the last bit and either may take the place of the
+other.
+
+The functions are void f(s, known, x, guards, constants, out): local time, whether order 0 is known, states, where the
+active guards' coefficients go, the constants of the tape in their registers, and where those of the states go. Sines,
+exponentials and the like at order 0 are left in their registers among the constants: a step begins where the one before
+it was looked at last, and need not work them out again. That of what is `ahead` is void f(s, d, series, guards,
+constants, out), see `hybridsim.engine.roots.defect_check`; that of sizes void f(h, ., ., guards, ., out), see
+`measure` in `hybridsim.engine.series.interpreter`. Those of Runge-Kutta methods know nothing of a step before: void
+f(s, ., x, guards, constants, out), x the states, or along a step their coefficients.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from hybridsim.engine.native.constants import EXACTLY
+from hybridsim.engine.native.llvm_text import DECLARATIONS, INF, NAN, ONE, ZERO, Lines, function, number
+from hybridsim.engine.native.simd_series import Powers
+from hybridsim.engine.series.high_orders import (
+    FACTOR,
+    HAS_B,
+    HAS_C,
+    INTEGRATE,
+    NEGATIVE,
+    OVER_B,
+    OVER_C,
+    RECIPROCAL,
+)
+from hybridsim.engine.series.optimise import (
+    ADD_CONSTANT,
+    CONSTANT_SUB,
+    DIVIDE_BY,
+    SCALE,
+    SINCOS_LINEAR,
+    SUB_CONSTANT,
+    needed_rows,
+)
+from hybridsim.engine.series.tape import (
+    ADD,
+    COPY,
+    DIV,
+    EXP,
+    LESS,
+    MUL,
+    NEG,
+    SELECT,
+    SINCOS,
+    SQRT,
+    SUB,
+    TANGENT,
+)
+
+TWINS = (SINCOS, SINCOS_LINEAR, TANGENT)  # they keep a companion series in the next register
+_COSTLY = (*TWINS, EXP)  # of which order 0 takes as long as all other orders
+KNOWN = frozenset(
+    (
+        COPY, ADD, SUB, NEG, MUL, DIV, SQRT, EXP, SINCOS, TANGENT, SELECT, LESS,
+        ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB, SCALE, DIVIDE_BY, SINCOS_LINEAR,
+    )
+)  # fmt: skip
+
+
+def _results(op: int) -> int:
+    """How many registers an operation fills."""
+    return 2 if op in TWINS else 1
+
+
+@dataclass(frozen=True)
+class ModeTape:
+    """What is needed of the lean tape of one vector of modes: rows, those of high orders, registers of time, states,
+    rates, active guards, arguments of what may fade; conditions that hold while time goes on."""
+
+    rows: tuple[tuple[int, ...], ...]
+    high: tuple[tuple[int, ...], ...]
+    time: int
+    states: tuple[int, ...]
+    rates: tuple[int, ...]
+    guards: tuple[int, ...]
+    fading: tuple[int, ...]
+    holding: frozenset[int]
+
+    @property
+    def is_known(self) -> bool:
+        """Whether every operation can be written out."""
+        return all(row[0] in KNOWN for row in self.rows)
+
+
+class _Expansion(Lines):
+    """Coefficients 0..order of every register; is_known: sines and the like at order 0 are in their registers."""
+
+    def __init__(self, tape: ModeTape, order: int, stride: int, is_known: bool = False) -> None:
+        super().__init__("v" if is_known else "u")
+        self.tape, self.order, self.stride, self.is_known = tape, order, stride, is_known
+        self.expand("%s", [self.load("%x", i) for i in range(len(tape.states))])
+
+    def expand(self, s: str, x: list[str]) -> None:
+        """All coefficients from a local time and a state on."""
+        tape, order = self.tape, self.order
+        self.series: dict[int, list[str]] = {r: [value] for r, value in zip(tape.states, x, strict=True)}
+        self._set_time(s)
+        for k in range(order + 1):
+            if k > EXACTLY and tape.high:
+                self._run(tape.high if k < order else tape.high[: -len(tape.states)], k)
+                continue
+            self._run(tape.rows, k)
+            if k < order:
+                rates = [self.at(r, k) for r in tape.rates]
+                for r, rate in zip(tape.states, rates, strict=True):
+                    self.series[r].append(self.over(rate, k + 1))
+
+    def _run(self, rows: Iterable[tuple[int, ...]], k: int) -> None:
+        """Coefficient k of every operation, in order."""
+        for op, a, b, c, out in rows:
+            if k == 0 and op in _COSTLY and self.is_known:
+                values = tuple(self.load("%c", r * self.stride) for r in (out, out + 1)[: _results(op)])
+            else:
+                values = self._advance(op, a, b, c, out, k)
+            for r, value in zip((out, out + 1), values, strict=False):
+                self.series.setdefault(r, []).append(value)
+
+    def _set_time(self, s: str) -> None:
+        if self.tape.time >= 0:
+            self.series[self.tape.time] = [s, ONE] + [ZERO] * self.order
+
+    def at(self, r: int, k: int) -> str:
+        """Coefficient k of a register."""
+        if r in self.series:
+            return self.series[r][k]
+        return self.load("%c", r * self.stride) if k == 0 else ZERO
+
+    def _weight(self, a: int, i: int, weighted: bool) -> str:
+        return self.op("fmul", self.at(a, i), number(i)) if weighted else self.at(a, i)
+
+    def _pair(self, a: int, b: int, i: int, j: int, weighted: bool) -> str:
+        first, second = self._weight(a, i, weighted), self._weight(a, j, weighted)
+        return self.op("fadd", self.op("fmul", first, self.at(b, j)), self.op("fmul", second, self.at(b, i)))
+
+    def _twice(self, a: int, i: int) -> str:
+        return self.op("fmul", self.at(a, i), number(2.0))
+
+    def _inner(self, a: int, b: int, k: int, weighted: bool = False) -> str:
+        total, other, m = ZERO, ZERO, k // 2
+        if k > 0 and k % 2 == 0:
+            total = self.op("fmul", self._weight(a, m, weighted), self.at(b, m))
+        for i in range((k - 1) // 2, 0, -1):
+            if k <= EXACTLY:
+                total = self.op("fadd", total, self._pair(a, b, i, k - i, weighted))
+            elif a == b and not weighted:
+                total = self.fused(self._twice(a, i), self.at(a, k - i), total)
+            else:
+                total = self.fused(self._weight(a, i, weighted), self.at(b, k - i), total)
+                other = self.fused(self._weight(a, k - i, weighted), self.at(b, i), other)
+        return total if other == ZERO else self.op("fadd", total, other)
+
+    def _product(self, a: int, b: int, k: int) -> str:
+        if k == 0:
+            return self.op("fmul", self.at(a, 0), self.at(b, 0))
+        inner = self._inner(a, b, k)
+        if k <= EXACTLY:
+            return self.op("fadd", inner, self._pair(a, b, 0, k, False))
+        if a == b:
+            return self.fused(self._twice(a, 0), self.at(a, k), inner)
+        return self.fused(self.at(a, 0), self.at(b, k), self.fused(self.at(a, k), self.at(b, 0), inner))
+
+    def _rise(self, a: int, b: int, k: int) -> str:
+        inner, part = self._inner(a, b, k, True), number(1.0 / k)
+        if k <= EXACTLY:
+            last = self.op("fmul", self._weight(a, k, True), self.at(b, 0))
+            return self.op("fmul", self.op("fadd", inner, last), part)
+        return self.fused(self.at(a, k), self.at(b, 0), self.op("fmul", inner, part))
+
+    def _factor(self, flags: int, b: int, c: int) -> str:
+        """What flags make of two constants; see `hybridsim.engine.series.high_orders`."""
+        f = ONE
+        for has, over, r in ((HAS_B, OVER_B, b), (HAS_C, OVER_C, c)):
+            if flags & has:
+                g = self.op("fdiv", ONE, self.at(r, 0)) if flags & over else self.at(r, 0)
+                f = g if f == ONE else self.op("fmul", f, g)
+        return self.negative(f) if flags & NEGATIVE else f
+
+    def _scaled(self, a: str, flags: int, b: int, c: int, part: str) -> str:
+        """A coefficient times a factor."""
+        f = self._factor(flags, b, c)
+        return self.op("fmul", a, part if f == ONE else f if part == ONE else self.op("fmul", f, part))
+
+    def _reciprocal(self, a: str, flags: int, b: int, c: int, out: int, k: int) -> str:
+        """Coefficient k of a constant over b."""
+        part = self.op("fdiv", ONE, self.at(b, 0))
+        factor = self.op("fmul", self.op("fmul", self.at(out, 0), part), self._factor(flags ^ NEGATIVE, 0, c))
+        return self.fused(a, factor, self.negative(self.op("fmul", self._inner(out, b, k), part)))
+
+    def _advance(self, op: int, a: int, b: int, c: int, out: int, k: int) -> tuple[str, ...]:
+        """Coefficient k of an operation, and of its companion."""
+        if op in TWINS:
+            return self._start(op, a, b) if k == 0 else self._twins(op, a, b, out, k)
+        u = self.at(a, k)
+        if op == COPY:
+            return (u,)
+        if op == NEG:
+            return (self.negative(u),)
+        if op == LESS:
+            return (self.choice("olt", u, self.at(b, 0), ONE, ZERO) if k == 0 else ZERO,)
+        if op == SELECT and a in self.tape.holding:
+            return (self.at(b, k),)
+        if op == SELECT:
+            return (self.choice("une", self.at(a, 0), ZERO, self.at(b, k), self.at(c, k)),)
+        if op in (ADD, SUB):
+            return (self.op("fadd" if op == ADD else "fsub", u, self.at(b, k)),)
+        if op in (ADD_CONSTANT, SUB_CONSTANT):
+            return (self.op("fadd" if op == ADD_CONSTANT else "fsub", u, self.at(b, 0)) if k == 0 else u,)
+        if op == CONSTANT_SUB:
+            return (self.op("fsub", self.at(b, 0), u) if k == 0 else self.negative(u),)
+        if op == SCALE:
+            return (self.op("fmul", u, self.at(b, 0)),)
+        if op >= RECIPROCAL:
+            return (self._reciprocal(u, op - RECIPROCAL, b, c, out, k),)
+        if op >= FACTOR:
+            part, kind = (number(1.0 / (k + 1)), INTEGRATE) if op >= INTEGRATE else (ONE, FACTOR)
+            return (self._scaled(u, op - kind, b, c, part),)
+        if op == MUL:
+            return (self._product(a, b, k),)
+        if op in (DIVIDE_BY, DIV):
+            if k == 0:
+                return (self.op("fdiv", u, self.at(b, 0)),)
+            if op == DIV and k <= EXACTLY:
+                first = self.op("fmul", self.at(out, 0), self.at(b, k))
+                u = self.op("fsub", u, self.op("fadd", self._inner(out, b, k), first))
+            elif op == DIV:
+                rest = self.op("fsub", u, self._inner(out, b, k))
+                u = self.fused(self.negative(self.at(out, 0)), self.at(b, k), rest)
+            return (self.op("fmul", u, self.op("fdiv", ONE, self.at(b, 0))),)
+        return (self._exponential(a, out, k) if op == EXP else self._root(a, out, k),)
+
+    def _exponential(self, a: int, out: int, k: int) -> str:
+        if k > 0:
+            return self._rise(a, out, k)
+        u = self.at(a, 0)
+        return self.choice("oge", u, number(709.0), INF, self.call("llvm.exp.f64", u))
+
+    def _root(self, a: int, out: int, k: int) -> str:
+        u = self.at(a, k)
+        if k == 0:
+            return self.choice("oge", u, ZERO, self.call("llvm.sqrt.f64", u), NAN)
+        root = self.at(out, 0)
+        rest = self.op("fmul", self.op("fsub", u, self._inner(out, out, k)), number(0.5))
+        quotient = self.op("fdiv", rest, root)
+        return self.choice("oeq", root, ZERO, self.choice("oeq", rest, ZERO, ZERO, quotient), quotient)
+
+    def _start(self, op: int, a: int, b: int) -> tuple[str, ...]:
+        """Order 0 of an operation with a companion."""
+        u = self.at(a, 0)
+        if op != TANGENT:
+            return self.call("llvm.sin.f64", u), self.call("llvm.cos.f64", u)
+        y = self.call("c_tan" if b == 0 else "c_tanh", u)
+        square = self.op("fmul", y, y)
+        return y, self.op("fadd", ONE, square if b == 0 else self.negative(square))
+
+    def _twins(self, op: int, a: int, b: int, out: int, k: int) -> tuple[str, ...]:
+        """Order k >= 1 of an operation with a companion."""
+        if op == SINCOS_LINEAR:
+            rate = self.op("fmul", self.at(a, 1), number(1.0 / k))
+            sine, cosine = self.at(out, k - 1), self.at(out + 1, k - 1)
+            return self.op("fmul", rate, cosine), self.negative(self.op("fmul", rate, sine))
+        if op == SINCOS:
+            return self._rise(a, out + 1, k), self.negative(self._rise(a, out, k))
+        self.series[out].append(self._rise(a, out + 1, k))
+        w = self._product(out, out, k)
+        return self.series[out].pop(), w if b == 0 else self.negative(w)
+
+
+def series_function(name: str, tape: ModeTape, order: int) -> str:
+    """The function that writes the coefficients (n, order + 1) of the states and (guards + fading, order + 1)."""
+    code, size = _Expansion(tape, order, order + 1, is_known=True), order + 1
+    for array, registers in (("%out", tape.states), ("%g", tape.guards + tape.fading)):
+        for i, r in enumerate(registers):
+            for k in range(size):
+                code.store(code.at(r, k), array, i * size + k)
+    begin = ("  %is_known = fcmp une double %e, 0.0", "  br i1 %is_known, label %go, label %first", "first:")
+    return function(name, [*begin, *_start(tape, size).lines, "  br label %go", "go:", *code.lines])
+
+
+def short_function(name: str, tape: ModeTape, order: int, count: int, stride: int) -> str:
+    """The function that writes the coefficients (n, order + 1) of the states and (guards, count).
+
+    stride: columns of the array with the constants.
+    """
+    code = _Expansion(replace(tape, high=()), order, stride)
+    for array, registers, size in (("%out", tape.states, order + 1), ("%g", tape.guards, count)):
+        for i, r in enumerate(registers):
+            for k in range(size):
+                code.store(code.at(r, k), array, i * size + k)
+    return function(name, code.lines)
+
+
+def values_function(name: str, tape: ModeTape, stride: int) -> str:
+    """The function that writes the rates of the states and the values of the guards."""
+    code = _start(tape, stride)
+    for array, registers in (("%out", tape.rates), ("%g", tape.guards)):
+        for i, r in enumerate(registers):
+            code.store(code.at(r, 0), array, i)
+    return function(name, code.lines)
+
+
+class _Ahead(_Expansion):
+    """Order 0 at a distance %e from the origin of series of some order, and sums of these series."""
+
+    def __init__(self, tape: ModeTape, order: int) -> None:
+        Lines.__init__(self, "u")
+        self.tape, self.order, self.stride, self.is_known = tape, 0, order + 1, False
+        n, count, size = len(tape.states), len(tape.guards), order + 1
+        powers = Powers(self, "%e", order)
+        x, slopes, changes = [], [], []
+        for i in range(n):
+            value, slope, change = powers.terms("%x", i * size)
+            x.append(self.op("fadd", self.load("%x", i * size), value))
+            slopes.append(slope)
+            changes.append(change)
+        self.expand(self.op("fadd", "%s", "%e"), x)
+        sums = [
+            self.op("fadd", self.load("%g", j * size), powers.sum("%g", j * size, is_size=False))
+            for j in range(count)
+        ]
+        values = [self.at(r, 0) for r in tape.guards]
+        rates = [self.at(r, 0) for r in tape.rates]
+        powers.store("%out")
+        for i, value in enumerate((*x, *rates, *slopes, *changes, *values, *sums)):
+            self.store(value, "%out", size + i)
+
+
+def ahead_function(name: str, tape: ModeTape, order: int) -> str:
+    """The function that writes what is ahead of series of an order."""
+    return function(name, _kept_order(_Ahead(tape, order)).lines)
+
+
+class _Along(_Expansion):
+    """Coefficients of the guards, those of the states being given."""
+
+    def __init__(self, tape: ModeTape, order: int) -> None:
+        Lines.__init__(self, "u")
+        self.tape, self.order, self.stride, self.is_known = tape, order, order + 1, False
+        size = order + 1
+        self.series = {
+            r: [self.load("%x", i * size + k) for k in range(size)] for i, r in enumerate(tape.states)
+        }
+        self._set_time("%s")
+        rows = needed_rows(list(tape.rows), set(tape.guards))
+        for k in range(size):
+            self._run(rows, k)
+
+
+def along_function(name: str, tape: ModeTape, order: int) -> str:
+    """The function that writes the coefficients (guards, order + 1) along states whose own (n, order + 1) are given."""
+    code, size = _Along(tape, order), order + 1
+    for i, r in enumerate(tape.guards):
+        for k in range(size):
+            code.store(code.at(r, k), "%g", i * size + k)
+    return function(name, code.lines)
+
+
+def sizes_function(name: str, guards: int, order: int) -> str:
+    """The function of h that writes its powers, and for each guard sum_k |c_k| h**k."""
+    code, size = Lines(), order + 1
+    powers = Powers(code, "%s", order)
+    powers.store("%out")
+    for j in range(guards):
+        first = code.call("llvm.fabs.f64", code.load("%g", j * size))
+        code.store(code.op("fadd", first, powers.sum("%g", j * size, is_size=True)), "%out", size + j)
+    return function(name, code.lines)
+
+
+def _start(tape: ModeTape, stride: int) -> _Expansion:
+    """Order 0, of which what is costly is left in its registers."""
+    return _kept_order(_Expansion(tape, 0, stride))
+
+
+def _kept_order(code: _Expansion) -> _Expansion:
+    """Code with stores of what is costly at order 0."""
+    tape, stride = code.tape, code.stride
+    for op, *_, out in tape.rows:
+        if op in _COSTLY:
+            for r in (out, out + 1)[: _results(op)]:
+                code.store(code.at(r, 0), "%c", r * stride)
+    return code
+
+
+def ends_text(tape: ModeTape, terms: int, first: int, order: int) -> str:
+    """A module with ends_0, first_0, along_0 and values_0.
+
+    ends_0: so many terms; first_0: the states up to an order of their own; see `short_function`. along_0: guards up to
+    the last order; see `along_function`.
+    """
+    stride = order + 1
+    parts = (
+        short_function("ends_0", tape, terms - 1, terms, stride),
+        short_function("first_0", tape, first, terms, stride),
+        along_function("along_0", tape, order),
+        values_function("values_0", tape, stride),
+    )
+    return DECLARATIONS + "".join(parts)
+
+
+def series_text(tape: ModeTape, order: int) -> str:
+    """A module with series_0, values_0, ahead_0 and sizes_0; TooLong where it would take too long to compile."""
+    parts = (
+        series_function("series_0", tape, order),
+        values_function("values_0", tape, order + 1),
+        ahead_function("ahead_0", tape, order),
+        sizes_function("sizes_0", len(tape.guards) + len(tape.fading), order),
+    )
+    return DECLARATIONS + "".join(parts)

@@ -1,0 +1,182 @@
+"""Rows for the high orders of a lean tape: the rates along shorter chains of operations.
+
+A coefficient waits for the one before it through every operation between a state and its rate, and with a compiled tape
+this wait is most of a step's time. Constants that follow each other become one factor, what a sum takes last is what
+comes last, and the last factor of a rate takes up the division by the order. Rounded differently than along the rows of
+the lean tape; so they stay as they are for the orders by which events are judged, and for guards at any order.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from hybridsim.engine.series.optimise import (
+    ADD_CONSTANT,
+    CONSTANT_SUB,
+    DIVIDE_BY,
+    PAIRED,
+    SCALE,
+    SINCOS_LINEAR,
+    SUB_CONSTANT,
+    arguments_of,
+    needed_rows,
+)
+from hybridsim.engine.series.tape import ADD, DIV, NEG, SQRT, SUB
+
+# Operations at orders k > 0 alone, each with flags: out_k = a_k f, and a_{k+1} of a state out, a_k f / (k + 1), where
+# f is the product of the constants b and c, or of their reciprocals, and a sign.
+FACTOR, INTEGRATE = 64, 96
+# And out_k of a constant over b, where b_k = a_k c, a_k / c or a_k, with a sign:
+# -(sum_{0<i<k} out_i b_{k-i} + out_0 b_k) / b_0, in which a_k waits for one product and one difference.
+RECIPROCAL = 128
+HAS_B, OVER_B, HAS_C, OVER_C, NEGATIVE = 1, 2, 4, 8, 16
+
+Row = tuple[int, ...]
+_SAME, _TURNED = (ADD_CONSTANT, SUB_CONSTANT), (NEG, CONSTANT_SUB)  # at high orders
+# cycles until a result is there; of what is not among them a sum of products
+_WAITS = {ADD: 3, SUB: 3, NEG: 1, SCALE: 3, DIVIDE_BY: 3, DIV: 12, SQRT: 15}
+_PRODUCT = 6
+_MOST = 2  # constants of a factor
+_EARLY = -(10**6)  # what does not wait for any state
+
+
+@dataclass(frozen=True)
+class _Scaled:
+    """A register as a multiple of another: its constants, each with whether it is divided by, and its sign."""
+
+    base: int
+    constants: tuple[tuple[int, bool], ...] = ()
+    is_negative: bool = False
+
+    def row(self, kind: int, out: int) -> Row:
+        """The row for it."""
+        places, flags = [0, 0], NEGATIVE if self.is_negative else 0
+        for i, (register, divides) in enumerate(self.constants):
+            places[i] = register
+            flags |= (HAS_B, HAS_C)[i] | ((OVER_B, OVER_C)[i] if divides else 0)
+        if kind == FACTOR and not self.constants:
+            return (NEG if self.is_negative else ADD_CONSTANT, self.base, 0, 0, out)
+        return (kind + flags, self.base, *places, out)
+
+
+def high_rows(
+    rows: Sequence[Row], states: Sequence[int], rates: Sequence[int], watched: Iterable[int]
+) -> list[Row]:
+    """The rows that give the next coefficients of the states, and those of watched registers, at high orders."""
+    made = _Rewriting(rows, states, rates, set(watched))
+    integrals = [made.scaled(rate).row(INTEGRATE, state) for state, rate in zip(states, rates, strict=True)]
+    return [*needed_rows(made.rows, made.watched | {row[1] for row in integrals}), *integrals]
+
+
+class _Rewriting:
+    """Rows with their chains made short, in `rows`; those that watched registers need are as they were."""
+
+    def __init__(
+        self, rows: Sequence[Row], states: Sequence[int], rates: Sequence[int], watched: set[int]
+    ) -> None:
+        self.watched = watched
+        self._of = {row[4]: row for row in rows}
+        self._states = set(states)
+        self._kept = set(needed_rows(list(rows), watched))
+        self._readers = Counter([*(a for row in rows for a in arguments_of(row)), *rates])
+        self._forms: dict[int, _Scaled] = {}
+        ready = self._ready_after(dict.fromkeys(states, 0))
+        ends = [ready.get(rate, _EARLY) for rate in rates]
+        # of the states some come before others
+        self._ready = self._ready_after({x: end - max(ends) for x, end in zip(states, ends, strict=True)})
+        self._lent: set[int] = set()  # registers of sums that are a part of others
+        self._sums: dict[int, tuple[list[tuple[int, bool]], list[int]]] = {}
+        for row in reversed(rows):
+            if row[0] in (ADD, SUB) and row not in self._kept and row[4] not in self._lent:
+                self._take_apart(row)
+        self.rows: list[Row] = []
+        for row in rows:
+            self._rewrite(row)
+
+    def scaled(self, register: int) -> _Scaled:
+        """A register by what it is a multiple of."""
+        return self._forms.get(register, _Scaled(register))
+
+    def _ready_after(self, ready: dict[int, int]) -> dict[int, int]:
+        """When registers have their coefficients, in cycles, the states' being given."""
+        for row in self._of.values():
+            op, out = row[0], row[4]
+            wait = _EARLY if op == SINCOS_LINEAR else 0 if op in _SAME else _WAITS.get(op, _PRODUCT)
+            ready[out] = max([ready.get(a, _EARLY) for a in arguments_of(row)]) + wait
+            if op in (*PAIRED, SINCOS_LINEAR):
+                ready[out + 1] = ready[out]
+        return ready
+
+    def _rewrite(self, row: Row) -> None:
+        op, a, b, _, out = row
+        if op in (*_SAME, *_TURNED, SCALE, DIVIDE_BY):
+            form = self.scaled(a)
+            if op in _TURNED:
+                form = replace(form, is_negative=not form.is_negative)
+            elif op not in _SAME:
+                form = form if len(form.constants) < _MOST else _Scaled(a)
+                form = replace(form, constants=(*form.constants, (b, op == DIVIDE_BY)))
+            self._forms[out] = form
+            self.rows.append(row if row in self._kept else form.row(FACTOR, out))
+        elif out in self._sums:
+            self._sum(out, *self._sums[out])
+        elif op == DIV and row not in self._kept and a not in self._of and a not in self._states:
+            self.rows.append(self._reciprocal(b, out))
+        elif out not in self._lent:
+            self.rows.append(row)
+
+    def _reciprocal(self, b: int, out: int) -> Row:
+        """What does not change over a register."""
+        form = self.scaled(b)
+        if len(form.constants) > 1:
+            form = _Scaled(b)
+        flags, register = NEGATIVE if form.is_negative else 0, 0
+        for constant, divides in form.constants:
+            flags, register = flags | HAS_C | (OVER_C if divides else 0), constant
+        return (RECIPROCAL + flags, form.base, b, register, out)
+
+    def _sum(self, out: int, terms: Sequence[tuple[int, bool]], inner: Sequence[int]) -> None:
+        """A sum that takes last what comes last; the sums it is made of lend their registers."""
+        (total, is_negative), *others = sorted(terms, key=lambda term: self._ready.get(term[0], _EARLY))
+        for (register, turns), to in zip(others, (*inner, out), strict=True):
+            if turns == is_negative:
+                self.rows.append((ADD, total, register, 0, to))
+            else:
+                first, second = (register, total) if is_negative else (total, register)
+                self.rows.append((SUB, first, second, 0, to))
+                is_negative = False
+            total = to
+
+    def _take_apart(self, row: Row) -> None:
+        """Find the registers of a sum, each with whether it is subtracted, and the sums in it that nobody else reads.
+
+        One of negative terms alone stays as it is.
+        """
+        found: list[tuple[int, bool]] = []
+        inner: list[int] = []
+        waiting = [(row[2], row[0] == SUB), (row[1], False)]
+        while waiting:
+            r, turns = waiting.pop()
+            while self._is_inner(r, (*_SAME, *_TURNED)):
+                r, turns = self._of[r][1], turns != (self._of[r][0] in _TURNED)
+            if self._is_inner(r, (ADD, SUB)):
+                op, a, b, *_ = self._of[r]
+                inner.append(r)
+                waiting += [(b, turns != (op == SUB)), (a, turns)]
+            else:
+                found.append((r, turns))
+        if not all(is_negative for _, is_negative in found):
+            self._sums[row[4]] = found, inner
+            self._lent.update(inner)
+
+    def _is_inner(self, register: int, operations: tuple[int, ...]) -> bool:
+        """Whether a register is of one of these operations, and read but once."""
+        row = self._of.get(register)
+        return (
+            row is not None
+            and row[0] in operations
+            and row not in self._kept
+            and self._readers[register] == 1
+        )

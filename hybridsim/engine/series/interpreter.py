@@ -1,0 +1,484 @@
+"""Taylor coefficients of any order along a flow, and how far they reach.
+
+The recurrences are those of automatic differentiation (A. Jorba and M. Zou, Experimental Mathematics 14 (2005) 99,
+doi:10.1080/10586458.2005.10128904), over the lean tape and without the error bounds that
+`hybridsim.engine.series.bounded` keeps.
+
+Sums run from the middle of a convolution outward: what is newest, at both ends, comes last, so that little waits for
+it. What is divided by an order, or at higher orders by one and the same number, is multiplied by the reciprocal. The
+generated code of `hybridsim.engine.series.emit_series` does each operation alike, to the last bit, and so does
+`hybridsim.engine.series.bounded` up to the order by which events are judged; beyond it products and sums are fused.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.native.constants import EXACTLY
+from hybridsim.engine.native.kernels import call_apart, call_series, fused, inlined, kernel, polynomial_kernel
+from hybridsim.engine.series.high_orders import (
+    FACTOR,
+    HAS_B,
+    HAS_C,
+    INTEGRATE,
+    NEGATIVE,
+    OVER_B,
+    OVER_C,
+    RECIPROCAL,
+)
+from hybridsim.engine.series.optimise import (
+    ADD_CONSTANT,
+    CONSTANT_SUB,
+    DIVIDE_BY,
+    SCALE,
+    SINCOS_LINEAR,
+    SUB_CONSTANT,
+)
+from hybridsim.engine.series.tape import (
+    ABS,
+    ACOS,
+    ADD,
+    AND,
+    ANGLE,
+    ASIN,
+    ATAN,
+    DIV,
+    EQUAL,
+    EXP,
+    INTEGRAL,
+    LESS,
+    LESS_EQUAL,
+    LOG,
+    MAX,
+    MIN,
+    MUL,
+    NEG,
+    NOT,
+    OR,
+    SELECT,
+    SIGN,
+    SINCOS,
+    SINHCOSH,
+    SQRT,
+    SUB,
+    TANGENT,
+)
+
+# Step control: the last two coefficients of each state and each guard stay below the tolerance at the end of a step.
+_SHORTER = 0.5  # factor on a step over which a guard's series does not reach, where nothing tells more
+# Of a guard's terms over the tolerance: one that is a state is not to shorten that state's own step.
+SLACK = 1.5
+_TRIALS = 60  # halvings: down to nothing
+_FIRST, _SURELY = 4, 0.9  # terms that are looked at for a shorter step; share of it that serves surely
+_LEAST, _MANTISSA, _ONE = 1e-300, (1 << 52) - 1, 1023 << 52  # of a double
+
+
+@kernel
+def _inner(V: Any, a: int, b: int, k: int) -> float:
+    """sum_{i=1}^{k-1} a_i b_{k-i}."""
+    total = V[a, k // 2] * V[b, k // 2] if k > 0 and k % 2 == 0 else 0.0
+    if k <= EXACTLY:
+        for i in range((k - 1) // 2, 0, -1):
+            total += V[a, i] * V[b, k - i] + V[a, k - i] * V[b, i]
+        return total
+    if a == b:
+        for i in range((k - 1) // 2, 0, -1):
+            total = fused(2.0 * V[a, i], V[a, k - i], total)
+        return total
+    other = 0.0  # beside it, so that neither waits for the other
+    for i in range((k - 1) // 2, 0, -1):
+        total, other = fused(V[a, i], V[b, k - i], total), fused(V[a, k - i], V[b, i], other)
+    return total + other
+
+
+@inlined
+def _product(V: Any, a: int, b: int, k: int) -> float:
+    """sum_{i=0}^{k} a_i b_{k-i}."""
+    if k == 0:
+        return V[a, 0] * V[b, 0]
+    inner = call_apart(_inner, (V, a, b, k))
+    if k <= EXACTLY:
+        return inner + (V[a, 0] * V[b, k] + V[a, k] * V[b, 0])
+    if a == b:
+        return fused(2.0 * V[a, 0], V[a, k], inner)
+    return fused(V[a, 0], V[b, k], fused(V[a, k], V[b, 0], inner))
+
+
+@kernel
+def _weighted(V: Any, a: int, b: int, k: int) -> float:
+    """sum_{i=1}^{k-1} i a_i b_{k-i}."""
+    total = k // 2 * V[a, k // 2] * V[b, k // 2] if k % 2 == 0 else 0.0
+    if k <= EXACTLY:
+        for i in range((k - 1) // 2, 0, -1):
+            total += i * V[a, i] * V[b, k - i] + (k - i) * V[a, k - i] * V[b, i]
+        return total
+    other = 0.0
+    for i in range((k - 1) // 2, 0, -1):
+        total = fused(i * V[a, i], V[b, k - i], total)
+        other = fused((k - i) * V[a, k - i], V[b, i], other)
+    return total + other
+
+
+@inlined
+def _rise(V: Any, a: int, b: int, k: int) -> float:
+    """Coefficient k of the integral of a' b; at high orders the newest product waits for nothing but its sum."""
+    if k <= EXACTLY:
+        return _slope(V, a, b, k) * (1.0 / k)
+    return fused(V[a, k], V[b, 0], call_apart(_weighted, (V, a, b, k)) * (1.0 / k))
+
+
+@inlined
+def _slope(V: Any, a: int, b: int, k: int) -> float:
+    """sum_{i=1}^{k} i a_i b_{k-i}: coefficient k - 1 of a' b."""
+    return call_apart(_weighted, (V, a, b, k)) + k * V[a, k] * V[b, 0]
+
+
+@kernel
+def _leading(op: int, V: Any, a: int, b: int, c: int, out: int) -> None:
+    """Order 0 of the operations that follow a differential equation."""
+    u = V[a, 0]
+    if op == EXP:
+        V[out, 0] = math.inf if u >= 709.0 else math.exp(u)  # math.exp raises where it overflows
+    elif op in (SINCOS, SINCOS_LINEAR):
+        V[out, 0], V[out + 1, 0] = math.sin(u), math.cos(u)
+    elif op == SINHCOSH:
+        V[out, 0], V[out + 1, 0] = math.sinh(u), math.cosh(u)
+    elif op == TANGENT:
+        y = math.tan(u) if b == 0 else math.tanh(u)
+        V[out, 0], V[out + 1, 0] = y, 1.0 + (y * y if b == 0 else -y * y)
+    elif op == INTEGRAL:
+        v, y = V[b, 0], math.nan
+        if c == LOG and v > 0.0:
+            y = math.log(v)
+        elif c == ASIN and abs(v) <= 1.0:
+            y = math.asin(v)
+        elif c == ACOS and abs(v) <= 1.0:
+            y = math.acos(v)
+        elif c == ATAN:
+            y = math.atan(v)
+        elif c == ANGLE:
+            y = math.atan2(v, u)
+        V[out, 0] = y
+
+
+@kernel
+def _higher(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
+    """Order k >= 1 of the operations that follow a differential equation."""
+    if op == EXP:
+        V[out, k] = _rise(V, a, out, k)
+    elif op == SINCOS:
+        V[out, k] = _rise(V, a, out + 1, k)
+        V[out + 1, k] = -_rise(V, a, out, k)
+    elif op == SINHCOSH:
+        V[out, k] = _rise(V, a, out + 1, k)
+        V[out + 1, k] = _rise(V, a, out, k)
+    elif op == TANGENT:
+        V[out, k] = _rise(V, a, out + 1, k)
+        w = _product(V, out, out, k)
+        V[out + 1, k] = w if b == 0 else -w
+    elif op == INTEGRAL and c != ANGLE:
+        V[out, k] = (V[b, k] - call_apart(_weighted, (V, out, a, k)) * (1.0 / k)) / V[a, 0]
+    elif op == INTEGRAL:
+        total = _slope(V, b, a, k) - _slope(V, a, b, k)
+        for j in range(1, k):
+            total -= j * V[out, j] * (_product(V, a, a, k - j) + _product(V, b, b, k - j))
+        V[out, k] = total / (k * (V[a, 0] ** 2 + V[b, 0] ** 2))
+
+
+@kernel
+def _logic(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
+    """Order k of comparisons, choices and corners; a corner takes the side its argument goes to."""
+    if op in (ABS, MIN, MAX):
+        sign = 0.0
+        for i in range(k + 1):
+            difference = V[a, i] if op == ABS else V[a, i] - V[b, i]
+            if difference != 0.0:
+                sign = 1.0 if difference > 0.0 else -1.0
+                break
+        if op == ABS:
+            V[out, k] = sign * V[a, k]
+        else:
+            V[out, k] = V[a, k] if (sign <= 0.0) == (op == MIN) else V[b, k]
+    elif op == SELECT:
+        V[out, k] = V[b, k] if V[a, 0] != 0.0 else V[c, k]
+    elif k > 0:
+        V[out, k] = 0.0
+    else:
+        u, v = V[a, 0], V[b, 0]
+        truth = False
+        if op == SIGN:
+            V[out, 0] = 1.0 if u > 0.0 else (-1.0 if u < 0.0 else 0.0)
+            return
+        if op == LESS:
+            truth = u < v
+        elif op == LESS_EQUAL:
+            truth = u <= v
+        elif op == EQUAL:
+            truth = u == v
+        elif op == AND:
+            truth = u != 0.0 and v != 0.0
+        elif op == OR:
+            truth = u != 0.0 or v != 0.0
+        elif op == NOT:
+            truth = u == 0.0
+        V[out, 0] = 1.0 if truth else 0.0
+
+
+@inlined
+def _factor(flags: int, V: Any, b: int, c: int) -> float:
+    """What flags make of two constants; see `hybridsim.engine.series.high_orders`."""
+    f = 1.0
+    if flags & HAS_B:
+        f = 1.0 / V[b, 0] if flags & OVER_B else V[b, 0]
+    if flags & HAS_C:
+        f *= 1.0 / V[c, 0] if flags & OVER_C else V[c, 0]
+    return -f if flags & NEGATIVE else f
+
+
+@kernel
+def advance(rows: Any, V: Any, k: int) -> None:
+    """Coefficient k of every operation, in order."""
+    for r in range(rows.shape[0]):
+        op, a, b, c, out = rows[r, 0], rows[r, 1], rows[r, 2], rows[r, 3], rows[r, 4]
+        if op == SCALE:
+            V[out, k] = V[a, k] * V[b, 0]
+        elif op == ADD:
+            V[out, k] = V[a, k] + V[b, k]
+        elif op == SUB:
+            V[out, k] = V[a, k] - V[b, k]
+        elif op == ADD_CONSTANT:
+            V[out, k] = V[a, k] + V[b, 0] if k == 0 else V[a, k]
+        elif op == SUB_CONSTANT:
+            V[out, k] = V[a, k] - V[b, 0] if k == 0 else V[a, k]
+        elif op == CONSTANT_SUB:
+            V[out, k] = V[b, 0] - V[a, 0] if k == 0 else -V[a, k]
+        elif op == SINCOS_LINEAR and k > 0:
+            rate = V[a, 1] * (1.0 / k)
+            V[out, k] = rate * V[out + 1, k - 1]
+            V[out + 1, k] = -(rate * V[out, k - 1])
+        elif op == MUL:
+            V[out, k] = _product(V, a, b, k)
+        elif op == DIVIDE_BY:
+            V[out, k] = V[a, k] / V[b, 0] if k == 0 else V[a, k] * (1.0 / V[b, 0])
+        elif op == DIV:
+            if k == 0:
+                V[out, 0] = V[a, 0] / V[b, 0]
+            else:
+                inner = call_apart(_inner, (V, out, b, k))
+                if k <= EXACTLY:
+                    rest = V[a, k] - (inner + V[out, 0] * V[b, k])
+                else:
+                    rest = fused(-V[out, 0], V[b, k], V[a, k] - inner)
+                V[out, k] = rest * (1.0 / V[b, 0])
+        elif op == NEG:
+            V[out, k] = -V[a, k]
+        elif op == SQRT:
+            if k == 0:
+                V[out, 0] = math.sqrt(V[a, 0]) if V[a, 0] >= 0.0 else math.nan
+            else:
+                rest = 0.5 * (V[a, k] - call_apart(_inner, (V, out, out, k)))
+                V[out, k] = 0.0 if V[out, 0] == 0.0 and rest == 0.0 else rest / V[out, 0]
+        elif op >= RECIPROCAL:
+            part = 1.0 / V[b, 0]
+            factor = V[out, 0] * part * _factor((op - RECIPROCAL) ^ NEGATIVE, V, 0, c)
+            V[out, k] = fused(V[a, k], factor, -(call_apart(_inner, (V, out, b, k)) * part))
+        elif op >= INTEGRATE:
+            if k + 1 < V.shape[1]:
+                V[out, k + 1] = V[a, k] * (_factor(op - INTEGRATE, V, b, c) * (1.0 / (k + 1)))
+        elif op >= FACTOR:
+            V[out, k] = V[a, k] * _factor(op - FACTOR, V, b, c)
+        elif op >= ABS and op <= EQUAL:
+            _logic(op, V, a, b, c, out, k)
+        elif k == 0:
+            _leading(op, V, a, b, c, out)
+        else:
+            _higher(op, V, a, b, c, out, k)
+
+
+@kernel
+def expand(rows: Any, high: Any, places: Any, order: int, s: float, x: Any, V: Any) -> None:
+    """Coefficients 0..order along the flow from x at local time s: of all registers, or of what `high` leaves.
+
+    high: rows for the orders beyond `EXACTLY` (`hybridsim.engine.series.high_orders`); none: they are as at the lower
+    ones. places: registers of time (-1: none), of the states and of their derivatives. Constants are set beforehand.
+    """
+    time, states, derivatives = places
+    if time >= 0:
+        V[time, 0], V[time, 1] = s, 1.0
+    for i in range(states.shape[0]):
+        V[states[i], 0] = x[i]
+    for k in range(order + 1):
+        if k > EXACTLY and high.shape[0] > 0:
+            call_apart(advance, (high, V, k))
+            continue
+        call_apart(advance, (rows, V, k))
+        if k < order:
+            for i in range(states.shape[0]):
+                rate, j = V[derivatives[i], k], k + 1
+                V[states[i], j] = rate / j if j <= EXACTLY else rate * (1.0 / j)
+
+
+@inlined
+def tabulate(h: float, order: int, powers: Any) -> None:
+    """powers[k] = h**k for k = 0..order, order >= 1; from the fifth on four at a time."""
+    powers[0], powers[1] = 1.0, h
+    for k in range(2, min(order, 4) + 1):
+        powers[k] = powers[k // 2] * powers[k - k // 2]
+    for k in range(5, order + 1):
+        powers[k] = powers[k - 4] * powers[4]
+
+
+@inlined
+def sum_sizes(U: Any, r: int, order: int, powers: Any) -> float:
+    """sum_k |U[r, k]| h**k, the powers given: four sums side by side, from the last terms on."""
+    a, b, c, d = 0.0, 0.0, 0.0, 0.0
+    for k in range(order - 3, 0, -4):
+        a, b = fused(abs(U[r, k]), powers[k], a), fused(abs(U[r, k + 1]), powers[k + 1], b)
+        c, d = fused(abs(U[r, k + 2]), powers[k + 2], c), fused(abs(U[r, k + 3]), powers[k + 3], d)
+    total = (a + c) + (b + d)
+    for k in range(order % 4, 0, -1):
+        total = fused(abs(U[r, k]), powers[k], total)
+    return abs(U[r, 0]) + total
+
+
+@inlined
+def measure(code: int, U: Any, watched: Any, order: int, h: float, powers: Any, totals: Any) -> None:
+    """Powers of h, and for the series in the watched rows of U what `sum_sizes` makes of them.
+
+    code: address of a function that does so for all rows, where the totals follow on the powers in memory (`sizes` of
+    `hybridsim.engine.series.emit_series`); 0 for none.
+    """
+    if code != 0:
+        call_series(code, h, 0.0, U, U, U, powers)
+        return
+    tabulate(h, order, powers)
+    for j in range(watched.shape[0]):
+        totals[j] = sum_sizes(U, watched[j], order, powers)
+
+
+@inlined
+def _root(x: float, n: int) -> float:
+    """x**(1/n) for x >= 0, to some digits: cheaper than a power."""
+    return math.exp(math.log(x) / n) if 0.0 < x < math.inf else x
+
+
+@polynomial_kernel
+def rough_inverse_root(x: float, n: int) -> float:
+    """x**(-1/n) for x >= 0, to three digits: cheaper than a power.
+
+    Exponent and mantissa are taken apart in the bits of a double; between powers of two the logarithm and the
+    exponential are cubics, good to 8e-4 / n and 1e-4.
+    """
+    if not _LEAST <= x < math.inf:
+        return math.inf if x == 0.0 else 1.0 / _root(x, n)
+    bits = np.float64(x).view(np.int64)
+    f = np.int64((bits & _MANTISSA) | _ONE).view(np.float64) - 1.0
+    log = ((0.152700285 * f - 0.568704053) * f + 1.41565319) * f + 8.25462823e-4
+    log = (((bits >> 52) - 1023) + log) * (-1.0 / n)
+    whole = math.floor(log)
+    f = log - whole
+    power = ((0.07896726 * f + 0.22469316) * f + 0.69632477) * f + 0.99990029
+    return power * np.int64((np.int64(whole) + 1023) << 52).view(np.float64)
+
+
+@inlined
+def shorter_reach(U: Any, r: int, order: int, rtol: float, h: float, is_before: bool) -> float:
+    """A step below h over which the last term of a series is below rtol of one of its first four, or half of h.
+
+    is_before: the last but one, which is larger. One of the first four is the largest, or not much less, over a step
+    that serves: of exp(w t) with rtol = 1e-12 and order 24 the fourth. They tell the step at once.
+    """
+    last = order - 1 if is_before else order
+    found = 0.0
+    for k in range(min(_FIRST, last)):
+        if U[r, k] != 0.0:
+            found = max(found, rough_inverse_root(abs(U[r, last]) / (rtol * abs(U[r, k])), last - k))
+    found *= _SURELY
+    return found if 0.0 < found < h else _SHORTER * h
+
+
+@kernel
+def reach(
+    code: int,
+    V: Any,
+    states: Any,
+    U: Any,
+    watched: Any,
+    order: int,
+    rtol: float,
+    atol: Any,
+    slack: float,
+    longest: float,
+    powers: Any,
+    totals: Any,
+) -> float:
+    """The step h up to which the series hold to the tolerance, at most `longest`.
+
+    powers (order + 1,) are h**k then, totals those of `sum_sizes` for the functions; code: see `measure`.
+
+    states: rows of V with the series of the states, watched: rows of U with those of functions. The last two terms of
+    each state are below atol + rtol |x|; those of each function below rtol of its largest term, times the slack. NaN
+    where a coefficient is no number.
+    """
+    h, first, last = longest, 0.0, 0.0  # the last two terms over the tolerance, without the powers of h
+    for i in range(states.shape[0]):
+        r = states[i]
+        one, two = abs(V[r, order - 1]), abs(V[r, order])
+        if not (one < math.inf and two < math.inf):
+            return math.nan
+        scale = atol[i] + rtol * abs(V[r, 0])
+        if scale == 0.0:
+            scale = rtol * max(abs(V[r, 1]) * h, 1e-300)
+        first, last = max(first, one / scale), max(last, two / scale)
+    h = min(h, rough_inverse_root(first, order - 1), rough_inverse_root(last, order))
+    measure(code, U, watched, order, h, powers, totals)
+    for j in range(watched.shape[0]):
+        r = watched[j]
+        for _ in range(_TRIALS):
+            if not totals[j] < math.inf:
+                return math.nan
+            term = max(abs(U[r, order - 1]) * powers[order - 1], abs(U[r, order]) * powers[order])
+            largest = max(abs(U[r, 0]), abs(U[r, 1]) * powers[1])
+            if term <= slack * rtol * largest or term == 0.0:
+                break
+            if not term > slack * rtol * totals[j]:  # else none of them is large enough
+                a, b, c = 0.0, 0.0, 0.0
+                for k in range(2, order - 3, 3):  # three lines, which do not wait for each other
+                    a = max(a, abs(U[r, k]) * powers[k])
+                    b = max(b, abs(U[r, k + 1]) * powers[k + 1])
+                    c = max(c, abs(U[r, k + 2]) * powers[k + 2])
+                for k in range(max(order - 3, 2), order - 1):
+                    a = max(a, abs(U[r, k]) * powers[k])
+                if term <= slack * rtol * max(max(largest, a), max(b, c)):
+                    break
+            h = shorter_reach(U, r, order, rtol, h, abs(U[r, order]) * powers[order] < term)
+            measure(code, U, watched, order, h, powers, totals)
+    return h
+
+
+@kernel
+def evaluate_series(V: Any, registers: Any, order: int, d: float, out: Any) -> None:
+    """Values of the series of some registers at a distance d from their origin (Horner)."""
+    for i in range(registers.shape[0]):
+        total = V[registers[i], order]
+        for k in range(order - 1, -1, -1):
+            total = total * d + V[registers[i], k]
+        out[i] = total
+
+
+@polynomial_kernel
+def polynomials(coefficients: Any, d: Any, out: Any) -> None:
+    """out[j, i] = sum_k coefficients[i, k] d[j]**k.
+
+    To the last bit as `hybridsim.engine.record.series_block` has it.
+    """
+    order = coefficients.shape[1] - 1
+    for j in range(d.shape[0]):
+        for i in range(coefficients.shape[0]):
+            total = coefficients[i, order]
+            for k in range(order - 1, -1, -1):
+                total = total * d[j] + coefficients[i, k]
+            out[j, i] = total

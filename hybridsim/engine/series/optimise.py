@@ -1,0 +1,214 @@
+"""The tape of one vector of modes made lean: copies gone, what is constant in time worked out once.
+
+The rows of a tape (see `hybridsim.engine.series.tape`) are sorted by what they depend on: a row over constants has one
+coefficient and runs once; a product with a constant, and the sine of an angle that grows linearly, cost one
+multiplication an order instead of a convolution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.series.tape import (
+    ABS,
+    ADD,
+    AGREEING,
+    COPY,
+    DIV,
+    EXP,
+    LESS,
+    MUL,
+    NEG,
+    NOT,
+    SELECT,
+    SIGN,
+    SINCOS,
+    SINHCOSH,
+    SQRT,
+    SUB,
+    TANGENT,
+)
+
+# Operations of the lean tape beyond those of the tape: on a series a and a constant b.
+ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB, SCALE, DIVIDE_BY, SINCOS_LINEAR = range(40, 46)
+
+CONSTANT, LINEAR, SERIES = range(3)  # what a register is in time
+PAIRED = (SINCOS, SINHCOSH, TANGENT)  # operations with a companion in the next register
+_ONE = (
+    COPY,
+    NEG,
+    ABS,
+    SIGN,
+    NOT,
+    EXP,
+    SQRT,
+    SINCOS,
+    SINHCOSH,
+    TANGENT,
+)  # of one register; the rest are of two
+_KEEP_LINEAR = (ADD, SUB, NEG)
+
+
+@dataclass(frozen=True)
+class LeanTape:
+    """Rows (operation, a, b, c, out) over the registers of the tape they come from.
+
+    Parameters
+    ----------
+    constant_rows : run once a segment, at order 0.
+    rows : run at every order.
+    states, derivatives, guards, surfaces, monitors : registers of the states, their rates and the results.
+    """
+
+    constant_rows: np.ndarray
+    rows: np.ndarray
+    states: np.ndarray
+    derivatives: np.ndarray
+    guards: np.ndarray
+    surfaces: np.ndarray
+    monitors: np.ndarray
+
+
+def twins_of(tape: dict[str, Any]) -> dict[int, int]:
+    """Registers that are constant in some modes and not in others, with the register that each has where it is.
+
+    A compiled loop keeps its registers from mode to mode and writes of a constant the leading coefficient alone: what
+    another mode has left behind that would still stand there.
+    """
+    kinds = [dict.fromkeys(tape["states"], SERIES) | {tape["time"]: LINEAR} for _ in range(2)]
+    least, most = kinds
+    paired: set[int] = set()
+    for _, branches in tape["parts"]:
+        found: dict[int, list[tuple[int, int]]] = {}
+        for branch in branches:
+            below, above = dict(least), dict(most)
+            for op, *given, out in branch:
+                for kind in (below, above):
+                    kind[out] = _kind(op, [kind.get(r, CONSTANT) for r in given[: _registers(op)]])
+                    if op in PAIRED:
+                        kind[out + 1] = kind[out]
+                if op in PAIRED:
+                    paired.add(out)
+                for r in (out, out + 1) if op in PAIRED else (out,):
+                    found.setdefault(r, []).append((below[r], above[r]))
+        for out, seen in found.items():
+            least[out], most[out] = min(low for low, _ in seen), max(high for _, high in seen)
+    twins: dict[int, int] = {}
+    for out in sorted(most):
+        if most[out] != CONSTANT and least[out] == CONSTANT and out not in twins:
+            twins[out] = tape["registers"] + len(twins)
+            if out in paired:
+                twins[out + 1] = tape["registers"] + len(twins)
+    return twins
+
+
+def lean(
+    tape: dict[str, Any],
+    rows: Iterable[tuple[int, ...]],
+    active: Iterable[int],
+    twins: Mapping[int, int] = MappingProxyType({}),
+) -> LeanTape:
+    """The lean form of the rows of one vector of modes, with its active guards; twins as found by `twins_of`."""
+    kind = dict.fromkeys(tape["states"], SERIES) | {tape["time"]: LINEAR}
+    same: dict[int, int] = {}  # a copy -> what it is a copy of
+    constant_rows: list[tuple[int, ...]] = []
+    series_rows: list[tuple[int, ...]] = []
+    for op, *given, out in rows:
+        count = _registers(op)
+        a, b, c = (same.get(r, r) if i < count else r for i, r in enumerate(given))
+        if op == COPY:
+            same[out] = a
+            continue
+        kinds = [kind.get(r, CONSTANT) for r in (a, b, c)[:count]]
+        kind[out] = _kind(op, kinds)
+        if op in PAIRED:
+            kind[out + 1] = kind[out]
+        if kind[out] == CONSTANT:
+            for r in (out, out + 1) if op in PAIRED else (out,):
+                same[r] = twins.get(r, r)
+                kind[same[r]] = CONSTANT
+            constant_rows.append((op, a, b, c, same[out]))
+        else:
+            series_rows.append((*_special(op, a, b, c, kinds), out))
+
+    def registers(key: str) -> np.ndarray:
+        return np.array([same.get(r, r) for r in tape[key]], dtype=np.int64)
+
+    states, derivatives, guards = registers("states"), registers("derivatives"), registers("guards")
+    surfaces, monitors = registers("surfaces"), registers("monitors")
+    wanted = {*derivatives, *surfaces, *monitors, *(guards[g] for g in active)}
+    needed = needed_rows(series_rows, wanted)
+    constants = needed_rows(constant_rows, wanted | {r for row in needed for r in row[1:4]})
+    return LeanTape(_array(constants), _array(needed), states, derivatives, guards, surfaces, monitors)
+
+
+def has_corners(tape: dict[str, Any]) -> bool:
+    """Whether a corner or a jump (abs, min, max, sign, a condition) depends on what moves, in any mode."""
+    kind = dict.fromkeys(tape["states"], SERIES) | {tape["time"]: LINEAR}
+    agreeing = set()
+    for _, branches in tape["parts"]:
+        for op, *given, out in (row for branch in branches for row in branch):
+            kinds = [kind.get(r, CONSTANT) for r in given[: _registers(op)]]
+            deciding = kinds[:1] if op == SELECT else kinds
+            if op == LESS and given[2] == AGREEING:
+                agreeing.add(out)
+            elif op == SELECT and given[0] in agreeing:
+                pass
+            elif op >= ABS and max(deciding) != CONSTANT:
+                return True
+            kind[out] = max(_kind(op, kinds), kind.get(out, CONSTANT))
+            if op in PAIRED:
+                kind[out + 1] = kind[out]
+    return False
+
+
+def _array(rows: list[tuple[int, ...]]) -> np.ndarray:
+    return np.array(rows, dtype=np.int64).reshape(-1, 5)
+
+
+def _registers(op: int) -> int:
+    """How many of a, b, c are registers; the others are flags of the operation."""
+    return 1 if op in _ONE else 3 if op == SELECT else 2
+
+
+def _kind(op: int, kinds: list[int]) -> int:
+    highest = max(kinds)
+    if highest == LINEAR:
+        scaled = (op == MUL and min(kinds) == CONSTANT) or (op == DIV and kinds[1] == CONSTANT)
+        return LINEAR if scaled or op in _KEEP_LINEAR else SERIES
+    return highest
+
+
+def _special(op: int, a: int, b: int, c: int, kinds: list[int]) -> tuple[int, int, int, int]:
+    """The cheaper operation where one operand is constant or an angle is linear."""
+    if op == SINCOS and kinds[0] == LINEAR:
+        return SINCOS_LINEAR, a, b, c
+    if len(kinds) == 2 and kinds[1] == CONSTANT:
+        cheap = {ADD: ADD_CONSTANT, SUB: SUB_CONSTANT, MUL: SCALE, DIV: DIVIDE_BY}
+        return cheap.get(op, op), a, b, c
+    if len(kinds) == 2 and kinds[0] == CONSTANT:
+        cheap = {ADD: ADD_CONSTANT, SUB: CONSTANT_SUB, MUL: SCALE}
+        return (cheap[op], b, a, c) if op in cheap else (op, a, b, c)
+    return op, a, b, c
+
+
+def arguments_of(row: tuple[int, ...]) -> tuple[int, ...]:
+    """The registers whose series a row reads."""
+    return row[1 : 2 if row[0] >= ADD_CONSTANT else 1 + _registers(row[0])]
+
+
+def needed_rows(rows: list[tuple[int, ...]], wanted: set[int]) -> list[tuple[int, ...]]:
+    """The rows that the wanted registers depend on, in order."""
+    wanted = set(wanted)
+    kept = []
+    for row in reversed(rows):
+        out = row[4]
+        if out in wanted or (row[0] in (*PAIRED, SINCOS_LINEAR) and out + 1 in wanted):
+            kept.append(row)
+            wanted |= set(row[1:4])  # flags among them only keep a row too many
+    return kept[::-1]

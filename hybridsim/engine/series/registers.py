@@ -1,0 +1,63 @@
+"""Where the inputs of a tape are among its registers, as index arrays that kernels take."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybridsim.engine.native.struct_pack import packed
+from hybridsim.engine.series.layout import Layout
+from hybridsim.engine.series.optimise import twins_of
+from hybridsim.expr import own_roundoff
+
+
+class Inputs(NamedTuple):
+    """Registers of a tape's inputs: constants with values and error bounds (m, 2), parameters and their places in p,
+    phases, time (1,) (-1: none), states."""
+
+    constants: np.ndarray
+    values: np.ndarray
+    parameters: np.ndarray
+    sources: np.ndarray
+    phases: np.ndarray
+    time: np.ndarray
+    states: np.ndarray
+
+
+class Registers:
+    """Where the tape's inputs are, as index arrays."""
+
+    def __init__(self, tape: dict[str, Any], layout: Layout) -> None:
+        self.twins = twins_of(tape)
+        self.count: int = tape["registers"] + len(self.twins)
+        time: int = tape["time"]
+        constants = np.array([r for r, *_ in tape["constants"]], dtype=np.int64)
+        values = np.array([v for _, *v in tape["constants"]], dtype=float).reshape(-1, 2)
+        parameters = np.array([r for r, _ in tape["parameters"]], dtype=np.int64)
+        sources = np.array([i for _, i in tape["parameters"]], dtype=np.int64)
+        is_phase = (sources >= layout.phases_at) & (sources < layout.signals_at)
+        phases, states = parameters[is_phase], np.array(tape["states"], dtype=np.int64)
+        self.inputs = packed(
+            Inputs(constants, values, parameters, sources, phases, np.array([time], dtype=np.int64), states)
+        )
+
+    def with_roundoff(self, p: np.ndarray) -> Inputs:
+        """The inputs with the roundoff of each number itself: parameters as constants that have an error."""
+        known: Inputs = self.inputs
+        numbers = np.concatenate([known.values[:, 0], p[known.sources]])
+        errors = np.array([own_roundoff(number) for number in numbers.tolist()])
+        errors[: len(known.constants)] = np.maximum(errors[: len(known.constants)], known.values[:, 1])
+        none = np.zeros(0, dtype=np.int64)
+        inputs: Inputs = packed(
+            Inputs(
+                np.concatenate([known.constants, known.parameters]),
+                np.column_stack([numbers, errors]),
+                none,
+                none,
+                known.phases,
+                known.time,
+                known.states,
+            )
+        )
+        return inputs

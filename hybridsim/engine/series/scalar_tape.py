@@ -1,0 +1,127 @@
+"""A function of a few arguments as a lean tape: which of them move in time, which are constants of each instance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.engine.series.optimise import lean
+from hybridsim.engine.series.tape import ABS, ANGLE, EQUAL, INTEGRAL, TapeBuilder
+from hybridsim.errors import ModelError
+from hybridsim.expr.symbolic import to_sympy
+
+if TYPE_CHECKING:
+    from hybridsim.expr import Expression
+
+
+@dataclass(frozen=True)
+class ScalarTape:
+    """Rows of a lean tape (see `hybridsim.engine.series.optimise`) and the registers of what goes in and comes out.
+
+    Parameters
+    ----------
+    registers : how many there are.
+    constant_rows, rows : run once, and at every order.
+    moving, constants : register of each argument.
+    numbers : register and value of each number in the expression.
+    out : register of the value.
+    """
+
+    registers: int
+    constant_rows: np.ndarray
+    rows: np.ndarray
+    moving: tuple[int, ...]
+    constants: tuple[int, ...]
+    numbers: tuple[tuple[int, float], ...]
+    out: int
+
+
+@lru_cache(maxsize=256)
+def scalar_tape(
+    expression: Expression, moving: tuple[str, ...], constants: tuple[str, ...], positive: str
+) -> ScalarTape:
+    """The tape of an expression.
+
+    Parameters
+    ----------
+    moving, constants : names of the arguments that move in time, and of those that do not.
+    positive : the moving argument that is never negative.
+
+    Raises
+    ------
+    ModelError
+        Where the expression has a corner or a jump, or a power that has no Taylor series at zero.
+    """
+    form = _form(expression, (*moving, *constants), positive)
+    _refuse_powers(expression, form, moving)
+    builder = TapeBuilder()
+    inputs = [builder.register(f"v_{name}") for name in moving]
+    given = [builder.register(f"v_{name}") for name in constants]
+    clock = builder.register("clock")
+    rows = builder.rows([("value", form)], {})
+    corners = [row for row in rows if ABS <= row[0] <= EQUAL or (row[0] == INTEGRAL and row[3] == ANGLE)]
+    if corners:
+        raise ModelError(
+            f"'{expression.text}' has a corner or a jump", place=expression.place, remedy="write it smoothly."
+        )
+    tape: dict[str, Any] = {
+        "states": inputs,
+        "time": clock,
+        "derivatives": [],
+        "guards": [],
+        "surfaces": [],
+        "monitors": [builder.register("value")],
+    }
+    form_lean = lean(tape, rows, [])
+    return ScalarTape(
+        builder.count,
+        form_lean.constant_rows,
+        form_lean.rows,
+        tuple(inputs),
+        tuple(given),
+        tuple((register, value) for (value, _), register in builder.constants.items()),
+        int(form_lean.monitors[0]),
+    )
+
+
+@lru_cache(maxsize=256)
+def is_same(first: Expression, second: Expression, at_zero: str) -> bool:
+    """Whether two expressions agree, by algebra, where one of their arguments is zero."""
+    import sympy as sp
+
+    from hybridsim.expr.simplify import simplified
+
+    names = tuple(sorted(first.names | second.names | {at_zero}))
+    difference = _form(first, names, "") - _form(second, names, "")
+    return bool(simplified(difference.subs(sp.Symbol(f"v_{at_zero}", real=True), 0)) == 0)
+
+
+def _form(expression: Expression, names: Sequence[str], positive: str) -> Any:
+    import sympy as sp
+
+    plain = {name: sp.Symbol(f"v_{name}", real=True) for name in names}
+    form = to_sympy(expression, plain)
+    if positive in plain:  # so that |v| is v
+        marked = sp.Symbol(f"v_{positive}", nonnegative=True)
+        form = form.subs(plain[positive], marked)
+    return form
+
+
+def _refuse_powers(expression: Expression, form: Any, moving: Sequence[str]) -> None:
+    names = {f"v_{name}" for name in moving}
+    for power in form.atoms(type(form**0.123)) if form.free_symbols else ():
+        if not power.is_Pow:
+            continue
+        moves = {s.name for s in power.base.free_symbols} & names
+        if moves and power.base.subs({s: 0 for s in power.base.free_symbols if s.name in names}) == 0:
+            whole = power.exp.is_number and float(power.exp).is_integer()
+            if not whole:
+                raise ModelError(
+                    f"'{expression.text}' has the power {power.exp} of what is zero at rest: no Taylor series",
+                    place=expression.place,
+                    remedy="choose a law with whole powers, or to_model() and dop853.",
+                )

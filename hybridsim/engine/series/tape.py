@@ -1,0 +1,305 @@
+"""A tape: expressions as rows (operation, a, b, c, out) over numbered registers, for one pre-compiled interpreter.
+
+The tape is data. It is built once from SymPy expressions when a model is first lowered, stored beside the
+generated source, and run by `hybridsim.engine.series.bounded` to get Taylor coefficients with error bounds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Set
+from typing import Any
+
+from hybridsim.expr.grammar import WHOLE_POWERS
+
+# Operations. INTEGRAL gives y with y' * a = b' (log, atan, asin: the derivative is a quotient).
+COPY, ADD, SUB, MUL, DIV, NEG, SQRT, EXP, SINCOS, INTEGRAL = range(10)
+SINHCOSH, TANGENT, ABS, SIGN, MIN, MAX, LESS, LESS_EQUAL, AND, OR, NOT, SELECT, EQUAL = range(10, 23)
+# what LESS has in c where what is chosen by it is one function on both sides
+AGREEING = 1
+# how INTEGRAL finds its own leading coefficient from the argument c
+LOG, ASIN, ACOS, ATAN, ANGLE = range(30, 35)
+
+_UNIT = 2.0**-53  # unit roundoff of a double
+# Twelve squarings; exp(n log u), which has no value for u < 0, only beyond
+_MAX_INTEGER_POWER = 4096
+
+
+class TapeBuilder:
+    """Turns SymPy expressions over named registers into rows; equal subexpressions share a register.
+
+    Parameters
+    ----------
+    fixed : names of what is constant in a segment: parameters, and what is made of them alone.
+    """
+
+    def __init__(self, fixed: Set[str] = frozenset()) -> None:
+        self.fixed = fixed
+        self.registers: dict[str, int] = {}  # name -> register
+        self.constants: dict[tuple[float, float], int] = {}  # value and bound of its error -> register
+        self.count = 0
+
+    def register(self, name: str) -> int:
+        """The register of a name, made on first use."""
+        if name not in self.registers:
+            self.registers[name] = self._new()
+        return self.registers[name]
+
+    def rows(self, assignments: list[tuple[str, Any]], known: dict[Any, int]) -> list[tuple[int, ...]]:
+        """Rows that put each expression into the register of its name; `known` shares subexpressions."""
+        rows: list[tuple[int, ...]] = []
+        for name, expression in assignments:
+            source = self._emit(expression, known, rows)
+            rows.append((COPY, source, 0, 0, self.register(name)))
+        return rows
+
+    def _new(self) -> int:
+        self.count += 1
+        return self.count - 1
+
+    def _constant(self, value: float, error: float = 0.0) -> int:
+        if (value, error) not in self.constants:
+            self.constants[value, error] = self._new()
+        return self.constants[value, error]
+
+    def _op(self, rows: list[tuple[int, ...]], op: int, a: int, b: int = 0, c: int = 0) -> int:
+        out = self._new()
+        if op in (SINCOS, SINHCOSH, TANGENT):
+            self._new()  # these operations keep a companion series in the next register
+        rows.append((op, a, b, c, out))
+        return out
+
+    def _emit(self, e: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
+        if e in known:
+            return known[e]
+        known[e] = out = self._emit_new(e, known, rows)
+        return out
+
+    def _emit_new(self, e: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
+        import sympy as sp
+
+        if e.is_Symbol:
+            return self.register(e.name)
+        if e is sp.true or e is sp.false:
+            return self._constant(1.0 if e is sp.true else 0.0)
+        if e.is_number and not e.has(sp.Function):
+            value = float(e)
+            is_exact = e.is_Float or (e.is_Rational and math.isfinite(value) and sp.Rational(value) == e)
+            return self._constant(value, 0.0 if is_exact else _UNIT * abs(value))
+        if e.is_Add or e.is_Mul:
+            return self._emit_chain(e, known, rows)
+        if e.is_Pow:
+            return self._emit_power(e.base, e.exp, known, rows)
+        if isinstance(e, sp.Piecewise):
+            return self._emit_piecewise(e, known, rows)
+        arguments = [self._emit(a, known, rows) for a in e.args]
+        return self._emit_function(e, arguments, known, rows)
+
+    def _emit_chain(self, e: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
+        import sympy as sp
+
+        if e.is_Mul:
+            # negative powers only: exp(-u) over one would be infinite where it is nothing
+            below = [a for a in e.args if a.is_Pow and a.exp.is_number and a.exp.is_negative]
+            saturating = [a for a in below if _grows_without_bound(a.base, a.exp)]
+            numerator = sp.Mul(*(a for a in e.args if a not in below))
+            denominator = sp.Mul(*(1 / a for a in below if a not in saturating))
+            if saturating or (denominator != 1 and not denominator.is_number):
+                out = self._emit(numerator, known, rows)
+                for a in saturating:
+                    out = self._op(rows, MUL, out, self._emit(a, known, rows))
+                if denominator == 1:
+                    return out
+                return self._op(rows, DIV, out, self._emit(denominator, known, rows))
+            if e.could_extract_minus_sign() and e.args[0] is sp.S.NegativeOne:
+                return self._op(rows, NEG, self._emit(-e, known, rows))
+        out = -1
+        for argument in e.args:
+            subtract = e.is_Add and out >= 0 and argument.could_extract_minus_sign()
+            value = self._emit(-argument if subtract else argument, known, rows)
+            if out < 0:
+                out = value
+            else:
+                out = self._op(rows, SUB if subtract else (ADD if e.is_Add else MUL), out, value)
+        return out
+
+    def _emit_power(
+        self, base: Any, exponent: Any, known: dict[Any, int], rows: list[tuple[int, ...]]
+    ) -> int:
+        """Whole and half powers as products of the base or its root, so that they have a value at 0 and below."""
+        import sympy as sp
+
+        if _grows_without_bound(base, exponent):
+            return self._products(self._over(base, known, rows), -int(exponent), known, rows)
+        source = self._emit(base, known, rows)
+        twice = 2.0 * float(exponent) if exponent.is_number else 0.5
+        if twice.is_integer() and abs(twice) <= 2 * _MAX_INTEGER_POWER:
+            n, odd = divmod(int(twice), 2)
+            if odd:
+                n, root = int(twice), self._op(rows, SQRT, source)
+                source = (
+                    self._unless_zero(rows, root, source, self._constant(1.0)) if base.has(sp.Abs) else root
+                )
+            power = self._products(source, abs(n), known, rows)
+            return power if n > 0 else self._op(rows, DIV, self._constant(1.0), power)
+        logarithm = self._op(rows, INTEGRAL, source, source, LOG)
+        number = self._emit(exponent, known, rows)
+        power = self._op(rows, EXP, self._op(rows, MUL, number, logarithm))
+        if base.has(sp.Abs):
+            power = self._unless_zero(rows, power, source, number)
+        if (
+            exponent.is_number
+            or not {s.name for s in exponent.free_symbols} <= self.fixed
+            or base.is_positive
+        ):
+            return power
+        return self._whole(source, self._emit(exponent, known, rows), power, known, rows)
+
+    def _unless_zero(self, rows: list[tuple[int, ...]], power: int, base: int, exponent: int) -> int:
+        """A power of what is zero at its corner: nothing there for a positive exponent, and without a series."""
+        nothing = self._constant(0.0)
+        at_zero = self._op(rows, SELECT, self._op(rows, LESS, nothing, exponent), nothing, power)
+        return self._op(rows, SELECT, self._op(rows, LESS, nothing, base), power, at_zero)
+
+    def _over(self, base: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
+        """1/(c + d e^u) and 1/cosh(u), which are nothing where the exponential is infinite, by q = e^-|u|."""
+        found = _with_exponential(base)
+        rest, factor, u = found or (None, None, base.args[0])
+        exponent, one = self._emit(u, known, rows), self._constant(1.0)
+        is_large = self._op(rows, LESS, self._constant(0.0), exponent, AGREEING)
+        q = self._op(rows, EXP, self._op(rows, SELECT, is_large, self._op(rows, NEG, exponent), exponent))
+        if found is None:
+            below = self._op(rows, ADD, one, self._op(rows, MUL, q, q))
+            return self._op(rows, DIV, self._op(rows, ADD, q, q), below)
+        c, d = self._emit(rest, known, rows), self._emit(factor, known, rows)
+        large = self._op(rows, ADD, self._op(rows, MUL, c, q), d)
+        small = self._op(rows, ADD, c, self._op(rows, MUL, d, q))
+        above, below = (
+            self._op(rows, SELECT, is_large, q, one),
+            self._op(rows, SELECT, is_large, large, small),
+        )
+        return self._op(rows, DIV, above, below)
+
+    def _whole(
+        self, source: int, exponent: int, power: int, known: dict[Any, int], rows: list[tuple[int, ...]]
+    ) -> int:
+        """A power whose exponent may turn out to be whole: it has a value at 0 and below then."""
+        one = self._constant(1.0)
+        for n in WHOLE_POWERS:
+            product = self._products(source, abs(n), known, rows) if n else one
+            whole = self._op(rows, DIV, one, product) if n < 0 else product
+            is_so = self._op(rows, EQUAL, exponent, self._constant(float(n)))
+            power = self._op(rows, SELECT, is_so, whole, power)
+        return power
+
+    def _products(self, source: int, n: int, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
+        """A register to the power n >= 1 by squaring."""
+        if n == 1:
+            return source
+        key = ("power", source, n)
+        if key not in known:
+            half = self._products(source, n // 2, known, rows)
+            out = self._op(rows, MUL, half, half)
+            known[key] = self._op(rows, MUL, out, source) if n % 2 else out
+        return known[key]
+
+    def _emit_piecewise(self, e: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
+        out = self._emit(e.args[-1].expr, known, rows)
+        for pair in reversed(e.args[:-1]):
+            condition = self._emit(pair.cond, known, rows)
+            value = self._emit(pair.expr, known, rows)
+            out = self._op(rows, SELECT, condition, value, out)
+        return out
+
+    def _emit_function(self, e: Any, a: list[int], known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
+        import sympy as sp
+
+        one = self._constant(1.0)
+        simple: Mapping[Any, int] = {
+            sp.Abs: ABS,
+            sp.sign: SIGN,
+            sp.Not: NOT,
+            sp.tan: TANGENT,
+        }
+        chained: Mapping[Any, int] = {sp.Min: MIN, sp.Max: MAX, sp.And: AND, sp.Or: OR}
+        ordered: Mapping[Any, tuple[int, bool]] = {
+            sp.StrictLessThan: (LESS, False),
+            sp.StrictGreaterThan: (LESS, True),
+            sp.LessThan: (LESS_EQUAL, False),
+            sp.GreaterThan: (LESS_EQUAL, True),
+        }
+        kind = e.func
+        if isinstance(e, sp.exp):
+            return self._op(rows, EXP, a[0])
+        if kind in simple:
+            return self._op(rows, simple[kind], a[0])
+        if kind in chained:
+            out = a[0]
+            for other in a[1:]:
+                out = self._op(rows, chained[kind], out, other)
+            return out
+        if kind in ordered:
+            op, swap = ordered[kind]
+            return self._op(rows, op, a[1] if swap else a[0], a[0] if swap else a[1])
+        if kind is sp.Eq:
+            return self._op(rows, EQUAL, a[0], a[1])
+        if kind is sp.ITE:
+            return self._op(rows, SELECT, a[0], a[1], a[2])
+        if kind is sp.cot:  # SymPy makes it of tan(u + pi/2)
+            return self._op(rows, DIV, one, self._op(rows, TANGENT, a[0]))
+        if kind is sp.Ne:
+            return self._op(rows, NOT, self._op(rows, EQUAL, a[0], a[1]))
+        if kind in (sp.sin, sp.cos):
+            pair = ("sincos", e.args[0])
+            if pair not in known:
+                known[pair] = self._op(rows, SINCOS, a[0])
+            return known[pair] + (0 if kind is sp.sin else 1)
+        if isinstance(e, (sp.sinh, sp.cosh)):
+            pair = ("sinhcosh", e.args[0])
+            if pair not in known:
+                known[pair] = self._op(rows, SINHCOSH, a[0])
+            return known[pair] + (0 if isinstance(e, sp.sinh) else 1)
+        if isinstance(e, sp.tanh):
+            # (e^u - e^-u)/(e^u + e^-u) overflows; 1 - 2/(e^{2u} + 1) loses digits at 0: use y' = (1 - y^2) u'
+            return self._op(rows, TANGENT, a[0], 1)
+        if kind is sp.log:
+            return self._op(rows, INTEGRAL, a[0], a[0], LOG)
+        if kind in (sp.asin, sp.acos):
+            root = self._op(rows, SQRT, self._op(rows, SUB, one, self._op(rows, MUL, a[0], a[0])))
+            if kind is sp.asin:
+                return self._op(rows, INTEGRAL, root, a[0], ASIN)
+            return self._op(rows, INTEGRAL, self._op(rows, NEG, root), a[0], ACOS)
+        if kind is sp.atan:
+            return self._op(
+                rows, INTEGRAL, self._op(rows, ADD, one, self._op(rows, MUL, a[0], a[0])), a[0], ATAN
+            )
+        if kind is sp.atan2:
+            # on the unit circle turned by the leading angle the rest is an ordinary arc tangent
+            return self._op(rows, INTEGRAL, a[1], a[0], ANGLE)
+        raise NotImplementedError(f"no Taylor recurrence for {kind}")
+
+
+def _with_exponential(base: Any) -> tuple[Any, Any, Any] | None:
+    """(c, d, u) of a sum c + d e^u in which nothing else grows as fast; None of anything else."""
+    import sympy as sp
+
+    if not base.is_Add:
+        return None
+    growing = [term for term in base.args if term.has(sp.exp, sp.sinh, sp.cosh)]
+    if len(growing) != 1 or len(base.args) == 1:
+        return None
+    factors = sp.Mul.make_args(growing[0])
+    exponentials = [factor for factor in factors if isinstance(factor, sp.exp)]
+    others = [factor for factor in factors if not isinstance(factor, sp.exp)]
+    if len(exponentials) != 1 or any(factor.has(sp.exp, sp.sinh, sp.cosh) for factor in others):
+        return None
+    rest = sp.Add(*(term for term in base.args if term is not growing[0]))
+    return rest, sp.Mul(*others), exponentials[0].args[0]
+
+
+def _grows_without_bound(base: Any, exponent: Any) -> bool:
+    """Whether a power is one over what has no series where an exponential in it is infinite, and is nothing there."""
+    import sympy as sp
+
+    is_below = exponent.is_Integer and exponent.is_negative
+    return bool(is_below and (isinstance(base, sp.cosh) or _with_exponential(base) is not None))

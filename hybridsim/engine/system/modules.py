@@ -1,0 +1,157 @@
+"""Generated modules on disk: found by the hash of the model's structure, imported, compiled, never built twice."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from importlib.abc import InspectLoader
+from importlib.machinery import SourceFileLoader
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from hybridsim.engine.native.cache import model_folder, store
+from hybridsim.engine.native.private_folder import is_trusted_file
+from hybridsim.forks import SharedLock
+
+if TYPE_CHECKING:
+    from hybridsim.engine.system.user_functions.code import PythonCode
+    from hybridsim.model.parts.model import Model
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """A model's functions: addresses for kernels, plain Python for what runs once an event."""
+
+    module: ModuleType
+    seconds: float  # what lowering took; 0 when the module was found in the cache
+    _kept: dict[str, tuple[Any, Any]] = field(default_factory=dict)
+    _shared: dict[str, Any] = field(default_factory=dict)
+
+    is_current = True  # expressions read nothing from outside
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """Everything about the model that the functions do not say."""
+        return self.module.DATA
+
+    def shared(self, name: str, make: Callable[[], Any]) -> Any:
+        """Something that follows from the structure alone, made once for all systems that share it.
+
+        Of threads that make it at the same time, all get what the first one has left.
+        """
+        if name not in self._shared:
+            self._shared.setdefault(name, make())
+        return self._shared[name]
+
+    def lengths_to_compile(self) -> list[int]:
+        """The lengths of the texts of those functions that have no machine code yet."""
+        from hybridsim.engine.native.kernels import texts_to_compile
+
+        return [len(text) for text in texts_to_compile(self.module)]
+
+    def address(self, name: str) -> Any:
+        """Address of one of flow, tangent, project, guards, surfaces, monitors, quantities; compiled on first use."""
+        if name not in self._kept:
+            from hybridsim.engine.native.kernels import compile_model_function
+
+            # another thread may have been first: its code is in use, and must not be let go
+            self._kept.setdefault(name, compile_model_function(self.module, name))
+        return self._kept[name][0]
+
+
+_loaded: dict[str, Compiled] = {}
+_STRUCTURES = 64  # that are kept, those that were asked for last; others are read from disk again
+_MOST = 16  # models of Python functions that are kept; their functions cannot be found again on disk
+_of_functions: dict[tuple[Any, ...], PythonCode] = {}
+_lock = SharedLock()  # of these
+
+
+def compiled(model: Model) -> Compiled | PythonCode:
+    """The compiled form of a model, from memory, from disk, or lowered now."""
+    if model.flow is not None:
+        return _code_of_functions(model)
+    name: str = model.once("module", lambda: _name(model))
+    code = _loaded.get(name) or _load(model, name)
+    with _lock:
+        # another thread may have been first: what it has is in use
+        code = _loaded.pop(name, code)
+        _loaded[name] = code
+        while len(_loaded) > _STRUCTURES:
+            del _loaded[next(iter(_loaded))]
+    return code
+
+
+def _code_of_functions(model: Model) -> PythonCode:
+    from hybridsim.engine.system.user_functions.code import PythonCode
+
+    # copies with other values have the same functions
+    key = (model.structure(), model.flow, model.components, model.monitors, model.schedules, model.outputs)
+    with _lock:
+        if key in _of_functions and not _of_functions[key].is_current:
+            del _of_functions[key]
+        code = _of_functions.pop(key, None) or PythonCode(model)
+        while len(_of_functions) >= _MOST:
+            del _of_functions[next(iter(_of_functions))]
+        _of_functions[key] = code
+        return code
+
+
+def _name(model: Model) -> str:
+    return f"hybridsim_model_{hashlib.sha256(model.structure().encode()).hexdigest()[:24]}"
+
+
+def _path(name: str) -> Path | None:
+    folder = model_folder()
+    return None if folder is None else folder / f"{name}.py"
+
+
+def _load(model: Model, name: str) -> Compiled:
+    path = _path(name)
+    if path is not None and path.exists():
+        # A damaged file may raise any exception. If a new copy of it raises as well, the model is at fault.
+        with suppress(Exception):
+            return Compiled(_import(_FromDisk(name, str(path))), 0.0)
+    from hybridsim.engine.lowering.emit import emit
+
+    start = time.perf_counter()
+    text = emit(model)
+    is_kept = store(path, text.encode())
+    seconds = time.perf_counter() - start
+    loader = _FromDisk(name, str(path)) if is_kept else _FromMemory(name, text)
+    return Compiled(_import(loader), seconds)
+
+
+class _FromDisk(SourceFileLoader):
+    """Reads a module, or what Python compiled of it, from files that nobody else can have written."""
+
+    def get_data(self, path: str) -> bytes:
+        """The bytes of a file."""
+        if not is_trusted_file(path):
+            raise PermissionError(f"{path} may be of another user")
+        return super().get_data(path)
+
+
+class _FromMemory(InspectLoader):
+    """The module of a model where nothing is kept on disk."""
+
+    def __init__(self, name: str, text: str) -> None:
+        self.name, self._text = name, text
+
+    def get_source(self, fullname: str) -> str:
+        """Its text."""
+        return self._text
+
+
+def _import(loader: _FromDisk | _FromMemory) -> ModuleType:
+    spec = importlib.util.spec_from_loader(loader.name, loader)
+    assert spec is not None, "it has a loader"
+    module = importlib.util.module_from_spec(spec)
+    loader.exec_module(module)
+    if not hasattr(module, "DATA"):
+        raise ImportError(f"{loader.name} is not whole")
+    return module

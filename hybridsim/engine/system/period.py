@@ -1,0 +1,70 @@
+"""The period of a model's forcing, where it has one."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from hybridsim.expr import evaluate
+
+if TYPE_CHECKING:
+    from hybridsim.engine.system.system import System
+    from hybridsim.model.parts.model import Model
+
+# Ratios of periods that differ from a whole number by less than this are whole: parameters carry rounding.
+_COMMENSURATE = 1e-9
+_MOST = 64  # times the longest period: what repeats later does not repeat
+
+
+def system_period(system: System) -> float | None:
+    """Period of everything that varies in time in a known way: the longest, if the others divide it; else None."""
+    periods = forcing_periods(system)
+    return _multiple_of_all(periods, 1) if periods else None
+
+
+def common_period(system: System) -> float | None:
+    """After how long all forcing, inputs and clocks repeat: the least multiple of the longest period, or None."""
+    return common_multiple(all_periods(system))
+
+
+def common_multiple(periods: list[float]) -> float | None:
+    """The least multiple of the longest of some periods that the others divide, or None."""
+    return _multiple_of_all(periods, _MOST) if periods else None
+
+
+def all_periods(system: System) -> list[float]:
+    """The periods of all forcing, inputs and clocks; none where one of the forcings has none."""
+    periods = forcing_periods(system)
+    if periods is None:
+        return []
+    values = system.values
+    return periods + [evaluate(c.period, values) for c in system.model.schedules if c.period is not None]
+
+
+def forcing_periods(system: System) -> list[float] | None:
+    """The period of each sine of time and of each input; None where one of them has none."""
+    values = system.values
+    periods = [2.0 * math.pi / abs(float(rate)) for rate in system.rates if rate != 0.0]
+    for declared in system.model.inputs:
+        if declared.period is None:
+            return None
+        periods.append(evaluate(declared.period, values))
+    return periods
+
+
+def _multiple_of_all(periods: list[float], most: int) -> float | None:
+    longest = max(periods)
+    for k in range(1, most + 1):
+        ratios = [k * longest / period for period in periods]
+        if all(abs(r - round(r)) <= _COMMENSURATE * r for r in ratios):
+            return k * longest
+    return None
+
+
+def forcing_period(model: Model) -> float | None:
+    """Period of a model's forcing at its parameter values, or None where it has no single one."""
+    from hybridsim.engine.native.kernels import announce_compilation
+    from hybridsim.engine.system.system import System
+
+    announce_compilation()
+    return system_period(System(model))

@@ -1,0 +1,42 @@
+"""The machine code of Runge-Kutta methods: short series at the ends of steps, for the modes of a structure."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hybridsim.engine.series.emit_series import ModeTape, ends_text
+from hybridsim.engine.system.programs.code_shelf import CodeShelf
+from hybridsim.engine.system.system import System
+
+
+class EndsCodes(NamedTuple):
+    """As of a `CodeShelf`: functions at the end of a step, where a segment begins, and of guards along a step."""
+
+    ends: np.ndarray
+    first: np.ndarray
+    along: np.ndarray
+    values: np.ndarray
+    lacked: np.ndarray
+
+
+class EndsShelf(CodeShelf):
+    """Machine code of one structure.
+
+    Parameters
+    ----------
+    terms : of the states at the end of a step.
+    first : order of the states where a segment begins.
+    order : of the guards along a step.
+    """
+
+    codes = EndsCodes
+    functions = ("ends", "first", "along", "values")
+
+    def __init__(self, system: System, terms: int, first: int, order: int) -> None:
+        super().__init__(system, f"ends{terms}.{first}.{order}")
+        self.shape = (terms, first, order)
+
+    def _text(self, tape: ModeTape) -> str:
+        return ends_text(tape, *self.shape)

@@ -1,0 +1,84 @@
+"""Of the tapes on a shelf, what the guards alone need: fewer rows than the flow, and often only linear ones."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hybridsim.engine.native.struct_pack import packed
+from hybridsim.engine.series.optimise import (
+    ADD_CONSTANT,
+    CONSTANT_SUB,
+    DIVIDE_BY,
+    SCALE,
+    SUB_CONSTANT,
+    needed_rows,
+)
+from hybridsim.engine.series.tape import ADD, NEG, SUB
+from hybridsim.engine.system.programs.mode_tables import Tapes, in_a_row
+
+_LINEAR = {ADD, SUB, NEG, ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB, SCALE, DIVIDE_BY}
+
+
+class Parts(NamedTuple):
+    """Rows for the guards of each vector of modes, one slice each, and whether these are linear in states and time.
+
+    The other rows are those that a step needs: of the flow, and of guards where they are linear.
+    """
+
+    start: np.ndarray
+    rows: np.ndarray
+    is_linear: np.ndarray
+    step_start: np.ndarray
+    step_rows: np.ndarray
+
+
+class _ModeParts(NamedTuple):
+    """The parts of one vector of modes."""
+
+    guards: np.ndarray
+    is_linear: bool
+    steps: np.ndarray
+
+
+class GuardParts:
+    """The parts of the tapes last seen; they follow from the structure of a model alone."""
+
+    def __init__(self) -> None:
+        self._known: tuple[Tapes, Parts] | None = None
+        self._of_modes: dict[bytes, _ModeParts] = {}  # tapes grow by a few vectors of modes again and again
+
+    def of(self, tapes: Tapes) -> Parts:
+        """The parts of these tapes."""
+        known = self._known  # read once: other threads may put theirs in its place at any time
+        if known is None or known[0] is not tapes:
+            self._known = known = tapes, self._parts(tapes)
+        return known[1]
+
+    def _parts(self, tapes: Tapes) -> Parts:
+        found = []
+        for k, modes in enumerate(tapes.modes):
+            key = modes.tobytes()
+            if key not in self._of_modes:
+                self._of_modes[key] = _mode_parts(tapes, k)
+            found.append(self._of_modes[key])
+        parts: Parts = packed(
+            Parts(
+                *in_a_row([one.guards for one in found]),
+                np.array([one.is_linear for one in found], dtype=np.bool_),
+                *in_a_row([one.steps for one in found]),
+            )
+        )
+        return parts
+
+
+def _mode_parts(tapes: Tapes, k: int) -> _ModeParts:
+    lean = [tuple(row) for row in tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]].tolist()]
+    active = tapes.active[tapes.active_start[k] : tapes.active_start[k + 1]]
+    watched, rates = set(tapes.guards[k, active].tolist()), set(tapes.derivatives[k].tolist())
+    guards = needed_rows(lean, watched)
+    is_linear = all(row[0] in _LINEAR for row in guards)
+    steps = needed_rows(lean, rates | watched if is_linear else rates)
+    guard_rows, step_rows = (np.array(rows, dtype=np.int64).reshape(-1, 5) for rows in (guards, steps))
+    return _ModeParts(guard_rows, is_linear, step_rows)

@@ -1,0 +1,55 @@
+"""Modes of the components that a state alone decides: sides of corners and jumps, pieces of tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from hybridsim.engine.system.system import Automaton, System
+
+
+def modes_by_state(
+    system: System, components: Iterable[int], s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray
+) -> np.ndarray:
+    """The modes z with those of some components replaced by the ones that hold at x.
+
+    A component on a border keeps its mode where that is one of the two; on a surface it holds where it can. An argument
+    may itself have corners, so that the modes are taken again until none changes.
+    """
+    z, row, numbers = z.copy(), np.ascontiguousarray(x)[None, :], tuple(components)
+
+    def violated(c: int, mode: int) -> int | None:
+        """The first guard of a mode that is negative at x."""
+        z[c] = mode
+        values = system.rows("guards", system.guard_count, np.array([s]), row, p, z)[0]
+        guards = system.automata[c].guards[mode]
+        return next((k for k, number in enumerate(guards) if not values[number] >= 0.0), None)
+
+    def on_surface(c: int, automaton: Automaton) -> int:
+        """The mode of a surface: above, below, or the one that holds where that is admissible."""
+        above, below = violated(c, automaton.above) is None, violated(c, automaton.below) is None
+        if above and below and violated(c, automaton.hold) is None:
+            return automaton.hold
+        return automaton.above if above else automaton.below
+
+    def on_side(c: int, automaton: Automaton) -> int:
+        """The mode of a corner or a table, from border to border."""
+        mode = int(z[c])
+        for _ in automaton.modes:
+            k = violated(c, mode)
+            if k is None:
+                break
+            mode = automaton.targets[mode][k][0]
+        return mode
+
+    for _ in range(len(numbers) + 1):
+        before = z.copy()
+        for c in numbers:
+            automaton = system.automata[c]
+            z[c] = on_surface(c, automaton) if automaton.has_surface else on_side(c, automaton)
+        if (z == before).all():
+            break
+    return z

@@ -1,0 +1,201 @@
+"""Inputs at run time: the piece of a table, wave or chirp that holds from an instant on, and its next knot."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left, bisect_right
+from collections.abc import Mapping
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridsim.engine.system.instant import Instant, multiple
+from hybridsim.errors import ModelError
+from hybridsim.expr import evaluate
+
+if TYPE_CHECKING:
+    from hybridsim.model.parts.inputs import Input
+
+_TWO_PI = 2.0 * math.pi
+# knots of a wave as fractions of its period, with (value, slope per period) just after each
+_SHAPES = {
+    "triangle": ((-0.25, -1.0, 4.0), (0.25, 1.0, -4.0)),
+    "sawtooth": ((0.0, -1.0, 2.0),),
+}
+
+
+class Signal:
+    """One input with its numbers: pieces and knots."""
+
+    def __init__(self, declared: Input, values: Mapping[str, float]) -> None:
+        self.kind = declared.kind
+        self.shape = declared.shape
+        self._number = {name: evaluate(e, values) for name, e in declared.expressions.items()}
+        if self.kind == "table":
+            self._knots, self._coefficients = _table(declared)
+        elif self.kind == "step":
+            self._first, self._turns, self._period = step_turns(self._number, declared)
+        elif self.kind == "wave" and self.shape != "sine":
+            duty = self._number.get("duty", 0.5)
+            square = ((0.0, 1.0, 0.0), (duty, -1.0, 0.0))
+            self._corners = square if self.shape == "square" else _SHAPES[str(self.shape)]
+
+    def piece(self, origin: Instant, forward: bool) -> tuple[float, ...]:
+        """The six slots of the piece at `origin`: to its right, or to its left when time runs backward."""
+        if self.kind == "table":
+            return self._table_piece(origin, forward)
+        if self.kind == "step":
+            return (self._step_value(origin, forward), 0.0, 0.0, 0.0, 0.0, 0.0)
+        if self.kind == "chirp":
+            return self._chirp_piece(origin, forward)
+        if self.shape == "sine":
+            number = self._number
+            turns = (_exact(origin) - Fraction(number["phase"])) / Fraction(number["period"])
+            angle = _TWO_PI * float(turns - round(turns))
+            return (angle, _TWO_PI / number["period"], 0.0, number["amplitude"], 0.0, number["offset"])
+        return self._wave_piece(origin, forward)
+
+    def next_knot(self, after: Instant, forward: bool) -> Instant | None:
+        """The first knot strictly after an instant (before it, backward in time)."""
+        if self.kind == "table":
+            # pairs compare in the order of time; a table may have many knots, and each asks for the next
+            index = bisect_right(self._knots, after) if forward else bisect_left(self._knots, after) - 1
+            return self._knots[index] if 0 <= index < len(self._knots) else None
+        if self.kind == "chirp":
+            end = Instant(self._number["duration"])
+            candidates = [Instant(0.0), end]
+        elif self.kind == "step":
+            candidates = [turn for turn, _ in self._step_turns(after)]
+        elif self.shape == "sine":
+            return None
+        else:
+            candidates = [knot for knot, _, _ in self._wave_knots(after)]
+        ahead_of = [k for k in candidates if (k.minus(after) > 0.0 if forward else k.minus(after) < 0.0)]
+        if not ahead_of:
+            return None
+        return min(ahead_of, key=float) if forward else max(ahead_of, key=float)
+
+    def _step_turns(self, near: Instant) -> list[tuple[Instant, float]]:
+        """The changes of a step near an instant, each with the value from then on."""
+        if self._period == 0.0:
+            return [(Instant(time), value) for time, value in self._turns]
+        k0 = math.floor(float(near) / self._period)
+        return [
+            (multiple(time, k, self._period), value)
+            for k in range(k0 - 2, k0 + 3)
+            for time, value in self._turns
+        ]
+
+    def _step_value(self, origin: Instant, forward: bool) -> float:
+        behind = [
+            turn
+            for turn in self._step_turns(origin)
+            if (turn[0].minus(origin) <= 0.0 if forward else turn[0].minus(origin) < 0.0)
+        ]
+        return max(behind, key=lambda turn: float(turn[0]))[1] if behind else self._first
+
+    def _wave_knots(self, near: Instant) -> list[tuple[Instant, float, float]]:
+        number = self._number
+        k0 = math.floor((float(near) - number["phase"]) / number["period"])
+        return [
+            (multiple(number["phase"], k, number["period"]).plus(fraction * number["period"]), value, slope)
+            for k in range(k0 - 2, k0 + 4)
+            for fraction, value, slope in self._corners
+        ]
+
+    def _wave_piece(self, origin: Instant, forward: bool) -> tuple[float, ...]:
+        number = self._number
+        behind = [
+            knot
+            for knot in self._wave_knots(origin)
+            if (knot[0].minus(origin) <= 0.0 if forward else knot[0].minus(origin) < 0.0)
+        ]
+        start, value, slope = max(behind, key=lambda knot: float(knot[0]))
+        scale = number["amplitude"]
+        return (
+            number["offset"] + scale * value,
+            scale * slope / number["period"],
+            0.0,
+            0.0,
+            start.minus(origin),
+            0.0,
+        )
+
+    def _table_piece(self, origin: Instant, forward: bool) -> tuple[float, ...]:
+        index = (bisect_right if forward else bisect_left)(self._knots, origin)
+        start = self._knots[max(index - 1, 0)].minus(origin)
+        return (*self._coefficients[index], start, 0.0)
+
+    def _chirp_piece(self, origin: Instant, forward: bool) -> tuple[float, ...]:
+        number = self._number
+        t, end = _exact(origin), Fraction(number["duration"])
+        f0, f1 = Fraction(number["f0"]), Fraction(number["f1"])
+        bend = (f1 - f0) / (2 * end)
+        before_start = t < 0 or (t == 0 and not forward)
+        after_end = t > end or (t == end and forward)
+        if before_start:
+            turns, rate, bend_here = f0 * t, f0, Fraction(0)
+        elif after_end:
+            turns, rate, bend_here = f0 * end + bend * end * end + f1 * (t - end), f1, Fraction(0)
+        else:
+            turns, rate, bend_here = f0 * t + bend * t * t, f0 + 2 * bend * t, bend
+        angle = number["phase"] + _TWO_PI * float(turns - round(turns))
+        return (angle, _TWO_PI * float(rate), _TWO_PI * float(bend_here), number["amplitude"], 0.0, 0.0)
+
+
+def step_turns(
+    number: Mapping[str, float], declared: Input
+) -> tuple[float, list[tuple[float, float]], float]:
+    """The value of a step before all its changes, these with the values from then on, and their period (or 0).
+
+    Raises
+    ------
+    ModelError
+        Where what decides is zero at all times.
+    """
+    shift, rate, amplitude = number["shift"], number["rate"], number.get("amplitude")
+    if amplitude is None:
+        if rate:
+            return float(rate < 0.0), [(-shift / rate, float(rate > 0.0))], 0.0
+        amplitude, number = 0.0, {"phase": 0.0}
+    if rate == 0.0:
+        shift, amplitude = shift + amplitude * math.sin(number["phase"]), 0.0
+    if shift == amplitude == 0.0:
+        title = getattr(declared, "title", declared.name)
+        raise ModelError(
+            f"'{title}' is zero at all times: a condition on its sign has no meaning",
+            remedy="correct the numbers, or write the case that is meant",
+        )
+    if abs(shift) >= abs(amplitude):  # a wave that only touches zero changes nothing
+        return float(shift > 0.0), [], 0.0
+    # sin(phase + rate t) > -shift/amplitude between two angles, for a positive amplitude
+    low = math.asin(-shift / amplitude)
+    angles = ((low, float(amplitude > 0.0)), (math.pi - low, float(amplitude < 0.0)))
+    forward = rate > 0.0
+    turns = [((angle - number["phase"]) / rate, value if forward else 1.0 - value) for angle, value in angles]
+    period = _TWO_PI / abs(rate)
+    first, second = sorted((time % period, value) for time, value in turns)
+    return second[1], [first, second], period
+
+
+def _exact(instant: Instant) -> Fraction:
+    return Fraction(instant.high) + Fraction(instant.low)
+
+
+def _table(declared: Input) -> tuple[list[Instant], list[tuple[float, float, float, float]]]:
+    """Knots, and the cubic after each (index 0: before the first); the end values hold beyond the table."""
+    times, values = np.array(declared.times), np.array(declared.values)
+    if declared.interpolation == "cubic":
+        from scipy.interpolate import CubicSpline
+
+        c = CubicSpline(times, values, bc_type="natural").c
+        rows = [
+            (float(c[3, i]), float(c[2, i]), float(c[1, i]), float(c[0, i])) for i in range(len(times) - 1)
+        ]
+    else:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            slopes = np.where(np.diff(times) > 0.0, np.diff(values) / np.diff(times), 0.0)
+        rows = [(float(v), float(m), 0.0, 0.0) for v, m in zip(values, slopes, strict=False)]
+    first, last = (float(values[0]), 0.0, 0.0, 0.0), (float(values[-1]), 0.0, 0.0, 0.0)
+    return [Instant(float(t)) for t in times], [first, *rows, last]

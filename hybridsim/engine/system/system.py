@@ -1,0 +1,529 @@
+"""A model bound to parameter values: its compiled functions, its run-time vector, its series with error bounds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.engine.native.kernels import Door
+from hybridsim.engine.native.rows import evaluate, evaluate_rows
+from hybridsim.engine.series.bounded import ORDER, run_series
+from hybridsim.engine.series.high_orders import high_rows
+from hybridsim.engine.series.layout import SIGNAL_SLOTS, Layout
+from hybridsim.engine.series.optimise import LeanTape, has_corners, lean
+from hybridsim.engine.series.registers import Registers
+from hybridsim.engine.system.finite_differences import DifferenceSeries, run_differences, run_jacobian
+from hybridsim.engine.system.instant import Instant, phase_of
+from hybridsim.engine.system.modules import compiled
+from hybridsim.engine.system.signals import Signal
+from hybridsim.model.parts.component import Corner, LoadAutomaton
+from hybridsim.model.smoothing.explicit_corners import smoothed
+from hybridsim.model.smoothing.jumps import SIGN
+from hybridsim.model.smoothing.steps_in_time import constant_inputs
+from hybridsim.model.toml.automata import SINGLE
+
+if TYPE_CHECKING:
+    from hybridsim.model.parts.model import Model
+
+
+CORNER = "corner"  # the kind of an event that is a corner's change of side
+
+
+@dataclass(frozen=True)
+class Automaton:
+    """One component as the engine sees it; modes and guards are numbers."""
+
+    name: str
+    modes: tuple[str, ...]
+    guards: tuple[tuple[int, ...], ...]  # global guard number of each guard of each mode
+    guard_names: tuple[tuple[str, ...], ...]
+    targets: tuple[tuple[tuple[int, ...], ...], ...]  # mode, guard -> target modes of its choices
+    fatal: tuple[tuple[str | None, ...], ...]
+    above: int = -1
+    below: int = -1
+    hold: int = -1
+    initial: int = -1
+    is_unilateral: bool = False  # its surface is a gap: there is no mode below
+    is_unique: bool = False  # its surface takes a motion only where no other is admissible
+    is_corner: bool = False  # made by the program of a corner; both its modes agree where it changes
+    is_step: bool = False  # except those of a step in time
+    is_load: bool = False  # the load of a contact that opens
+    limit: int = -1  # the mode that is entered where its transitions accumulate
+
+    @property
+    def kind(self) -> str:
+        """What a change of its mode is called."""
+        return CORNER if self.is_corner else "transition"
+
+    @property
+    def resting(self) -> int:
+        """The mode that it may be in where its events accumulate; -1 if there is none."""
+        return self.hold if self.has_surface else self.limit
+
+    @property
+    def has_surface(self) -> bool:
+        """Whether its mode is decided by admissibility at a surface."""
+        return self.hold >= 0
+
+
+@dataclass(frozen=True)
+class Series:
+    """Taylor coefficients along a flow, order along the last axis, with rounding error bounds."""
+
+    V: np.ndarray
+    E: np.ndarray
+    place: LeanTape
+
+    @property
+    def guards(self) -> np.ndarray:
+        """Of all guards (guards, orders)."""
+        return self.V[self.place.guards]
+
+    @property
+    def guard_bounds(self) -> np.ndarray:
+        """Error bounds of the guards' coefficients."""
+        return self.E[self.place.guards]
+
+    @property
+    def surfaces(self) -> np.ndarray:
+        """Of the surfaces."""
+        return self.V[self.place.surfaces]
+
+    @property
+    def surface_bounds(self) -> np.ndarray:
+        """Error bounds of the surfaces' coefficients."""
+        return self.E[self.place.surfaces]
+
+    @property
+    def monitors(self) -> np.ndarray:
+        """Of the monitors."""
+        return self.V[self.place.monitors]
+
+    @property
+    def monitor_bounds(self) -> np.ndarray:
+        """Error bounds of the monitors' coefficients."""
+        return self.E[self.place.monitors]
+
+    @property
+    def states(self) -> np.ndarray:
+        """Of the states."""
+        return self.V[self.place.states]
+
+
+def _automaton(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automaton:
+    names = tuple(m.name for m in component.modes)
+    surface = component.surface
+    return Automaton(
+        component.name,
+        names,
+        guards,
+        tuple(tuple(g.name for g in m.guards) for m in component.modes),
+        tuple(tuple(tuple(names.index(c.to) for c in g.then) for g in m.guards) for m in component.modes),
+        tuple(tuple(g.fatal for g in m.guards) for m in component.modes),
+        *(
+            (
+                names.index(surface.above),
+                -1 if surface.below is None else names.index(surface.below),
+                names.index(surface.hold),
+            )
+            if surface
+            else (-1, -1, -1)
+        ),
+        initial=-1 if component.initial is None else names.index(component.initial),
+        is_unilateral=bool(surface and surface.is_unilateral),
+        is_unique=bool(surface and surface.unique),
+        is_corner=isinstance(component, Corner),
+        is_step=isinstance(component, Corner) and any(v.startswith(SIGN) for v in component.variables),
+        is_load=isinstance(component, LoadAutomaton),
+        limit=names.index(component.limit.to) if component.limit else -1,
+    )
+
+
+class _Frame:
+    """What systems of one structure have in common."""
+
+    def __init__(self, model: Model, data: dict[str, Any]) -> None:
+        self.names = tuple(s.name for s in model.states)
+        self.layout = Layout(len(model.parameters), len(model.discrete), data["rates"], len(model.inputs))
+        self.automata = tuple(
+            _automaton(c, g) for c, g in zip(model.all_components(), data["guards"], strict=True)
+        )
+        self.resets = {key: (number, targets) for number, (key, targets) in enumerate(data["resets"])}
+        self.monitor_names = tuple(m.name for m in model.monitors)
+        self.owner = np.zeros(data["guard_count"], dtype=np.int64)
+        for c, automaton in enumerate(self.automata):
+            for numbers in automaton.guards:
+                self.owner[list(numbers)] = c
+        self.has_surface = np.array([a.has_surface for a in self.automata], dtype=np.bool_)
+        self.is_corner = np.array([a.is_corner for a in self.automata], dtype=np.bool_)
+        self.is_unilateral = np.array([a.is_unilateral for a in self.automata], dtype=np.bool_)
+        self.led = tuple(c for c, a in enumerate(self.automata) if a.is_corner or a.is_load)
+        self.declared = self.automata[: len(self.automata) - int(self.is_corner.sum())]
+        self.component_numbers = np.arange(len(self.automata))
+        self.guard_table = self._guard_table()
+
+    def _guard_table(self) -> np.ndarray:
+        """Guard numbers (components, modes, widest) of every mode, -1 where it has fewer."""
+        most = max((len(a.modes) for a in self.automata), default=0)
+        widest = max((len(g) for a in self.automata for g in a.guards), default=0)
+        table = np.full((len(self.automata), most, max(widest, 1)), -1, dtype=np.int64)
+        for c, automaton in enumerate(self.automata):
+            for m, numbers in enumerate(automaton.guards):
+                table[c, m, : len(numbers)] = numbers
+        return table
+
+
+_run_series = Door(run_series)
+
+
+class System:
+    """A model with values: what integrators and the mode loop work on.
+
+    Parameters
+    ----------
+    as_written : take corners inside a mode as they stand, instead of as components
+    (`hybridsim.model.smoothing.explicit_corners`), which
+        come after those that the model declares.
+    """
+
+    def __init__(self, model: Model, as_written: bool = False) -> None:
+        self.written = model  # held for as long as the system is: `system_cache` knows systems by it
+        self.model = model = model if as_written else smoothed(model)
+        self.code = compiled(model)
+        data = self.code.data
+        self._frame = frame = self.code.shared("frame", lambda: _Frame(model, data))
+        self.names: tuple[str, ...] = frame.names
+        self.n = len(self.names)
+        self.layout: Layout = frame.layout
+        self.automata: tuple[Automaton, ...] = frame.automata
+        self.declared: tuple[Automaton, ...] = frame.declared  # those that are no corners
+        self.has_surface: np.ndarray = frame.has_surface
+        self.is_corner: np.ndarray = frame.is_corner
+        self.is_unilateral: np.ndarray = frame.is_unilateral
+        self.led: tuple[int, ...] = frame.led  # corners and loads: their modes follow from the state
+        # by impacts or resets; friction and relays alone do not
+        self.may_bounce = bool((frame.is_unilateral | ~(frame.has_surface | frame.is_corner)).any())
+        self.owner: np.ndarray = frame.owner  # component of each guard
+        self.guard_count: int = data["guard_count"]
+        self.surface_of: tuple[int, ...] = data["surfaces"]  # component of each surface
+        self.clusters: tuple[tuple[int, ...], ...] = data["clusters"]
+        self.ties: tuple[tuple[int, int, bool], ...] = data[
+            "ties"
+        ]  # see `hybridsim.engine.lowering.stop_coupling.Tie`
+        self.pins: dict[int, tuple[int, ...]] = data["pins"]
+        self.projected: dict[int, tuple[int, ...]] = data["projected"]
+        self.linear: dict[str, tuple[bool, ...]] = data["linear"]
+        self.quantities: tuple[str, ...] = data["quantities"]
+        self.resets: dict[tuple[Any, ...], tuple[int, tuple[str, ...]]] = frame.resets
+        self.monitor_names: tuple[str, ...] = frame.monitor_names
+        self.values = model.parameter_values()
+        self._base = np.zeros(self.layout.size)
+        self._base[: self.layout.parameters] = list(self.values.values())
+        self._base[self.layout.pin_at] = 1.0
+        self.rates = self.rates_at(self._base)
+        self.fastest = float(max(map(abs, self.rates), default=0.0))
+        self._turning = tuple(enumerate(self.rates.tolist(), self.layout.phases_at))
+        numbers = {**model.discrete_values(), **constant_inputs(model), **self.values} if model.inputs else {}
+        self.signals = tuple(Signal(i, numbers) for i in model.inputs)
+        self.starts: dict[tuple[Any, ...], Any] = {}  # what `hybridsim.engine.events.start` has found
+        self.tables: dict[float, Any] = {}  # what `hybridsim.engine.linear.tables` has made last
+        self.runs: dict[Any, Any] = {}  # what `hybridsim.preparation` remembers
+        self.opposed: set[tuple[Any, ...]] = (
+            set()
+        )  # starts that `hybridsim.engine.events.dissipation_check` has let pass
+        self.has_tape: bool = data["tape"] is not None  # it is made from expressions
+        if self.has_tape:
+            self._registers: Registers = self.code.shared(
+                "registers", lambda: Registers(data["tape"], self.layout)
+            )
+        self._lean: dict[bytes, LeanTape] = self.code.shared("lean", dict)
+        self._high: dict[bytes, list[tuple[int, ...]]] = self.code.shared("high orders", dict)
+
+    @property
+    def has_corners(self) -> bool:
+        """Whether a flow, guard or monitor has a corner or a jump inside a mode."""
+        return self.has_tape and self.code.shared("corners", lambda: has_corners(self.code.data["tape"]))
+
+    @cached_property
+    def is_linear(self) -> bool:
+        """Whether the flow of every mode is linear in the states."""
+        return all(all(modes) for modes in self.linear.values())
+
+    @cached_property
+    def heard(self) -> tuple[str, ...]:
+        """Names of all that events can be of: components, monitors, schedules, inputs."""
+        model = self.model
+        named = (self.automata, model.monitors, model.schedules, model.inputs)
+        return tuple(part.name for parts in named for part in parts)
+
+    @property
+    def can_hold(self) -> bool:
+        """Whether some mode holds states on a surface."""
+        return bool(self.pins or self.projected)
+
+    def holds(self, z: np.ndarray) -> bool:
+        """Whether a mode in z holds states on a surface."""
+        return any(z[c] == self.automata[c].hold for c in (*self.pins, *self.projected))
+
+    def evaluated(self, z: np.ndarray) -> list[int]:
+        """The states that the modes in z evaluate from their constraints, each exactly."""
+        return [i for c, held in self.pins.items() if z[c] == self.automata[c].hold for i in held]
+
+    # -- values ---------------------------------------------------------------------------------------------
+
+    def start_state(self, overrides: Mapping[str, float]) -> np.ndarray:
+        """Initial states, in order."""
+        values = self._start | dict(overrides)
+        return np.array([float(values[n]) for n in self.names])
+
+    @cached_property
+    def _start(self) -> dict[str, float]:
+        return self.model.start_values()
+
+    @cached_property
+    def discrete_start(self) -> np.ndarray:
+        """Initial discrete states, in order."""
+        values = self.model.discrete_values()
+        return np.array([values[d.name] for d in self.model.discrete], dtype=float)
+
+    def vector(self, origin: Instant, discrete: np.ndarray, forward: bool = True) -> np.ndarray:
+        """The run-time vector p of a segment whose local time starts at `origin`."""
+        p = self._base.copy()
+        at = self.layout
+        p[at.discrete_slice] = discrete
+        p[at.origin_at] = float(origin)
+        for place, rate in self._turning:
+            p[place] = phase_of(origin.high, origin.low, rate, 0.0)
+        for k, signal in enumerate(self.signals):
+            place = at.signals_at + SIGNAL_SLOTS * k
+            p[place : place + SIGNAL_SLOTS] = signal.piece(origin, forward)
+        return p
+
+    def discrete(self, p: np.ndarray) -> np.ndarray:
+        """Discrete states in p."""
+        return p[self.layout.discrete_slice]
+
+    def mode_names(self, z: np.ndarray) -> dict[str, str]:
+        """Mode of every component by name."""
+        return {a.name: a.modes[m] for a, m in zip(self.automata, z, strict=True)}
+
+    def hot_functions(self) -> tuple[str, ...]:
+        """The functions that every run needs compiled; the others are compiled when they are first used."""
+        names = ["flow", *(["guards"] if self.guard_count else []), *(["project"] if self.can_hold else [])]
+        names += ["monitors"] if self.monitor_names else []
+        return tuple(names)
+
+    # -- functions ------------------------------------------------------------------------------------------
+
+    def address(self, name: str) -> Any:
+        """Address of a compiled function, for kernels."""
+        return self.code.address(name)
+
+    @property
+    def registers(self) -> Registers:
+        """Where the tape's inputs and results are."""
+        return self._registers
+
+    def rates_at(self, p: np.ndarray) -> np.ndarray:
+        """The rates at which angles grow in time, at the values of parameters in p."""
+        out = np.zeros(self.layout.phases)
+        self.code.module.rates(0.0, np.zeros(0), p, np.zeros(0, dtype=np.int64), out)
+        return out
+
+    def flow(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """dx/dt."""
+        out = np.empty(self.n)
+        evaluate(self.address("flow"), s, x, p, z, out)
+        return out
+
+    def project(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """x with every held state evaluated from its constraint."""
+        if not self.can_hold:
+            return x
+        out = np.empty(self.n)
+        evaluate(self.address("project"), s, np.ascontiguousarray(x), p, z, out)
+        return out
+
+    def rows(
+        self, name: str, count: int, s: np.ndarray, x: np.ndarray, p: np.ndarray, z: np.ndarray
+    ) -> np.ndarray:
+        """A function at many points: s (k,), x (k, n) -> (k, count)."""
+        out = np.empty((len(s), count))
+        evaluate_rows(self.address(name), s, x, p, z, out)
+        return out
+
+    def jumps(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> dict[int, tuple[float, float]]:
+        """Jump of each unknown on release to above and to below, by component."""
+        out = np.zeros(2 * len(self.surface_of))
+        self._in_python("jumps", s, x, p, z, out)
+        return {c: (float(out[2 * k]), float(out[2 * k + 1])) for k, c in enumerate(self.surface_of)}
+
+    def effects(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> dict[int, float]:
+        """Effect of each unknown on the rate of its own surface, by component; negative for one that opposes it."""
+        out = np.zeros(len(self.surface_of))
+        self._in_python("effects", s, x, p, z, out)
+        return {c: float(out[k]) for k, c in enumerate(self.surface_of)}
+
+    def impulses(
+        self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """For m surfaces the slopes of their u (m, n), changes of the states by impulses (m, n), loads (2, m, m).
+
+        u is the rate of a gap, or a relative velocity; see `hybridsim.engine.lowering.impulse_rows`.
+        """
+        n, m = self.n, len(self.surface_of)
+        out = np.zeros(2 * m * (n + m))
+        self._in_python("impulses", s, x, p, z, out)
+        return (
+            out[: m * n].reshape(m, n),
+            out[m * n : 2 * m * n].reshape(m, n),
+            out[2 * m * n :].reshape(2, m, m),
+        )
+
+    def gap_slopes(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """d(gap)/dx (m, n) of the m surfaces; zero for those that are no gaps."""
+        out = np.zeros(len(self.surface_of) * self.n)
+        self._in_python("gap_slopes", s, x, p, z, out)
+        return out.reshape(-1, self.n)
+
+    def restitutions(
+        self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray, speeds: np.ndarray
+    ) -> np.ndarray:
+        """Coefficient of restitution (m,) of the surfaces at their speeds of approach (m,); 0 where there is none."""
+        out = np.zeros(len(self.surface_of))
+        self._in_python("restitutions", s, np.concatenate([x, speeds]), p, z, out)
+        return out
+
+    def choose(self, component: int, mode: int, guard: int, s: float, x: Any, p: Any, z: Any) -> int:
+        """Number of the first choice of a guard whose condition holds; -1 if none."""
+        out = np.zeros(1)
+        has_value = self._in_python("choose", s, x, p, np.array([*z, component, mode, guard]), out)
+        return int(out[0]) if has_value else -1  # a condition without a value holds no more than a false one
+
+    def apply_reset(
+        self, key: tuple[Any, ...], s: float, x: Any, p: Any, z: Any, x_plus: Any, p_plus: Any
+    ) -> None:
+        """Write the values that one reset sets; everything is evaluated at (s, x, p, z)."""
+        if key in self.resets:
+            at = self.layout.discrete_slice
+            out = np.concatenate([x_plus, p_plus[at]])
+            if not self._in_python("reset", s, x, p, np.array([*z, self.resets[key][0]]), out):
+                discrete = [d.name for d in self.model.discrete]
+                out[[[*self.names, *discrete].index(name) for name in self.resets[key][1]]] = np.nan
+            x_plus[:], p_plus[at] = out[: self.n], out[self.n :]
+
+    def _in_python(self, name: str, s: float, x: Any, p: Any, z: Any, out: np.ndarray) -> bool:
+        """Evaluate a function of the module that is called too seldom to be compiled; whether it has a value.
+
+        Where it has none, as the standard library's functions beyond their domain, out is filled with NaN.
+        """
+        with np.errstate(all="ignore"):  # what is no number is dealt with where it is used
+            try:
+                getattr(self.code.module, name)(s, x, p, z, out)
+            except (ValueError, ArithmeticError):
+                if name != "reset":  # which may set but a few of all
+                    out[:] = np.nan
+                return False
+        return True
+
+    # -- series ---------------------------------------------------------------------------------------------
+
+    def guards_of(self, z: np.ndarray) -> np.ndarray:
+        """Active guard numbers (components, widest), -1 where a mode has fewer."""
+        return np.asarray(self._frame.guard_table[self._frame.component_numbers, z])
+
+    def guard_title(self, guard: int, z: np.ndarray) -> str:
+        """A guard of the modes z in words."""
+        automaton, mode = self.automata[self.owner[guard]], int(z[self.owner[guard]])
+        name = automaton.guard_names[mode][automaton.guards[mode].index(guard)]
+        of = "" if automaton.name == SINGLE else f" of {automaton.name}"
+        return f"guard {name}{of} in mode {automaton.modes[mode]}"
+
+    def active(self, z: np.ndarray) -> np.ndarray:
+        """Mask of the guards that the modes in z have."""
+        mask = np.zeros(self.guard_count, dtype=np.bool_)
+        numbers = self.guards_of(z)
+        mask[numbers[numbers >= 0]] = True
+        return mask
+
+    def mode_rows(self, z: np.ndarray) -> list[tuple[int, ...]]:
+        """The rows of the tape in the modes z."""
+        rows: list[tuple[int, ...]] = []
+        for component, branches in self.code.data["tape"]["parts"]:
+            rows += branches[0 if component < 0 else z[component]]
+        return rows
+
+    def lean_tape(self, z: np.ndarray) -> LeanTape:
+        """The tape of the modes z for series of any order."""
+        key = z.tobytes()
+        if key not in self._lean:
+            active = np.flatnonzero(self.active(z))
+            self._lean[key] = lean(self.code.data["tape"], self.mode_rows(z), active, self._registers.twins)
+        return self._lean[key]
+
+    def high_rows(self, z: np.ndarray) -> list[tuple[int, ...]]:
+        """The rows of that tape for high orders of states, active guards and monitors."""
+        key = z.tobytes()
+        if key in self._high:
+            return self._high[key]
+        tape = self.lean_tape(z)
+        watched = (*tape.guards[self.active(z)].tolist(), *tape.monitors.tolist())
+        rows = list(map(tuple, tape.rows.tolist()))
+        self._high[key] = high_rows(rows, tape.states.tolist(), tape.derivatives.tolist(), watched)
+        return self._high[key]
+
+    def series(
+        self,
+        s: float,
+        x: np.ndarray,
+        p: np.ndarray,
+        z: np.ndarray,
+        x_error: np.ndarray,
+        s_error: float,
+        with_numbers: bool = False,
+    ) -> Series | DifferenceSeries:
+        """Coefficients up to third order of guards, surfaces, monitors and states along the flow of z.
+
+        with_numbers: the bounds count the own roundoff of the model's numbers.
+        """
+        if not self.has_tape:
+            return self._differences(s, x, p, z, x_error, s_error)
+        tape, count = self.lean_tape(z), self._registers.count
+        V, E = np.empty((count, ORDER + 1)), np.empty((count, ORDER + 1))
+        x, x_error, p = (np.ascontiguousarray(array, dtype=float) for array in (x, x_error, p))
+        inputs = self._registers.with_roundoff(p) if with_numbers else self._registers.inputs
+        _run_series(
+            tape.constant_rows, tape.rows, inputs, tape.derivatives, s, s_error, x, x_error, p, V, E
+        )  # fmt: skip
+        return Series(V, E, tape)
+
+    def _differences(
+        self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray, x_error: np.ndarray, s_error: float
+    ) -> DifferenceSeries:
+        """The same where functions are known by their values alone."""
+        guards = self.guard_count
+        shape = (guards + len(self.monitor_names), ORDER + 1)
+        C, G, E = np.empty((self.n, ORDER + 1)), np.empty(shape), np.empty(shape)
+        p = self._probing(p)
+        run_differences(
+            self.address("flow"), self.address("watched"), s, float(p[self.layout.origin_at]) + s, s_error,
+            np.ascontiguousarray(x, dtype=float), x_error, p, z, C, G, E,
+        )  # fmt: skip
+        return DifferenceSeries(C, G[:guards], E[:guards], G[guards:], E[guards:])
+
+    def jacobian(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """d(dx/dt)/dx (n, n) by differences: for functions that are known by their values alone."""
+        out = np.empty((self.n, self.n))
+        t = float(p[self.layout.origin_at]) + s
+        run_jacobian(self.address("flow"), s, t, x, self._probing(p), z, out)
+        return out
+
+    def _probing(self, p: np.ndarray) -> np.ndarray:
+        """p for differences, which go far from the run: what Python functions raise there is not noted."""
+        p = p.copy()
+        p[self.layout.pin_at] = 0.0
+        return p

@@ -1,0 +1,203 @@
+"""First derivatives of rates, guards, surfaces and monitors by everything they depend on: the tape run on tangents.
+
+Forward automatic differentiation (A. Griewank and A. Walther, Evaluating Derivatives, 2nd ed., SIAM 2008, chapter 3):
+beside the value of each register stand its derivatives in D directions, and each operation has its own rule for them.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybridsim.engine.native.kernels import inlined, kernel
+from hybridsim.engine.series.interpreter import advance
+from hybridsim.engine.series.optimise import (
+    ADD_CONSTANT,
+    CONSTANT_SUB,
+    DIVIDE_BY,
+    SCALE,
+    SINCOS_LINEAR,
+    SUB_CONSTANT,
+    needed_rows,
+)
+from hybridsim.engine.series.tape import (
+    ABS,
+    ADD,
+    ANGLE,
+    DIV,
+    EQUAL,
+    EXP,
+    INTEGRAL,
+    MAX,
+    MIN,
+    MUL,
+    NEG,
+    SELECT,
+    SINCOS,
+    SINHCOSH,
+    SQRT,
+    SUB,
+    TANGENT,
+)
+from hybridsim.engine.system.system import System
+
+
+@inlined
+def _combine(D: Any, out: int, first: float, a: int, second: float, b: int) -> None:
+    """D[out] = first D[a] + second D[b]; what has no tangent does not count, however large its factor."""
+    for j in range(D.shape[1]):
+        total = 0.0
+        if D[a, j] != 0.0:
+            total += first * D[a, j]
+        if D[b, j] != 0.0:
+            total += second * D[b, j]
+        D[out, j] = total
+
+
+@kernel
+def _tangent(op: int, a: int, b: int, c: int, out: int, V: Any, D: Any) -> None:
+    """The rule of one operation, all values V[register, 0] being known."""
+    u, v, y = V[a, 0], V[b, 0], V[out, 0]
+    if op in (ADD, ADD_CONSTANT):
+        _combine(D, out, 1.0, a, 1.0, b)
+    elif op in (SUB, SUB_CONSTANT):
+        _combine(D, out, 1.0, a, -1.0, b)
+    elif op == CONSTANT_SUB:
+        _combine(D, out, -1.0, a, 1.0, b)
+    elif op == NEG:
+        _combine(D, out, -1.0, a, 0.0, a)
+    elif op in (MUL, SCALE):
+        _combine(D, out, v, a, u, b)
+    elif op in (DIV, DIVIDE_BY):
+        _combine(D, out, 1.0 / v, a, -y / v, b)
+    elif op == SQRT:
+        _combine(D, out, 0.5 / y, a, 0.0, a)
+    elif op == EXP:
+        _combine(D, out, y, a, 0.0, a)
+    elif op in (SINCOS, SINCOS_LINEAR):
+        _combine(D, out, V[out + 1, 0], a, 0.0, a)
+        _combine(D, out + 1, -y, a, 0.0, a)
+    elif op == SINHCOSH:
+        _combine(D, out, V[out + 1, 0], a, 0.0, a)
+        _combine(D, out + 1, y, a, 0.0, a)
+    elif op == TANGENT:  # tan and 1 + tan^2; tanh and 1 - tanh^2
+        _combine(D, out, V[out + 1, 0], a, 0.0, a)
+        _combine(D, out + 1, 2.0 * y if b == 0 else -2.0 * y, out, 0.0, a)
+    elif op == INTEGRAL and c == ANGLE:
+        square = u * u + v * v
+        _combine(D, out, -v / square, a, u / square, b)
+    elif op == INTEGRAL:  # y' a = b'
+        _combine(D, out, 0.0, a, 1.0 / u, b)
+    elif op == ABS:
+        _combine(D, out, 1.0 if u >= 0.0 else -1.0, a, 0.0, a)
+    elif op in (MIN, MAX):
+        takes_a = (u <= v) == (op == MIN)
+        _combine(D, out, 1.0 if takes_a else 0.0, a, 0.0 if takes_a else 1.0, b)
+    elif op == SELECT:
+        source = b if u != 0.0 else c
+        for j in range(D.shape[1]):  # what is so at one point alone is not so beside it
+            D[out, j] = D[c, j] if u != 0.0 and D[a, j] != 0.0 else D[source, j]
+    elif op == EQUAL:
+        _combine(D, out, 1.0, a, -1.0, b)
+    else:  # other comparisons and logic
+        _combine(D, out, 0.0, a, 0.0, a)
+
+
+@kernel
+def run_tangents(
+    rows: Any,
+    inputs: Any,
+    seeds: Any,
+    wanted: Any,
+    s: Any,
+    x: Any,
+    p: Any,
+    V: Any,
+    D: Any,
+    values: Any,
+    tangents: Any,
+) -> None:
+    """Values (m, W) and tangents (m, W, D) of the wanted registers (W,) at local times s (m,) and states x (m, n).
+
+    seeds (n + 1 + P, D): directions of the states, of local time and of each entry of p.
+    """
+    time, states = inputs.time[0], inputs.states
+    n = states.shape[0]
+    for i in range(inputs.constants.shape[0]):
+        V[inputs.constants[i], 0] = inputs.values[i, 0]
+        for j in range(D.shape[1]):
+            D[inputs.constants[i], j] = 0.0
+    for i in range(inputs.parameters.shape[0]):
+        r, source = inputs.parameters[i], inputs.sources[i]
+        V[r, 0] = p[source]
+        for j in range(D.shape[1]):
+            D[r, j] = seeds[n + 1 + source, j]
+    for m in range(s.shape[0]):
+        if time >= 0:
+            V[time, 0] = s[m]
+            for j in range(D.shape[1]):
+                D[time, j] = seeds[n, j]
+        for i in range(n):
+            V[states[i], 0] = x[m, i]
+            for j in range(D.shape[1]):
+                D[states[i], j] = seeds[i, j]
+        advance(rows, V, 0)
+        for r in range(rows.shape[0]):
+            _tangent(rows[r, 0], rows[r, 1], rows[r, 2], rows[r, 3], rows[r, 4], V, D)
+        for i in range(wanted.shape[0]):
+            values[m, i] = V[wanted[i], 0]
+            for j in range(D.shape[1]):
+                tangents[m, i, j] = D[wanted[i], j]
+
+
+class Tangents(NamedTuple):
+    """Values (m, W) and derivatives (m, W, D) of some functions of a mode."""
+
+    values: np.ndarray
+    slopes: np.ndarray
+
+
+class TangentTape:
+    """Rates, and whatever else is asked for, of one vector of modes with their derivatives.
+
+    Parameters
+    ----------
+    guards, monitors, surfaces : numbers of those that are wanted behind the rates of the n states.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        z: np.ndarray,
+        guards: tuple[int, ...] = (),
+        monitors: tuple[int, ...] = (),
+        surfaces: tuple[int, ...] = (),
+    ) -> None:
+        tape = system.lean_tape(z)
+        self._wanted = np.concatenate(
+            [
+                tape.derivatives,
+                tape.guards[list(guards)],
+                tape.monitors[list(monitors)],
+                tape.surfaces[list(surfaces)],
+            ]
+        ).astype(np.int64)
+        rows = [tuple(row) for row in np.concatenate([tape.constant_rows, tape.rows]).tolist()]
+        self._rows = np.array(needed_rows(rows, set(self._wanted.tolist())), dtype=np.int64).reshape(-1, 5)
+        self._registers = system.registers
+
+    def is_same(self, other: TangentTape) -> bool:
+        """Whether another tape computes the same quantities by the same operations."""
+        return np.array_equal(self._rows, other._rows) and np.array_equal(self._wanted, other._wanted)
+
+    def __call__(self, s: np.ndarray, x: np.ndarray, p: np.ndarray, seeds: np.ndarray) -> Tangents:
+        """At local times s (m,) and states x (m, n), along the directions seeds (n + 1 + len(p), D)."""
+        count, wanted, directions = self._registers.count, len(self._wanted), seeds.shape[1]
+        values, slopes = np.empty((len(s), wanted)), np.empty((len(s), wanted, directions))
+        run_tangents(
+            self._rows, self._registers.inputs, np.ascontiguousarray(seeds), self._wanted,
+            np.ascontiguousarray(s, dtype=float), np.ascontiguousarray(x, dtype=float), p,
+            np.zeros((count, 1)), np.zeros((count, directions)), values, slopes,
+        )  # fmt: skip
+        return Tangents(values, slopes)

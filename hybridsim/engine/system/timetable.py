@@ -1,0 +1,125 @@
+"""What happens at times known beforehand: scheduled resets, clock ticks, knots of inputs."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left, bisect_right
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from hybridsim.engine.system.instant import Instant, multiple
+from hybridsim.expr import evaluate
+
+if TYPE_CHECKING:
+    from hybridsim.engine.system.system import System
+
+
+@dataclass(frozen=True)
+class Appointment:
+    """An instant to be stepped to, and the schedules that are due then (none: a knot of an input).
+
+    A schedule in whose list this time stands several times is there as often.
+    At a renewal nothing happens but that local time begins anew.
+    """
+
+    instant: Instant
+    schedules: tuple[int, ...]
+    is_renewal: bool = False
+
+
+class Timetable:
+    """The scheduled times of one run that ends at a given instant."""
+
+    def __init__(self, system: System, end: Instant) -> None:
+        self._end = end
+        self.settled: Instant | None = None  # the last appointment that was kept, or the start of the run
+        values = system.values
+        self._signals = system.signals
+        self._schedules = []
+        for schedule in system.model.schedules:
+            times = sorted(Instant(float(evaluate(t, values))) for t in schedule.times)
+            start = evaluate(schedule.start, values) if schedule.start is not None else 0.0
+            period = evaluate(schedule.period, values) if schedule.period is not None else 0.0
+            count = 1 if schedule.start is not None and schedule.period is None else schedule.count
+            self._schedules.append((times, start, period, count))
+
+    def kept(self, instant: Instant) -> None:
+        """Note that an instant is settled: what lies within rounding of it is not due once more."""
+        self.settled = instant
+
+    def due_at_start(self, start: Instant) -> tuple[int, ...]:
+        """Schedules whose very first time is the start of the run: a clock ticks at its offset."""
+        return tuple(
+            k
+            for k in range(len(self._schedules))
+            if (first := self._first(k)) is not None and abs(first.minus(start)) <= self._slack(start)
+            for _ in range(self._count(k, start))
+        )
+
+    def next(self, after: Instant, forward: bool) -> Appointment | None:
+        """The nearest appointment strictly after an instant; what coincides within rounding comes together.
+
+        Two clocks whose periods are rounded to doubles differ by up to two ulps where they should meet. The last one
+        meets the end of the run in the same way; None where nothing is left before it.
+        """
+        found: list[tuple[Instant, int]] = []
+        for k in range(len(self._schedules)):
+            time = self._next(k, after, forward)
+            if time is not None:
+                found.append((time, k))
+        for signal in self._signals:
+            knot = signal.next_knot(after, forward)
+            if knot is not None:
+                found.append((knot, -1))
+        if not found:
+            return None
+        nearest = min(found, key=lambda f: abs(f[0].minus(after)))[0]
+        slack = self._slack(nearest)
+        together = [k for time, k in found if abs(time.minus(nearest)) <= slack]
+        latest = max(
+            (t for t, _ in found if abs(t.minus(nearest)) <= slack), key=lambda t: abs(t.minus(after))
+        )
+        if abs(self._end.minus(nearest)) <= slack:
+            latest = self._end
+        elif (self._end.minus(nearest) < 0.0) == forward:
+            return None
+        due = sorted(k for k in together if k >= 0)
+        return Appointment(latest, tuple(k for k in due for _ in range(self._count(k, nearest))))
+
+    def _count(self, k: int, instant: Instant) -> int:
+        """How often an instant, within rounding, stands in the list of a schedule that is due then; 1 for a clock."""
+        times, slack = self._schedules[k][0], self._slack(instant)
+        if not times:
+            return 1
+        first, last = bisect_left(times, instant.plus(-slack)), bisect_right(times, instant.plus(slack))
+        return sum(abs(time.minus(instant)) <= slack for time in times[first:last])
+
+    def _slack(self, near: Instant) -> float:
+        """What rounding of periods and offsets amounts to at an instant."""
+        return 2.0 * math.ulp(max(abs(near.high), *(abs(start) for _, start, _, _ in self._schedules), 0.0))
+
+    def _first(self, k: int) -> Instant | None:
+        times, start, _period, _ = self._schedules[k]
+        return times[0] if times else Instant(start)
+
+    def _next(self, k: int, after: Instant, forward: bool) -> Instant | None:
+        times, start, period, count = self._schedules[k]
+        if times:  # a list may be long
+            index, step = (bisect_right(times, after), 1) if forward else (bisect_left(times, after) - 1, -1)
+            while 0 <= index < len(times):
+                if not self._is_settled(times[index]):
+                    return times[index]
+                index += step
+            return None
+        last = math.inf if count is None else count - 1
+        near = 0 if period == 0.0 else math.floor((float(after) - start) / period)
+        ticks = range(int(max(min(near - 1, last), 0)), int(min(max(near, 0) + 3, last)) + 1)
+        candidates = [multiple(start, i, period) for i in ticks]
+        ahead = [c for c in candidates if (c.minus(after) > 0.0 if forward else c.minus(after) < 0.0)]
+        ahead = [c for c in ahead if not self._is_settled(c)]
+        return None if not ahead else (ahead[0] if forward else ahead[-1])
+
+    def _is_settled(self, instant: Instant) -> bool:
+        """Whether it lies within rounding of the last appointment that was kept."""
+        settled = self.settled
+        return settled is not None and abs(instant.minus(settled)) <= self._slack(settled)

@@ -1,0 +1,282 @@
+"""The code of a model whose rates are Python functions: what `hybridsim.engine.system.modules` emits for all others."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from hybridsim.engine.lowering.reset_keys import added, amounts_of
+from hybridsim.engine.native import kernels
+from hybridsim.engine.system.user_functions.forms import Forms, Parts, Scalar, number, parts_of, rates, value
+from hybridsim.engine.system.user_functions.surroundings import surroundings
+from hybridsim.errors import ModelError
+from hybridsim.expr import function_name
+
+if TYPE_CHECKING:
+    from hybridsim.model.parts.model import Model
+
+
+class RunRecord(Protocol):
+    """The part of a run's record to which user functions add what they have to say."""
+
+    status: str
+    message: str
+
+    def warn(self, message: str) -> None:
+        """Count a warning."""
+
+
+class PythonCode:
+    """A model's Python functions, compiled where numba can, else called back from the engine.
+
+    It is used like `hybridsim.engine.system.modules.Compiled`; ``data["tape"]`` is None.
+    """
+
+    seconds = 0.0
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.parts = parts = parts_of(model)
+        _refuse_other_arguments(parts)
+        self.forms = Forms(parts)
+        self.resets, self.conditions = _resets(model), _conditions(model)
+        self.data = _data(model, self.resets)
+        watched = (*parts.guards, *parts.monitors)
+        self._rows: dict[str, tuple[Scalar, ...]] = {
+            "guards": parts.guards,
+            "monitors": parts.monitors,
+            "quantities": parts.outputs,
+            "watched": watched,
+        }
+        nothing = self.forms.row(())
+        self.module = SimpleNamespace(
+            flow=self.forms.flow,
+            **{name: self.forms.row(scalars) for name, scalars in self._rows.items()},
+            **dict.fromkeys(
+                (
+                    "surfaces",
+                    "jumps",
+                    "effects",
+                    "rates",
+                    "impulses",
+                    "gap_slopes",
+                    "restitutions",
+                    "stepped",
+                ),
+                nothing,
+            ),
+            choose=self._choose,
+            reset=self._reset,
+        )
+        self._kept: dict[str, Any] = {}
+        self._things: dict[str, Any] = {}
+        self._compiler: Any = None
+        self.refused = ""  # numba's reason, where it cannot compile them
+        self._surroundings = surroundings(self._functions)
+        if kernels.ENABLED:
+            from hybridsim.engine.system.user_functions.compiled import Compiler
+
+            self._compiler = Compiler(parts)
+            self.refused = self._compiler.refused
+
+    @property
+    def _functions(self) -> list[Callable[..., Any]]:
+        parts = self.parts
+        scalars = [scalar.function for scalar in (*parts.guards, *parts.monitors, *parts.outputs)]
+        return [f for f in (*(flow for _, flow in parts.flows), *scalars) if callable(f)]
+
+    @property
+    def is_current(self) -> bool:
+        """Whether the globals that the functions read are as they were when they were compiled."""
+        is_live = self._compiler is None or bool(self.refused)
+        return is_live or surroundings(self._functions) == self._surroundings
+
+    def shared(self, name: str, make: Callable[[], Any]) -> Any:
+        """As in `Compiled`."""
+        if name not in self._things:
+            self._things.setdefault(name, make())
+        return self._things[name]
+
+    def address(self, name: str) -> Any:
+        """Address of one of flow, guards, monitors, quantities, and watched: guards and monitors together."""
+        if name not in self._kept:
+            self._kept.setdefault(name, self._addressed(name))
+        return self._kept[name][0]
+
+    def _addressed(self, name: str) -> tuple[Any, Any]:
+        form = getattr(self.module, name)
+        if self._compiler is None:
+            return form, form
+        if self.refused:
+            from hybridsim.engine.system.user_functions.compiled import called_back
+
+            width = self.parts.states if name == "flow" else len(self._rows[name])
+            return called_back(form, self.parts, len(self.model.all_components()), width)
+        compiled: tuple[Any, Any] = (
+            self._compiler.flow() if name == "flow" else self._compiler.row(self._rows[name])
+        )
+        return compiled
+
+    def last_failure(self) -> str:
+        """The last exception of a run in words, empty where there was none; the next call tells of what came since."""
+        if self._compiler is not None and not self.refused:
+            self._compiler.replay(self.forms.failures)
+        last, self.forms.failures.last = self.forms.failures.last, ""
+        return last
+
+    def flow_without_value(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> str:
+        """What a flow returns where a rate is no finite number, in words with its name.
+
+        Empty where it raises: that is told by `report`, also where compiled code does not (it divides by zero).
+        """
+        function, given = self.forms.flow_of(z), self.forms.arguments(s, x, p)
+        try:
+            with np.errstate(all="ignore"):  # it looks for what is no number
+                found = rates(function, self.parts.states, *given)
+        except Exception as fault:  # a user's code may raise anything
+            self.forms.failures.note(function, given[0], fault, True)
+            return ""
+        if np.isfinite(found).all():
+            return ""
+        shown = ", ".join(f"{rate:g}" for rate in found)
+        return (
+            f": the function {function_name(function)} returned ({shown}); look there for a division by zero"
+        )
+
+    @property
+    def refused_in_words(self) -> str:
+        """Why the functions are not compiled."""
+        return f"numba cannot compile its Python functions ({self.refused})"
+
+    def report(self, trajectory: RunRecord) -> None:
+        """Say in a run's record what it owes to functions that are known by their values alone."""
+        if self._rows["watched"]:
+            trajectory.warn(
+                "derivatives of guards and monitors come from differences of the Python functions"
+            )
+        if self.refused:
+            trajectory.warn(f"{self.refused_in_words}: they were called from Python")
+        failure = self.last_failure()
+        if failure and trajectory.status not in ("finished", "terminated"):
+            trajectory.message += f"; {failure}"
+
+    def check(self, x: np.ndarray, p: np.ndarray) -> None:
+        """Call each function once, in plain Python: shapes and mistakes show here, by the name of the function.
+
+        What is not a number there (out of its domain, in a mode that does not hold) is left to the run.
+        """
+        t, state, named = self.forms.arguments(0.0, x, p)
+        flows = [(function, True) for _, function in self.parts.flows]
+        scalars = (*self._rows["watched"], *self.parts.outputs)
+        others = [(scalar.function, False) for scalar in scalars if callable(scalar.function)]
+        for function, is_flow in flows + others:
+            try:
+                if is_flow:
+                    rates(function, self.parts.states, t, state.copy(), named)
+                else:
+                    number(function, t, state.copy(), named)
+            except ModelError:
+                raise
+            except (ArithmeticError, ValueError):
+                continue
+            except Exception as fault:  # a user's code may raise anything; told with its place
+                name = function_name(function)
+                message = f"the function {name} raised {type(fault).__name__}: {fault} at t = {t!r}"
+                remedy = f"call {name}(t, x, p) with the initial values to see where"
+                raise ModelError(message, remedy=remedy) from fault
+
+    # -- what runs once an event, in plain Python -----------------------------------------------------------
+
+    def _choose(self, s: float, x: Any, p: Any, z: Any, out: Any) -> int:
+        """As the generated function of that name; component, mode and guard stand behind the modes."""
+        c, m, g = (int(k) for k in z[-3:])
+        out[0] = -1.0
+        for k, condition in enumerate(self.conditions[c, m, g]):
+            if condition is None or self.forms.number(condition, s, x, p):
+                out[0] = float(k)
+                break
+        return 0
+
+    def _reset(self, s: float, x: Any, p: Any, z: Any, out: Any) -> int:
+        """As the generated function of that name; the number of the reset stands behind the modes."""
+        names = [state.name for state in self.model.states]
+        for name, function in self.resets[int(z[-1])][1].items():
+            out[names.index(name)] = self.forms.number(function, s, x, p)
+        return 0
+
+
+def _refuse_other_arguments(parts: Parts) -> None:
+    """Refuse a function that does not take time, states and parameters."""
+    scalars = (*parts.guards, *parts.monitors, *parts.outputs)
+    functions = [function for _, function in parts.flows] + [scalar.function for scalar in scalars]
+    for function in filter(callable, functions):
+        try:
+            inspect.signature(function).bind(0.0, None, None)
+        except ValueError:  # what was written in C may have no signature: the first call tells
+            continue
+        except TypeError:
+            name = function_name(function)
+            raise ModelError(
+                f"the function {name} takes {inspect.signature(function)}, and is called with (t, x, p)",
+                remedy="let it take three arguments: the time, the states in order, and the parameters by name "
+                "(p.NAME), whether it uses them or not",
+            ) from None
+
+
+def _conditions(model: Model) -> dict[tuple[int, int, int], tuple[Any, ...]]:
+    return {
+        (c, m, g): tuple(None if choice.when is None else value(choice.when) for choice in guard.then)
+        for c, component in enumerate(model.all_components())
+        for m, mode in enumerate(component.modes)
+        for g, guard in enumerate(mode.guards)
+    }
+
+
+def _resets(model: Model) -> list[tuple[tuple[Any, ...], dict[str, Any]]]:
+    """(what, state -> function or number) of every reset: of choices, limits, monitors and schedules.
+
+    Behind them, by `added`, stand the amounts of those that add.
+    """
+    found: list[tuple[tuple[Any, ...], Any]] = [
+        (("choice", c, m, g, k), choice.reset)
+        for c, component in enumerate(model.all_components())
+        for m, mode in enumerate(component.modes)
+        for g, guard in enumerate(mode.guards)
+        for k, choice in enumerate(guard.then)
+    ]
+    limits = [(c, component.limit) for c, component in enumerate(model.all_components())]
+    found += [(("limit", c), limit.reset) for c, limit in limits if limit]
+    found += [(("monitor", k), monitor.reset) for k, monitor in enumerate(model.monitors)]
+    found += [(("schedule", k), schedule.reset) for k, schedule in enumerate(model.schedules)]
+    found = [(key, reset) for key, reset in found if reset]
+    found += [(added(key), amounts) for key, reset in found if (amounts := amounts_of(reset))]
+    return [(key, {name: value(e) for name, e in reset.items()}) for key, reset in found]
+
+
+def _data(model: Model, resets: list[tuple[tuple[Any, ...], dict[str, Any]]]) -> dict[str, Any]:
+    count, guards = 0, []
+    for component in model.all_components():
+        numbers = []
+        for mode in component.modes:
+            numbers.append(tuple(range(count, count + len(mode.guards))))
+            count += len(mode.guards)
+        guards.append(tuple(numbers))
+    linear = {component.name: (False,) * len(component.modes) for component in model.all_components()}
+    return {
+        "guards": tuple(guards),
+        "guard_count": count,
+        "surfaces": (),
+        "pins": {},
+        "projected": {},
+        "clusters": (),
+        "ties": (),
+        "rates": 0,
+        "linear": {"": (False,)} | linear,
+        "quantities": tuple(output.name for output in model.outputs),
+        "resets": tuple((key, tuple(reset)) for key, reset in resets),
+        "tape": None,
+    }

@@ -1,0 +1,267 @@
+"""A user's Python functions compiled by numba into the engine's form, or called back from it. Needs the compiler."""
+
+from __future__ import annotations
+
+import ctypes
+import inspect
+import math
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numba
+import numpy as np
+from numba import literal_unroll, types
+from numba.core.errors import NumbaError
+from numba.extending import intrinsic, overload
+from numba.np.unsafe.ndarray import to_fixed_tuple
+
+from hybridsim.engine.native.kernels import SIGNATURE
+from hybridsim.engine.system.user_functions.forms import Failures, Parts, Scalar, number, rates
+from hybridsim.engine.system.user_functions.helpers import compiled_with_helpers
+from hybridsim.expr import function_name
+
+_REASON = 160  # characters of numba's reason that are shown
+_HEADS = ("Failed in nopython mode", "During:", "File ", "<source", "def ", "- Resolution", "^")
+
+
+@intrinsic
+def _doubles_at(typingctx: Any, address: Any) -> Any:
+    """A pointer to doubles out of an address."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.inttoptr(args[0], context.get_value_type(signature.return_type))
+
+    return types.CPointer(types.float64)(types.int64), generate
+
+
+@numba.njit
+def _mark(address: int, function: int, t: float, x: Any, p: Any) -> None:
+    """Note in memory of ours the last call that raised: number of the function, from one, t, states, parameters."""
+    room = numba.carray(_doubles_at(address), (2 + x.shape[0] + p.shape[0],))
+    room[0], room[1] = function, t
+    room[2 : 2 + x.shape[0]] = x
+    room[2 + x.shape[0] :] = p
+
+
+class Compiler:
+    """Compiles the functions of one model; `refused` is numba's reason where it cannot."""
+
+    def __init__(self, parts: Parts) -> None:
+        self.parts = parts
+        self.count = len(parts.parameters._fields)
+        self.room = np.zeros(2 + parts.states + self.count)
+        self.functions: list[Any] = []
+        self.refused = ""
+        self._written: dict[tuple[int, bool], Any] = {}
+        scalars = (*parts.guards, *parts.monitors, *parts.outputs)
+        used = [(f, True) for _, f in parts.flows]
+        used += [(scalar.function, False) for scalar in scalars if callable(scalar.function)]
+        for function, is_flow in used:
+            self.refused = self.refused or self._take(function, is_flow)
+
+    def flow(self) -> tuple[int, Any]:
+        """Address of the flow, and what keeps it alive."""
+        flows = [(mode, self._written[id(function), True]) for mode, function in self.parts.flows]
+        chosen = _in_every_mode(flows[-1][1])
+        for mode, write in flows[-2::-1]:
+            chosen = _either(self.parts.component, mode, write, chosen)
+        return _as_cfunc(chosen)
+
+    def row(self, scalars: tuple[Scalar, ...]) -> tuple[int, Any]:
+        """Address of a function of several numbers."""
+        chain = _nothing
+        for k, scalar in reversed(list(enumerate(scalars))):
+            f = scalar.function
+            write = self._written[id(f), False] if callable(f) else _constant(f)
+            chain = _one_more(write, k, scalar.component, scalar.mode, chain)
+        return _as_cfunc(chain)
+
+    def replay(self, failures: Failures) -> None:
+        """Call again, in plain Python, what raised last in compiled code, to tell what it said."""
+        if self.room[0] == 0.0:
+            return
+        function, is_flow = self.functions[int(self.room[0]) - 1]
+        t, x = float(self.room[1]), self.room[2 : 2 + self.parts.states].copy()
+        p = self.parts.parameters(*self.room[2 + self.parts.states :].tolist())
+        self.room[0] = 0.0
+        try:
+            rates(function, self.parts.states, t, x, p) if is_flow else number(function, t, x, p)
+        except Exception as fault:  # a user's code may raise anything; the run ends with what it said
+            failures.note(function, t, fault, True)
+
+    def _take(self, function: Any, is_flow: bool) -> str:
+        """Compile a function, and what writes its result into out; numba's reason where it cannot."""
+        if (id(function), is_flow) in self._written:
+            return ""
+        if not (inspect.isfunction(function) or hasattr(function, "py_func")):
+            return f"{function_name(function)}: it compiles plain functions only"
+        own = function if hasattr(function, "py_func") else compiled_with_helpers(function)
+        named = numba.typeof(self.parts.parameters(*[0.0] * self.count))
+        signature = (types.float64, types.Array(types.float64, 1, "C"), named)
+        try:
+            own.compile(signature)
+        except (NumbaError, NotImplementedError, TypeError) as fault:  # the last of arguments with defaults
+            return f"{function_name(function)}: {_in_short(fault)}"
+        returned = own.overloads[signature].signature.return_type
+        if _put_compiled(returned, None, None, None) is None:
+            return f"{function_name(function)} returns {returned}"
+        self.functions.append((function, is_flow))
+        width = self.parts.states if is_flow else -1
+        self._written[id(function), is_flow] = self._wrapped(own, len(self.functions), width)
+        return ""
+
+    def _wrapped(self, function: Any, number: int, width: int) -> Any:
+        """width: how many numbers it returns in a row; -1 for a single one that is no row."""
+        n, count, origin = self.parts.states, self.count, self.parts.origin_at
+        parameters, address, length = self.parts.parameters, self.room.ctypes.data, abs(width)
+
+        @numba.njit(error_model="numpy")
+        def write(s: float, x: Any, p: Any, out: Any, at: int) -> None:
+            t, state, given = p[origin] + s, numba.carray(x, (n,)), numba.carray(p, (count,))
+            raised = False
+            try:
+                named = parameters(*to_fixed_tuple(given, count))
+                _put(function(t, state.copy(), named), out, at, width)
+            except Exception:  # numba compiles no other clause; what it was a second call tells
+                raised = True
+            if raised:
+                if p[origin + 1] > 0.0:  # on the run, not in differences far from it
+                    _mark(address, number, t, state, given)
+                for i in range(length):
+                    out[at + i] = math.nan
+
+        return write
+
+
+def _put(given: Any, out: Any, at: int, width: int) -> None:
+    """Write what a function returned, `width` numbers in a row or (-1) a single one; raises where it is not that."""
+    raise NotImplementedError("compiled code only")
+
+
+def _put_compiled(given: Any, out: Any, at: Any, width: Any) -> Any:
+    """How to write what is of this type; None for what is not numbers."""
+    real = (types.Float, types.Integer, types.Boolean)
+    parts = given.types if isinstance(given, types.BaseTuple) else (getattr(given, "dtype", given),)
+    if not all(isinstance(part, real) for part in parts):
+        return None
+    if isinstance(given, real):
+
+        def single(given: Any, out: Any, at: Any, width: Any) -> Any:
+            if width != -1:
+                raise ValueError("one number")
+            out[at] = given
+
+        return single
+    if isinstance(given, types.Tuple):  # of different types
+
+        def mixed(given: Any, out: Any, at: Any, width: Any) -> Any:
+            if len(given) != width:
+                raise ValueError("another number of rates")
+            i = at
+            for number in literal_unroll(given):
+                out[i] = number
+                i += 1
+
+        return mixed
+    if isinstance(given, (types.UniTuple, types.List)) or (
+        isinstance(given, types.Array) and given.ndim == 1
+    ):
+
+        def row(given: Any, out: Any, at: Any, width: Any) -> Any:
+            if len(given) != width:
+                raise ValueError("another number of rates")
+            for i in range(width):
+                out[at + i] = given[i]
+
+        return row
+    return None
+
+
+overload(_put)(_put_compiled)
+
+
+@numba.njit
+def _nothing(s: float, x: Any, p: Any, z: Any, out: Any) -> None:
+    """End of a chain."""
+
+
+def _constant(value: float) -> Any:
+    @numba.njit
+    def write(s: float, x: Any, p: Any, out: Any, at: int) -> None:
+        out[at] = value
+
+    return write
+
+
+def _one_more(write: Any, place: int, component: int, mode: int, rest: Any) -> Any:
+    """A chain with one more number in front; 1 where its mode is not active."""
+
+    @numba.njit
+    def chain(s: float, x: Any, p: Any, z: Any, out: Any) -> None:
+        if component < 0 or z[component] == mode:
+            write(s, x, p, out, place)
+        else:
+            out[place] = 1.0
+        rest(s, x, p, z, out)
+
+    return chain
+
+
+def _either(component: int, mode: int, write: Any, other: Any) -> Any:
+    """A flow that is `write` in one mode."""
+
+    @numba.njit
+    def chosen(s: float, x: Any, p: Any, z: Any, out: Any) -> None:
+        if z[component] == mode:
+            write(s, x, p, out, 0)
+        else:
+            other(s, x, p, z, out)
+
+    return chosen
+
+
+def _in_every_mode(write: Any) -> Any:
+    @numba.njit
+    def flow(s: float, x: Any, p: Any, z: Any, out: Any) -> None:
+        write(s, x, p, out, 0)
+
+    return flow
+
+
+def _as_cfunc(function: Any) -> tuple[int, Any]:
+    def form(s: float, x: Any, p: Any, z: Any, out: Any) -> int:
+        function(s, x, p, z, out)
+        return 0
+
+    compiled = numba.cfunc(SIGNATURE)(form)
+    return compiled.address, compiled
+
+
+def called_back(form: Callable[..., int], parts: Parts, components: int, width: int) -> tuple[int, Any]:
+    """Address of a C function that calls a Python form, and what keeps it alive."""
+    sizes = (parts.states, parts.origin_at + 2)
+
+    def call(s: float, x: int, p: int, z: int, out: int) -> int:
+        return form(
+            s,
+            (ctypes.c_double * sizes[0]).from_address(x),
+            (ctypes.c_double * sizes[1]).from_address(p),
+            (ctypes.c_int64 * components).from_address(z),
+            (ctypes.c_double * width).from_address(out),
+        )
+
+    pointer = ctypes.c_void_p
+    kind = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_double, pointer, pointer, pointer, pointer)
+    function = kind(call)
+    address = ctypes.cast(function, pointer).value
+    assert address is not None
+    return address, function
+
+
+def _in_short(fault: Exception) -> str:
+    """The first line of a reason that says something, without colours."""
+    lines = [line.strip() for line in re.sub(r"\x1b\[[0-9;]*m", "", str(fault)).splitlines()]
+    telling = [line for line in lines if line and not line.startswith(_HEADS)]
+    text = (telling or [type(fault).__name__])[0]
+    return text if len(text) <= _REASON else f"{text[: _REASON - 3]}..."

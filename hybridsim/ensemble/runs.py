@@ -1,0 +1,210 @@
+"""Many runs of one model that differ in the values of parameters and in their start: the last period of each.
+
+A single run has its model checked, bound and decided on at its start in Python, which takes several times as long as a
+short run of linear modes itself. Here that is done for all runs together, or in compiled code. The runs are those of
+`hybridsim.integrators.closed_form.compiled_loop`; one that holds anything unusual is left to it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybridsim.engine.events.compiled.scratch import MOST, work_space
+from hybridsim.engine.events.outcome import Outcome
+from hybridsim.engine.linear.modes import holds_constants, is_always_linear
+from hybridsim.engine.linear.stretch import NODES, WEIGHTS, Stretch
+from hybridsim.engine.native.kernels import ENABLED, Door
+from hybridsim.engine.native.struct_pack import packed
+from hybridsim.engine.run.compiled_loop import NOT_LINEAR
+from hybridsim.engine.run.desk import Desk, laid_out
+from hybridsim.engine.system.period import common_multiple
+from hybridsim.engine.system.programs.mode_tables import automata_of, shelf_of
+from hybridsim.engine.system.system import System
+from hybridsim.ensemble.run import NEXT, SEGMENTS, Runs, run_fleet
+from hybridsim.ensemble.start import opposing
+from hybridsim.ensemble.tables import FleetTables, fleet_tables
+from hybridsim.integrators.closed_form.segments import Record, reach_leap, room_for
+
+_TOGETHER = 128  # runs whose tables are made at once: they stay in the processor's cache
+_TURNS = 100  # as in `hybridsim.engine.run.mode_loop`: the longest segment, in turns of the fastest angle
+_FULLY = 2.0 * math.pi
+
+_run, _opposing = Door(run_fleet), Door(opposing)
+
+
+class LastPeriods(NamedTuple):
+    """The last period of some runs: their numbers (m,), how long the periods are (m,), and what the states did, a row
+    of each array of a `Stretch` for each."""
+
+    numbers: np.ndarray
+    periods: np.ndarray
+    stretch: Stretch
+
+
+def sails(system: System) -> bool:
+    """Whether runs of a model may go together: contacts alone, in modes that are linear at any values of parameters.
+
+    What they hold has to be a number: what a state does that follows others is not read off here.
+    """
+    model = system.model
+    parts = model.monitors or model.inputs or model.schedules or model.discrete or system.ties
+    return (
+        ENABLED
+        and system.has_tape
+        and system.n > 0
+        and not parts
+        and all(a.has_surface and not (a.is_unique or a.is_unilateral) for a in system.automata)
+        and len(system.automata) <= MOST  # the shelf is complete from the beginning
+        and is_always_linear(system)
+        and holds_constants(system)
+    )
+
+
+class Fleet:
+    """Runs of one system from t = 0, each over a number of periods of its forcing; for one thread.
+
+    Parameters
+    ----------
+    system : one for which `sails` holds, at any values of its parameters.
+    goes_on : asked every few milliseconds; no more is run where it says no.
+    """
+
+    def __init__(self, system: System, goes_on: Callable[[], bool]) -> None:
+        self.system, self.automata, self.goes_on = system, automata_of(system), goes_on
+        self.inputs = system.registers.inputs
+        self.first = np.zeros(len(system.automata), dtype=np.int64)
+        shelf = shelf_of(system)
+        shelf.surround(self.first)
+        self.tapes = shelf.tapes
+        lean, layout = system.lean_tape(self.first), system.layout
+        self.surfaces = (
+            lean.constant_rows,
+            lean.rows,
+            lean.derivatives,
+            lean.surfaces,
+            np.array(system.surface_of, dtype=np.int64),
+        )
+        self.places = layout.origin_at, layout.phases_at, layout.pin_at
+        self.hold = np.array([a.hold for a in system.automata], dtype=np.int64)
+
+    def runs(self, parameters: np.ndarray, starts: np.ndarray, periods: int) -> Iterator[LastPeriods]:
+        """The last period of each run, some together, in any order; a run that is missing is not for a fleet.
+
+        parameters (N, P), in the order of the model; starts (N, n). It ends early where it is not to go on.
+        """
+        for first in range(0, len(parameters), _TOGETHER):
+            here = slice(first, first + _TOGETHER)
+            for last in self._runs(parameters[here], starts[here], periods):
+                yield last._replace(numbers=first + last.numbers)
+            if not self.goes_on():
+                return
+
+    def _runs(self, parameters: np.ndarray, starts: np.ndarray, periods: int) -> Iterator[LastPeriods]:
+        system, layout = self.system, self.system.layout
+        vectors = np.zeros((len(parameters), layout.size))
+        vectors[:, : layout.parameters] = parameters
+        vectors[:, layout.pin_at] = 1.0
+        rates = np.array([system.rates_at(p) for p in vectors]).reshape(len(vectors), -1)
+        known, which = np.unique(rates, axis=0, return_inverse=True)
+        times = np.array([_period(row) for row in known])[which.reshape(-1)]
+        fastest = np.abs(rates).max(axis=1, initial=0.0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            longest = _TURNS * _FULLY / fastest
+            horizons = np.minimum(periods * times, longest)
+        fit = np.flatnonzero(np.isfinite(times) & self._may_begin(starts, vectors))
+        groups = fleet_tables(system, self.tapes.modes, np.ascontiguousarray(parameters[fit]), horizons[fit])
+        for group in groups:
+            numbers = fit[group.numbers]
+            m, n, count = len(numbers), system.n, len(self.hold)
+            runs = Runs(
+                tables=group.addresses,
+                vectors=vectors[numbers],
+                rates=rates[numbers],
+                starts=np.ascontiguousarray(starts[numbers]),
+                ends=periods * times[numbers],
+                periods=times[numbers],
+                longest=longest[numbers],
+                done=np.zeros(m, dtype=np.bool_),
+                extremes=np.empty((m, 2, n)),
+                integrals=np.empty((m, 2, n)),
+                sides=np.empty((m, 2, n)),
+                held=np.empty((m, 2, count)),
+                holding=np.empty((m, 2, count), dtype=np.bool_),
+                at=np.zeros(4, dtype=np.int64),
+            )
+            self._sail(group, runs)
+            stretch = Stretch(runs.extremes, runs.integrals, runs.sides, runs.held, runs.holding)
+            yield LastPeriods(
+                numbers[runs.done], runs.periods[runs.done], Stretch(*(part[runs.done] for part in stretch))
+            )
+
+    def _sail(self, group: FleetTables, runs: Runs) -> None:
+        """Run all of them, as long as it is to go on."""
+        spare: deque[Any] = self.system.code.shared(f"scratch of fleets for {group.form}", deque)
+        try:
+            ship = spare.pop()
+        except IndexError:
+            ship = _Ship(self, group.first, runs.vectors[0])
+        under_way = packed(runs)
+        while True:
+            _run(
+                self.automata, self.tapes, self.inputs, NOT_LINEAR, group.first, self.places,
+                self.surfaces, self.hold, (NODES, WEIGHTS), under_way, ship.slopes, *ship.packs,
+            )  # fmt: skip
+            if runs.at[NEXT] == len(runs.ends) or not self.goes_on():
+                break
+        spare.append(ship)
+
+    def _may_begin(self, starts: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+        """Where each contact opposes its own velocity (N,); a run with one that does not is refused by itself."""
+        found = np.empty(len(starts), dtype=np.bool_)
+        room = np.zeros(len(self.system.surface_of))
+        _opposing(self.system.address("effects"), starts, vectors, self.first, room, found)
+        return found
+
+
+def _period(rates: np.ndarray) -> float:
+    """Of everything that turns at such rates; NaN where it does not repeat."""
+    return common_multiple((_FULLY / abs(rates[rates != 0.0])).tolist()) or math.nan
+
+
+class _Ship:
+    """Scratch arrays for runs whose tables are of one form, and their packs in the order in which they are taken."""
+
+    def __init__(self, fleet: Fleet, tables: Any, p: np.ndarray) -> None:
+        system = fleet.system
+        n, widest, count, whole = system.n, tables.values.shape[1], len(fleet.hold), np.int64
+        work = work_space(system, len(tables.kinds), len(tables.factors))
+        none, guards = np.zeros(0, dtype=whole), system.guard_count
+        blank = Outcome(
+            np.zeros(n), p.copy(), np.zeros(count, dtype=whole), np.ones(guards, dtype=whole),
+            np.zeros(guards, dtype=whole), none, none, np.zeros(n), np.zeros(guards), np.zeros(0),
+        )  # fmt: skip
+        desk = Desk.of(laid_out(blank, p), work, room_for(system, tables))
+        size = 2 * SEGMENTS
+        record = Record(
+            ends=np.empty(size),
+            clocks=np.empty((size, 2)),
+            rows=np.empty(size, dtype=whole),
+            modes=np.empty((size, count), dtype=whole),
+            vectors=np.empty((size, system.layout.size)),
+            coordinates=np.empty((size, widest), dtype=complex),
+            fires=np.empty(size, dtype=whole),
+            jumps=np.empty((size, 3, n)),
+        )
+        found = Stretch(
+            extremes=np.empty((2, n)),
+            integrals=np.empty((2, n)),
+            ends=np.empty((2, n)),
+            held=np.empty((2, count)),
+            holding=np.empty((2, count), dtype=np.bool_),
+        )
+        late = packed(Record(*(part[SEGMENTS:] for part in record)))
+        reach_leap(fleet.automata, fleet.tapes, fleet.inputs, tables, desk.as_packed, work, desk.room, late)
+        self.packs = desk.as_packed, work, desk.room, late, packed(record), packed(found)
+        self.slopes = np.zeros((3, n))

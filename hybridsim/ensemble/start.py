@@ -1,0 +1,189 @@
+"""How a run starts, in compiled code: contacts that are to find their modes by themselves, as far as that is plain.
+
+The rules are those of `hybridsim.engine.events.resolve`, which settles what is not plain and can say what is the
+matter.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from hybridsim.engine.events.choice.verdict import FINE, choose
+from hybridsim.engine.events.compiled.scratch import AT, AT_ERROR, Before, called_by
+from hybridsim.engine.events.compiled.verdicts import cluster_of, guard_series, judge_candidate, judge_members
+from hybridsim.engine.linear.motion import functions_of_time, to_modal
+from hybridsim.engine.native.kernels import call, call_apart, kernel, merged
+from hybridsim.engine.native.loop_hints import put
+from hybridsim.engine.native.simd_products import LANES
+from hybridsim.engine.run.leap import set_origin
+from hybridsim.engine.series.bounded import UNIT, run_series
+from hybridsim.engine.system.programs.modes_index import find_modes
+
+_UNKNOWN = -1  # in place of a mode
+
+
+@kernel
+def plain_start(
+    automata: Any,
+    tapes: Any,
+    inputs: Any,
+    none: Any,
+    places: Any,
+    surfaces: Any,
+    t0: float,
+    state: Any,
+    work: Any,
+) -> bool:
+    """Decide all modes at t0 from the state, whose p holds parameters; False where that is not plain.
+
+    none: empty tables, so that guards are judged by the tape. places: rates, then where in p the origin, the phases and
+    the pin are. surfaces: of the tape of the first modes constant rows, rows, registers of the rates and of the
+    surfaces, and the component of each surface.
+    """
+    rates, origin_at, phases_at, pin_at = places
+    x, x_error, z, p = state.x, state.x_error, state.z, state.p
+    set_origin((origin_at, phases_at), rates, t0, 0.0, p)
+    for i in range(x.shape[0]):
+        x_error[i] = (
+            0.0 if x[i] == round(x[i]) else 2.0 * UNIT * abs(x[i])
+        )  # as `engine.events.start.start_errors`
+    if not _take_sides(automata, inputs, surfaces, pin_at, state, work):
+        return False
+    for c in range(z.shape[0]):
+        if z[c] == _UNKNOWN and not _decide_cluster(automata, tapes, inputs, none, state, c, work):
+            return False
+    k = find_modes(tapes, z)
+    if k < 0:
+        return False
+    at = Before(0.0, 0.0, x, x_error, p, z)
+    guard_series(tapes, inputs, none, k, at, x, x_error, work)
+    verdict = call_apart(
+        judge_members,
+        (
+            automata, none, k, at, x, x_error, z, work.everything, -1, False, False, work, state.sides, state.orders,
+            state.floors,
+        ),
+    )  # fmt: skip
+    return verdict == FINE
+
+
+@merged
+def _take_sides(automata: Any, inputs: Any, surfaces: Any, pin_at: int, state: Any, work: Any) -> bool:
+    """The mode of the side that each is on, _UNKNOWN on the surface; False where there is no number."""
+    constant, rows, derivatives, registers, owners = surfaces
+    V, E, z, p = work.V, work.E, state.z, state.p
+    p[pin_at] = 0.0  # the states as they are, not as a holding mode would have them
+    run_series(constant, rows, inputs, derivatives, 0.0, 0.0, state.x, state.x_error, p, V, E)
+    p[pin_at] = 1.0
+    for j in range(registers.shape[0]):
+        c, value = owners[j], V[registers[j], 0]
+        if not abs(value) < math.inf:
+            return False
+        work.on_surface[c] = abs(value) <= E[registers[j], 0]
+        if work.on_surface[c]:
+            z[c] = _UNKNOWN
+        else:
+            z[c] = automata.above[c] if value > 0.0 else 3 - automata.hold[c] - automata.above[c]
+    return True
+
+
+@merged
+def _decide_cluster(
+    automata: Any, tapes: Any, inputs: Any, none: Any, state: Any, first: int, work: Any
+) -> bool:
+    """The one motion that `choose` prefers, of those that a component on its surface may begin with the others."""
+    x, x_error, z, p = state.x, state.x_error, state.z, state.p
+    members, candidates, current, holds = work.members, work.candidates, work.current, work.holds
+    verdicts, trial, y = work.verdicts, work.trial, work.y
+    cluster = cluster_of(automata, first)
+    count = 0
+    for i in range(cluster.shape[0]):
+        c = cluster[i]
+        if z[c] == _UNKNOWN:
+            if count == members.shape[0]:
+                return False
+            members[count], current[count], holds[count] = c, automata.hold[c], automata.hold[c]
+            count += 1
+    for c in range(z.shape[0]):
+        trial[c] = max(z[c], 0)
+    for i in range(count):
+        trial[members[i]] = holds[i]
+    call(called_by(work).project, 0.0, x, p, trial, y)
+    put(y, x)
+    for i in range(count):
+        for j in range(automata.pin.shape[1]):
+            held = automata.pin[members[i], j]
+            if held >= 0:
+                x_error[held] = UNIT * abs(x[held])
+    work.real[AT] = work.real[AT_ERROR] = 0.0
+    put(x, work.x_after)
+    put(x_error, work.slopes)
+    total = 3**count
+    for number in range(total):
+        rest = number
+        for i in range(count - 1, -1, -1):
+            candidates[number, i] = rest % 3
+            rest //= 3
+        for i in range(count):
+            trial[members[i]] = candidates[number, i]
+        verdicts[number] = call_apart(
+            judge_candidate, (automata, tapes, inputs, none, state, work, -1, False, first, number)
+        )
+        if verdicts[number] < -1:  # modes that are not on the shelf
+            return False
+    number = choose(candidates[:total, :count], verdicts[:total], current[:count], holds[:count])
+    if number < 0 or verdicts[number] != FINE:
+        return False
+    for i in range(count):
+        z[members[i]] = candidates[number, i]
+    return True
+
+
+@kernel
+def rests_for_ever(tapes: Any, lin: Any, state: Any, work: Any, c: Any) -> bool:
+    """Whether nothing moves from here on: all states stand still, and no guard of a wave ever goes beyond zero.
+
+    A guard that comes to zero and turns back there, to within its rounding, leaves the mode as it is. Functions of time
+    are taken at the origin of the state; c: room for modal coordinates.
+    """
+    x, z, p = state.x, state.z, state.p
+    k = find_modes(tapes, z)
+    if k < 0:
+        return False
+    functions_of_time(lin, 0.0, p, work.factors, work.w)
+    for m in range(lin.slopes.shape[2]):
+        for q in range(lin.slopes.shape[1]):
+            for i in range(LANES):
+                if lin.slopes[k, q, m, i] != 0.0 and (m >= x.shape[0] or x[m] != 0.0):
+                    return False  # it moves, or is driven
+    to_modal(lin, k, x, work.w, c)
+    for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
+        g = tapes.active[i]
+        turning = lin.waves[k, g]
+        level = size = 0.0
+        for j in range(lin.counts[k]):
+            size += lin.sizes[k, g, j] * (abs(c[j].real) + abs(c[j].imag))
+            if j != turning:
+                if lin.sizes[k, g, j] != 0.0 and lin.values[k, j] != 0.0:
+                    return False  # neither a constant nor the one wave
+                level += lin.terms[k, g, j, 0, 0] * c[j].real - lin.terms[k, g, j, 1, 0] * c[j].imag
+        radius = 0.0
+        if turning >= 0:
+            u, v = lin.terms[k, g, turning, 0, 0], lin.terms[k, g, turning, 1, 0]
+            radius = math.hypot(
+                u * c[turning].real - v * c[turning].imag, u * c[turning].imag + v * c[turning].real
+            )
+        if not level - radius >= -(16.0 + 2.0 * lin.counts[k]) * UNIT * size or not level > 0.0:
+            return False
+    return True
+
+
+@kernel
+def opposing(effects: Any, x: Any, p: Any, z: Any, room: Any, out: Any) -> None:
+    """Whether in each of N starts x (N, n), p (N, P) every contact opposes its own velocity: out (N,); room (C,)."""
+    for i in range(x.shape[0]):
+        call(effects, 0.0, x[i], p[i], z, room)
+        out[i] = True
+        for c in range(room.shape[0]):
+            out[i] = out[i] and room[c] < 0.0

@@ -1,0 +1,109 @@
+"""Tables of linear modes for many values of the parameters: made together, in arrays that lie one behind the other."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.linear.plan import plan_of
+from hybridsim.engine.linear.tables import (
+    LinearTables,
+    angles_of,
+    horizon_class,
+    leave_out,
+    of_matrices,
+    unknown,
+)
+from hybridsim.engine.native.struct_pack import packed
+from hybridsim.engine.system.system import System
+
+_COMPUTED = ("rates", "offsets", "weights")  # of the atoms: what depends on the values of parameters
+
+
+class FleetTables:
+    """What `hybridsim.engine.linear.tables.tables_of` gives for one point, for all points of a group.
+
+    Parameters
+    ----------
+    numbers : of the points (m,).
+    fields : of the tables, by name, where they differ from point to point one behind the other.
+    modes : how many vectors of modes they are for.
+
+    Attributes
+    ----------
+    first : the tables of the first point, for kernels; its type is that of all.
+    addresses : of the packs of all points (m,).
+    """
+
+    def __init__(self, numbers: np.ndarray, fields: dict[str, np.ndarray], modes: int) -> None:
+        self.numbers = numbers
+        self.form = len(fields["kinds"]), len(fields["factors"]), modes, fields["values"].shape[1]
+        counts = {name: modes if name not in _COMPUTED else 1 for name in LinearTables._fields}
+        shared = {name for name in LinearTables._fields if _is_shared(name)}
+        self._arrays = fields  # the packs hold addresses alone
+        self.first: Any = packed(
+            LinearTables(
+                **{
+                    name: array
+                    if name in shared
+                    else array[0]
+                    if name in _COMPUTED
+                    else array[: counts[name]]
+                    for name, array in fields.items()
+                }
+            )
+        )
+        steps = [
+            0 if name in shared else fields[name].strides[0] * counts[name] for name in LinearTables._fields
+        ]
+        rows = np.tile(self.first.table, (len(numbers), 1))
+        by_array = rows.reshape(len(numbers), len(steps), -1)
+        by_array[:, :, 0] += np.arange(len(numbers))[:, None] * np.array(steps, dtype=np.int64)
+        self._rows = rows
+        self.addresses = rows.ctypes.data + np.arange(len(numbers)) * rows.strides[0]
+
+
+def _is_shared(name: str) -> bool:
+    return name in ("kinds", "term_start", "sources", "factors", "phases")
+
+
+def fleet_tables(
+    system: System, modes: np.ndarray, parameters: np.ndarray, horizons: np.ndarray
+) -> list[FleetTables]:
+    """Tables of these vectors of modes (K, components) at many points: parameters (N, P), horizons (N,).
+
+    One group for each order of magnitude of the horizon and each plan. Points whose tables hold no finite numbers are
+    in none of them.
+    """
+    classes = np.array([horizon_class(float(h)) for h in horizons])
+    groups, left = [], np.arange(len(parameters))
+    while len(left):
+        plan, _ = plan_of(system, modes, parameters[left[0]])
+        registers, holds = plan.recipe.values_at(parameters[left])
+        chosen, registers = left[holds], registers[holds]
+        for horizon in np.unique(classes[chosen]):
+            among = classes[chosen] == horizon
+            made = _group(system, plan, chosen[among], registers[among], float(horizon))
+            if made is not None:
+                groups.append(made)
+        left = left[~holds]
+    return groups
+
+
+def _group(
+    system: System, plan: Any, numbers: np.ndarray, registers: np.ndarray, horizon: float
+) -> FleetTables | None:
+    A, rows = plan.matrices(registers)
+    is_finite = leave_out(A, rows, system.n)
+    known = is_finite.any(axis=1)
+    numbers, registers, A, rows, is_finite = (
+        part[known] for part in (numbers, registers, A, rows, is_finite)
+    )
+    if not len(numbers):
+        return None
+    modes = A.shape[1]
+    A, rows = (part.reshape(-1, *part.shape[2:]) for part in (A, rows))  # one behind the other
+    of_modes = unknown(of_matrices(A, rows, system.n, horizon), is_finite.ravel())
+    fields = plan.atoms(registers) | {"phases": angles_of(system)} | of_modes
+    return FleetTables(numbers, {name: np.ascontiguousarray(a) for name, a in fields.items()}, modes)

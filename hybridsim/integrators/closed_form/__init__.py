@@ -1,0 +1,1 @@
+"""The integrator `exact` follows linear modes in closed form."""

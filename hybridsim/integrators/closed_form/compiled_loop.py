@@ -1,0 +1,194 @@
+"""Leaps over segments of linear modes, as the general mode loop sees them."""
+
+from __future__ import annotations
+
+import math
+from time import perf_counter
+
+import numpy as np
+
+from hybridsim.engine.events.compiled.scratch import work_space
+from hybridsim.engine.events.outcome import Outcome
+from hybridsim.engine.linear.closed_form_block import ClosedFormBlock
+from hybridsim.engine.linear.tables import LinearTables, tables_of
+from hybridsim.engine.native.kernels import Door
+from hybridsim.engine.native.struct_pack import Sheet
+from hybridsim.engine.record.array_forms import check_modes
+from hybridsim.engine.record.checkpoint import damaged
+from hybridsim.engine.record.counters import Counters
+from hybridsim.engine.record.trajectory import Trajectory
+from hybridsim.engine.run.desk import Desk, Laid, laid_out
+from hybridsim.engine.run.kernel_run import Leapt
+from hybridsim.engine.run.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Landing
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.programs.mode_tables import automata_of, shelf_of
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.tolerances import Tolerances
+from hybridsim.integrators.closed_form.segments import Record, leap_at_address, reach_leap, room_for
+
+_SEGMENTS = 1024  # room for one call
+_NONE = np.zeros(0, dtype=np.int64)
+
+_leap = Door(leap_at_address)
+
+
+class ExactLeaper:
+    """Leaps of one run."""
+
+    def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
+        self.system, self.longest = system, longest
+        self.horizon = 0.0  # the farthest that a segment might have gone so far
+        # as in the room of a leap, where the last one left them
+        self.hints = np.zeros((0, system.guard_count))
+        self.shelf, self.automata = shelf_of(system), automata_of(system)
+        self.tables: LinearTables | None = None  # those that the sheet is for
+        self.sheet: Sheet
+        self.leapt: Leapt | None = None  # a call that was made ahead, for the next leap to begin with
+
+    def anew(self) -> ExactLeaper:
+        """The same for another run."""
+        other: ExactLeaper = object.__new__(type(self))
+        vars(other).update(vars(self))
+        return other
+
+    @property
+    def place(self) -> tuple[np.ndarray, ...]:
+        """How far ahead the tables reach, and when guards were zero last: the last digits of a zero depend on it.
+
+        The hints come with their vectors of modes: another process has these in other rows.
+        """
+        count = len(self.hints)
+        modes = self.shelf.tapes.modes[:count]
+        return np.array([self.horizon, float(count)]), modes.ravel().astype(float), self.hints.ravel()
+
+    @place.setter
+    def place(self, place: np.ndarray) -> None:
+        guards, components = self.system.guard_count, len(self.system.automata)
+        what = "the zeros of guards that were met last"
+        whole = len(place) >= 2 and 0.0 <= place[0] < math.inf and 0.0 <= place[1] <= len(place)
+        if not whole or len(place) != 2 + int(place[1]) * (components + guards):
+            raise damaged(what)
+        self.horizon, count = float(place[0]), int(place[1])
+        try:
+            check_modes(
+                what,
+                place[2 : 2 + count * components].reshape(count, components),
+                [len(a.modes) for a in self.system.automata],
+            )
+        except ValueError:
+            raise damaged(what) from None
+        vectors = place[2 : 2 + count * components].reshape(count, components).astype(np.int64)
+        hints = place[2 + count * components :].reshape(count, guards)
+        is_known = (hints > 0.0).any(axis=1)
+        rows = self.shelf.rows_of(vectors[is_known])
+        self.hints = np.zeros((max(rows.tolist(), default=-1) + 1, guards))
+        self.hints[rows] = hints[is_known]
+
+    def go(self, origin: Instant, laid: Laid, target: Instant) -> Leapt | None:
+        """Call the kernel; None where there are no tables."""
+        system, shelf = self.system, self.shelf
+        shelf.surround(laid.part("z"))
+        tapes, inputs = shelf.tapes, system.registers.inputs
+        horizon = max(self.horizon, min(target.minus(origin), self.longest))
+        found = tables_of(system, tapes.modes, laid.part("p"), horizon)
+        if found is None:
+            self.horizon = horizon
+            return None
+        tables, spare = found
+        if tables is not self.tables:
+            self.tables, self.sheet = tables, self._sheet(tables)
+        memory = self.sheet.blank()
+        rows = self.sheet.packed(memory)
+        try:
+            desk = spare.pop()
+        except IndexError:
+            work = work_space(system, len(tables.kinds), len(tables.factors))
+            desk = Desk.of(laid, work, room_for(system, tables))
+            reach_leap(self.automata, tapes, inputs, tables, desk.as_packed, work, desk.room, rows)
+        desk.take_up(laid)
+        room = desk.room
+        room.rates[:], room.longest[0] = system.rates, self.longest
+        room.times[:] = *target, *origin
+        hints, known = room.hints, len(self.hints)
+        hints[:known], hints[known:] = self.hints, 0.0
+        began = perf_counter()
+        code = _leap(self.automata, tapes, inputs, tables, desk.as_packed, desk.work, room, rows)
+        seconds = perf_counter() - began
+        end, clock, count = desk.leave(), room.times[2:].tolist(), int(room.committed[0])
+        beside = (tables, horizon, hints.copy())
+        spare.append(desk)
+        shelf.surround(end.part("z"))
+        has_news = count > 0 and len(shelf.tapes.modes) != len(tapes.modes)
+        return Leapt(system, self.sheet, memory, 0, code, count, count, clock, end, has_news, seconds, beside)
+
+    def leap(
+        self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
+    ) -> Landing:
+        """As far as ordinary events and the room for them go."""
+        leapt, self.leapt = self.leapt or self.go(origin, laid_out(outcome, p), target), None
+        if leapt is None:
+            return Landing(origin, outcome.copy, BEFORE_SOMETHING, np.zeros((0, 2)), _NONE)
+        _, self.horizon, self.hints = leapt.beside
+        self.count(leapt, record.counters)
+        if leapt.count:
+            self._commit(leapt, record)
+        goes_on = leapt.is_full or leapt.has_news
+        end = ARRIVED if leapt.is_at_target else (PAUSED if goes_on else BEFORE_SOMETHING)
+        return Landing(Instant(*leapt.clock), leapt.after, end, leapt.instants, leapt.owners)
+
+    def count(self, leapt: Leapt, counters: Counters) -> None:
+        """Add what a call has cost."""
+        leapt.count_in(counters)
+
+    def forget_segments(self, leapt: Leapt) -> bool:
+        """Let go of all segments but the end of the last one."""
+        leapt.forget_segments()
+        return True
+
+    def _sheet(self, tables: LinearTables) -> Sheet:
+        """What the kernel writes to; the trajectory keeps it, events longer than segments."""
+        widest, system = tables.values.shape[1], self.system
+
+        def made() -> Sheet:
+            return Sheet(
+                Record,
+                (
+                    (float, (_SEGMENTS,), 0),
+                    # one row more: where each begins and where the last one ends
+                    (float, (_SEGMENTS + 1, 2), 1),
+                    (np.int64, (_SEGMENTS,), 0),
+                    (np.int64, (_SEGMENTS + 1, len(system.automata)), 1),
+                    (float, (_SEGMENTS, system.layout.size), 0),
+                    (complex, (_SEGMENTS, widest), 0),
+                    (np.int64, (_SEGMENTS,), 1),
+                    (float, (_SEGMENTS, 3, system.n), 1),
+                ),
+            )
+
+        sheet: Sheet = system.code.shared(f"sheet for {widest} modal coordinates", made)
+        return sheet
+
+    def segments_of(self, leapt: Leapt) -> ClosedFormBlock:
+        """The segments of a call that has some, and has let go of none."""
+        ends, origins, numbers, modes, vectors, coordinates, _, jumps = leapt.rows
+        begun, tables = slice(0, leapt.count), leapt.beside[0]
+        return ClosedFormBlock(
+            self.system,
+            tables,
+            numbers[begun],
+            ends[begun],
+            coordinates[begun],
+            origins[begun],
+            modes[begun],
+            vectors[begun],
+            jumps[begun],
+        )
+
+    def _commit(self, leapt: Leapt, record: Trajectory) -> None:
+        """Leave the segments to the trajectory, and the events."""
+        if record.segments.is_end_alone:
+            record.segments.keep_only(leapt.last_end)
+        else:
+            record.segments.add(self.segments_of(leapt))
+        if leapt.crossings is not None:
+            record.occurrences.add(leapt.crossings)

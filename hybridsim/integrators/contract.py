@@ -1,0 +1,117 @@
+"""The contract of an integrator, for those who write one."""
+
+from __future__ import annotations
+
+from abc import ABCMeta
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import ClassVar
+
+import numpy as np
+
+from hybridsim.engine.record.trajectory import Task, Trajectory
+from hybridsim.engine.run.at_once import carried_out
+from hybridsim.engine.run.stepping import Flow, Leaps, Stepper, Watch
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.tolerances import Tolerances
+
+NEEDS_TAPE = "it works on a tape, which is made from expressions"  # reason to lack "functions"
+CAPABILITIES = {
+    "contacts": "contacts with dry friction, which stick",
+    "located": "events of contacts are located: their number and order are those of the motion",
+    "impacts": "unilateral contacts with restitution",
+    "sliding": "switching surfaces, along which a motion slides",
+    "transitions": "general automata: modes, choices, resets",
+    "monitors": "events that change no mode",
+    "scheduled": "events and inputs at times known beforehand",
+    "multiple-roots": "several zeros of a guard within one step",
+    "accumulation": "events that follow each other ever faster, down to rounding",
+    "tangent-exit": "sliding that is left, at a tangency as ever, where several states make the surface",
+    "poles": "motions that grow without bound towards a time that is not reached",
+    "exact-stick": "a held state is exact, bit for bit",
+    "backward": "time running backward",
+    "corners": "what is left of corners and jumps inside a mode: sign, a condition, a corner that is no component",
+    "functions": "models whose rates are a Python function",
+    "stiff": "rates that differ by many decades",
+    "nonlinear": "flows and guards that are not linear in the states",
+    "adaptive": "the error follows rtol and atol",
+}
+
+
+class _IntegratorType(ABCMeta):
+    """The type of integrators, which prints an integrator with its name and its order."""
+
+    def __repr__(cls) -> str:
+        name, title, order = (getattr(cls, key, "") for key in ("name", "title", "order"))
+        return f"<integrator {name}: {title}, order {order}>" if name else super().__repr__()
+
+
+class Integrator(metaclass=_IntegratorType):
+    """How a piecewise-smooth system is integrated.
+
+    The contract, in the order in which it matters:
+
+    1. An integrator is a frozen dataclass; its fields are its options, with defaults and types. It keeps no state
+       between runs: whatever a run needs lives in the stepper.
+    2. Give ``start`` to step through smooth segments and have events located, decided and settled by the engine; or
+       give ``run`` to drive a whole run, as a fixed-step method that makes its own decisions does.
+    3. ``start(flow, x0, s_bound, tolerances, first_step, watch)`` begins a segment at local time 0 in the state x0.
+       Its field ``flow.rhs(s, x)`` is smooth: no sign, no switch. Everything is fresh: no history of an earlier
+       segment may be used.
+    4. ``stepper.step()`` returns the next accepted `Step`, the last one ending at ``s_bound`` bit for bit, or raises
+       `StepFailure`. A trial in which a number is not finite is a rejected step, never an accepted one. s_bound is
+       negative when time runs backward.
+    5. ``step.dense(times)`` takes local times (k,) inside the step to states (k, n) and meets x0 and x1 at its ends.
+       Say in ``dense_is_accurate`` whether it is as accurate as the method; if not, give ``stepper.restep(step, s)``,
+       the same step up to s exactly, and event times get the accuracy of the method. Where its error up to s is
+       above the tolerance, return a shorter step, from whose end ``step()`` goes on: it is searched anew.
+    6. A method that finds zeros by itself returns them in ``step.roots`` and ends its step at them; ``watch`` says
+       what to look for and which leading coefficients are zero at the start, by decree.
+    7. What a method cannot do stands in ``lacks``: capability (a key of `CAPABILITIES`) to the reason. A model that
+       needs it is refused with that reason.
+    8. Evaluate only through ``flow``: it counts. Count rejected steps in ``flow.counters.rejected``.
+    9. `hybridsim.testing` holds every integrator to the event contract; run it on yours.
+    """
+
+    name: ClassVar[str]
+    title: ClassVar[str]
+    order: ClassVar[str]
+    reference: ClassVar[str]
+    when: ClassVar[str]
+    lacks: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    dense_is_accurate: ClassVar[bool] = False
+    leaps: ClassVar[bool] = False  # whether it has a compiled loop, which leaper() gives
+
+    @property
+    def stable_to(self) -> float:
+        """Of an explicit method, how far along the negative axis of h*lambda its steps are stable; else 0."""
+        return 0.0
+
+    @property
+    def rounding(self) -> float:
+        """What steps round away at most, in units of rounding of the way that the states went."""
+        return 100.0
+
+    def prepare(self, system: System) -> None:
+        """Compile what a run of this method needs beyond the model's functions; it counts as compile time."""
+        return
+
+    def start(
+        self,
+        flow: Flow,
+        x0: np.ndarray,
+        s_bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+        watch: Watch,
+    ) -> Stepper:
+        """Begin a smooth segment."""
+        raise NotImplementedError(f"{self.name} has no start(): it drives its runs itself")
+
+    def leaper(self, system: System, tolerances: Tolerances, longest: float) -> Leaps | None:
+        """The compiled loop of this method for one run; None where the model rules it out."""
+        return None
+
+    def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
+        """Run a task; by default step by step through the engine's mode loop."""
+        return carried_out(system, self, task, progress)

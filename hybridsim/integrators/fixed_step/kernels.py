@@ -1,0 +1,81 @@
+"""What the kernels of all fixed-step methods share: why a stretch of steps ends, and what a step has passed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.native.kernels import call, inlined
+
+# why a stretch of steps ended
+BOUND, FULL, GUARD, MONITOR, NOT_FINITE, RESTITUTION, RESTED = 0, 1, 2, 3, 4, 5, 6
+GOES_ON = -1
+
+
+@inlined
+def leaves_side(before: float, after: float) -> bool:
+    """Whether a monitor goes from one side to zero or beyond."""
+    return (before > 0.0 and after <= 0.0) or (before < 0.0 and after >= 0.0)
+
+
+@inlined
+def brought_to_zero(
+    address: Any, s: float, x: Any, p: Any, z: Any, fresh: Any, is_first: bool, before: Any, after: Any
+) -> bool:
+    """Whether the modes that a step begins with have brought a monitor to zero from where the step before left it.
+
+    address: of the monitors, whose values are written to before; after: their values at the end of the step before.
+    Those that it holds for are marked in fresh.
+    """
+    found = False
+    if fresh.shape[0] > 0:
+        call(address, s, x, p, z, before)
+        for k in range(fresh.shape[0]):
+            if not is_first and leaves_side(after[k], before[k]):
+                fresh[k] = True
+                found = True
+    return found
+
+
+@inlined
+def passed(
+    functions: Any,
+    s1: float,
+    x1: Any,
+    p: Any,
+    z: Any,
+    watched: Any,
+    fresh: Any,
+    is_first: bool,
+    guards: Any,
+    before: Any,
+    after: Any,
+    counts: Any,
+) -> int:
+    """What ends the stretch at a step to (s1, x1), or GOES_ON.
+
+    functions: addresses of guards and monitors. watched: guards that must not be negative. fresh: monitors that have
+    just fired: the rest of such a zero is no new zero on the first step. before: their values where the step begins.
+    guards, after: room.
+    """
+    for i in range(x1.shape[0]):
+        if not np.isfinite(x1[i]):
+            return NOT_FINITE
+    if watched.shape[0] > 0:
+        call(functions[0], s1, x1, p, z, guards)
+        counts[1] += 1
+        leaves = False
+        for i in range(watched.shape[0]):
+            if watched[i] >= 0:
+                if np.isnan(guards[watched[i]]):
+                    return NOT_FINITE
+                leaves = leaves or guards[watched[i]] < 0.0
+        if leaves:
+            return GUARD
+    if fresh.shape[0] > 0:
+        call(functions[1], s1, x1, p, z, after)
+        for k in range(fresh.shape[0]):
+            if leaves_side(before[k], after[k]) and not (is_first and fresh[k]):
+                return MONITOR
+    return GOES_ON

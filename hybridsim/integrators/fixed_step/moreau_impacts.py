@@ -1,0 +1,98 @@
+"""Kernels of time stepping with impacts: which gaps close in a step, how they rebound, what loads friction."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hybridsim.engine.native.kernels import call, kernel
+from hybridsim.engine.native.loop_hints import put
+from hybridsim.model.parts.impact import ROUNDING
+
+UNILATERAL = 7  # column of the table that says whether a surface is a gap
+# what a normal force lets grow: friction of slip above, below, limits of stick
+UP, DOWN, MOST, LEAST = range(4)
+_STEPPED = 6  # number of that function among those of a step
+
+
+@kernel
+def add_impacts(functions: Any, table: Any, s: float, x: Any, p: Any, room: Any) -> None:
+    """Rates u of the surfaces with their slopes at (s, x), what a unit of each force does, and loads of friction.
+
+    The loads are taken where the forces are, see `take_apart`: `room.sides` are the modes that x is in, with all gaps
+    open, and `room.y1` the surfaces.
+    """
+    n, m, sides, trial = x.shape[0], table.shape[0], room.sides, room.trial
+    stepped = functions[_STEPPED]
+    call(stepped, s, x, p, sides, room.rows)
+    for k in range(m):
+        room.u[k] = room.rows[k]
+        for i in range(n):
+            room.S[k, i] = room.rows[m + k * n + i]
+            room.B[k, i] = room.rows[m + (m + k) * n + i]
+        is_above = room.y1[k] >= 0.0
+        _keep_loads(room, n, m, k, UP if is_above else DOWN)
+    for k in range(m):
+        if table[k, UNILATERAL] != 0:
+            continue
+        c, is_above = table[k, 0], room.y1[k] >= 0.0
+        put(sides, trial)
+        trial[c] = table[k, 3]
+        call(functions[4], s, x, p, trial, room.on)
+        call(stepped, s, room.on, p, trial, room.rows)
+        _keep_loads(room, n, m, k, MOST)
+        _keep_loads(room, n, m, k, LEAST)
+        trial[c] = table[k, 2 if is_above else 1]
+        call(stepped, s, room.on, p, trial, room.rows)
+        _keep_loads(room, n, m, k, DOWN if is_above else UP)
+
+
+@kernel
+def _keep_loads(room: Any, n: int, m: int, k: int, bound: int) -> None:
+    first = m + 2 * m * n + (bound * m + k) * m
+    for d in range(m):
+        room.loads[bound, k, d] = room.rows[first + d]
+
+
+@kernel
+def approach(restitutions: Any, table: Any, s: float, h: float, x: Any, p: Any, z: Any, room: Any) -> bool:
+    """Which gaps may push in a step from (s, x, z), and how fast they separate at least; False: a restitution is amiss.
+
+    A gap takes part that is closed, or that would be so by the middle of the step at its present rate. What is closed
+    does not approach: rounding must not make it rebound.
+    """
+    n = x.shape[0]
+    for i in range(n):
+        room.approach[i] = x[i]
+    for k in range(table.shape[0]):
+        is_gap, is_closed = table[k, UNILATERAL] != 0, z[table[k, 0]] == table[k, 3]
+        speed = max(-room.u[k], 0.0) if is_gap and not is_closed else 0.0
+        room.approach[n + k] = speed
+        takes_part = is_gap and (is_closed or room.y1[k] + 0.5 * h * room.u[k] <= 0.0)
+        room.active[k] = 1 if takes_part else 0
+    call(restitutions, s, room.approach, p, room.sides, room.restitution)
+    for k in range(table.shape[0]):
+        room.rebound[k] = 0.0
+        if room.active[k] != 0:
+            e = room.restitution[k]
+            if not -ROUNDING <= e <= 1.0 + ROUNDING:
+                return False
+            room.rebound[k] = min(max(e, 0.0), 1.0) * room.approach[n + k]
+    return True
+
+
+@kernel
+def gap_rates(table: Any, X: Any, free: Any, room: Any) -> None:
+    """Rates of the surfaces without forces, `room.y`, and what a unit of each force does to them, `room.G`.
+
+    Linear about X, the last iterate: where the iteration ends they are exact.
+    """
+    for k in range(table.shape[0]):
+        total = room.u[k]
+        for i in range(X.shape[0]):
+            total += room.S[k, i] * (free[i] - X[i])
+        room.y[k] = total
+        for j in range(table.shape[0]):
+            total = 0.0
+            for i in range(X.shape[0]):
+                total += room.S[k, i] * room.w[j, i]
+            room.G[k, j] = total

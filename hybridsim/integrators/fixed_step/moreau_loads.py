@@ -1,0 +1,45 @@
+"""Whether the limits of a friction force depend on another friction force, which time stepping does not solve for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from hybridsim.errors import UsageError
+from hybridsim.model.smoothing.one_sided import names_of
+
+if TYPE_CHECKING:
+    from hybridsim.model.parts.model import Model
+
+
+def refuse_loads_of_friction(model: Model, integrator: str) -> None:
+    """Refuse a contact whose load, or law, uses the friction force of another one.
+
+    The sweeps take each limit as given, except for normal forces. A limit that follows another friction force would be
+    taken as where that one slips.
+    """
+    components = model.all_components()
+    frictions = {c.surface.unknown: c.name for c in components if c.surface and not c.surface.is_unilateral}
+    behind = {name: names_of(expr.tree) for name, expr in model.definitions}
+    for component in components:
+        for mode in component.modes:
+            for name, expr in mode.set.items():
+                if name not in frictions:
+                    behind[name] = behind.get(name, frozenset()) | names_of(expr.tree)
+    for component in components:
+        surface = component.surface
+        if surface is None or surface.is_unilateral:
+            continue
+        open_ = set().union(*(names_of(guard.expr.tree) for mode in component.modes for guard in mode.guards))
+        open_ |= set().union(*(names_of(expr.tree) for mode in component.modes for expr in mode.set.values()))
+        seen: set[str] = set()
+        while open_:
+            name = open_.pop()
+            seen.add(name)
+            open_ |= behind.get(name, set()) - seen
+        used = sorted(seen & (frictions.keys() - {surface.unknown}))
+        if used:
+            raise UsageError(
+                f"{integrator} takes the load of each contact as given: that of {component.name} depends on the "
+                f"friction force {', '.join(used)}",
+                remedy="use an integrator that locates events, such as exact, taylor or dop853",
+            )

@@ -1,0 +1,148 @@
+"""The published fixed-step methods: RK4 with a dichotomy to the zero-velocity interval, and RK4 with a bare sign."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+from hybridsim.engine.record.trajectory import Task, Trajectory
+from hybridsim.engine.system.system import System
+from hybridsim.errors import UsageError
+from hybridsim.integrators.contract import Integrator
+from hybridsim.integrators.fixed_step.rk4_kernels import SIGN, ZONE
+from hybridsim.integrators.fixed_step.rk4_march import FixedStep, Rk4March
+from hybridsim.integrators.fixed_step.run import FixedStepRun
+from hybridsim.integrators.fixed_step.step_length import fixed_step_length, refuse_longer
+
+_PAPER = "He et al. 2026, doi:10.3390/sym18010057"
+_FIXED = {
+    "adaptive": "its step is fixed (options step and steps_per_period)",
+    "multiple-roots": "it compares signs at both ends of a step, and misses what changes twice in between",
+    "stiff": "explicit, with a fixed step",
+    "backward": "it runs forward in time only: its rule for the zone around zero velocity has no past",
+    "sliding": "its rule for the zone around zero velocity is one of friction, and knows no switching surface",
+    "impacts": "its rule is made for friction forces, not for impulses",
+    "functions": "it is a method for contacts, which are declared by expressions",
+}
+
+
+@dataclass(frozen=True)
+class Rk4Dichotomy(Integrator):
+    """The published method: classic RK4 with step T/h0; a step in which the velocity changes sign is halved.
+
+    The friction force follows Eq. 4 of the paper: beyond the zero-velocity interval it is the slip force; inside it
+    the force that holds the body, as far as the limit allows. Halving ends when |v| <= eps_v or after 16 halvings, and
+    the run goes on from there. What the paper leaves open are options; the defaults are its literal reading.
+
+    Parameters
+    ----------
+    steps_per_period : steps in one period of the forcing, h0 in the paper (1200 there).
+    period : that period T, if not the forcing's own.
+    step : the step itself, instead of T/h0.
+    eps_v : half width of the zero-velocity interval (8e-4 m/s), in the unit of the relative velocity.
+    max_bisections : halvings at most (16).
+    stick_velocity : "kept" as Eq. 4 reads, then the body creeps with up to eps_v while it sticks; or "zero".
+    release : "step": taken at the next step; "located": halved to the limit.
+    friction : "step": the force is chosen at the start of a step; "stage": at every stage.
+    after_event : "full-step" from the located time on; "rest-of-step" first, back to the grid.
+
+    When to choose it: to compare with the published figures. Its event times are as good as eps_v, whatever the step.
+    Source: He, Pan, Zhang, Mei, Zhang, Symmetry 18 (2026) 57, doi:10.3390/sym18010057.
+    """
+
+    name: ClassVar[str] = "rk4-dichotomy"
+    title: ClassVar[str] = "the published RK4 with a dichotomy to the zero-velocity interval"
+    order: ClassVar[str] = "4 between events, 1 in eps_v at them"
+    reference: ClassVar[str] = _PAPER
+    when: ClassVar[str] = "to compare with the published figures"
+    lacks: ClassVar[dict[str, str]] = {
+        **_FIXED,
+        "exact-stick": "with stick_velocity='kept' a sticking body creeps at up to eps_v",
+    }
+
+    steps_per_period: float = 1200.0
+    period: float | None = None
+    step: float | None = None
+    eps_v: float = 8e-4
+    max_bisections: int = 16
+    stick_velocity: Literal["kept", "zero"] = "kept"
+    release: Literal["step", "located"] = "step"
+    friction: Literal["step", "stage"] = "step"
+    after_event: Literal["full-step", "rest-of-step"] = "full-step"
+
+    def __post_init__(self) -> None:
+        _one_of(self.name, "stick_velocity", self.stick_velocity, ("kept", "zero"))
+        _one_of(self.name, "release", self.release, ("step", "located"))
+        _one_of(self.name, "friction", self.friction, ("step", "stage"))
+        _one_of(self.name, "after_event", self.after_event, ("full-step", "rest-of-step"))
+        if not (math.isfinite(self.eps_v) and self.eps_v > 0.0):
+            raise UsageError(f"{self.name}: eps_v is {self.eps_v!r}", remedy="give a positive number")
+        if not (isinstance(self.max_bisections, int) and self.max_bisections >= 1):
+            raise UsageError(
+                f"{self.name}: max_bisections is {self.max_bisections!r}", remedy="give a whole number"
+            )
+
+    def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
+        """Run a task with fixed steps."""
+        step = fixed_step_length(system, self.step, self.period, self.steps_per_period, self.name)
+        refuse_longer(step, task.tolerances.max_step, self.name)
+        settings = FixedStep(
+            step,
+            ZONE,
+            self.friction == "stage",
+            True,
+            self.stick_velocity == "zero",
+            self.release == "located",
+            self.after_event == "rest-of-step",
+            self.eps_v,
+            self.max_bisections,
+        )
+        return FixedStepRun(system, task, Rk4March(system, settings), progress).run()
+
+
+@dataclass(frozen=True)
+class Rk4Sign(Integrator):
+    """Classic RK4 with the force mu N sgn(v) and no stick: the paper's "not considering stick-slip".
+
+    Parameters
+    ----------
+    steps_per_period : steps in one period of the forcing, h0 in the paper (1200 there).
+    period : that period T, if not the forcing's own.
+    step : the step itself, instead of T/h0.
+    friction : "stage": the sign is taken at every stage; "step": at the start of each step.
+
+    When to choose it: never for an answer; to see what chatter through a stick costs. Its modes are that chatter.
+    Source: He, Pan, Zhang, Mei, Zhang, Symmetry 18 (2026) 57, doi:10.3390/sym18010057, Eq. 2.
+    """
+
+    name: ClassVar[str] = "rk4-sign"
+    title: ClassVar[str] = "RK4 with the sign of the velocity and no stick"
+    order: ClassVar[str] = "4 between events, 1 through them"
+    reference: ClassVar[str] = _PAPER
+    when: ClassVar[str] = "to see what not modelling stick does"
+    lacks: ClassVar[dict[str, str]] = {
+        **_FIXED,
+        "exact-stick": "it has no stick: the velocity chatters around zero",
+    }
+
+    steps_per_period: float = 1200.0
+    period: float | None = None
+    step: float | None = None
+    friction: Literal["step", "stage"] = "stage"
+
+    def __post_init__(self) -> None:
+        _one_of(self.name, "friction", self.friction, ("step", "stage"))
+
+    def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
+        """Run a task with fixed steps."""
+        step = fixed_step_length(system, self.step, self.period, self.steps_per_period, self.name)
+        refuse_longer(step, task.tolerances.max_step, self.name)
+        settings = FixedStep(step, SIGN, self.friction == "stage", False, False, False, False, 0.0, 16)
+        return FixedStepRun(system, task, Rk4March(system, settings), progress).run()
+
+
+def _one_of(integrator: str, option: str, value: str, known: tuple[str, ...]) -> None:
+    if value not in known:
+        raise UsageError(f"{integrator}: {option} is {value!r}", remedy=f"give one of {', '.join(known)}")

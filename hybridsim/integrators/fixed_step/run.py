@@ -1,0 +1,466 @@
+"""The march of a fixed-step method: steps by the kernel, declared events, and decisions at the zones it finds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from typing import Protocol
+
+import numpy as np
+
+from hybridsim.engine.events.choice.verdict import side_after, side_before
+from hybridsim.engine.events.diagnosis import power_without_value
+from hybridsim.engine.events.first_modes import as_given
+from hybridsim.engine.events.input_jumps import surfaces_jump
+from hybridsim.engine.events.outcome import Situation
+from hybridsim.engine.events.resolve import Settling
+from hybridsim.engine.events.zeno.accumulation import Accumulation, accumulated
+from hybridsim.engine.record.checkpoint import Checkpoint, damaged
+from hybridsim.engine.record.fixed_blocks import StepOccurrences, StepSegments
+from hybridsim.engine.record.limits import Gauge, LimitReached
+from hybridsim.engine.record.segments import Occurrence
+from hybridsim.engine.record.trajectory import Task, Trajectory
+from hybridsim.engine.series.bounded import UNIT
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.timetable import Appointment, Timetable
+from hybridsim.integrators.fixed_step.gaps import gaps
+from hybridsim.integrators.fixed_step.kernels import BOUND, FULL, MONITOR, NOT_FINITE, RESTED, RESTITUTION
+from hybridsim.integrators.fixed_step.step_length import refuse_endless
+
+_STATE = ("x", "z", "discrete", "scale", "fresh", "turned")  # what a run needs to go on
+_ROWS = 8192  # steps of one call of the kernel; each call starts a new time origin, so no digits are lost
+
+
+class March(Protocol):
+    """The kernels of one method for one run.
+
+    step, halvings: length of a step, and how often it is halved to find what a guard or monitor does in it. pinned:
+    whether held states are evaluated from their constraints. has_sides_only: whether there is no third mode, and the
+    holding one marks an exact zero. counts: evaluations of rates and of guards.
+    """
+
+    step: float
+    halvings: int
+    pinned: bool
+    has_sides_only: bool
+    counts: np.ndarray
+
+    def run(
+        self,
+        watched: np.ndarray,
+        bound: float,
+        p: np.ndarray,
+        start: tuple[np.ndarray, np.ndarray],
+        fresh: np.ndarray,
+        rows: tuple[np.ndarray, np.ndarray, np.ndarray],
+    ) -> tuple[int, int]:
+        """Steps from local time 0 in start = (x, z) up to the bound, or to what needs the caller.
+
+        watched: guards of components without a surface. fresh: monitors that have just fired. Row k of rows = (times,
+        states, modes) holds the start of step k and the modes it was taken in; the last row is the end. Returns (number
+        of rows, why it ended).
+        """
+        ...
+
+    def trial(self, s: float, tau: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """The state after one step of length tau."""
+        ...
+
+    def refused(self) -> str:
+        """What ended the last call with RESTITUTION."""
+        ...
+
+    def warnings(self) -> list[str]:
+        """What a user should know of the run."""
+        ...
+
+
+def _left(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """See `hybridsim.integrators.fixed_step.kernels.leaves_side`; of all monitors."""
+    return ((before > 0.0) & (after <= 0.0)) | ((before < 0.0) & (after >= 0.0))
+
+
+def surface_table(system: System) -> np.ndarray:
+    """A row for each component with a surface: its number, above, below, hold, upper and lower guard of the latter.
+
+    -1 stands for what a gap does not have.
+    """
+    return np.array(
+        [
+            (c, a.above, a.below, a.hold, *((*a.guards[a.hold], -1)[:2]))
+            for c, a in enumerate(system.automata)
+            if a.has_surface
+        ],
+        dtype=np.int64,
+    ).reshape(-1, 6)
+
+
+class FixedStepRun:
+    """One run with fixed steps: surface components by the rule of the kernel, everything else settled here."""
+
+    def __init__(
+        self, system: System, task: Task, march: March, progress: Callable[[float], None] | None
+    ) -> None:
+        refuse_endless(march.step, (task.t0, task.t1), "step")
+        self.system, self.task, self.march, self.progress = system, task, march, progress
+        self.record = task.record or Trajectory(system, task.keep)
+        self.gauge = Gauge(task.limits, self.record.counters)
+        self.origin, self.end = Instant(task.t0), Instant(task.t1)
+        self.timetable = Timetable(system, self.end)
+        self.x, self.z, self.discrete = task.x0.copy(), np.maximum(task.z0, 0), task.discrete.copy()
+        self._holds = np.array([a.hold for a in system.automata], dtype=np.int64)
+        self.declared = [c for c, a in enumerate(system.automata) if not a.has_surface]
+        self.located = located = march.step * 2.0**-march.halvings  # how well an event is located
+        self.accumulation = Accumulation(located, 4.0 * located)
+        self.scale = np.abs(self.x)  # of the states on the last stretch: what rounding is relative to
+        self.fresh = np.zeros(len(system.monitor_names), dtype=np.bool_)  # monitors that have just fired
+        self.turned = False  # an input may just have jumped
+
+    def run(self) -> Trajectory:
+        """Step to the end; what was computed is kept in any case."""
+        record = self.record
+        try:
+            self._run()
+            record.finish(self.origin, self.z, self._vector(), self.x, self.system.layout.discrete_slice)
+        except LimitReached as reached:
+            record.stop_early("limit", str(reached), self.task.t0)
+        except KeyboardInterrupt:
+            record.stop_early("interrupted", "", self.task.t0)
+        record.seal()
+        counts = self.march.counts
+        record.counters.rhs_evaluations += int(counts[0])
+        record.counters.guard_evaluations += int(counts[1])
+        for warning in self.march.warnings():
+            record.warn(warning)
+        return record
+
+    def _run(self) -> None:
+        checkpoint = self.record.checkpoint
+        if checkpoint is not None:
+            self._go_on_from(checkpoint)
+        else:
+            due = self.timetable.due_at_start(self.origin)
+            self.timetable.kept(self.origin)
+            if self._overlaps(range(len(self.z))):
+                return
+            if (self.declared or due) and self._settle(
+                self.origin, (), due, self.task.x0.copy(), starting=True
+            ):
+                return
+        while self.origin != self.end:
+            arrays = {name: np.array(getattr(self, name)) for name in _STATE}
+            settled, paces = self.timetable.settled, dict(self.accumulation.paces)
+            self.record.mark(partial(Checkpoint, self.origin, arrays, settled, paces))
+            appointment = self.timetable.next(self.origin, forward=True)
+            if self._stretch(appointment, appointment.instant if appointment else self.end):
+                return
+            if self.progress:
+                self.progress((float(self.origin) - self.task.t0) / (self.task.t1 - self.task.t0))
+            if self.origin != self.end:
+                self.gauge.check()
+
+    def _go_on_from(self, checkpoint: Checkpoint) -> None:
+        if not checkpoint.arrays.keys() >= {*_STATE}:
+            raise damaged("the place where it goes on")
+        self.origin = checkpoint.instant
+        if checkpoint.settled is not None:
+            self.timetable.kept(checkpoint.settled)
+        self.accumulation.go_on(checkpoint.paces)
+        state = {name: checkpoint.arrays[name].copy() for name in _STATE}
+        self.x, self.z, self.discrete, self.scale, self.fresh = (state[name] for name in _STATE[:-1])
+        self.turned = bool(state["turned"])
+
+    def _vector(self) -> np.ndarray:
+        p = self.system.vector(self.origin, self.discrete)
+        p[self.system.layout.pin_at] = 1.0 if self.march.pinned else 0.0
+        return p
+
+    def _stretch(self, appointment: Appointment | None, target: Instant) -> bool:
+        """One call of the kernel and what ends it; True where the run stops."""
+        system = self.system
+        p, bound = self._vector(), target.minus(self.origin)
+        times, states = np.empty(_ROWS), np.empty((_ROWS, system.n))
+        modes = np.empty((_ROWS, len(self.z)), dtype=np.int64)
+        numbers = (
+            system.guards_of(self.z)[self.declared].ravel() if self.declared else np.zeros(0, dtype=np.int64)
+        )
+        start_z = self.z.copy()
+        rows = (times, states, modes)
+        if self.turned and self._overlaps(np.flatnonzero(self.z == self._holds).tolist()):
+            return True
+        z = self._sides_taken() if self.turned else self.z
+        self.turned = False
+        here = self.x.copy(), z  # moved on as it goes; events hold what was there
+        count, why = self.march.run(numbers, bound, p, here, self.fresh, rows)
+        rested = np.flatnonzero(self.fresh) if why == RESTED else None
+        self.fresh[:] = False
+        if count < _ROWS:  # a short stretch does not hold on to room for a long one
+            times, states, modes = times[:count].copy(), states[:count].copy(), modes[:count].copy()
+        self.scale = np.abs(states).max(axis=0)
+        self._keep(p, times, states, modes, start_z)
+        s, x = float(times[count - 1]), states[count - 1]
+        self.x, self.z = x.copy(), modes[count - 1].copy()
+        instant = target if why == BOUND else self.origin.plus(s)
+        if why == NOT_FINITE:
+            self.record.status = "step-failure"
+            ahead = self.x + self.march.step * system.flow(s, self.x, p, self.z)
+            power = power_without_value(system, list(system.names), float(instant) + self.march.step, ahead)
+            self.record.message = (
+                f"after t = {float(instant)!r}: the state or a guard is not a number after one step{power}"
+            )
+            return True
+        if why == RESTITUTION:
+            self.record.status = "inconsistent"
+            self.record.message = f"at t = {float(instant)!r}: {self.march.refused()}"
+            return True
+        if why == FULL:
+            self.origin = instant
+            return False
+        if rested is not None:
+            self.origin = instant
+            sides = np.sign(self._monitors(float(times[count - 2]), states[count - 2], p))
+            return self._monitor_events(instant, rested, -sides.astype(np.int64), self.x)
+        if why == BOUND:
+            self.origin = instant
+            schedules = appointment.schedules if appointment else ()
+            self.timetable.kept(instant)
+            self.turned = bool(system.signals)
+            at_zero = bool(self.declared) and bool((self._guards(s, x, p)[self._watched()] == 0.0).any())
+            return (bool(schedules) or at_zero) and self._settle(instant, (), schedules, x)
+        return self._declared_event(s, p, why)
+
+    def _sides_taken(self) -> np.ndarray:
+        """The modes, but for what an input's jump has carried off its surface: the kernel sees that as it is held."""
+        z, p = self.z.copy(), self._vector()
+        p[self.system.layout.pin_at] = 0.0
+        values = self.system.rows(
+            "surfaces", len(self.system.surface_of), np.zeros(1), self.x[None, :], p, self.z
+        )[0]
+        for c, value in zip(self.system.surface_of, values.tolist(), strict=True):
+            automaton = self.system.automata[c]
+            if z[c] == automaton.hold and value != 0.0 and not automaton.is_unilateral:
+                z[c] = automaton.above if value > 0.0 else automaton.below
+        for c, (gap, is_moving) in self._gaps().items():
+            if gap or is_moving:
+                z[c] = self.system.automata[c].above
+        return z
+
+    def _gaps(self) -> dict[int, tuple[int, bool]]:
+        """See `gaps`; of the present states."""
+        if not self.system.is_unilateral.any():
+            return {}
+        p = self._vector()
+        p[self.system.layout.pin_at] = 0.0
+        return gaps(self.system, self.x, p, self.z)
+
+    def _overlaps(self, of: Iterable[int]) -> bool:
+        """Whether a gap of these components is negative where it cannot be, which ends the run."""
+        below = [c for c, (gap, _) in self._gaps().items() if gap < 0 and c in of]
+        if below:
+            names = ", ".join(self.system.automata[c].name for c in below)
+            self.record.status = "inconsistent"
+            self.record.message = f"at t = {float(self.origin)!r}: the gap of {names} is below zero"
+        return bool(below)
+
+    # -- events of guards and monitors beside the surfaces --------------------------------------------------
+
+    def _declared_event(self, s: float, p: np.ndarray, why: int) -> bool:
+        """Halve the step in which a guard or monitor changed its sign, then settle what fired."""
+        x, z = self.x, self.z
+        watched = self._watched()
+        before = self._monitors(s, x, p)
+        low, high, best = 0.0, self.march.step, x
+        for _ in range(self.march.halvings):
+            tau = 0.5 * (low + high)
+            trial = self._trial(s, tau, p)
+            if why == MONITOR:
+                beyond = bool(_left(before, self._monitors(s + tau, trial, p)).any())
+            else:
+                guards = self._guards(s + tau, trial, p)
+                beyond = bool((guards[watched] < 0.0).any())
+            if beyond:
+                high = tau
+            else:
+                low = tau
+        tau = high
+        best = self._trial(s, tau, p)
+        self._keep(p, np.array([s, s + tau]), np.array([x, best]), np.array([z, z]), z)
+        instant = self.origin.plus(s + tau)
+        if why == MONITOR:
+            self.x, self.origin = best, instant
+            after = self._monitors(s + tau, best, p)
+            left = _left(before, after)
+            self.fresh[left] = True
+            crossed = np.flatnonzero(left & ~self._turning_back(before, after))
+            return self._monitor_events(instant, crossed, -np.sign(before).astype(np.int64), best)
+        first, last = self._guards(s, x, p), self._guards(s + tau, best, p)
+        self.x = best
+        shares = {
+            g: first[g] / (first[g] - last[g]) if first[g] > 0.0 else 0.0 for g in watched if last[g] < 0.0
+        }
+        fired = sorted(shares, key=shares.__getitem__)
+        return self._settle(instant, tuple(fired), (), best)
+
+    def _watched(self) -> list[int]:
+        """Guards of the components without a surface, in their present modes."""
+        if not self.declared:
+            return []
+        return [int(g) for g in self.system.guards_of(self.z)[self.declared].ravel() if g >= 0]
+
+    def _guards(self, s: float, x: np.ndarray, p: np.ndarray) -> np.ndarray:
+        return self.system.rows("guards", self.system.guard_count, np.array([s]), x[None, :], p, self.z)[0]
+
+    def _trial(self, s: float, tau: float, p: np.ndarray) -> np.ndarray:
+        return self.march.trial(s, tau, self.x, p, self.z)
+
+    def _monitors(self, s: float, x: np.ndarray, p: np.ndarray) -> np.ndarray:
+        """Their values at states as they are, not as the modes would hold them."""
+        free = p.copy()
+        free[self.system.layout.pin_at] = 0.0
+        names = self.system.monitor_names
+        return self.system.rows("monitors", len(names), np.array([s]), x[None, :], free, self.z)[0]
+
+    def _turning_back(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+        """Which of the monitors are zero here to the last bit, and go back to the side on which they were."""
+        back = np.zeros(len(after), dtype=np.bool_)
+        if (after == 0.0).any():  # inputs as they are from here on
+            series = self.system.series(0.0, self.x, self._vector(), self.z, np.zeros(len(self.x)), 0.0)
+            for k in np.flatnonzero(after == 0.0):
+                back[k] = side_after(series.monitors[k], series.monitor_bounds[k], 1)[0] == np.sign(before[k])
+        return back
+
+    def _monitor_events(
+        self, instant: Instant, crossed: np.ndarray, directions: np.ndarray, x: np.ndarray
+    ) -> bool:
+        stop, resetting, seen = False, [], []
+        for k in crossed:
+            monitor = self.system.model.monitors[k]
+            if {"up": 1, "down": -1, "both": directions[k]}[monitor.direction] != directions[k]:
+                continue
+            seen.append((monitor.name, int(directions[k])))
+            if monitor.action == "reset":
+                resetting.append(int(k))
+            elif monitor.action == "terminate":
+                self.record.status = "terminated"
+                self.record.message = f"ended by {monitor.name} at t = {float(instant)!r}"
+                stop = True
+        if resetting:  # all of one instant, so that they read one state
+            return self._settle(instant, (), (), x, monitors=tuple(resetting), seen=seen) or stop
+        self._record_monitors(instant, seen, x, x)
+        return stop
+
+    def _record_monitors(
+        self, instant: Instant, seen: Sequence[tuple[str, int]], x_minus: np.ndarray, x_plus: np.ndarray
+    ) -> None:
+        for name, direction in seen:
+            occurrence = Occurrence(instant, "monitor", name, "", "", "", direction, x_minus, x_plus)
+            self.record.occurrences.append(occurrence)
+
+    def _settle(
+        self,
+        instant: Instant,
+        fired: tuple[int, ...],
+        schedules: tuple[int, ...],
+        x_minus: np.ndarray,
+        monitors: tuple[int, ...] = (),
+        seen: Sequence[tuple[str, int]] = (),
+        starting: bool = False,
+    ) -> bool:
+        """Transitions and resets by the event contract, for all components but those with a surface.
+
+        monitors: numbers of those that reset; seen: names and directions of all that crossed, to be recorded first.
+        """
+        system, record = self.system, self.record
+        self.origin = instant
+        p = self._vector()
+        before = np.where(starting, self.task.z0, self.z)
+        x, sides = self.x, np.sign(self._monitors(0.0, self.x, p))
+        # what was located lies within the last halving of a step
+        s_error = self.located if fired or monitors else 0.0
+        x_error = 4.0 * UNIT * np.maximum(np.abs(self.x), self.scale)
+        if s_error:
+            x_error += s_error * np.abs(system.flow(0.0, self.x, p, self.z))
+        at = Situation(0.0, self.x.copy(), p, self.z.copy(), x_error, s_error, bool(starting))
+        if starting:  # resets read contacts on the sides on which they are
+            at.z[system.has_surface] = self.task.z0[system.has_surface]
+            at.z = as_given(system, at).z
+        resets: list[tuple[object, ...]] = [("schedule", k) for k in schedules]
+        resets += [("monitor", k) for k in monitors]
+        settling = Settling(system, at, before, forward=True, scope=self.declared)
+        settling.jumped = surfaces_jump(system, instant, at, forward=True)
+        outcome = settling.run(fired, resets)
+        self.x, self.discrete = outcome.x, system.discrete(outcome.p).copy()
+        self.z = np.where(system.has_surface, self.z, outcome.z)
+        self._record_monitors(instant, seen, x_minus, outcome.x)
+        for change in outcome.changes:
+            automaton = system.automata[change.component]
+            if starting and automaton.is_corner:
+                continue
+            source, target = automaton.modes[change.source], automaton.modes[change.target]
+            record.occurrences.append(
+                Occurrence(
+                    instant,
+                    automaton.kind,
+                    automaton.name,
+                    change.guard,
+                    source,
+                    target,
+                    -1,
+                    x_minus,
+                    outcome.x,
+                )
+            )
+            record.counters.events += 1
+        for k in schedules:
+            schedule = system.model.schedules[k]
+            record.occurrences.append(
+                Occurrence(instant, "scheduled", schedule.name, "", "", "", 0, x_minus, outcome.x)
+            )
+            if schedule.terminate:
+                record.status, record.message = (
+                    "terminated",
+                    f"ended by {schedule.name} at t = {float(instant)!r}",
+                )
+        left = _left(sides, self._monitors(0.0, self.x, self._vector()))
+        left[list(monitors)] = False
+        if left.any():
+            series = system.series(0.0, x, p, before, x_error, s_error)
+            # a little beyond its zero a monitor is on the side that it had before
+            for k in map(int, np.flatnonzero(left)):
+                value, bound = series.monitors[k], series.monitor_bounds[k]
+                sides[k] = side_before(value, bound, 1)[0] if abs(value[0]) <= bound[0] else sides[k]
+            left &= (sides != 0) & (outcome.monitor_sides != sides)
+            self._monitor_events(instant, np.flatnonzero(left), -sides.astype(np.int64), self.x)
+        if outcome.status:
+            record.status, record.message = outcome.status, f"at t = {float(instant)!r}: {outcome.message}"
+        changed = tuple(sorted({c.component for c in outcome.changes}))
+        limit = self.accumulation.limit(instant, changed)
+        if limit is not None:
+            record.status = "accumulation"
+            record.message = accumulated(limit, system.automata, has_rtol=False)
+        return record.status != "finished"
+
+    # -- the record -----------------------------------------------------------------------------------------
+
+    def _keep(self, p: np.ndarray, s: np.ndarray, x: np.ndarray, z: np.ndarray, before: np.ndarray) -> None:
+        """The rows of one stretch as segments of constant modes, and the mode changes between them."""
+        record = self.record
+        record.counters.steps += len(s) - 1
+        if self.march.has_sides_only:
+            self._side_of_zeros(z)
+        sources = np.concatenate([(before if len(record.segments) else z[0])[None], z[:-1]])
+        rows, components = np.nonzero(sources != z)
+        segments = StepSegments(self.system, self.origin, p, s, x, z, np.unique(rows[rows > 0]))
+        record.segments.add(segments)
+        record.counters.events += len(rows)
+        changes = np.stack([sources[rows, components], z[rows, components]], axis=1)
+        record.occurrences.add(StepOccurrences(self.system, self.origin, rows, components, changes, s, x))
+
+    def _side_of_zeros(self, z: np.ndarray) -> None:
+        """A row whose velocity was exactly zero gets the side it went to: that method knows no third mode."""
+        for c, _, _, hold, *_ in surface_table(self.system):
+            for k in np.flatnonzero(z[:-1, c] == hold)[::-1]:
+                z[k, c] = z[k + 1, c]
+            if z[-1, c] == hold and len(z) > 1:
+                z[-1, c] = z[-2, c]

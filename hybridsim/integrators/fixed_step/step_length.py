@@ -1,0 +1,51 @@
+"""How long a fixed step is: as given, or a share of the forcing's period."""
+
+from __future__ import annotations
+
+import math
+
+from hybridsim.engine.system.period import system_period
+from hybridsim.engine.system.system import System
+from hybridsim.errors import UsageError
+
+_MOST_STEPS = (
+    1e18  # thirty years at a nanosecond each; below it a run to a far end may still be ended by a monitor
+)
+
+
+def fixed_step_length(
+    system: System, step: float | None, period: float | None, steps_per_period: float, name: str
+) -> float:
+    """Length of the fixed step: as given, or the forcing's period over the number of steps per period."""
+    for label, value in (("step", step), ("period", period), ("steps_per_period", steps_per_period)):
+        if value is not None and not (math.isfinite(value) and value > 0.0):
+            raise UsageError(f"{name}: {label} is {value!r}", remedy="give a positive number")
+    if step is not None:
+        return step
+    if period is None:
+        period = system_period(system)
+    if period is None:
+        raise UsageError(
+            f"{name} steps by a share of the forcing's period, and model {system.model.name} has no single one",
+            remedy="give step=... or period=...",
+        )
+    return period / steps_per_period
+
+
+def refuse_longer(step: float, max_step: float, name: str) -> None:
+    """A fixed step is not shortened behind the user's back."""
+    if step > max_step:
+        raise UsageError(
+            f"max_step is {max_step:g}, and the fixed step of {name} is {step:g}",
+            remedy="set step or steps_per_period",
+        )
+
+
+def refuse_endless(step: float, span: tuple[float, float], name: str) -> None:
+    """Steps so short that nobody sees the end of a run: a slip of the keyboard."""
+    count = abs(span[1] - span[0]) / step
+    if count > _MOST_STEPS:
+        raise UsageError(
+            f"{name} is {step!r}: from {span[0]:g} to {span[1]:g} it would take {count:.0e} steps",
+            remedy=f"give a longer one: more than {_MOST_STEPS:.0e} steps come to no end",
+        )

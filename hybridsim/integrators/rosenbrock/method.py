@@ -1,0 +1,151 @@
+"""Rosenbrock methods from their tableau: stiff modes without iterations, with the exact Jacobian."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from hybridsim.engine.run.stepping import Flow
+from hybridsim.engine.series.interpreter import advance
+from hybridsim.engine.system.tolerances import Tolerances
+from hybridsim.integrators.one_step import OneStepStepper, Point, Trial
+from hybridsim.integrators.rosenbrock.step import RosenbrockTableau, linearise, rosenbrock_attempt, solve
+
+_DEFECT = 100.0  # times the tolerance, as for Runge-Kutta methods: by how much a step may miss the flow in its middle
+
+
+@dataclass(frozen=True)
+class StageDense:
+    """Dense output from the stages of one step: a polynomial in theta = (s - s0)/(s1 - s0), see `RosenbrockTableau`.
+
+    K (order - 1, n) are the combinations of stages; the ends are met bit for bit.
+    """
+
+    s0: float
+    s1: float
+    x0: np.ndarray
+    x1: np.ndarray
+    K: np.ndarray
+
+    def __call__(self, s: np.ndarray) -> np.ndarray:
+        """States (k, n) at local times (k,)."""
+        return self._at((np.asarray(s, dtype=float) - self.s0) / (self.s1 - self.s0))
+
+    def _at(self, theta: np.ndarray) -> np.ndarray:
+        """States (k, n) at these shares of the step (k,)."""
+        theta = theta[:, None]
+        inner = np.zeros((len(theta), len(self.x0)))
+        for row in self.K[::-1]:
+            inner = inner * theta + row
+        # written from x0 on, so that what does not move stays where it is to the last bit
+        out = self.x0 + theta * ((self.x1 - self.x0) + (1.0 - theta) * inner)
+        out[theta[:, 0] == 1.0] = self.x1
+        return out
+
+    def middle(self) -> np.ndarray:
+        """State (n,) at theta = 1/2, which may be between two doubles of time."""
+        return self._at(np.array([0.5]))[0]
+
+    def middle_slope(self) -> np.ndarray:
+        """Rate of change (n,) at theta = 1/2."""
+        orders = np.arange(len(self.K))
+        inner = (orders * 0.5 ** (orders - 1.0)) @ self.K
+        return ((self.x1 - self.x0) + 0.25 * inner) / (self.s1 - self.s0)
+
+
+class RosenbrockStepper(OneStepStepper):
+    """Steps a Rosenbrock method through one segment; event times are refined by repeating the step."""
+
+    def __init__(
+        self,
+        tableau: RosenbrockTableau,
+        flow: Flow,
+        x0: np.ndarray,
+        bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+    ) -> None:
+        self.tableau, system, n = tableau, flow.system, flow.n
+        self._address = system.address("flow")
+        lean = system.lean_tape(flow.z)
+        inputs = system.registers.inputs
+        self._rows, self._places = lean.rows, (int(inputs.time[0]), inputs.states, lean.derivatives)
+        self._V = np.zeros((system.registers.count, 2))
+        self._V[inputs.constants, 0] = inputs.values[:, 0]
+        self._V[inputs.parameters, 0] = flow.p[inputs.sources]
+        advance(lean.constant_rows, self._V, 0)
+        self._room = (np.empty((n, n)), np.empty(n, dtype=np.int64), np.empty(n))
+        super().__init__(flow, x0, bound, tolerances, first_step, tableau.order, tableau.error_order)
+
+    def _point(self, s: float, x: np.ndarray) -> RosenbrockPoint:
+        return RosenbrockPoint(self.flow, s, x, self._linearised)
+
+    def _linearised(self, s: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        n = self.flow.n
+        jacobian, rate = np.empty((n, n)), np.empty(n)
+        self.flow.counters.rhs_evaluations += n + 1
+        linearise(self._rows, self._places, s, x, self._V, jacobian, rate)
+        return jacobian, rate
+
+    def _attempt(self, start: Point, h: float) -> Trial:
+        assert isinstance(start, RosenbrockPoint)
+        flow, tableau, out = self.flow, self.tableau, np.empty(self.flow.n)
+        stages = np.empty((len(tableau.nodes), flow.n))
+        flow.counters.rhs_evaluations += len(tableau.nodes)
+        error = rosenbrock_attempt(
+            self._address,
+            tableau.arrays,
+            start.s,
+            h,
+            start.x,
+            *start.linear,
+            flow.p,
+            flow.z,
+            self.control,
+            *self._room,
+            stages,
+            out,
+        )
+        return Trial(out, error, stages)
+
+    def _holds(self, start: Point, end: Point, trial: Trial) -> bool:
+        """Whether in the middle the dense output meets the flow as well as the tolerances ask for.
+
+        What it misses by is weighed as an error of the step is, h (1 - gamma h J)^-1 (f(x) - x'): of a stiff component
+        that the flow brings back at once little is left.
+        """
+        flow, tableau = self.flow, self.tableau
+        dense = self._dense(start, end, trial)
+        x = dense.middle()
+        flow.counters.rhs_evaluations += 1
+        missed = flow.rhs(0.5 * (start.s + end.s), x) - dense.middle_slope()
+        matrix, pivots, _ = self._room
+        solve(matrix, pivots, missed)
+        rtol, atol = self.control
+        size = np.maximum(np.abs(x), np.abs(start.x))
+        return not (np.abs(missed) > tableau.gamma * _DEFECT * (atol + rtol * size)).any()
+
+    def _dense(self, start: Point, end: Point, trial: Trial) -> StageDense:
+        return StageDense(start.s, end.s, start.x, end.x, self.tableau.dense @ trial.kept)
+
+
+class RosenbrockPoint(Point):
+    """A point with the flow's linearisation there: Jacobian (n, n) and derivative with respect to time (n,)."""
+
+    def __init__(
+        self,
+        flow: Flow,
+        s: float,
+        x: np.ndarray,
+        linearised: Callable[[float, np.ndarray], tuple[np.ndarray, np.ndarray]],
+    ) -> None:
+        super().__init__(flow, s, x)
+        self._linearised = linearised
+
+    @cached_property
+    def linear(self) -> tuple[np.ndarray, np.ndarray]:
+        """Worked out when it is first asked for: a repeated step starts from a point of its own."""
+        return self._linearised(self.s, self.x)

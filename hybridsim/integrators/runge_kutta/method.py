@@ -1,0 +1,130 @@
+"""Explicit embedded Runge-Kutta methods from their tableau: a new method is a tableau and a name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from hybridsim.engine.record.hermite import hermite, holds_between, middle_weights
+from hybridsim.engine.record.segments import Dense
+from hybridsim.engine.run.compiled_loop import compile_leaps
+from hybridsim.engine.run.stepping import Flow, Stepper, Watch
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.tolerances import Tolerances
+from hybridsim.integrators.contract import Integrator
+from hybridsim.integrators.one_step import OneStepStepper, Point, Trial
+from hybridsim.integrators.runge_kutta.compiled_loop import RungeKuttaLeaper
+from hybridsim.integrators.runge_kutta.step import Tableau, attempt
+
+__all__ = ["RungeKuttaIntegrator", "RungeKuttaStepper", "Tableau"]
+
+
+class RungeKuttaStepper(OneStepStepper):
+    """Steps a method through one segment, with local extrapolation and dense output of degree 7.
+
+    The dense output is the Hermite polynomial on the Taylor coefficients of the flow at both ends, with an
+    error of h**8 x^(8)/(256 8!); event times are refined by repeating the step.
+    """
+
+    def __init__(
+        self,
+        tableau: Tableau,
+        flow: Flow,
+        x0: np.ndarray,
+        bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+    ) -> None:
+        self.tableau = tableau
+        self._address = flow.system.address("flow")
+        self._slopes = np.empty((len(tableau.c), flow.n))
+        super().__init__(flow, x0, bound, tolerances, first_step, tableau.order, tableau.error_order)
+
+    def _attempt(self, start: Point, h: float) -> Trial:
+        flow, out = self.flow, np.empty(self.flow.n)
+        flow.counters.rhs_evaluations += len(self.tableau.c) - 1
+        error = attempt(
+            self._address,
+            self.tableau.packed,
+            start.s,
+            h,
+            start.x,
+            start.dx,
+            flow.p,
+            flow.z,
+            self.control,
+            self._slopes,
+            out,
+        )
+        return Trial(out, error)
+
+    def _holds(self, start: Point, end: Point, trial: Trial) -> bool:
+        flow, (x, dx) = self.flow, np.empty((2, self.flow.n))
+        if not flow.system.has_tape:  # its derivatives are differences, and less than the tolerances ask for
+            return True
+        flow.counters.rhs_evaluations += 1
+        weights, ends = middle_weights(start.series.shape[1]), (start.series, end.series)
+        return holds_between(
+            self._address, weights, start.s, end.s - start.s, *ends, flow.p, flow.z, self.control, x, dx
+        )
+
+    def _dense(self, start: Point, end: Point, trial: Trial) -> Dense:
+        made: list[Dense] = []
+
+        def dense(s: np.ndarray) -> np.ndarray:
+            if not made:
+                made.append(hermite(start.s, end.s, start.series, end.series))
+            return made[0](s)
+
+        return dense
+
+
+@dataclass(frozen=True)
+class RungeKuttaIntegrator(Integrator):
+    """An explicit embedded method in compiled code; its class variables are a tableau and what describes it.
+
+    Segments and ordinary events go through the compiled mode loop where nothing in the model speaks against it:
+    what jumps inside a mode and Python functions do, since it looks at guards through their series.
+    """
+
+    tableau: ClassVar[Tableau]
+    lacks: ClassVar[dict[str, str]] = {"stiff": "explicit: its step is bound by the fastest rate"}
+    leaps: ClassVar[bool] = True
+
+    @property
+    def stable_to(self) -> float:
+        """The border of the stability region of the tableau, on the negative axis."""
+        return self.tableau.real_stability
+
+    @property
+    def rounding(self) -> float:
+        """Of the sums of stages, and of the sums within them, which cancel in part."""
+        return self.tableau.rounding
+
+    @classmethod
+    def _leaper(cls, system: System, tolerances: Tolerances, longest: float) -> RungeKuttaLeaper:
+        return RungeKuttaLeaper(system, tolerances, longest, cls.tableau)
+
+    def prepare(self, system: System) -> None:
+        """The compiled mode loop."""
+        if system.has_tape and not system.has_corners:
+            compile_leaps(system, self._leaper)
+
+    def leaper(self, system: System, tolerances: Tolerances, longest: float) -> RungeKuttaLeaper | None:
+        """The compiled mode loop; None for a model with corners, or one of Python functions."""
+        leaps = system.has_tape and not system.has_corners
+        return self._leaper(system, tolerances, longest) if leaps else None
+
+    def start(
+        self,
+        flow: Flow,
+        x0: np.ndarray,
+        s_bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+        watch: Watch,
+    ) -> Stepper:
+        """Begin a smooth segment."""
+        return RungeKuttaStepper(self.tableau, flow, x0, s_bound, tolerances, first_step)

@@ -1,0 +1,171 @@
+"""One trial step of an explicit embedded Runge-Kutta method, its error, and the length to try next."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybridsim.engine.native.kernels import call, kernel
+from hybridsim.engine.native.struct_pack import packed
+
+# Step control of Hairer, Norsett and Wanner 1993, section II.4: safety factor and bounds of the change of a step.
+SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
+_LEAST = 1e-2  # an error below this share of the tolerance says nothing of how errors grow
+_NOTHING = 1e-9  # a coefficient that order conditions make zero, but for rounding
+SMALLEST = 10.0  # a rest of fewer ulps of the local time is no step of its own
+# Nor is a rest of less than this share of the step: some thousand steps of one length add up to their span but for
+# roundings of that size, and a step that is longer by it has the same error but for a part in 10**8.
+STRETCH = 1.0 + 2.0**-30
+
+
+class Coefficients(NamedTuple):
+    """The arrays of a tableau: nodes, matrix, and in rows the weights, those of the error, those of the low error."""
+
+    c: np.ndarray
+    a: np.ndarray
+    weights: np.ndarray
+
+
+@dataclass(frozen=True)
+class Tableau:
+    """An explicit method with s stages: nodes c (s,), a (s, s) strictly lower triangular, weights b (s,).
+
+    e (s,) is b minus the weights of the embedded method; the error estimate of a step then falls like
+    h**error_order. e_low, where given, is a second estimate of lower order that keeps the first one honest, as in
+    DOP853: the error used is e**2/sqrt(e**2 + 0.01 e_low**2).
+    """
+
+    c: np.ndarray
+    a: np.ndarray
+    b: np.ndarray
+    e: np.ndarray
+    order: int
+    error_order: int
+    e_low: np.ndarray = field(default_factory=lambda: np.zeros(0))
+
+    @cached_property
+    def packed(self) -> Any:
+        """What `attempt` takes."""
+        rows = [self.b, self.e, self.e_low] if self.e_low.size else [self.b, self.e]
+        arrays = (np.ascontiguousarray(part, dtype=float) for part in (self.c, self.a, rows))
+        return packed(Coefficients(*arrays))
+
+    @cached_property
+    def leading_terms(self) -> tuple[int, float, float, int, float]:
+        """First terms of the error estimates of a step on a linear problem, by coefficients x_k = x^(k)/k! of the flow.
+
+        There a combination e of the stages comes to sum_k (e . A**(k - 1) 1) k! h**k x_k. The order q of the main
+        estimate, its coefficients at q and q + 1, then order and coefficient of the low one, (0, 0) without.
+        """
+        q, terms = self._leading(self.e)
+        q_low, terms_low = self._leading(self.e_low) if self.e_low.size else (0, np.zeros(2))
+        return q, float(terms[0]), float(terms[1]), q_low, float(terms_low[0])
+
+    @cached_property
+    def rounding(self) -> float:
+        """What a step rounds away, in units of rounding of h*f: sum |b_i| (1 + sum |a_ij|)."""
+        return float(np.abs(self.b) @ (1.0 + np.abs(self.a).sum(axis=1)))
+
+    @cached_property
+    def real_stability(self) -> float:
+        """Up to which z all |R(-z)| <= 1, for R(z) = 1 + b.1 z + b.A 1 z**2 + ..., to 1e-3 or so."""
+        power, terms = np.ones(len(self.c)), [1.0]
+        for _ in self.c:
+            terms.append(float(self.b @ power))
+            power = self.a @ power
+        z = np.arange(1e-3, 3.0 * len(self.c), 1e-3)
+        unstable = np.abs(np.polynomial.polynomial.polyval(-z, terms)) > 1.0 + 1e-9
+        return float(z[np.argmax(unstable)])
+
+    def _leading(self, e: np.ndarray) -> tuple[int, np.ndarray]:
+        power, k = np.ones(len(self.c)), 0
+        found: list[float] = []
+        while len(found) < 2:
+            k += 1
+            term = abs(float(e @ power)) * math.factorial(k)
+            if found or term > _NOTHING:
+                found.append(term)
+            power = self.a @ power
+        return k - 1, np.array(found)
+
+
+@kernel
+def attempt(
+    flow: Any,
+    tableau: Any,
+    s: float,
+    h: float,
+    x: Any,
+    dx: Any,
+    p: Any,
+    z: Any,
+    tolerances: Any,
+    k: Any,
+    out: Any,
+) -> float:
+    """One step of length h from (s, x) with slope dx there; its end in `out`, its error in units of the tolerance.
+
+    tableau: `Coefficients`. tolerances: rtol, atol.
+    """
+    c, a, weights = tableau.c, tableau.a, tableau.weights
+    rtol, atol = tolerances
+    stages, n = c.shape[0], x.shape[0]
+    for m in range(n):
+        k[0, m] = dx[m]
+    for i in range(1, stages):
+        for m in range(n):
+            total = 0.0
+            for j in range(i):
+                total += a[i, j] * k[j, m]
+            out[m] = x[m] + h * total
+        call(flow, s + c[i] * h, out, p, z, k[i])
+    square, square_low = 0.0, 0.0
+    for m in range(n):
+        total, error, error_low = 0.0, 0.0, 0.0
+        for j in range(stages):
+            total += weights[0, j] * k[j, m]
+            error += weights[1, j] * k[j, m]
+            if weights.shape[0] > 2:
+                error_low += weights[2, j] * k[j, m]
+        out[m] = x[m] + h * total
+        scale = atol[m] + rtol * max(abs(x[m]), abs(out[m]))
+        if scale > 0.0:
+            square += (error / scale) ** 2
+            square_low += (error_low / scale) ** 2
+    if square == 0.0 or n == 0:
+        return 0.0
+    weighted = square + 0.01 * square_low
+    return abs(h) * square / math.sqrt(weighted * n) if weighted > 0.0 else math.nan
+
+
+@kernel
+def forget(memory: Any) -> None:
+    """Begin step control anew; memory (3,): length and error of the last accepted step, 1 after a rejected one."""
+    memory[0], memory[1], memory[2] = 0.0, 0.0, 0.0
+
+
+@kernel
+def next_length(h: float, error: float, error_order: int, memory: Any) -> float:
+    """The length to try after a step of length h with this error in units of the tolerance.
+
+    Where errors have been growing from step to step they are taken to go on so (K. Gustafsson, ACM Transactions on
+    Mathematical Software 20 (1994) 496, doi:10.1145/198429.198437); after a rejected step none is longer.
+    """
+    if not error <= 1.0:
+        memory[2] = 1.0
+        factor = SAFETY * error ** (-1.0 / error_order) if error < math.inf else SHRINK
+        return h * min(1.0, max(SHRINK, factor))
+    factor = GROW
+    if error > 0.0:
+        factor = SAFETY * error ** (-1.0 / error_order)
+        if memory[0] > 0.0:
+            trend = max(memory[1], _LEAST) / error
+            factor = min(factor, factor * (h / memory[0]) * trend ** (1.0 / error_order))
+    if memory[2] > 0.0:
+        factor = min(factor, 1.0)
+    memory[0], memory[1], memory[2] = h, error, 0.0
+    return h * min(GROW, max(SHRINK, factor))

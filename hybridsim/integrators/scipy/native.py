@@ -1,0 +1,159 @@
+"""SciPy's own event finding: `solve_ivp` with terminal events, called anew after each of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.record.segments import Dense
+from hybridsim.engine.run.stepping import Flow, Root, Step, Watch
+from hybridsim.engine.system.failures import StepFailure
+from hybridsim.engine.system.period import system_period
+from hybridsim.engine.system.tolerances import Tolerances
+
+# While a mode holds all states still, nothing but the event functions feels the forcing, and a step may grow over
+# whole periods of it. Who has met that bounds the step; we do it for him.
+_STEPS_PER_PERIOD = 10
+_DIRECTIONS = {"up": 1.0, "down": -1.0, "both": 0.0}
+
+
+class NativeStepper:
+    """One call of `solve_ivp` for a whole segment, handed out step by step.
+
+    What it does and does not see is `solve_ivp`'s own:
+
+    - the sign of an event function is tested at both ends of a step and nowhere between: of two zeros in one step
+      neither is seen;
+    - the test is closed at both ends: a function that is zero where the segment starts and falls fires there, also
+      where only its rounding falls;
+    - a zero is found on the dense output, which may be less accurate than the method.
+
+    The guards of the mode are terminal events with direction -1, monitors that only record are not terminal. Without
+    ``max_step`` a step is at most a tenth of the forcing's period.
+    """
+
+    def __init__(
+        self,
+        solver_class: Any,
+        implicit: bool,
+        flow: Flow,
+        x0: np.ndarray,
+        bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+        watch: Watch,
+    ) -> None:
+        from scipy.integrate import solve_ivp
+
+        self.flow = flow
+        system = flow.system
+        # the argument of a corner may stay at zero, which the test of signs takes for an event at every step
+        still = system.is_corner[system.owner[watch.guards]] & (watch.sides[watch.guards] == 0)
+        guards = [int(g) for g in watch.guards[~still]]
+        monitors = list(range(len(watch.monitor_sides)))
+        events = [self._guard(g) for g in guards] + [self._monitor(k) for k in monitors]
+        longest, period = tolerances.max_step, system_period(flow.system)
+        if np.isinf(longest) and period:
+            longest = period / _STEPS_PER_PERIOD
+        with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
+            try:
+                result = solve_ivp(
+                    self._rhs,
+                    (0.0, bound),
+                    x0,
+                    method=solver_class,
+                    dense_output=True,
+                    events=events,
+                    rtol=tolerances.rtol,
+                    atol=tolerances.atol,
+                    max_step=longest,
+                    first_step=first_step,
+                    **({"jac": flow.jacobian} if implicit else {}),
+                )
+            # of its root finder, or of a matrix that is no number
+            except (
+                RuntimeError,
+                ValueError,
+            ) as failure:
+                raise StepFailure(f"solve_ivp raises {type(failure).__name__}: {failure}") from None
+        self.failure = result.message if result.status < 0 else ""
+        self.steps = iter(self._cut(result, guards, monitors))
+
+    def _rhs(self, s: float, x: np.ndarray) -> np.ndarray:
+        self.flow.counters.rhs_evaluations += 1
+        if self.flow.look is not None:
+            self.flow.look(s)
+        return self.flow.rhs(s, x)
+
+    def _guard(self, number: int) -> Callable[[float, np.ndarray], float]:
+        def event(s: float, x: np.ndarray) -> float:
+            return float(self.flow.guards(np.array([s]), x[None, :])[0, number])
+
+        # SciPy reads these off the function itself; a function has no such attributes by its type
+        event.terminal, event.direction = True, -1.0  # type: ignore[attr-defined]  # SciPy reads them off the function
+        return event
+
+    def _monitor(self, number: int) -> Callable[[float, np.ndarray], float]:
+        monitor = self.flow.system.model.monitors[number]
+
+        def event(s: float, x: np.ndarray) -> float:
+            return float(self.flow.monitors(np.array([s]), x[None, :])[0, number])
+
+        # as for guards: attributes that a function does not have by its type
+        event.terminal = monitor.action != "record"  # type: ignore[attr-defined]  # SciPy reads them off the function
+        event.direction = _DIRECTIONS[monitor.direction]  # type: ignore[attr-defined]  # SciPy reads them off the function
+        return event
+
+    def _cut(self, result: Any, guards: list[int], monitors: list[int]) -> list[Step]:
+        """The steps of the call, cut where events were found in them."""
+        found: dict[float, list[Root]] = {}
+        for g, times in zip(guards, result.t_events, strict=False):
+            for s in times:
+                found.setdefault(float(s), []).append(Root(g, -1))
+        for k, times in zip(monitors, result.t_events[len(guards) :], strict=True):
+            for s in times:
+                found.setdefault(float(s), []).append(Root(k, self._direction(k, result, float(s)), True))
+        direction = -1.0 if result.t[-1] < 0.0 else 1.0
+        steps: list[Step] = []
+        x0 = result.y[:, 0]
+        ends = (
+            np.unique(np.concatenate([result.t[1:], [s for s in found if s != 0.0]]) * direction) * direction
+        )
+        s0 = 0.0
+        if 0.0 in found:
+            if result.status == 1 and result.t[-1] == 0.0:
+                raise StepFailure(
+                    "solve_ivp stops at an event where it starts: its sign test is closed at both ends of a step, "
+                    "so what is zero at a restart and does not rise fires at once"
+                )
+            steps.append(Step(0.0, 0.0, x0, x0, _dense(result.sol), tuple(found[0.0])))
+        for s1 in map(float, ends):
+            x1 = result.sol(s1)
+            steps.append(Step(s0, s1, x0, x1, _dense(result.sol), tuple(found.get(s1, ()))))
+            s0, x0 = s1, x1
+        return steps
+
+    def _direction(self, monitor: int, result: Any, s: float) -> int:
+        """Whether a monitor rises or falls at a zero: by its values at the ends of the step that holds it."""
+        ends = np.abs(result.t)
+        right = int(np.clip(np.searchsorted(ends, abs(s), side="left"), 1, len(ends) - 1))
+        pair = result.t[[right - 1, right]]
+        before, after = self.flow.monitors(pair, result.sol(pair).T)[:, monitor]
+        return 1 if after > before else -1
+
+    def step(self) -> Step:
+        """The next step of the call."""
+        step = next(self.steps, None)
+        if step is None:
+            raise StepFailure(f"solve_ivp: {self.failure}")
+        return step
+
+    def restep(self, step: Step, s: float) -> Step:
+        """Not needed: the step ends at the event."""
+        raise NotImplementedError("solve_ivp ends at its event")
+
+
+def _dense(solution: Any) -> Dense:
+    return lambda s: solution(s).T

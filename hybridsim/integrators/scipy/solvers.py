@@ -1,0 +1,198 @@
+"""SciPy's six initial value solvers, with events located by the engine or by `solve_ivp` itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from hybridsim.engine.run.stepping import Flow, Stepper, Watch
+from hybridsim.engine.system.tolerances import Tolerances
+from hybridsim.integrators.contract import Integrator
+from hybridsim.integrators.first_steps import with_first_steps
+from hybridsim.integrators.scipy.native import NativeStepper
+from hybridsim.integrators.scipy.stepper import SolverStepper, series_step
+
+_NOISE = {
+    "accumulation": "events that follow each other within its tolerances are noise: every restart is at order one"
+}
+_EXPLICIT = {"stiff": "explicit: its step is bound by the fastest rate"}
+# roots of |R(-z)| = 1 for their stability polynomials
+_STABLE = {
+    "RK23": 2.513,
+    "RK45": 3.307,
+    "DOP853": 6.394,
+}
+
+
+@dataclass(frozen=True)
+class ScipyIntegrator(Integrator):
+    """A solver of `scipy.integrate`.
+
+    Parameters
+    ----------
+    events : "located": the engine finds all zeros along each step and repeats the step up to the first one.
+        "native": each smooth stretch is one call of `solve_ivp` with terminal events, as a careful user writes it;
+        see `NativeStepper` for what that misses. What follows an event is decided by the engine either way.
+    """
+
+    events: Literal["located", "native"] = "located"
+
+    solver: ClassVar[str]
+    implicit: ClassVar[bool] = False
+    is_multistep: ClassVar[bool] = False  # it begins at order one
+    starts_blind: ClassVar[bool] = False  # a first step that is far too long makes it give up
+
+    @property
+    def stable_to(self) -> float:
+        """Of the explicit ones."""
+        return _STABLE.get(self.solver, 0.0)
+
+    def start(
+        self,
+        flow: Flow,
+        x0: np.ndarray,
+        s_bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+        watch: Watch,
+    ) -> Stepper:
+        """Begin a smooth segment."""
+        import scipy.integrate
+
+        solver = getattr(scipy.integrate, self.solver)
+        if self.events == "native":
+            return NativeStepper(solver, self.implicit, flow, x0, s_bound, tolerances, first_step, watch)
+        if self.starts_blind:
+            first_step = min(first_step or np.inf, series_step(flow, x0, s_bound, tolerances))
+        if self.is_multistep:
+            return with_first_steps(
+                flow,
+                x0,
+                s_bound,
+                tolerances,
+                watch,
+                lambda s, x: SolverStepper(
+                    solver,
+                    self.implicit,
+                    flow,
+                    x,
+                    s_bound,
+                    tolerances,
+                    self._first(first_step, s_bound - s),
+                    s,
+                ),
+            )
+        return SolverStepper(solver, self.implicit, flow, x0, s_bound, tolerances, first_step)
+
+    def _first(self, first_step: float | None, left: float) -> float | None:
+        """A first step that is no longer than what is left of the segment."""
+        return None if first_step is None else min(first_step, abs(left))
+
+
+@dataclass(frozen=True)
+class ScipyRK23(ScipyIntegrator):
+    """Bogacki and Shampine's pair of order 3(2); its dense output, a cubic, is as accurate as the method.
+
+    When to choose it: never for accuracy; it shows what a low order costs.
+    """
+
+    name: ClassVar[str] = "scipy-rk23"
+    title: ClassVar[str] = "SciPy RK23"
+    order: ClassVar[str] = "3(2)"
+    reference: ClassVar[str] = "Bogacki and Shampine 1989, doi:10.1016/0893-9659(89)90079-7"
+    when: ClassVar[str] = "very loose tolerances, 1e-3 and above"
+    lacks: ClassVar[dict[str, str]] = _EXPLICIT
+    solver: ClassVar[str] = "RK23"
+
+
+@dataclass(frozen=True)
+class ScipyRK45(ScipyIntegrator):
+    """Dormand and Prince's pair of order 5(4), SciPy's default.
+
+    When to choose it: loose tolerances (1e-3 to 1e-6) and few states; else `scipy-dop853` is cheaper.
+    """
+
+    name: ClassVar[str] = "scipy-rk45"
+    title: ClassVar[str] = "SciPy RK45"
+    order: ClassVar[str] = "5(4)"
+    reference: ClassVar[str] = "Dormand and Prince 1980, doi:10.1016/0771-050X(80)90013-3"
+    when: ClassVar[str] = "loose tolerances, smooth non-stiff modes"
+    lacks: ClassVar[dict[str, str]] = _EXPLICIT
+    solver: ClassVar[str] = "RK45"
+
+
+@dataclass(frozen=True)
+class ScipyDOP853(ScipyIntegrator):
+    """Dormand and Prince's method of order 8(5,3) with interpolant of order 7.
+
+    When to choose it: tight tolerances (1e-6 to 1e-13) and smooth non-stiff modes.
+    """
+
+    name: ClassVar[str] = "scipy-dop853"
+    title: ClassVar[str] = "SciPy DOP853"
+    order: ClassVar[str] = "8(5,3)"
+    reference: ClassVar[str] = "Hairer, Norsett and Wanner 1993, doi:10.1007/978-3-540-78862-1, section II.10"
+    when: ClassVar[str] = "tight tolerances, smooth non-stiff modes"
+    lacks: ClassVar[dict[str, str]] = _EXPLICIT
+    solver: ClassVar[str] = "DOP853"
+
+
+@dataclass(frozen=True)
+class ScipyRadau(ScipyIntegrator):
+    """Implicit Runge-Kutta method of order 5 (Radau IIA), Newton iteration with the model's own Jacobian.
+
+    When to choose it: stiff modes at 1e-4 to 1e-8. Its dense output is a cubic: steps are repeated to event times.
+    """
+
+    name: ClassVar[str] = "scipy-radau"
+    title: ClassVar[str] = "SciPy Radau"
+    order: ClassVar[str] = "5"
+    reference: ClassVar[str] = "Hairer and Wanner 1996, doi:10.1007/978-3-642-05221-7, section IV.8"
+    when: ClassVar[str] = "stiff modes, middle tolerances"
+    solver: ClassVar[str] = "Radau"
+    implicit: ClassVar[bool] = True
+
+
+@dataclass(frozen=True)
+class ScipyBDF(ScipyIntegrator):
+    """Backward differentiation formulas of orders 1 to 5 in quasi-constant steps, the model's own Jacobian.
+
+    When to choose it: stiff modes with few events, loose tolerances; it begins anew at order 1 after each event.
+    """
+
+    name: ClassVar[str] = "scipy-bdf"
+    title: ClassVar[str] = "SciPy BDF"
+    order: ClassVar[str] = "1 to 5"
+    reference: ClassVar[str] = "Shampine and Reichelt 1997, doi:10.1137/S1064827594276424"
+    when: ClassVar[str] = "stiff modes, few events, loose tolerances"
+    lacks: ClassVar[dict[str, str]] = {
+        **_NOISE,
+        "poles": "where a trial goes beyond a pole it begins again at order one, with steps that doubles of time lack",
+    }
+    dense_is_accurate: ClassVar[bool] = True
+    solver: ClassVar[str] = "BDF"
+    is_multistep: ClassVar[bool] = True
+    implicit: ClassVar[bool] = True
+
+
+@dataclass(frozen=True)
+class ScipyLSODA(ScipyIntegrator):
+    """ODEPACK's LSODA: Adams formulas while the motion is not stiff, BDF where it is, by its own choice.
+
+    When to choose it: modes of which nobody knows whether they are stiff. It gives up where its first step is far too
+    long, so it is given one from the Taylor series of the states.
+    """
+
+    name: ClassVar[str] = "scipy-lsoda"
+    title: ClassVar[str] = "SciPy LSODA"
+    order: ClassVar[str] = "1 to 12"
+    reference: ClassVar[str] = "Petzold 1983, doi:10.1137/0904010"
+    when: ClassVar[str] = "stiffness not known"
+    lacks: ClassVar[dict[str, str]] = _NOISE
+    dense_is_accurate: ClassVar[bool] = True
+    solver: ClassVar[str] = "LSODA"
+    is_multistep: ClassVar[bool] = True
+    implicit: ClassVar[bool] = True
+    starts_blind: ClassVar[bool] = True

@@ -1,0 +1,221 @@
+"""CVODE of SUNDIALS through scikit-sundae, restarted at every event, which the engine locates on its steps."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from typing import ClassVar
+
+import numpy as np
+
+from hybridsim.engine.record.hermite import hermite
+from hybridsim.engine.record.segments import Dense
+from hybridsim.engine.run.stepping import Flow, Step, Stepper, Watch
+from hybridsim.engine.system.failures import StepFailure
+from hybridsim.engine.system.tolerances import Tolerances
+from hybridsim.integrators.contract import Integrator
+from hybridsim.integrators.first_steps import with_first_steps
+from hybridsim.integrators.past_steps import MOST, converges, through
+
+_NOISE = {
+    "accumulation": "events that follow each other within its tolerances are noise: every restart is at order one"
+}
+# More steps than any one output should take; CVODE's default of 500 ends long smooth stretches.
+_MAX_STEPS = 10_000_000
+_SMALLEST = 2e-14  # rtol with which it still takes steps: below, it finds that too much accuracy is asked for
+
+
+@cache
+def _leave_stdout_alone() -> None:
+    """Have SUNDIALS write its warnings to standard error, unless somebody has chosen a place for them.
+
+    It writes to the standard output of C otherwise, among the data of whoever runs it. It reads these variables when a
+    solver is made; to redirect the descriptor around its calls would take away what other threads write meanwhile.
+    """
+    for level in ("WARNING", "INFO", "DEBUG"):
+        os.environ.setdefault(f"SUNLOGGER_{level}_FILENAME", "stderr")
+
+
+class CvodeStepper:
+    """Steps CVODE through one segment.
+
+    CVODE's step control sees the states alone. While a mode holds them still, a step would grow over many periods of
+    a forcing that only the guards feel. So the sine of every angle
+    that grows in time is integrated along: the error control then resolves the forcing in every mode.
+    """
+
+    def __init__(
+        self,
+        method: str,
+        flow: Flow,
+        x0: np.ndarray,
+        bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+        origin: tuple[float, np.ndarray] | None = None,
+    ) -> None:
+        from sksundae.cvode import CVODE
+
+        _leave_stdout_alone()
+        self.flow, self.bound = flow, bound
+        at = flow.system.layout.phases_at
+        self.rates = np.asarray(flow.system.rates)
+        self.phases = flow.p[at : at + len(self.rates)]
+        # its norm is the root of a mean, within which one of n errors may be sqrt(n) times the tolerance
+        share = 1.0 / np.sqrt(flow.n + len(self.rates))
+        rtol = max(share * tolerances.rtol, min(tolerances.rtol, _SMALLEST))
+        atol = share * np.concatenate([tolerances.atol, np.full(len(self.rates), tolerances.rtol)])
+        # a fresh start is of order 1: it cannot take up the step of before an event, only one that a user asks for
+        first = first_step if first_step == tolerances.first_step else None
+        self.solver = CVODE(
+            self._rhs(),
+            jacfn=self._jacobian() if method == "BDF" else None,
+            method=method,
+            rtol=rtol,
+            atol=atol,
+            first_step=first or 0.0,
+            max_step=0.0 if np.isinf(tolerances.max_step) else tolerances.max_step,
+            max_num_steps=_MAX_STEPS,
+        )
+        self.s, self.x = (0.0, x0) if origin is None else origin
+        angles = np.sin(self.phases + self.rates * self.s)
+        self.solver.init_step(self.s, np.concatenate([self.x, angles]))
+        self.past_times, self.past_states = [self.s], [self.x]
+        # the series at the end of the last step whose dense output was asked for
+        self.last_series = math.nan, np.zeros((0, 0))
+
+    def _rhs(self) -> Callable[[float, np.ndarray, np.ndarray], None]:
+        flow, n, rates, phases = self.flow, self.flow.n, self.rates, self.phases
+
+        def rhs(s: float, x: np.ndarray, dx: np.ndarray) -> None:
+            flow.counters.rhs_evaluations += 1
+            dx[:n] = flow.rhs(s, np.ascontiguousarray(x[:n]))
+            dx[n:] = rates * np.cos(phases + rates * s)
+
+        return rhs
+
+    def _jacobian(self) -> Callable[[float, np.ndarray, np.ndarray, np.ndarray], None]:
+        """The model's own; the differences that CVODE takes otherwise miss corners narrower than their increments."""
+        flow, n = self.flow, self.flow.n
+
+        def jacobian(s: float, x: np.ndarray, dx: np.ndarray, out: np.ndarray) -> None:
+            found = flow.jacobian(s, np.ascontiguousarray(x[:n]))
+            out[:, :] = 0.0
+            if np.isfinite(found).all():
+                out[:n, :n] = found
+
+        return jacobian
+
+    def _dense(self, s0: float, s1: float, x0: np.ndarray, x1: np.ndarray) -> Dense:
+        """Interpolation made when it is first asked for."""
+        made: list[Dense] = []
+        self.past_times, self.past_states = [*self.past_times, s1][-MOST:], [*self.past_states, x1][-MOST:]
+        times, states = np.array(self.past_times), np.array(self.past_states)
+
+        def dense(s: np.ndarray) -> np.ndarray:
+            if not made:
+                left = self._series(s0, x0) if self.last_series[0] != s0 else self.last_series[1]
+                right = self._series(s1, x1)
+                self.last_series = s1, right
+                smooth = converges(left, s1 - s0, x1) and converges(right, s0 - s1, x0)
+                made.append(hermite(s0, s1, left, right) if smooth else through(times, states))
+            return made[0](s)
+
+        return dense
+
+    def _series(self, s: float, x: np.ndarray) -> np.ndarray:
+        zero = np.zeros(self.flow.n)
+        return self.flow.system.series(s, x, self.flow.p, self.flow.z, zero, 0.0).states
+
+    def step(self) -> Step:
+        """One internal step of CVODE, cut at the bound."""
+        result = self.solver.step(self.bound, method="onestep", tstop=self.bound)
+        if not result.success:
+            raise StepFailure(f"CVODE: {result.message}")
+        s0, x0 = self.s, self.x
+        s1, x1 = float(result.t), np.array(result.y[: self.flow.n], dtype=float)
+        if s1 == s0:
+            raise StepFailure("CVODE: no progress")
+        self.s, self.x = s1, x1
+        return Step(s0, s1, x0, x1, self._dense(s0, s1, x0, x1))
+
+    def restep(self, step: Step, s: float) -> Step:
+        """Not needed: the dense output is as accurate as the method."""
+        raise NotImplementedError("an event of CVODE is taken from the dense output")
+
+
+@dataclass(frozen=True)
+class CvodeBDF(Integrator):
+    """Backward differentiation formulas of orders 1 to 5, variable step, Newton iteration.
+
+    When to choose it: stiff modes, such as regularised laws and laws with fast internal states. At events: a fresh
+    start of order 1. Dense output, on which events are located, is the two-point Hermite polynomial of degree 7.
+    """
+
+    name: ClassVar[str] = "cvode-bdf"
+    title: ClassVar[str] = "SUNDIALS CVODE, BDF"
+    order: ClassVar[str] = "1 to 5"
+    reference: ClassVar[str] = "Hindmarsh et al. 2005, doi:10.1145/1089014.1089020"
+    when: ClassVar[str] = "stiff modes"
+    lacks: ClassVar[dict[str, str]] = _NOISE
+    dense_is_accurate: ClassVar[bool] = True
+
+    def start(
+        self,
+        flow: Flow,
+        x0: np.ndarray,
+        s_bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+        watch: Watch,
+    ) -> Stepper:
+        """Begin a smooth segment."""
+        return with_first_steps(
+            flow,
+            x0,
+            s_bound,
+            tolerances,
+            watch,
+            lambda s, x: CvodeStepper("BDF", flow, x0, s_bound, tolerances, first_step, (s, x)),
+        )
+
+
+@dataclass(frozen=True)
+class CvodeAdams(Integrator):
+    """Adams-Moulton formulas of orders 1 to 12, variable step.
+
+    When to choose it: long smooth stretches between events at tight tolerances. At events as `cvode-bdf`.
+    """
+
+    name: ClassVar[str] = "cvode-adams"
+    title: ClassVar[str] = "SUNDIALS CVODE, Adams"
+    order: ClassVar[str] = "1 to 12"
+    reference: ClassVar[str] = "Hindmarsh et al. 2005, doi:10.1145/1089014.1089020"
+    when: ClassVar[str] = "long smooth stretches, not stiff"
+    lacks: ClassVar[dict[str, str]] = {
+        **_NOISE,
+        "stiff": "where rates are stiff its iteration converges with very short steps only: use cvode-bdf",
+    }
+    dense_is_accurate: ClassVar[bool] = True
+
+    def start(
+        self,
+        flow: Flow,
+        x0: np.ndarray,
+        s_bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+        watch: Watch,
+    ) -> Stepper:
+        """Begin a smooth segment."""
+        return with_first_steps(
+            flow,
+            x0,
+            s_bound,
+            tolerances,
+            watch,
+            lambda s, x: CvodeStepper("Adams", flow, x0, s_bound, tolerances, first_step, (s, x)),
+        )

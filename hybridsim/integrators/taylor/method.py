@@ -1,0 +1,199 @@
+"""Taylor series of the flow, of an order that the tolerance asks for; its dense output is the series itself."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from hybridsim.engine.native.time_grid import on_the_grid
+from hybridsim.engine.record.segments import Dense
+from hybridsim.engine.roots.defect_check import BETWEEN
+from hybridsim.engine.roots.vanishing_terms import PIECES, where_it_ends
+from hybridsim.engine.run.compiled_loop import TaylorLeaper, compile_leaps
+from hybridsim.engine.run.stepping import Flow, Step, Stepper, Watch
+from hybridsim.engine.series.interpreter import polynomials
+from hybridsim.engine.series.vanishing_kinds import KINDS, power_of, register_of
+from hybridsim.engine.system.failures import Collapsed, Creeping
+from hybridsim.engine.system.programs.mode_code import computed_rates, fading
+from hybridsim.engine.system.series_at import SeriesRun
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.tolerances import Tolerances
+from hybridsim.integrators.contract import NEEDS_TAPE, Integrator
+
+_SMALLEST = 10.0  # a rest of fewer ulps of the local time is no step of its own
+_SHORTER = 0.25  # factor on a step at whose end the series does not satisfy the equation
+_DEFECT = (
+    100.0  # of a step, in units of the tolerance: in the slope the last term of order p is p times as large
+)
+_WORTH_ITS_OWN = 0.9  # a first step that covers more than this share of what there is leaves no rest behind
+_RETRIES = 30
+# So many steps in a row, each shortened so often, lead nowhere: the solution ends at the edge of where its rate has a
+# value, the root of a level that falls to zero, and each series goes back and forth over it within the tolerance.
+_CREEPING, _OFTEN = 1000, 4
+
+
+class TaylorStepper:
+    """Steps the series through one segment."""
+
+    def __init__(
+        self,
+        flow: Flow,
+        x0: np.ndarray,
+        bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+    ) -> None:
+        self.flow, self.bound, self.tolerances = flow, bound, tolerances
+        self.series = SeriesRun(flow.system, flow.p, flow.z, tolerances)
+        self.computed = np.array(computed_rates(flow.system, flow.z))
+        self.fading = np.array(fading(flow.system, flow.z), dtype=np.int64)
+        self.pieces = np.empty(self.series.order), np.empty((PIECES, self.series.order + 2))
+        self.s, self.x = 0.0, x0
+        self.longest = first_step or math.inf
+        # steps in a row that were shortened often and do not shrink further, where they begin, and the first of them
+        self.creeping, self.since, self.shortest = 0, 0.0, 0.0
+
+    def step(self) -> Step:
+        """The next step, as long as the series reaches."""
+        direction = math.copysign(1.0, self.bound)
+        left = abs(self.bound - self.s)
+        longest = min(left, self.tolerances.max_step)
+        if self.longest < _WORTH_ITS_OWN * longest:
+            longest = self.longest
+        self.longest = math.inf
+        self.flow.counters.rhs_evaluations += 1
+        h, coefficients = self.series.expand(self.s, self.x, longest)
+        order = coefficients.shape[1] - 1
+        for number in self.fading:
+            u = power_of(number) * self.series.V[register_of(number)]
+            end = where_it_ends(u, number % KINDS, order, direction * h, *self.pieces, 0)
+            h = min(h, abs(end))
+        smallest = _SMALLEST * math.ulp(abs(self.bound))
+        before = self.flow.counters.rejected
+        for _ in range(_RETRIES):
+            last = h >= left - smallest  # what would be left is too short for a step of its own
+            h = left if last else h if math.isnan(h) else abs(on_the_grid(self.s, direction * h))
+            x1 = coefficients @ (direction * h) ** np.arange(coefficients.shape[1])
+            if math.isnan(h) or (
+                self._holds_between(coefficients, direction * h)
+                and self._holds(coefficients, self.x, x1, self.s, direction * h)
+            ):
+                break
+            self.flow.counters.rejected += 1
+            h *= _SHORTER
+        if self.flow.counters.rejected < before + _OFTEN:
+            self.creeping = 0
+        elif self.creeping and h > 0.5 * self.shortest:
+            self.creeping += 1
+        else:
+            self.creeping, self.since, self.shortest = 1, self.s, h
+        if self.creeping == _CREEPING:
+            raise Creeping(
+                f"{_CREEPING} steps in a row, which are left out, were a hundredth of what their series reach, "
+                f"the last {h:.3g}",
+                self.since,
+            )
+        if not h > 0.0:
+            raise Collapsed(f"the step fell to {h:.3g}")
+        s0, x0 = self.s, self.x
+        self.s = self.bound if last else s0 + direction * h
+        self.x = self.flow.landed(self.s, x1)
+        dense = _dense(s0, coefficients)
+
+        def holds(s: float) -> bool:
+            return self._holds(coefficients, x0, dense(np.array([s]))[0], s0, s - s0)
+
+        return Step(s0, self.s, x0, x1, dense, holds=holds)
+
+    def _holds_between(self, coefficients: np.ndarray, h: float) -> bool:
+        """The same as `_holds` on the way, where the rate of a state seems to stay as it is."""
+        moves = np.abs(coefficients[:, 2:]) @ np.abs(h) ** np.arange(2, coefficients.shape[1])
+        still = moves <= self.tolerances.atol + self.series.rtol * np.abs(self.x)
+        if not (still & self.computed).any():
+            return True
+        places = h * np.array(BETWEEN)
+        states = np.empty((len(places), len(self.x)))
+        polynomials(coefficients, places, states)
+        return all(
+            self._holds(coefficients, self.x, x, self.s, d) for d, x in zip(places, states, strict=True)
+        )
+
+    def _holds(self, coefficients: np.ndarray, x0: np.ndarray, x1: np.ndarray, s0: float, d: float) -> bool:
+        """Whether the series from s0 still satisfies the equation at a distance d, where the state is x1.
+
+        The terms of a series tell nothing of what is beyond rounding where it starts: a saturated tanh, the other
+        branch of a root, a friction that is larger near rest alone.
+        """
+        powers = np.arange(1, coefficients.shape[1])
+        slope = coefficients[:, 1:] @ (powers * d ** (powers - 1))
+        with np.errstate(
+            invalid="ignore"
+        ):  # infinite rates less infinite slopes: that is no defect below a bound
+            defect = abs(d) * np.abs(slope - self.flow.rhs(s0 + d, x1))
+        self.flow.counters.rhs_evaluations += 1
+        scale = self.tolerances.atol + self.series.rtol * np.maximum(np.abs(x0), np.abs(x1))
+        change = np.abs(coefficients[:, 1:]) @ np.abs(d) ** powers
+        return bool((defect <= _DEFECT * (scale + self.series.rtol * change)).all())
+
+    def restep(self, step: Step, s: float) -> Step:
+        """A shorter step, where the series does not hold at s: where it holds it is as accurate as at its end."""
+        self.flow.counters.rejected += 1
+        self.s, self.x, self.longest = step.s0, step.x0, _SHORTER * abs(s - step.s0)
+        return self.step()
+
+
+def _dense(s0: float, coefficients: np.ndarray) -> Dense:
+    def dense(s: np.ndarray) -> np.ndarray:
+        out = np.empty((len(s), coefficients.shape[0]))
+        polynomials(coefficients, np.asarray(s - s0, dtype=float), out)
+        return out
+
+    return dense
+
+
+@dataclass(frozen=True)
+class Taylor(Integrator):
+    """Taylor series by recurrences over the operations of the model, order and step chosen by the tolerance.
+
+    The order is 1.5 (1 - ln(rtol)/2), of linear modes with 1.6; the step is the one at which the
+    last two terms reach the tolerance: near the least work for an accuracy. Guards have series of their own, and the
+    step ends where these stop to be accurate.
+
+    When to choose it: tight tolerances, 1e-9 and below, and whenever events matter more than anything.
+    """
+
+    name: ClassVar[str] = "taylor"
+    title: ClassVar[str] = "Taylor series by automatic differentiation"
+    order: ClassVar[str] = "by the tolerance"
+    reference: ClassVar[str] = "Jorba and Zou 2005, doi:10.1080/10586458.2005.10128904"
+    when: ClassVar[str] = "highest accuracy; smooth modes, not stiff"
+    lacks: ClassVar[dict[str, str]] = {
+        "stiff": "explicit: its step is bound by the fastest rate",
+        "corners": "a series follows one side of what jumps inside a mode past its jump ('hybridsim check' names it)",
+        "functions": NEEDS_TAPE,
+    }
+    dense_is_accurate: ClassVar[bool] = True
+    leaps: ClassVar[bool] = True
+
+    def prepare(self, system: System) -> None:
+        """The compiled mode loop."""
+        compile_leaps(system, TaylorLeaper)
+
+    def leaper(self, system: System, tolerances: Tolerances, longest: float) -> TaylorLeaper:
+        """The compiled mode loop."""
+        return TaylorLeaper(system, tolerances, longest)
+
+    def start(
+        self,
+        flow: Flow,
+        x0: np.ndarray,
+        s_bound: float,
+        tolerances: Tolerances,
+        first_step: float | None,
+        watch: Watch,
+    ) -> Stepper:
+        """Begin a smooth segment."""
+        return TaylorStepper(flow, x0, s_bound, tolerances, first_step)

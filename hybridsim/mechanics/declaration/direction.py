@@ -1,0 +1,42 @@
+"""This module checks the numbers and directions in the declaration of a mechanical system."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from numbers import Integral
+from typing import TYPE_CHECKING, Any
+
+from hybridsim.arguments import as_real, is_row
+
+if TYPE_CHECKING:
+    from hybridsim.model.parts.declared import Declared
+
+
+_MOVES = "; for coefficients that vary in time or space write an hs.Model, starting from system.to_model()"
+
+
+def finite(part: Declared, what: str, value: Any) -> float:
+    """Return a finite number, or raise an error that names the part."""
+    number = as_real(value)
+    if number is None or not math.isfinite(number):
+        raise part._fault(f"{what} is {value!r}", "give finite numbers" + _MOVES * isinstance(value, str))
+    return number
+
+
+def weights(part: Declared, direction: Any) -> tuple[tuple[tuple[int, float], ...], int]:
+    """Return the non-zero (coordinate, weight) pairs, and the length of a row (0 for a mapping)."""
+    is_mapping = isinstance(direction, Mapping)
+    if not (is_mapping or is_row(direction)):
+        raise part._fault(
+            f"direction is {direction!r}", "give a row of weights, or a mapping from coordinates"
+        )
+    row = list(direction.items() if is_mapping else enumerate(direction))
+    given = [(i, finite(part, "direction", w)) for i, w in row]
+    for i, _ in given:
+        if not isinstance(i, Integral):
+            raise part._fault(f"direction names the coordinate {i!r}", "give whole numbers, counted from 0")
+    pairs = tuple((int(i), w) for i, w in given if w != 0.0)
+    if not pairs:
+        raise part._fault("the direction is zero", "give at least one weight that is not zero")
+    return pairs, 0 if is_mapping else len(row)

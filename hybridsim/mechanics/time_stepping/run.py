@@ -1,0 +1,163 @@
+"""This module runs a mechanical system by time stepping: it prepares arrays, calls kernels and collects results."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.engine.native.kernels import seconds_compiling
+from hybridsim.engine.native.simd_vectors import WIDTH, room_for
+from hybridsim.engine.native.struct_pack import packed
+from hybridsim.engine.record.counters import Counters
+from hybridsim.engine.record.limits import UNLIMITED, Gauge, LimitReached, Limits
+from hybridsim.engine.series.bounded import UNIT
+from hybridsim.errors import UsageError
+from hybridsim.mechanics.series_loop.mechanical_arrays import rates_of
+from hybridsim.mechanics.time_stepping.arrays import build_stepped, directions
+from hybridsim.mechanics.time_stepping.kernels import ABOVE, HOLDS, Bench, Kept, Stand, steps
+
+if TYPE_CHECKING:
+    from hybridsim.integrators.fixed_step.moreau import Moreau
+    from hybridsim.mechanics.declaration.system import MechanicalSystem
+
+_ROOM = 1 << 21  # doubles for the states of one call
+_EVENTS = 4096  # events per call, in addition to those of one step
+_EQUAL = 1e-9  # tolerance for a span that is a whole number of steps
+
+
+class SteppedRun:
+    """One run by time stepping; `go` carries it out.
+
+    The span is divided into equal steps, none longer than requested, so that one factored matrix serves all.
+    """
+
+    def __init__(
+        self,
+        system: MechanicalSystem,
+        method: Moreau,
+        span: tuple[float, float],
+        x: np.ndarray,
+        keep: bool,
+        limits: Limits = UNLIMITED,
+    ) -> None:
+        self.system, self.span, self.keep, self.start = system, span, keep, x
+        self.count = max(math.ceil((span[1] - span[0]) / _length(system, method) * (1.0 - _EQUAL)), 1)
+        self.step, self.theta = (span[1] - span[0]) / self.count, method.theta
+        self.settings = (self.step, method.theta, method.tolerance, method.iterations)
+        self.plant, self.laws = build_stepped(system, self.step, method.theta)
+        n, nc = system.n, len(system.contacts)
+        m = nc + len(system.impacts)
+        self.state = _stand(n, m)
+        self.room = _bench(n, nc, m, int(self.laws.registers.max(initial=0)))
+        self.state.q[:], self.state.v[:] = x[:n], x[n:]
+        self.states: list[np.ndarray] = [x[None, :]]
+        self.forces: list[np.ndarray] = []
+        self.events: list[np.ndarray] = []
+        self.first_modes = np.zeros(m, dtype=np.int64)
+        self.status, self.done, self.kernel_time, self.compile_time = "finished", 0, 0.0, 0.0
+        self.overlaps: list[str] = []
+        self.limits, self.counters, self.limit_message = limits, Counters(), ""
+
+    def go(self, progress: Callable[[float], None] | None) -> None:
+        """Step to the end of the span, or until a state is NaN."""
+        self._begin()
+        if self.overlaps:
+            self.status = "inconsistent"
+            return
+        system, state = self.system, self.state
+        packs = [packed(a) for a in (self.plant, self.laws, state, self.room)]
+        began, compiled, m = perf_counter(), seconds_compiling(), len(state.mode)
+        rows = max(_ROOM // (2 * system.n + m), 16)
+        gauge = Gauge(self.limits, self.counters)
+        while self.done < self.count:
+            wanted = min(rows, self.count - self.done)
+            kept = Kept(
+                np.empty((wanted if self.keep else 0, 2 * system.n)),
+                np.empty((wanted if self.keep else 0, m)),
+                np.empty((_EVENTS + m, 4), dtype=np.int64),
+                np.zeros(2, dtype=np.int64),
+            )
+            done = steps(*packs, packed(kept), self.settings, self.span[0], self.done, wanted)
+            self.done += done
+            self.states.append(kept.states[: kept.used[0]])
+            self.forces.append(kept.forces[: kept.used[0]])
+            self.events.append(kept.event[: kept.used[1]].copy())
+            if not (np.isfinite(state.q).all() and np.isfinite(state.v).all()):
+                self.status = "step-failure"
+                break
+            if progress is not None:
+                progress(self.done / self.count)
+            self.counters.steps, self.counters.events = self.done, self.counters.events + int(kept.used[1])
+            if self.done < self.count:
+                try:
+                    gauge.check()
+                except LimitReached as reached:
+                    self.status, self.limit_message = "limit", str(reached)
+                    break
+        self.compile_time = seconds_compiling() - compiled
+        self.kernel_time = perf_counter() - began - self.compile_time
+
+    def _begin(self) -> None:
+        """Find the modes at the start from the motion, and the gaps that are negative there."""
+        system, plant, n = self.system, self.plant, self.system.n
+        W, nc, x = directions(system), len(system.contacts), self.start
+        turns = plant.rates * self.span[0]
+        angle = turns[plant.base_rate] if len(plant.rates) else np.zeros(nc)
+        base = plant.base[:, 0] + plant.base[:, 1] * np.sin(angle) + plant.base[:, 2] * np.cos(angle)
+        mode = self.state.mode
+        mode[:nc] = np.sign((W @ x[n:])[:nc] - base)
+        mode[nc:] = ABOVE
+        gaps = (W @ x[:n])[nc:] + plant.gap
+        sizes = (abs(W) @ np.abs(x[:n]))[nc:] + np.abs(plant.gap)
+        self.overlaps = [
+            i.name for i, g, s in zip(system.impacts, gaps, sizes, strict=True) if g < -8 * UNIT * s
+        ]
+        self.first_modes = mode.copy()
+
+    @property
+    def time(self) -> float:
+        """The time that the run has reached."""
+        return self.span[1] if self.done == self.count else self.span[0] + self.done * self.step
+
+
+def _length(system: MechanicalSystem, method: Moreau) -> float:
+    """Return the given step, or a fraction of the single period of forcing and bases."""
+    for label in ("step", "period", "steps_per_period"):
+        value = getattr(method, label)
+        if value is not None and not (math.isfinite(value) and value > 0.0):
+            raise UsageError(f"moreau: {label} is {value!r}", remedy="give a positive number")
+    if method.step is not None:
+        return method.step
+    rates = [abs(rate) for rate in rates_of(system) if rate != 0.0]
+    period = method.period or (2.0 * math.pi / rates[0] if len(set(rates)) == 1 else None)
+    if period is None:
+        raise UsageError(
+            f"moreau needs a step size, because {system.name} has no single forcing period",
+            remedy="give step=... or period=...",
+        )
+    return period / method.steps_per_period
+
+
+def _stand(n: int, m: int) -> Stand:
+    return Stand(
+        np.zeros(n), np.zeros(n), np.full(m, HOLDS, dtype=np.int64), np.zeros(m), np.zeros(5),
+        np.zeros(4, dtype=np.int64), np.zeros(1),
+    )  # fmt: skip
+
+
+def _bench(n: int, nc: int, m: int, registers: int) -> Bench:
+    of: dict[str, Any] = {name: np.zeros(n) for name in ("force", "force_after", "b", "free", "solved")}
+    of |= {name: np.zeros(m) for name in ("y", "u", "rebound")}
+    of |= {name: np.zeros(nc) for name in ("speed", "up", "down", "up_before", "down_before")}
+    of |= {name: np.zeros(m, dtype=np.int64) for name in ("active", "dirty", "next")}
+    lanes = nc + WIDTH  # in whole vectors
+    return Bench(
+        **of,
+        base=np.zeros((nc, 3)),
+        lane=np.zeros(lanes, dtype=np.int64),
+        V=room_for(1, registers * lanes + 1)[0],
+    )

@@ -1,0 +1,142 @@
+"""Check contacts and their friction laws."""
+
+from __future__ import annotations
+
+from hybridsim.model.checks.names import check_identifier
+from hybridsim.model.checks.scope import Scope
+from hybridsim.model.laws.law import FORCE, INDEX, LOAD_RATE, NORMAL, SPEED, FrictionLaw
+from hybridsim.model.parts.contact import Contact
+
+# Keys of a law in TOML, which a parameter of a law cannot be called.
+_KEYS = (
+    "name", "slip", "stick", "slip_backward", "stick_backward", "force", "states", "definitions", "modes", "initial",
+    "copies", "tables", "parameters", "title", "source",
+)  # fmt: skip
+_TAKEN = {
+    SPEED: "the speed",
+    NORMAL: "the normal load",
+    LOAD_RATE: "the rate of the normal load",
+    INDEX: "the index of a copy",
+} | dict.fromkeys(_KEYS, "a key of the declaration")
+_AT_REST = ("stick", "stick_backward")
+
+
+def check_contacts(scope: Scope) -> None:
+    """Report invalid friction laws, and contacts whose velocity contains no state."""
+    checked: list[FrictionLaw] = []
+    for contact in scope.model.contacts:
+        _contact(scope, contact)
+        if contact.law not in checked:
+            checked.append(contact.law)
+            check_law(scope, contact.law)
+
+
+def check_law(scope: Scope, law: FrictionLaw) -> None:
+    """Report names in a law other than v, N, dN and the names that it declares."""
+    what = f"law {law.name}"
+    names = _own_names(scope, law)
+    known = names | {SPEED, NORMAL, LOAD_RATE} | ({INDEX} if law.copies else set())
+    parameters = frozenset(law.parameters)
+    at_rest = {t.name for t in law.tables if t.over.text == SPEED or SPEED not in t.over.names}
+    used: set[str] = set()
+    for field, expr in law.expressions():
+        used |= expr.names
+        if field.endswith(", when"):
+            continue  # a condition, which is checked with the automaton of the contact
+        if field in _AT_REST:
+            allowed = parameters | at_rest | {NORMAL}
+        elif field.startswith("slip"):
+            allowed = parameters | {table.name for table in law.tables} | {SPEED, NORMAL}
+        elif field.endswith(", start"):
+            allowed = parameters
+        elif field.startswith("table "):
+            allowed = parameters | {SPEED}
+        else:
+            allowed = known
+        scope.need_own(expr, f"{what}, {field}", allowed)
+    for name, value in law.parameters.items():
+        if value is not None:
+            scope.need_own(value, f"{what}, parameter {name}", parameters)
+            used |= value.names
+    for name in sorted(parameters - used - {law.copies}):
+        where = "neither in slip nor in stick" if law.is_set_valued else "nowhere in the law"
+        scope.fail(law, f"{what}: the parameter '{name}' is used {where}", "use it or remove it")
+    _form(scope, law, what)
+
+
+def _own_names(scope: Scope, law: FrictionLaw) -> frozenset[str]:
+    """Return the names that the law declares, and report invalid and duplicate ones."""
+    seen: dict[str, str] = {}
+    named = [("parameter", name) for name in law.parameters]
+    named += [("definition", name) for name in law.definitions]
+    named += [("table", table.name) for table in law.tables] + [("state", state.name) for state in law.states]
+    for kind, name in named:
+        what = f"law {law.name}"
+        if not check_identifier(scope, law, f"{what}, {kind}", name):
+            continue
+        if name in _TAKEN:
+            scope.fail(law, f"{what}: the {kind} '{name}' has the name of {_TAKEN[name]}", "rename it")
+        elif name in seen:
+            scope.fail(law, f"{what}: '{name}' is both a {seen[name]} and a {kind}", "rename one of them")
+        seen.setdefault(name, kind)
+    return frozenset(seen)
+
+
+def _form(scope: Scope, law: FrictionLaw, what: str) -> None:
+    """Report fields that this form of law cannot have, and modes that change foreign quantities."""
+    if law.is_set_valued:
+        for table in law.tables:
+            if table.over.text == SPEED and table.at[0] < 0.0:
+                scope.fail(
+                    table,
+                    f"{what}, table {table.name}: the point {table.at[0]:g} is negative, but v is the absolute speed",
+                    "start the table at 0; for a law that depends on the direction add slip_backward with a table",
+                )
+        for field in ("states", "definitions", "modes", "copies"):
+            if getattr(law, field):
+                scope.fail(
+                    law,
+                    f"{what}: a law with slip and stick has no {field}",
+                    "write force instead of slip and stick",
+                )
+        return
+    states = [state.name for state in law.states]
+    for mode in law.modes:
+        resets = [name for guard in mode.guards for choice in guard.then for name in choice.reset]
+        for name in (*mode.der, *resets):
+            if name not in states:
+                scope.unknown(law, f"{what}, mode {mode.name}: the law has no state", name, states, "states")
+        for name in mode.set:
+            if name != FORCE:
+                message = f"{what}, mode {mode.name} sets '{name}'"
+                scope.fail(law, message, "a mode of a law can only set the force")
+    if law.copies is not None and law.copies not in law.parameters:
+        scope.fail(
+            law,
+            f"{what}: copies is '{law.copies}', which is not a parameter",
+            f'write parameters = ["{law.copies}", ...]; the contact then sets the number of copies',
+        )
+
+
+def _contact(scope: Scope, contact: Contact) -> None:
+    what = f"contact {contact.name}"
+    known = scope.all_names - {contact.name}
+    scope.need(contact.velocity, f"{what}, velocity", known)
+    scope.need(contact.normal, f"{what}, normal", known)
+    for name, value in contact.arguments.items():
+        scope.need(value, f"{what}, law argument {name}", known)
+    own = [state.name for state in contact.law.states]
+    for field in ("start", "nominal"):
+        for name in getattr(contact, field):
+            if name.rstrip("0123456789") not in own and name not in own:
+                scope.unknown(contact, f"{what}, {field}: the law has no state", name, own, "states")
+    reached = scope.reached(contact.velocity)
+    if not (reached <= scope.all_names and contact.law.is_set_valued):
+        return
+    forces = sorted(name for name in reached if scope.is_switched(name))
+    if forces:
+        message = f"{what}: the velocity depends on '{forces[0]}', which depends on a mode"
+        scope.fail(contact, message, "use only states, inputs, parameters and t")
+    elif not any(scope.kinds.get(name) == "state" for name in reached):
+        message = f"{what}: the velocity '{contact.velocity.text}' contains no state"
+        scope.fail(contact, message, "write the relative velocity, e.g. 'v - v_belt'")

@@ -1,0 +1,278 @@
+"""Warnings about valid models: guards that cannot fire, pulses and jumps in a flow, missing units."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from hybridsim.errors import HybridsimError, Place
+from hybridsim.expr import Expression
+from hybridsim.expr.grammar import TIME
+from hybridsim.model.checks.pulses import pulse_in
+from hybridsim.model.laws.force_signs import wrong_signs
+from hybridsim.model.laws.velocity_powers import velocity_powers
+from hybridsim.model.meanings import Meanings
+from hybridsim.model.smoothing.explicit_corners import smoothing_of
+from hybridsim.model.smoothing.nonsmooth import JUMPS, KEPT, uses_primitives
+from hybridsim.model.smoothing.one_sided import names_of, never_negative, number_of
+
+if TYPE_CHECKING:
+    from hybridsim.model.parts.component import Component, Mode
+    from hybridsim.model.parts.model import Model
+
+
+@dataclass(frozen=True)
+class Caution:
+    """A warning about a valid model: message, place and remedy."""
+
+    message: str
+    place: Place | None
+    remedy: str
+
+    def __str__(self) -> str:
+        return str(HybridsimError(self.message, place=self.place, remedy=self.remedy))
+
+    @property
+    def sentence(self) -> str:
+        """The same in one line, with file and line number but without the source text."""
+        where = self.place.prefix if self.place else ""
+        return f"{where}{self.message}: {self.remedy.rstrip('.')}"
+
+
+def warnings_of(model: Model) -> tuple[Caution, ...]:
+    """Return the warnings about a valid model; those about guards come first.
+
+    A guard or monitor that is a square, an absolute value or otherwise of one sign; one that is constant while its mode
+    lasts; one whose quantities have no units where all others have; a pulse in plain t; a jump inside a mode; a
+    fractional power of a contact's velocity; a load or a friction force of the wrong sign. Nothing is reported that the
+    form of an expression, or its value at the start, does not show. The guards of contacts and surfaces are made by
+    the program and not looked at.
+    """
+    return (
+        *_of_signs(model),
+        *_of_units(model),
+        *_of_pulses(model),
+        *jumps_of(model),
+        *_of_powers(model),
+        *forces_of(model),
+    )
+
+
+def forces_of(model: Model) -> tuple[Caution, ...]:
+    """Return warnings about loads and friction forces of the wrong sign."""
+    return tuple(Caution(message, contact.place, remedy) for contact, message, remedy in wrong_signs(model))
+
+
+def _of_powers(model: Model) -> Iterator[Caution]:
+    for power in velocity_powers(model):
+        message = (
+            f"'{power.text}' in {power.where} has no Taylor series at zero velocity of contact {power.contact}; only "
+            "integrators that do not locate events support it"
+        )
+        yield Caution(message, power.place, f"{power.remedy}, or use integrator='moreau'")
+
+
+def jumps_of(model: Model) -> tuple[Caution, ...]:
+    """Return warnings about jumps that are not treated as switching surfaces; runs report them too."""
+    found: tuple[Caution, ...] = model.once("jumps", lambda: tuple(_of_jumps(model)))
+    return found
+
+
+class _Reading:
+    """The meaning of names in one mode of a component, and the set of varying quantities."""
+
+    def __init__(self, model: Model, component: Component | None = None, mode: Mode | None = None) -> None:
+        self.numbers = model.parameter_values()
+        self._trees = {name: expr.tree for name, expr in model.definitions}
+        self._trees |= {name: expr.tree for name, expr in (mode.set if mode else {}).items()}
+        others = [part for part in model.all_components() if part is not component]
+        self._moving = {TIME, *(signal.name for signal in model.inputs)}
+        self._moving |= {name for other in others for name in other.variables}
+        if mode is None:
+            self._moving |= set(model.variables())
+        self._moving |= _reset_names(model, component)
+        for state in model.states:
+            own = mode.der.get(state.name, state.der) if mode else state.der
+            rates = [own, *(m.der[state.name] for o in others for m in o.modes if state.name in m.der)]
+            if any(number_of(rate.tree, self.numbers, self.lookup) != 0 for rate in rates):
+                self._moving.add(state.name)
+
+    def lookup(self, name: str) -> ast.expr | None:
+        """Return the tree of a definition or variable, or None."""
+        return self._trees.get(name)
+
+    def changes(self, expr: Expression) -> bool:
+        """Return whether the value of an expression can change while the mode is active."""
+        open_, seen = set(names_of(expr.tree)), set()
+        while open_:
+            name = open_.pop()
+            seen.add(name)
+            if name in self._moving:
+                return True
+            tree = self.lookup(name)
+            if tree is not None:
+                open_ |= names_of(tree) - seen
+        return False
+
+    def one_sided(self, expr: Expression) -> tuple[str, str] | None:
+        """Return the sign that an expression cannot have ("negative" or "positive") and the reason."""
+        reason = never_negative(expr.tree, self.numbers, self.lookup)
+        if reason:
+            return "negative", reason
+        if isinstance(expr.tree, ast.UnaryOp) and isinstance(expr.tree.op, ast.USub):
+            reason = never_negative(expr.tree.operand, self.numbers, self.lookup)
+        return ("positive", f"minus {reason}") if reason else None
+
+
+def _reset_names(model: Model, own: Component | None) -> set[str]:
+    """Return the states that resets change, except resets that end the component's own mode."""
+    resets = [*(monitor.reset for monitor in model.monitors), *(one.reset for one in model.schedules)]
+    for component in model.components:
+        if component is not own:
+            resets += [c.reset for mode in component.modes for guard in mode.guards for c in guard.then]
+            resets += [component.limit.reset] if component.limit else []
+    return {name for reset in resets for name in reset}
+
+
+@dataclass(frozen=True)
+class _Watched:
+    """A guard or a monitor: its description, expression and place, and the meaning of its names."""
+
+    what: str
+    expr: Expression
+    place: Place | None
+    reading: _Reading
+    is_guard: bool
+
+
+def _watched(model: Model) -> Iterator[_Watched]:
+    for component in model.components:
+        for mode in component.modes:
+            reading = _Reading(model, component, mode)
+            for guard in mode.guards:
+                what = (
+                    f"guard {guard.name} of mode {mode.name}, component {component.name}: '{guard.expr.text}'"
+                )
+                yield _Watched(what, guard.expr, guard.expr.place or guard.place, reading, True)
+    reading = _Reading(model)
+    for monitor in model.monitors:
+        what = f"monitor {monitor.name}: '{monitor.expr.text}'"
+        yield _Watched(what, monitor.expr, monitor.expr.place or monitor.place, reading, False)
+
+
+def _of_signs(model: Model) -> Iterator[Caution]:
+    """Yield warnings about guards and monitors that are constant or of one sign."""
+    for item in _watched(model):
+        meant = "at the end of the mode" if item.is_guard else "at the event"
+        remedy = f"write an expression that changes its sign {meant}"
+        if not item.reading.changes(item.expr):
+            so = "in this mode, so it fires immediately or never" if item.is_guard else "and never fires"
+            yield Caution(f"{item.what} is constant {so}", item.place, remedy)
+        elif found := item.reading.one_sided(item.expr):
+            sign, reason = found
+            fires = "never fires" if item.is_guard else "fires only if it remains at zero"
+            fires = "fires as soon as it is not zero" if item.is_guard and sign == "positive" else fires
+            yield Caution(f"{item.what} is {reason}, never {sign}, so it {fires}", item.place, remedy)
+
+
+def _of_units(model: Model) -> Iterator[Caution]:
+    """Yield warnings about guards and monitors of quantities without units, if all other states have units.
+
+    Discrete states are left out: they count, as often as not.
+    """
+    units = {state.name: state.unit for state in model.states}
+    units |= {parameter.name: parameter.unit for parameter in model.parameters}
+    units |= {part.name: part.unit or "1" for part in model.discrete}
+    watched = [(item, _quantities(item.expr, item.reading, units)) for item in _watched(model)]
+    bare = [(item, names) for item, names in watched if names and not any(units[name] for name in names)]
+    measured = [item for item, names in watched if any(units[name] for name in names)]
+    named = {name for _, names in bare for name in names}
+    others = [state for state in model.states if state.name not in named]
+    if not (measured or len(bare) == 1) or not others or not all(state.unit for state in others):
+        return
+    for item, names in bare:
+        listed = ", ".join(sorted(names))
+        yield Caution(
+            f"{item.what} depends on quantities without units ({listed}), but all other states have units",
+            item.place,
+            f'declare a unit for {listed} (unit = "1" for pure numbers), or correct the names',
+        )
+
+
+def _quantities(expr: Expression, reading: _Reading, units: Mapping[str, str]) -> set[str]:
+    """Return the states, discrete states and parameters that an expression depends on."""
+    open_, seen = set(names_of(expr.tree)), set()
+    while open_:
+        name = open_.pop()
+        seen.add(name)
+        tree = reading.lookup(name)
+        if tree is not None:
+            open_ |= names_of(tree) - seen
+    return seen & units.keys()
+
+
+def _of_pulses(model: Model) -> Iterator[Caution]:
+    lookup = _Reading(model).lookup
+    found: set[str] = set()
+    for what, expr in _followed(model):
+        pulse = pulse_in(expr.tree, lookup)
+        if pulse is None or (text := ast.unparse(pulse)) in found:
+            continue
+        found.add(text)
+        yield Caution(
+            f"{what}: '{text}' is a pulse or step in t, which an integration step may miss",
+            expr.place,
+            "declare it as an input (table or wave), whose knots are hit exactly, or set max_step to its width",
+        )
+
+
+def _followed(model: Model) -> Iterator[tuple[str, Expression]]:
+    """Yield every expression that is integrated or monitored, with its place."""
+    for state in model.states:
+        yield f"state {state.name}", state.der
+    for contact in model.contacts:
+        yield f"contact {contact.name}", contact.velocity
+        yield f"contact {contact.name}", contact.normal
+    for surface in model.surfaces:
+        values = (surface.expr, *surface.above.values(), *surface.below.values())
+        yield from ((f"surface {surface.name}", expr) for expr in values)
+    yield from ((f"impact {impact.name}", impact.gap) for impact in model.impacts)
+    for component in model.components:
+        for mode in component.modes:
+            where = f"mode {mode.name} of component {component.name}"
+            yield from ((where, expr) for expr in (*mode.der.values(), *mode.set.values()))
+            yield from ((f"guard {guard.name} of {where}", guard.expr) for guard in mode.guards)
+    for monitor in model.monitors:
+        yield f"monitor {monitor.name}", monitor.expr
+
+
+def _of_jumps(model: Model) -> Iterator[Caution]:
+    if not uses_primitives(model):
+        return
+    meanings, states = Meanings(model), {state.name for state in model.states}
+    known = {TIME, *(signal.name for signal in model.inputs)}
+    for one in smoothing_of(model).primitives:
+        if one.became != KEPT or not one.remark.startswith(JUMPS):
+            continue
+        reason = one.remark.removeprefix(f"{JUMPS}: ")
+        what = f"'{one.text}' in {', '.join(one.where)}"
+        names = meanings.depended_on(re.findall(r"[A-Za-z_]\w*", one.text))
+        is_watched = all(where.startswith(("monitor ", "guard ")) for where in one.where)
+        if names & states and not is_watched:
+            yield Caution(
+                f"{what} is not treated as a switching surface ({reason}), so a run that slides along the jump "
+                "becomes extremely slow",
+                one.place,
+                "write the rate as a sum of terms with one sign() each, or declare a switching surface "
+                "([surfaces.NAME]) or, for dry friction, a contact ([contacts.NAME])",
+            )
+        elif names & (states | known):
+            yield Caution(
+                f"{what} is not treated as a switching surface ({reason}), so an integration step may miss the jump",
+                one.place,
+                "declare the switching quantity as an input (table or wave), use modes with guards, or set max_step "
+                "to the width of the jump",
+            )

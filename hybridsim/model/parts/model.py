@@ -1,0 +1,484 @@
+"""The class Model: states, parameters, automata, contacts, inputs, events and outputs, all immutable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from numbers import Real
+from typing import Any
+
+from hybridsim.errors import ExpressionError, ModelError, Place, UsageError, nearest
+from hybridsim.expr import Expression, evaluate, parse, resolve
+from hybridsim.files import path_text
+from hybridsim.model.laws.law_with_states import ContactState
+from hybridsim.model.parts.component import Component, Corner
+from hybridsim.model.parts.contact import Contact
+from hybridsim.model.parts.declared import Declared, as_tuple
+from hybridsim.model.parts.impact import Impact
+from hybridsim.model.parts.inputs import Input
+from hybridsim.model.parts.monitor import Monitor
+from hybridsim.model.parts.quantities import Discrete, Output, Parameter, State
+from hybridsim.model.parts.schedule import Schedule
+from hybridsim.model.parts.switching import SwitchingSurface
+
+_PARTS: dict[str, type[Declared]] = {
+    "states": State,
+    "parameters": Parameter,
+    "discrete": Discrete,
+    "components": Component,
+    "contacts": Contact,
+    "inputs": Input,
+    "monitors": Monitor,
+    "schedules": Schedule,
+    "outputs": Output,
+    "surfaces": SwitchingSurface,
+    "impacts": Impact,
+}
+
+# methods that other parts of the package call; completion does not offer them
+_INTERNAL = {
+    "components_of",
+    "error",
+    "is_known_to_be_sound",
+    "once",
+    "place",
+    "remedy_for_parameter",
+    "structure",
+    "with_values_of",
+}
+
+
+@dataclass(frozen=True)
+class Model(Declared):
+    """A piecewise-smooth (hybrid) dynamical system.
+
+    Parameters
+    ----------
+    name : str
+        Name of the model.
+    states : sequence of State, or mapping of str to float
+        Continuous states with their rates.
+    parameters : sequence of Parameter, or mapping of str to str or float, optional
+        `Parameter` objects, or a dict of names and numbers or expressions.
+    discrete : sequence of Discrete, optional
+        States that change only by resets.
+    components, contacts : sequence of Component, sequence of Contact, optional
+        The automata; their modes together are the discrete state z.
+    inputs, monitors, schedules : sequence, optional
+        `Input` objects (known signals), `Monitor` objects (events that change no mode) and `Schedule` objects
+        (events at known times).
+    outputs : sequence of Output, or mapping of str to str or float, optional
+        `Output` objects, or a dict of names and expressions.
+    definitions : mapping of str to str or float, or sequence of pairs, optional
+        Named intermediate expressions, as a dict or as pairs. They may use each other and the variables of components.
+    title, source, description, look : str, optional
+        Title, reference, longer description, and a hint what to look at.
+    duration : str or float, optional
+        Default length of runs and comparisons of the command line, in the unit of t; an expression of parameters.
+    path : str, optional
+        Path of the file that the model was read from.
+    flow : callable, optional
+        A Python function (t, x, p) that returns the n rates (a tuple or an array), instead of expressions. The
+        parameters are ``p.g`` or ``p[0]``. The states are then a dict of names and start values, or have der 0.
+        ``flow`` of a `Mode` replaces it in that mode. Guards, monitors, outputs, conditions and resets are functions
+        (t, x, p) that return a number, or constants. Contacts, inputs, definitions and discrete states need
+        expressions.
+    surfaces : sequence of SwitchingSurface, optional
+        Switching surfaces, along which the motion may slide.
+    impacts : sequence of Impact, optional
+        Unilateral contacts, whose gaps cannot become negative.
+    place : Place, optional
+        Place of the declaration, for error messages.
+
+    Examples
+    --------
+    >>> free = Model("free", states=[State("x", 1, der="v"), State("v", 0, der="-k*x")], parameters={"k": 4})
+    >>> free.with_(k=9).parameter_values()
+    {'k': 9.0}
+    >>> fall = Model("fall", states={"h": 1, "w": 0}, parameters={"g": 9.81}, flow=lambda t, x, p: (x[1], -p.g))
+    >>> fall.validate() is fall
+    True
+    """
+
+    name: str
+    states: tuple[State, ...]
+    parameters: tuple[Parameter, ...] = ()
+    discrete: tuple[Discrete, ...] = ()
+    components: tuple[Component, ...] = ()
+    contacts: tuple[Contact, ...] = ()
+    inputs: tuple[Input, ...] = ()
+    monitors: tuple[Monitor, ...] = ()
+    schedules: tuple[Schedule, ...] = ()
+    outputs: tuple[Output, ...] = ()
+    definitions: tuple[tuple[str, Expression], ...] = ()
+    title: str = ""
+    source: str = ""
+    description: str = ""
+    look: str = ""
+    duration: Expression | None = None
+    path: str | None = None
+    flow: Callable[..., Any] | None = None
+    surfaces: tuple[SwitchingSurface, ...] = ()
+    impacts: tuple[Impact, ...] = ()
+
+    def __post_init__(self) -> None:
+        self._functions("flow")
+        self._named("states", self._state)
+        self._named("parameters", Parameter)
+        self._named("discrete", Discrete)
+        self._named("outputs", Output)
+        self._texts("name", "title", "source", "description", "look")
+        self._expressions("duration")
+        for field, kind in _PARTS.items():
+            self._parts(field, kind)
+        pairs = self.definitions.items() if isinstance(self.definitions, Mapping) else self.definitions
+        try:
+            definitions = tuple((name, parse(text)) for name, text in pairs)
+        except (TypeError, ValueError):
+            remedy = "use a dict of names and expressions, or a list of pairs"
+            raise self._fault(f"definitions is {self.definitions!r}", remedy) from None
+        object.__setattr__(self, "definitions", definitions)
+        object.__setattr__(self, "states", tuple(self._with_those_of_laws()))
+
+    def _with_those_of_laws(self) -> Iterable[State]:
+        """Yield the states, including those that the laws of contacts add, with their current values."""
+        brought: dict[str, State] = {}
+        for contact in self.contacts:
+            try:
+                states = self._brought_by(contact)
+            except ModelError:
+                continue  # `validate` reports it
+            brought |= {state.name: state for state in states}
+        for state in self.states:
+            yield brought.pop(state.name, state) if isinstance(state, ContactState) else state
+        yield from brought.values()
+
+    def _load_rate(self, contact: Contact) -> Expression:
+        from hybridsim.model.rate import rate_along
+
+        return rate_along(self, contact.normal, f"the normal load of contact {contact.name}")
+
+    def _state(self, name: str, start: Any) -> State:
+        if self.flow is None:
+            remedy = "use hs.State(name, start, der) objects, or define all rates by a function flow(t, x, p)"
+            raise self._fault(f"state {name} has no rate", remedy)
+        return State(name, start, parse(0))
+
+    def _named(self, field: str, kind: Callable[[str, Any], Any]) -> None:
+        given = getattr(self, field)
+        if isinstance(given, Mapping):
+            object.__setattr__(self, field, tuple(kind(name, value) for name, value in given.items()))
+
+    def __eq__(self, other: object) -> bool:
+        """Compare all declared parts; the place and the path of the file are ignored."""
+        if not isinstance(other, Model):
+            return NotImplemented
+        return _content(self) == _content(other)
+
+    def __hash__(self) -> int:
+        return hash(_content(self))
+
+    def __dir__(self) -> list[str]:
+        return sorted(set(super().__dir__()) - _INTERNAL)
+
+    def __repr__(self) -> str:
+        automata = [contact.name for contact in self.contacts]
+        automata += [surface.name for surface in self.surfaces] + [impact.name for impact in self.impacts]
+        automata += [part.name for part in self.components]
+        names = ", ".join(state.name for state in self.states)
+        return f"<Model {self.name}: states {names or 'none'}; components {', '.join(automata) or 'none'}>"
+
+    def with_(self, /, **changes: Expression | str | float) -> Model:
+        """Return a copy with changed parameter values: ``model.with_(N=40, omega="0.7*sqrt(k/m)")``.
+
+        Parameters
+        ----------
+        **changes : str or float
+            New values of parameters, numbers or expressions of other parameters.
+
+        Returns
+        -------
+        Model
+            The copy.
+
+        Raises
+        ------
+        UsageError
+            For an unknown parameter.
+        ExpressionError
+            For a value that is not a valid expression.
+        """
+        names = [parameter.name for parameter in self.parameters]
+        _known(changes, names, "parameter", self.name, self.remedy_for_parameter)
+        changed = (
+            replace(p, value=_given(changes, p.name)) if p.name in changes else p for p in self.parameters
+        )
+        return self._valued(parameters=tuple(changed))
+
+    def remedy_for_parameter(self, name: str, others: tuple[str, ...] = ()) -> str:
+        """Return the remedy for an unknown parameter: similar names, or the argument of a law to change."""
+        names = [parameter.name for parameter in self.parameters]
+        for contact in self.contacts:
+            if name not in contact.law.parameters:
+                continue
+            given = contact.arguments.get(name, contact.law.parameters[name])
+            if given is not None and given.text in names:
+                return f"contact {contact.name} has {name} = {given.text}; change {given.text} instead"
+            text = "its default" if given is None else given.text
+            return (
+                f"{name} is an argument of the law of contact {contact.name} with the value {text}; declare a "
+                f'parameter, {name} = {text} under [parameters], and write law = {{ ..., {name} = "{name}" }}'
+            )
+        return nearest(name, [*names, *others], kind="parameters and states" if others else "parameters")
+
+    def with_start(self, /, **changes: Expression | str | float) -> Model:
+        """Return a copy with changed initial values of (discrete) states: ``model.with_start(x=0.1)``."""
+        names = [*(part.name for part in self.states), *(part.name for part in self.discrete)]
+        _known(changes, names, "state", self.name)
+        contacts = tuple(self._started(contact, changes) for contact in self.contacts)
+
+        def changed(parts: Iterable[Any]) -> tuple[Any, ...]:
+            return tuple(
+                replace(part, start=_given(changes, part.name)) if part.name in changes else part
+                for part in parts
+            )
+
+        return self._valued(states=changed(self.states), discrete=changed(self.discrete), contacts=contacts)
+
+    def with_values_of(self, other: Model) -> Model:
+        """Return a copy with the values of another model with the same parameters and states."""
+        states = tuple(replace(s, start=o.start) for s, o in zip(self.states, other.states, strict=True))
+        return self._valued(states=states, parameters=other.parameters, discrete=other.discrete)
+
+    def _valued(self, **parts: Any) -> Model:
+        """Return a copy that differs only in values and shares everything that does not depend on them."""
+        copy: Model = object.__new__(type(self))
+        vars(copy).update(vars(self), **parts, _common=self._common)
+        vars(copy).pop("_values", None)
+        return copy
+
+    @cached_property
+    def _common(self) -> dict[str, Any]:
+        return {}
+
+    def once(self, name: str, make: Callable[[], Any]) -> Any:
+        """Return a result that depends only on the structure; it is computed once for all copies."""
+        if name not in self._common:
+            self._common[name] = make()
+        return self._common[name]
+
+    def _started(self, contact: Contact, changes: Mapping[str, Any]) -> Contact:
+        """Return the contact with new initial values for the states of its law."""
+        own = {name for name in changes if name.startswith(contact.variable(""))}
+        if not (own and contact.law.states):
+            return contact
+        own &= {state.name for state in self._brought_by(contact)}
+        start = {name.removeprefix(contact.variable("")): parse(changes[name]) for name in sorted(own)}
+        return replace(contact, start={**contact.start, **start})
+
+    def _brought_by(self, contact: Contact) -> tuple[State, ...]:
+        return contact.states(self._never_negative_names(), partial(self._load_rate, contact))
+
+    def regularized(self, kind: str, *, v0: Expression | str | float) -> Model:
+        """Return a copy in which every friction force is single-valued, to compare regularised laws.
+
+        ::
+
+            tanh     f = slip(|v|) tanh(v/v0)
+            arctan   f = slip(|v|) (2/pi) atan(v/v0)
+            karnopp  in the band |v| < v0 the body is stopped and f is the holding force, up to the stick limit
+
+        With tanh and arctan there is no stick: a loaded body creeps at a speed of the order of v0. There are no
+        modes, and the problem becomes stiff for small v0. The error decreases with v0: at first order, up to
+        logarithms, with tanh; as v0**(2/3) with arctan, whose tails delay each release; with karnopp at first
+        order or better if mu_s = mu_k, and as v0**(1/2) if mu_s > mu_k (the time to leave the band).
+
+        Parameters
+        ----------
+        kind : str
+            "tanh", "arctan" or "karnopp".
+        v0 : str or float
+            Width, a positive velocity in the unit of the relative velocity. It becomes a parameter ``v0`` of the copy.
+
+        Returns
+        -------
+        Model
+            The copy.
+
+        Raises
+        ------
+        UsageError
+            For an unknown kind, for a model without contacts, for static friction above slip(0) with tanh or arctan,
+            and for contacts that act on each other with karnopp.
+
+        References
+        ----------
+        D. Karnopp, J. Dyn. Syst. Meas. Control 107 (1985) 100, doi:10.1115/1.3140698.
+        """
+        from hybridsim.model.smoothing.regularize import regularized
+
+        return regularized(self, kind, v0)
+
+    def parameter_values(self) -> dict[str, float]:
+        """Return the values of all parameters; cyclic definitions and infinite values raise an error."""
+        return dict(self._values)
+
+    @cached_property
+    def _values(self) -> dict[str, float]:
+        return resolve({parameter.name: parameter.value for parameter in self.parameters})
+
+    def start_values(self) -> dict[str, float]:
+        """Return the initial values of the states for the current parameters."""
+        return {state.name: evaluate(state.start, self._values) for state in self.states}
+
+    def discrete_values(self) -> dict[str, float]:
+        """Return the initial values of the discrete states for the current parameters."""
+        return {part.name: evaluate(part.start, self._values) for part in self.discrete}
+
+    def duration_value(self) -> float | None:
+        """Return the declared duration for the current parameters, or None."""
+        return None if self.duration is None else evaluate(self.duration, self._values)
+
+    def all_components(self) -> tuple[Component, ...]:
+        """Return all automata: of contacts, surfaces, impacts and components in this order, corners last."""
+        components: tuple[Component, ...] = self.once("components", self._components)
+        return components
+
+    def _components(self) -> tuple[Component, ...]:
+        parts = [part for contact in self.contacts for part in self.components_of(contact)]
+        parts += [surface.component() for surface in self.surfaces]
+        parts += [impact.component() for impact in self.impacts]
+        parts += self.components
+        return tuple(sorted(parts, key=lambda part: isinstance(part, Corner)))
+
+    def components_of(self, contact: Contact) -> tuple[Component, ...]:
+        """Return the automata of one contact."""
+        return contact.components(self._never_negative_names(), partial(self._load_rate, contact))
+
+    def constant_names(self) -> frozenset[str]:
+        """Return the names that are constant during a run: parameters and definitions of parameters."""
+        names: frozenset[str] = self.once("constants", self._constant_names)
+        return names
+
+    def _never_negative_names(self) -> frozenset[str]:
+        """Return constant names and normal forces of impacts: a load of these needs no guard."""
+        return self.constant_names() | {impact.name for impact in self.impacts}
+
+    def _constant_names(self) -> frozenset[str]:
+        constants = {parameter.name for parameter in self.parameters}
+        for _ in self.definitions:
+            constants |= {name for name, expr in self.definitions if expr.names <= constants}
+        return frozenset(constants)
+
+    def variables(self) -> dict[str, Component]:
+        """Return the variables that components set, contact forces included, each with its component."""
+        return {name: component for component in self.all_components() for name in component.variables}
+
+    def structure(self) -> str:
+        """Return the canonical text of everything that generated code depends on.
+
+        It excludes parameter values, initial values, units, titles and the numbers of tables, so that models that
+        differ only in these share their code.
+        """
+        from hybridsim.model.smoothing.structure import structure
+
+        text: str = self.once("structure", lambda: structure(self))
+        return text
+
+    @property
+    def is_known_to_be_sound(self) -> bool:
+        """Whether this model, or a copy with other values, has passed all checks except those of values."""
+        return "is sound" in self._common
+
+    def validate(self) -> Model:
+        """Check the declaration and return the model itself.
+
+        Returns
+        -------
+        Model
+            The model itself.
+
+        Raises
+        ------
+        ModelError
+            With all errors in ``errors``.
+        """
+        from hybridsim.model.checks.validate import find_errors
+
+        errors = find_errors(self)
+        if errors:
+            raise ModelError.collect(errors, f"model {self.name}")
+        return self
+
+    def to_toml(self) -> str:
+        """Return the model as TOML text, which includes its laws and tables.
+
+        Returns
+        -------
+        str
+            The text.
+
+        Raises
+        ------
+        UsageError
+            For a model with Python functions, which cannot be written as text.
+        """
+        from hybridsim.model.toml.write import write_model
+
+        if self.flow is not None:
+            raise UsageError(
+                f"model '{self.name}' contains Python functions, which cannot be written to TOML",
+                remedy="write its rates, guards and resets as expressions, or keep the model as a Python file",
+            )
+        return write_model(self)
+
+    @classmethod
+    def from_toml(cls, text: str, path: str | None = None) -> Model:
+        """Read and validate a model from TOML text; table files are searched in the folder of ``path``."""
+        from hybridsim.model.toml.read import read_model
+
+        if not isinstance(text, str):
+            raise UsageError(
+                f"The text of the model is {text!r}", remedy="pass TOML text, or use hs.load for a file"
+            )
+        if path is not None:
+            path = path_text(path)
+        return read_model(text, path)
+
+
+def _content(model: Model) -> tuple[object, ...]:
+    parts = (
+        model.states, model.parameters, model.discrete, model.components, model.contacts, model.surfaces, model.inputs,
+        model.monitors, model.schedules, model.outputs, model.definitions, model.impacts,
+    )  # fmt: skip
+    words = (model.title, model.source, model.description, model.look, model.duration)
+    return (model.name, *parts, *words, model.flow)
+
+
+def _given(changes: Mapping[str, Any], name: str) -> Expression:
+    """Return a changed value as an expression; an error names the changed quantity."""
+    try:
+        return parse(changes[name])
+    except ExpressionError as error:
+        where = error.place or Place()
+        place = replace(where, file=where.file or name)
+        raise ExpressionError(error.message, place=place, remedy=error.remedy) from None
+
+
+def _known(
+    changes: Mapping[str, Any],
+    names: Iterable[str],
+    kind: str,
+    model: str,
+    remedy: Callable[[str], str] | None = None,
+) -> None:
+    allowed = as_tuple(names)
+    for name, value in changes.items():
+        if not isinstance(value, Expression | str | Real):
+            raise UsageError(f"{kind} {name} is {value!r}", remedy="use a number or an expression")
+        if name not in allowed:
+            raise UsageError(
+                f"the model '{model}' has no {kind} '{name}'",
+                remedy=remedy(name) if remedy else nearest(name, allowed, kind=f"{kind}s"),
+            )

@@ -1,0 +1,147 @@
+"""Read friction laws from TOML: [laws.*], and the laws of contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from hybridsim.errors import UsageError, nearest
+from hybridsim.expr import Expression, parse
+from hybridsim.model.laws.law import SPEED, FrictionLaw
+from hybridsim.model.laws.law_table import LawTable
+from hybridsim.model.parts.quantities import State
+from hybridsim.model.toml.automata import read_mode
+from hybridsim.model.toml.table import Table
+
+KEYS = (
+    "slip", "stick", "slip_backward", "stick_backward", "force", "states", "definitions", "modes", "initial", "copies",
+    "tables", "parameters", "title", "source",
+)  # fmt: skip
+_OWN = ("name", *KEYS)
+_BRINGS = ("slip", "stick", "force")
+
+
+def read_laws(root: Table) -> dict[str, FrictionLaw]:
+    """Return the laws that the file declares, by name."""
+    found = {}
+    for name, table in root.entries("laws", "law"):
+        table.only(*KEYS)
+        law = _law(name, table, {})
+        if law is not None:
+            found[name] = law
+    return found
+
+
+def read_law_of_contact(
+    contact: Table, laws: dict[str, FrictionLaw]
+) -> tuple[FrictionLaw, dict[str, Expression]] | None:
+    """Return law and arguments of a contact, or None after reporting an unknown law.
+
+    ``law = { name = "coulomb", mu = "mu" }`` refers to a law of the file or the package. With ``slip`` and ``stick``,
+    or with ``force``, the table declares the law itself, and every other key is a parameter with its value.
+    """
+    if not contact.require("law", 'write law = { name = "coulomb", mu = 0.5 }'):
+        return None
+    table = contact.sub(contact.data["law"], f"{contact.kind}, law", "name", "law")
+    if table is None:
+        return None
+    arguments = {key: table.parsed(value, key) for key, value in table.data.items() if key not in _OWN}
+    name = table.text("name")
+    if any(key in table.data for key in _BRINGS):
+        own = _law(name or str(contact.path[-1]), table, arguments)
+        return None if own is None else (own, arguments)
+    for key in KEYS:
+        if key in table.data:
+            table.fail(
+                f"'{key}' is allowed only in the declaration of a law", f"write it in [laws.{name}]", key
+            )
+    if not table.require("name", 'write law = { name = "coulomb", mu = 0.5 }'):
+        return None
+    law = laws.get(name) or _packaged(name)
+    if law is None:
+        from hybridsim.model.library import list_laws
+
+        table.fail(f"unknown law '{name}'", nearest(name, {*laws, *list_laws()}, kind="laws"), "name")
+        return None
+    return law, arguments
+
+
+def _packaged(name: str) -> FrictionLaw | None:
+    from hybridsim.model.library import list_laws, load_law
+
+    return load_law(name) if name in list_laws() else None
+
+
+def _law(name: str, table: Table, arguments: dict[str, Expression]) -> FrictionLaw | None:
+    given: Any = table.data.get("parameters", {})
+    parameters: dict[str, Expression | None] = {}
+    if isinstance(given, list):
+        for index, item in enumerate(given):
+            parameters.update(_listed(table, item, index))
+    else:
+        parameters.update(table.expressions("parameters"))
+    for argument in arguments:
+        parameters.setdefault(argument, None)
+    force = table.expression("force")
+    slip: Any = table.expression("slip")  # None only together with a force, which FrictionLaw checks
+    stick: Any = table.expression("stick")
+    if force is None:
+        slip = table.needed(
+            "slip", 'write slip = "EXPRESSION" of v >= 0, N and parameters, or force = "EXPRESSION"'
+        )
+        stick = table.needed("stick", 'write stick = "EXPRESSION" of N and parameters')
+    modes = dict(table.entries("modes", "mode"))
+    marked = [mode for mode, part in modes.items() if part.flag("initial")]
+    texts = {key: table.text(key) for key in ("initial", "copies") if key in table.data}
+    try:
+        return FrictionLaw(
+            name,
+            slip,
+            stick,
+            parameters,
+            table.text("title"),
+            table.text("source"),
+            slip_backward=table.expression("slip_backward"),
+            stick_backward=table.expression("stick_backward"),
+            force=force,
+            states=tuple(_states(table)),
+            definitions=table.expressions("definitions"),
+            modes=tuple(read_mode(mode, part) for mode, part in modes.items()),
+            initial=texts.get("initial", marked[0] if marked else None),
+            copies=texts.get("copies"),
+            tables=tuple(_tables(table)),
+            place=table.place,
+        )
+    except UsageError as fault:
+        table.fail(fault.message.partition(": ")[2], fault.remedy or "")
+        return None
+
+
+def _states(law: Table) -> Iterator[State]:
+    for name, table in law.entries("states", f"{law.kind}, state", "der"):
+        table.only("start", "der", "unit", "nominal")
+        start = table.expression("start") or parse(0)
+        der = table.needed("der", 'write der = "EXPRESSION" of v, N, parameters and states of the law')
+        yield State(name, start, der, table.text("unit"), table.real("nominal"), place=table.place)
+
+
+def _tables(law: Table) -> Iterator[LawTable]:
+    for name, table in law.entries("tables", f"{law.kind}, table"):
+        table.only("at", "values", "over")
+        for key in ("at", "values"):
+            table.require(key, f"write {key} = [0, ...]")
+        over = table.expression("over") or parse(SPEED)
+        try:
+            yield LawTable(name, table.numbers("at"), table.numbers("values"), over, place=table.place)
+        except UsageError as fault:
+            table.fail(fault.message.partition(": ")[2], fault.remedy or "")
+
+
+def _listed(table: Table, item: Any, index: int) -> dict[str, Expression | None]:
+    """Return one entry of a list of parameters: a name without default, or names with defaults."""
+    if isinstance(item, str):
+        return {item: None}
+    if isinstance(item, dict):
+        return {name: table.parsed(value, "parameters", index, name) for name, value in item.items()}
+    table.fail(f"'parameters' contains {item!r}", "write a name, or { name = default }", "parameters", index)
+    return {}

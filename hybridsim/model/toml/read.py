@@ -1,0 +1,217 @@
+"""Read a model from TOML text, with one function for each kind of table."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from hybridsim.errors import ModelError, Place
+from hybridsim.expr import Expression
+from hybridsim.model.laws.law import FrictionLaw
+from hybridsim.model.parts.contact import Contact
+from hybridsim.model.parts.impact import Impact
+from hybridsim.model.parts.model import Model
+from hybridsim.model.parts.monitor import Monitor
+from hybridsim.model.parts.quantities import Discrete, Output, Parameter, State
+from hybridsim.model.parts.schedule import Schedule
+from hybridsim.model.parts.switching import SwitchingSurface
+from hybridsim.model.toml.automata import read_components
+from hybridsim.model.toml.inputs import read_inputs
+from hybridsim.model.toml.laws import read_law_of_contact, read_laws
+from hybridsim.model.toml.positions import positions
+from hybridsim.model.toml.table import Source, Table
+
+SCHEMA = 1
+KEYS = (
+    "schema", "name", "title", "source", "description", "look", "duration", "parameters", "states", "discrete",
+    "definitions", "inputs", "laws", "contacts", "surfaces", "impacts", "initial", "limit", "modes", "components",
+    "monitors", "schedules", "clocks", "outputs",
+)  # fmt: skip
+
+
+def read_model(text: str, path: str | None = None) -> Model:
+    """Read and validate a model.
+
+    Raises
+    ------
+    ModelError
+        For invalid TOML (with line and column), for all errors of the tables, or for all errors of the model.
+    """
+    root = open_text(text, path, "the model")
+    model = _model(root, Path(path).parent if path else Path())
+    if root.source.errors:
+        raise ModelError.collect(root.source.errors, path or f"model {model.name}")
+    return model.validate()
+
+
+def open_text(text: str, path: str | None, kind: str) -> Table:
+    """Return the top table of a TOML text, or raise ModelError if it is empty or not valid TOML."""
+    if not text.strip():
+        raise ModelError("the file is empty", place=Place(path), remedy="write at least [states]")
+    try:
+        data = tomllib.loads(text)
+        source = Source(path, _split(text), positions(text))
+    except tomllib.TOMLDecodeError as fault:
+        raise _not_toml(fault, text, path) from None
+    except (ValueError, RecursionError) as fault:
+        reason = "it is nested too deeply" if isinstance(fault, RecursionError) else str(fault)
+        raise ModelError(f"invalid TOML: {reason}", place=Place(path), remedy="simplify the file") from None
+    return Table(source, (), data, kind)
+
+
+def _not_toml(fault: tomllib.TOMLDecodeError, text: str, path: str | None) -> ModelError:
+    found = re.search(r"\(at line (\d+), column (\d+)\)", str(fault))
+    message = re.sub(r"\s*\(at [^)]*\)", "", str(fault))
+    lines = _split(text)
+    line, column = (int(found[1]), int(found[2]) - 1) if found else (len(lines), 0)
+    shown = lines[line - 1] if 0 < line <= len(lines) else ""
+    return ModelError(
+        f"invalid TOML: {message[:1].lower()}{message[1:]}",
+        place=Place(path, line, column, shown),
+        remedy='write key = value, with expressions in double quotes: der = "-k*x"',
+    )
+
+
+def _split(text: str) -> list[str]:
+    """Split a text into lines as TOML does, only at line feeds."""
+    return [line.rstrip("\r") for line in text.split("\n")]
+
+
+def _model(root: Table, folder: Path) -> Model:
+    root.only(*KEYS)
+    if root.data.get("schema", SCHEMA) != SCHEMA:
+        root.fail(f"unknown schema {root.data['schema']!r}", f"write schema = {SCHEMA}", "schema")
+    name = root.text("name") or (Path(root.source.file).stem if root.source.file else "model")
+    laws = read_laws(root)
+    return Model(
+        name=name,
+        states=tuple(_states(root)),
+        parameters=tuple(_parameters(root)),
+        discrete=tuple(_discrete(root)),
+        components=tuple(read_components(root)),
+        contacts=tuple(_contacts(root, laws)),
+        surfaces=tuple(_surfaces(root)),
+        impacts=tuple(_impacts(root)),
+        inputs=tuple(read_inputs(root, folder)),
+        monitors=tuple(_monitors(root)),
+        schedules=(*_schedules(root), *_clocks(root)),
+        outputs=tuple(_outputs(root)),
+        definitions=tuple(root.expressions("definitions").items()),
+        title=root.text("title"),
+        source=root.text("source"),
+        description=root.text("description"),
+        look=root.text("look"),
+        duration=root.expression("duration"),
+        path=root.source.file,
+        place=Place(root.source.file),
+    )
+
+
+def _parameters(root: Table) -> Iterable[Parameter]:
+    for name, table in root.entries("parameters", "parameter", "value"):
+        table.only("value", "unit", "title")
+        value = table.needed("value", 'write value = NUMBER or "EXPRESSION"')
+        yield Parameter(name, value, table.text("unit"), table.text("title"), place=table.place)
+
+
+def _states(root: Table) -> Iterable[State]:
+    for name, table in root.entries("states", "state"):
+        table.only("start", "der", "unit", "nominal")
+        start = table.needed("start", "write start = NUMBER, the initial value")
+        der = table.needed("der", 'write der = "EXPRESSION"; modes may replace it by their own der')
+        yield State(name, start, der, table.text("unit"), table.real("nominal"), place=table.place)
+
+
+def _discrete(root: Table) -> Iterable[Discrete]:
+    for name, table in root.entries("discrete", "discrete state", "start"):
+        table.only("start", "unit")
+        start = table.needed("start", "write start = NUMBER, the initial value")
+        yield Discrete(name, start, table.text("unit"), place=table.place)
+
+
+def _contacts(root: Table, laws: dict[str, FrictionLaw]) -> Iterable[Contact]:
+    for name, table in root.entries("contacts", "contact"):
+        table.only("velocity", "normal", "law", "opens", "start", "nominal")
+        velocity = table.needed("velocity", 'write velocity = "EXPRESSION", the relative velocity')
+        normal = table.needed("normal", 'write normal = "EXPRESSION", the normal load')
+        law = read_law_of_contact(table, laws)
+        if law is not None:
+            yield Contact(
+                name,
+                velocity,
+                normal,
+                *law,
+                table.flag("opens"),
+                table.expressions("start"),
+                table.reals("nominal"),
+                place=table.place,
+            )
+
+
+def _surfaces(root: Table) -> Iterable[SwitchingSurface]:
+    for name, table in root.entries("surfaces", "surface", "expr"):
+        table.only("expr", "above", "below")
+        expr = table.needed("expr", 'write expr = "EXPRESSION", which changes its sign at the surface')
+        above, below = table.expressions("above"), table.expressions("below")
+        single = sorted(set(above) ^ set(below))
+        for one in single:
+            given, side = ("above", "below") if one in above else ("below", "above")
+            table.fail(f"'{one}' has no value {side}", f"write {side} = {{ {one} = ... }}", given, one)
+        if not single:
+            yield SwitchingSurface(name, expr, above, below, place=table.place)
+
+
+def _impacts(root: Table) -> Iterable[Impact]:
+    for name, table in root.entries("impacts", "impact"):
+        table.only("gap", "restitution")
+        gap = table.needed("gap", 'write gap = "EXPRESSION" of positions, which cannot become negative')
+        restitution = table.needed("restitution", "write restitution = NUMBER from 0 to 1")
+        yield Impact(name, gap, restitution, place=table.place)
+
+
+def _monitors(root: Table) -> Iterable[Monitor]:
+    for name, table in root.entries("monitors", "monitor", "expr"):
+        table.only("expr", "direction", "action", "reset")
+        expr = table.needed("expr", 'write expr = "EXPRESSION", whose zeros are the events')
+        action = table.text("action", "reset" if "reset" in table.data else "record")
+        direction = table.text("direction", "both")
+        yield Monitor(name, expr, direction, action, table.resets("reset"), place=table.place)
+
+
+def _schedules(root: Table) -> Iterable[Schedule]:
+    for name, table in root.entries("schedules", "schedule", "times"):
+        table.only("times", "start", "period", "count", "reset", "terminate")
+        yield Schedule(
+            name,
+            tuple(_times(table)),
+            table.expression("start"),
+            table.expression("period"),
+            table.count("count"),
+            table.resets("reset"),
+            table.flag("terminate"),
+            place=table.place,
+        )
+
+
+def _times(table: Table) -> Iterable[Expression]:
+    times: Any = table.data.get("times", [])
+    for index, time in enumerate(times if isinstance(times, list) else [times]):
+        yield table.parsed(time, "times", index)
+
+
+def _clocks(root: Table) -> Iterable[Schedule]:
+    for name, table in root.entries("clocks", "clock"):
+        table.only("period", "offset", "set")
+        period = table.needed("period", "write period = NUMBER, the time between ticks")
+        start = table.expression("offset")
+        yield Schedule(name, start=start, period=period, reset=table.resets("set"), place=table.place)
+
+
+def _outputs(root: Table) -> Iterable[Output]:
+    for name, table in root.entries("outputs", "output", "expr"):
+        table.only("expr", "unit", "modes")
+        expr = table.needed("expr", 'write expr = "EXPRESSION", the value of the output')
+        yield Output(name, expr, table.text("unit"), table.expressions("modes"), place=table.place)

@@ -1,0 +1,1 @@
+"""This folder gives results their form: tables, readable text, colours, and HTML for notebooks."""

@@ -1,0 +1,85 @@
+"""This module stores a multiple-precision run: pieces of Taylor series, evaluated in double or full precision."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybridsim.reference.multiple_precision.expansion import Coefficients, value_at
+from hybridsim.reference.multiple_precision.precision import Number, Precision
+
+
+@dataclass(frozen=True)
+class Piece:
+    """The states over [t, t + h] as series in the time since t."""
+
+    t: Number
+    h: Number
+    states: tuple[Coefficients, ...]
+
+
+@dataclass
+class Motion:
+    """The states of a run; ``motion(times, side)`` in double precision, ``motion.state(t)`` in full precision.
+
+    Parameters
+    ----------
+    last : states (n,) after the events at the end.
+    """
+
+    precision: Precision
+    pieces: list[Piece] = field(default_factory=list)
+    last: tuple[Number, ...] = ()
+
+    def __call__(self, times: NDArray[np.float64], side: str = "+") -> NDArray[np.float64]:
+        """Return states (n, k) at times (k,); at an event, "+" gives the state after it and "-" the state before.
+
+        The piece is chosen by times rounded to doubles, like the times of the events.
+        """
+        times = np.asarray(times, dtype=float)
+        states = np.empty((len(self.last), len(times)))
+        index = np.searchsorted(self._starts, times, side="right" if side == "+" else "left") - 1
+        for i in np.unique(index):
+            here = index == i
+            piece = self.pieces[max(int(i), 0)]
+            states[:, here] = self._values(piece, times[here])
+        if side == "+":
+            states[:, times >= self._end] = np.array([float(value) for value in self.last])[:, None]
+        return states
+
+    def state(self, t: float | Number, side: str = "+") -> tuple[Number, ...]:
+        """Return the states at a time in full precision."""
+        t = self.precision.number(t)
+        past = [piece for piece in self.pieces if (piece.t <= t if side == "+" else piece.t < t)]
+        if side == "+" and t >= self.pieces[-1].t + self.pieces[-1].h:
+            return self.last
+        piece = past[-1] if past else self.pieces[0]
+        return tuple(value_at(c, t - piece.t) for c in piece.states)
+
+    @cached_property
+    def _starts(self) -> NDArray[np.float64]:
+        return np.array([float(piece.t) for piece in self.pieces])
+
+    @cached_property
+    def _end(self) -> float:
+        return float(self.pieces[-1].t + self.pieces[-1].h)
+
+    def _values(self, piece: Piece, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Evaluate a piece by Horner's scheme in doubles, in the fraction of the step; the error is a few ulps."""
+        high = float(piece.t)
+        low = float(piece.t - high)
+        fraction = np.clip(((times - high) - low) / float(piece.h), 0.0, 1.0) if piece.h else 0.0 * times
+        rows = []
+        for c in piece.states:
+            scaled, power = [], self.precision.context.one
+            for value in c:
+                scaled.append(float(value * power))
+                power = power * piece.h
+            total = np.full(len(times), scaled[-1])
+            for value in reversed(scaled[:-1]):
+                total = total * fraction + value
+            rows.append(total)
+        return np.array(rows).reshape(len(piece.states), len(times))

@@ -1,0 +1,101 @@
+"""This module caches the equations of each combination of modes, and the series at one instant."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from hybridsim.reference.multiple_precision.expansion import Expansion
+from hybridsim.reference.multiple_precision.precision import Number, Precision
+from hybridsim.reference.multiple_precision.program import Point, Program
+from hybridsim.reference.multiple_precision.reading import Reading
+from hybridsim.reference.multiple_precision.signals import Signal
+
+if TYPE_CHECKING:
+    from hybridsim.expr import Expression
+    from hybridsim.model import Model
+
+Modes = tuple[str, ...]
+"""Name of the mode of each component."""
+UNDECIDED = ""
+"""The mode of a contact before the first decision."""
+
+
+class Programs:
+    """Builds the equations and series on demand and caches them.
+
+    Parameters
+    ----------
+    longest : the maximum reach of a series.
+    """
+
+    def __init__(
+        self, model: Model, precision: Precision, signals: Sequence[Signal], longest: Number
+    ) -> None:
+        self.model, self.precision, self.signals, self.longest = model, precision, signals, longest
+        self.components = model.all_components()
+        self._programs: dict[Modes, Program] = {}
+        self._expansions: dict[tuple[Modes, Point], Expansion] = {}
+
+    @property
+    def first_modes(self) -> Modes:
+        """The modes before the first decision."""
+        return tuple(component.initial or UNDECIDED for component in self.components)
+
+    def decided(self, modes: Modes) -> Modes:
+        """Return the modes with undecided components holding; their surfaces are the same functions in every mode."""
+        return self.held(modes, [c for c, mode in enumerate(modes) if mode == UNDECIDED])
+
+    def held(self, modes: Modes, components: Iterable[int]) -> Modes:
+        """Return the same modes with some components holding."""
+        changed = list(modes)
+        for c in components:
+            surface = self.components[c].surface
+            assert surface is not None
+            changed[c] = surface.hold
+        return tuple(changed)
+
+    def given(self, point: Point, modes: Modes) -> Modes:
+        """Return the modes with undecided components on the side of their state, or holding if on neither."""
+        if UNDECIDED not in modes:
+            return modes
+        decided = self.decided(modes)
+        expansion, changed = self.expand(point, decided), list(decided)
+        owners = [c for c, component in enumerate(self.components) if component.surface]
+        for c, watched in zip(owners, expansion.surfaces, strict=True):
+            surface = self.components[c].surface
+            assert surface is not None and surface.below is not None  # models with impacts are refused
+            if modes[c] == UNDECIDED and not expansion.is_zero(watched):
+                changed[c] = surface.above if watched.c[0] > 0 else surface.below
+        return tuple(changed)
+
+    def program(self, modes: Modes) -> Program:
+        """Return the equations in these modes."""
+        if modes not in self._programs:
+            reading = Reading(self.model, modes, self.precision, self.signals)
+            self._programs[modes] = Program(reading, self.precision, self.longest)
+        return self._programs[modes]
+
+    def new_instant(self) -> None:
+        """Clear the series of the previous instant."""
+        self._expansions.clear()
+
+    def expand(self, point: Point, modes: Modes) -> Expansion:
+        """Return the series from a point on."""
+        key = (modes, point)
+        if key not in self._expansions:
+            self._expansions[key] = self.program(modes).expand(point)
+        return self._expansions[key]
+
+    def value(self, expr: Expression, point: Point, modes: Modes) -> Number | bool:
+        """Return the value of an expression at a point."""
+        return self.program(self.decided(modes)).value(expr, point)
+
+    def leaving(self, expansion: Expansion) -> list[tuple[int, int]]:
+        """Return the guards, as (component, number), that are negative just after."""
+        return [
+            (c, j)
+            for c, row in enumerate(expansion.guards)
+            for j, guard in enumerate(row)
+            if expansion.side_after(guard)[0] < 0
+        ]

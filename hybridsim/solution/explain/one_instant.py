@@ -1,0 +1,87 @@
+"""This module lists the events of one instant: guards located at zero, and the effects of resets."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridsim.engine.series.bounded import UNIT
+from hybridsim.integrators.contract import Integrator
+
+if TYPE_CHECKING:
+    from hybridsim.engine.events.outcome import Change
+    from hybridsim.engine.events.resolve import Settling
+    from hybridsim.engine.record.segments import Occurrence, Segment
+    from hybridsim.engine.system.system import System
+
+LOCATED = (
+    1e6  # multiple of its rounding error; a located guard is closer to zero, a guard moved by a reset is not
+)
+_STEPS = 2.0  # in steps of a method that drives its own runs, because it assigns events to its steps
+BY_RESET = (
+    "reset"  # the guard name of a change that a reset made by moving the state to one side of a surface
+)
+
+
+def fired_guards(
+    system: System, segment: Segment, together: list[Occurrence], method: Integrator
+) -> list[int]:
+    """Return the numbers of the guards that reached zero at one instant, in the modes of the segment before.
+
+    Guards that another event of this instant moved are left out: they are not at zero at the end of the
+    segment.
+    """
+    named = set()
+    for o in together:
+        c = next((k for k, a in enumerate(system.automata) if a.name == o.component), -1)
+        if c < 0 or not o.guard:
+            continue
+        automaton, mode = system.automata[c], int(segment.z[c])
+        if o.source == automaton.modes[mode] and o.guard in automaton.guard_names[mode]:
+            named.add(automaton.guards[mode][automaton.guard_names[mode].index(o.guard)])
+    if not named or (len({o.component for o in together}) == 1 and not system.model.inputs):
+        return sorted(named)
+    s, x = float(segment.s[-1]), segment.x[-1]
+    s_error = 2.0 * math.ulp(float(np.abs(segment.s).max()))
+    if type(method).run is not Integrator.run:
+        s_error += _STEPS * abs(float(segment.s[-1] - segment.s[-2]))
+    slopes = np.abs(system.flow(s, x, segment.p, segment.z)) if system.n else np.zeros(0)
+    x_error = 4.0 * UNIT * np.abs(segment.x).max(axis=0) + s_error * slopes
+    series = system.series(s, x, segment.p, segment.z, x_error, s_error)
+    return [g for g in sorted(named) if not abs(series.guards[g, 0]) > LOCATED * series.guard_bounds[g, 0]]
+
+
+def resets_before(settling: Settling, change: Change) -> str:
+    """Describe the resets before a change at its instant, with the values that they set; empty without any."""
+    system = settling.system
+    said: dict[str, None] = {}
+    for one in settling.changes:
+        if one is change:
+            break
+        automaton = system.automata[one.component]
+        if automaton.has_surface or one.x_minus is change.x_minus:  # of the same round
+            continue
+        moved = changes_in_words(system.names, one.x_minus, one.x_plus)
+        if moved:
+            said[f"the reset of guard {one.guard} of {automaton.name} ({moved})"] = None
+    return " and ".join(said)
+
+
+def changes_in_words(
+    names: Sequence[str],
+    before: np.ndarray,
+    after: np.ndarray,
+    error: np.ndarray | float = 0.0,
+    texts: Mapping[str, str] = MappingProxyType({}),
+) -> str:
+    """Describe the states that changed by more than their error: name, old value, new value, and an optional note."""
+    moved = np.abs(after - before) > 2.0 * error
+    return ", ".join(
+        f"{name} from {a:.6g} to {b:.6g}{texts.get(name, '')}"
+        for name, a, b, has_moved in zip(names, before, after, moved, strict=True)
+        if has_moved
+    )

@@ -1,0 +1,139 @@
+"""This module repeats a resolution of modes and records its decisions and the values that each of them used."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.engine.events.choice.verdict import FINE, UNDECIDED
+from hybridsim.engine.events.resolve import Settling
+from hybridsim.engine.system.system import Series
+
+if TYPE_CHECKING:
+    from hybridsim.engine.events.outcome import Situation
+
+
+@dataclass(frozen=True)
+class Look:
+    """One combination of modes that was judged.
+
+    Parameters
+    ----------
+    at : the situation in which it was judged.
+    z : modes of all components; components : those whose guards were judged.
+    verdict : one of the codes of `hybridsim.engine.events.choice.verdict`.
+    decreed : the number of leading derivatives of each guard that the event makes zero.
+    motion : coefficients of the states and surfaces along its flow, with bounds of their rounding,
+        (2, n + surfaces, orders); zero for a surface that it holds.
+    free : a mask of the rows that describe its motion; a held state follows from its surface.
+    """
+
+    at: Situation
+    z: np.ndarray
+    components: tuple[int, ...]
+    verdict: int
+    decreed: np.ndarray
+    motion: np.ndarray
+    free: np.ndarray
+
+    def is_as(self, other: Look) -> bool:
+        """Return whether both are the same motion to rounding."""
+        free = self.free & other.free
+        (mine, error), (its, its_error) = self.motion[:, free], other.motion[:, free]
+        return bool((np.abs(mine - its) <= error + its_error).all())
+
+
+@dataclass
+class Decision:
+    """One joint decision: the combinations it judged, the modes it chose, and the changes it caused.
+
+    Parameters
+    ----------
+    first, last : the changes first to last - 1 of the resolution belong to it.
+    z : modes of all components after it; empty if it found none.
+    """
+
+    first: int
+    last: int = 0
+    looks: list[Look] = field(default_factory=list)
+    z: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+
+    @property
+    def components(self) -> tuple[int, ...]:
+        """Return the components whose guards were judged."""
+        return self.looks[0].components if self.looks else ()
+
+    def has_taken(self, look: Look) -> bool:
+        """Return whether it ended with the modes of a look."""
+        members = list(look.components)
+        return bool(len(self.z) and (look.z[members] == self.z[members]).all())
+
+    @property
+    def taken(self) -> Look | None:
+        """The look whose modes were taken."""
+        return next((look for look in self.looks if self.has_taken(look)), None)
+
+    def with_verdict(self, verdict: int) -> list[Look]:
+        """The looks with this verdict."""
+        return [look for look in self.looks if look.verdict == verdict]
+
+    @property
+    def fine(self) -> list[Look]:
+        """Return the admissible looks."""
+        return self.with_verdict(FINE)
+
+    @property
+    def undecided(self) -> list[Look]:
+        """Return the looks that rounding leaves open."""
+        return self.with_verdict(UNDECIDED)
+
+
+class Watched(Settling):
+    """A resolution that judges all candidates, including those that the choice does not need."""
+
+    is_thorough = True
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.decisions: list[Decision] = []
+
+    def _decide_cluster(self, cluster: tuple[int, ...], open_: set[int]) -> tuple[str, str] | None:
+        decision = Decision(len(self.changes))
+        self.decisions.append(decision)
+        failure = super()._decide_cluster(cluster, open_)
+        decision.last = len(self.changes)
+        if failure is None:
+            decision.z = self.at.z.copy()
+        return failure
+
+    def verdict(self, z: np.ndarray, components: Iterable[int]) -> int:
+        components = tuple(components)
+        found = super().verdict(z, components)
+        decreed = self._decreed(z, self._continuous(z, components))
+        series = self.series_of(z)
+        assert isinstance(series, Series)  # models with surfaces are made from expressions
+        states = series.states, series.E[series.place.states]
+        surfaces = series.surfaces.copy(), series.surface_bounds.copy()
+        held = [z[c] == self.system.automata[c].hold for c in self.system.surface_of]
+        for coefficients in surfaces:
+            coefficients[held] = 0.0
+        motion = np.concatenate([states, surfaces], axis=1)
+        free = np.ones(motion.shape[1], dtype=np.bool_)
+        free[self.system.evaluated(z)] = False
+        look = Look(replace(self.at), z.copy(), components, found, decreed, motion, free)
+        self.decisions[-1].looks.append(look)
+        return found
+
+    def decision_of(self, component: int, number: int) -> Decision | None:
+        """Return the decision that made a change of a component, by its number; None if no decision did."""
+        for decision in self.decisions:
+            if component in decision.components and number < decision.last:
+                return decision if decision.first <= number else None
+        return None
+
+    def decision_after(self, component: int, number: int) -> Decision | None:
+        """Return the first decision on a component after a change, by its number."""
+        return next((d for d in self.decisions if component in d.components and d.first > number), None)

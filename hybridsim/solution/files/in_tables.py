@@ -1,0 +1,60 @@
+"""This module converts the table of a run to CSV, NPZ, pandas and xarray."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from os import PathLike
+from typing import TYPE_CHECKING
+
+from hybridsim.presentation.tables import Table, event_columns, event_frame
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+    from hybridsim.solution.event import Event
+
+
+class InTables(ABC):
+    """The base class of results with names, events and a table, which can be written in several formats."""
+
+    @property
+    @abstractmethod
+    def names(self) -> tuple[str, ...]:
+        """Names of the states, in the order of the rows of y."""
+
+    @property
+    @abstractmethod
+    def events(self) -> Sequence[Event]:
+        """All events in order of time."""
+
+    @abstractmethod
+    def table(self, points: int | None = None) -> Table:
+        """Return times, states, outputs and modes as columns; all conversions below use this table.
+
+        Parameters
+        ----------
+        points : the number of equally spaced times, both ends included. Without it the times are ``sol.t``: the
+            integrator's own steps with both sides of each event, or the grid of `simulate`.
+        """
+
+    def to_csv(self, path: str | PathLike[str], points: int | None = None) -> None:
+        """Write the `table` as CSV."""
+        self.table(points).to_csv(path)
+
+    def to_npz(self, path: str | PathLike[str], points: int | None = None) -> None:
+        """Write the `table` and the events for `numpy.load`: ``["x"]``, ``["mode(f)"]``, ``["events/t"]``, ..."""
+        self.table(points).to_npz(path, event_columns(self.events, self.names))
+
+    def to_pandas(self, points: int | None = None) -> pd.DataFrame:
+        """Return the `table` as a data frame over t; modes are categorical, and ``attrs`` holds the units."""
+        return self.table(points).to_pandas()
+
+    def to_xarray(self, points: int | None = None) -> xr.Dataset:
+        """Return the `table` as a data set over t; modes are coordinates, and ``attrs`` holds the units."""
+        return self.table(points).to_xarray()
+
+    def events_to_pandas(self) -> pd.DataFrame:
+        """Return the events as a data frame with one row per event: t, kind, component, ..., states."""
+        return event_frame(self.events, self.names)

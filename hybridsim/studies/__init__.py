@@ -1,0 +1,1 @@
+"""Published studies are done again here, each in one folder."""

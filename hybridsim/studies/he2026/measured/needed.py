@@ -1,0 +1,116 @@
+"""This module finds the step of `rk4-sign` and the interval of `rk4-dichotomy` for an error of A below 1 %."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hybridsim.simulate import simulate
+from hybridsim.studies.he2026.measured.pool import Pool
+from hybridsim.studies.he2026.measured.settings import (
+    LITERAL,
+    SIGNS,
+    STEPS_PER_PERIOD,
+    ZEROED,
+    Point,
+    Size,
+    Variant,
+)
+from hybridsim.studies.he2026.measured.steady import declared, measured, periods_of, settling_periods
+
+TOLERANCE = 0.01
+STEPS = (150, 300, 600, 1200, 2400, 4800, 9600, 19200)
+EPS = tuple(1.28e-2 / 2.0**k for k in range(15))  # 8e-4 is the fifth, the last is 7.8e-7
+RATIO_SPAN, R_SPAN = (0.52, 1.5), (0.1, 2.0)
+# The runs begin on the exact orbit and need not settle; the chatter takes some periods to spread.
+_PERIODS, _LAST = 60, 40
+
+
+@dataclass(frozen=True)
+class Needed:
+    """For each method, a map of the coarsest setting from which on all periods are within 1 %.
+
+    nan if the finest one is not enough.
+    """
+
+    ratios: np.ndarray
+    r: np.ndarray
+    steps: dict[str, np.ndarray]
+    eps: dict[str, np.ndarray]
+
+    def to_plain(self) -> dict[str, Any]:
+        """Return the entries for the file of verdicts."""
+        result: dict[str, Any] = {"tolerance": TOLERANCE, "finest h0": STEPS[-1], "finest eps_v": EPS[-1]}
+        for name, table in (*self.steps.items(), *self.eps.items()):
+            published = STEPS_PER_PERIOD if name in self.steps else 8e-4
+            enough = table <= published if name in self.steps else table >= 0.999 * published
+            values = np.sort(np.nan_to_num(table.ravel(), nan=np.inf if name in self.steps else 0.0))
+            result[name] = {
+                "published setting is enough on this share of the map": float(np.mean(enough)),
+                "the finest is not enough on this share": float(np.mean(np.isnan(table))),
+                "median": float(values[len(values) // 2]),
+            }
+        return result
+
+
+def needed(size: Size, pool: Pool) -> Needed:
+    """Try the settings at every point from coarse to fine."""
+    ratios, r = np.linspace(*RATIO_SPAN, size.ladder_count), np.linspace(*R_SPAN, size.ladder_count)
+    points = [Point(float(b), float(a)) for a in ratios for b in r]
+    starts = pool.map(_start, points, 0.0, 0.05)
+    jobs = list(itertools.product((*SIGNS, LITERAL, ZEROED), zip(points, starts, strict=True)))
+    found = pool.map(lambda job: _coarsest(job[0], *job[1]), jobs, 0.05, 1.0)
+    table = np.array(found).reshape(-1, len(ratios), len(r))
+    names = [v.name for v in (*SIGNS, LITERAL, ZEROED)]
+    count = len(SIGNS)
+    return Needed(
+        ratios,
+        r,
+        dict(zip(names[:count], table[:count], strict=True)),
+        dict(zip(names[count:], table[count:], strict=True)),
+    )
+
+
+def _start(point: Point) -> tuple[float, tuple[float, float]]:
+    """Return the exact amplitude, and the state at the beginning of a period of the exact orbit."""
+    solution = simulate(
+        declared("dfcs"),
+        (0.0, settling_periods(point) * point.period),
+        params=point.params,
+        integrator="exact",
+        save="last-period",
+    )
+    x, v = solution.y[:, -1].tolist()
+    return measured(solution, point).amplitude, (x, v)
+
+
+def _coarsest(variant: Variant, point: Point, start: tuple[float, tuple[float, float]]) -> float:
+    amplitude, state = start
+    by_steps = variant in SIGNS
+    settings: tuple[float, ...] = STEPS if by_steps else EPS
+    good = float("nan")
+    for setting in settings:
+        options: dict[str, Any] = dict(variant.options)
+        if not by_steps:
+            options["eps_v"] = setting
+        solution = simulate(
+            declared("dfcs"),
+            (0.0, _PERIODS * point.period),
+            params=point.params,
+            x0=state,
+            integrator=variant.integrator,
+            save=_LAST * point.period,
+            steps_per_period=float(setting if by_steps else STEPS_PER_PERIOD),
+            **options,
+        )
+        A = periods_of(solution, point, _PERIODS, _LAST).A
+        if float(np.abs(A / amplitude - 1.0).max()) > TOLERANCE:
+            good = float("nan")
+        elif np.isnan(good):
+            good = setting
+        elif setting >= 4 * good if by_steps else setting <= good / 4:
+            break  # two finer ones agree
+    return good

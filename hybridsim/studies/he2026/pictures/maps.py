@@ -1,0 +1,171 @@
+"""This module draws maps over F0/N and r: stick, stops, errors of simpler models, and needed settings."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.plot import style
+from hybridsim.studies.he2026.measured.needed import EPS, STEPS, Needed
+from hybridsim.studies.he2026.measured.race import Race
+from hybridsim.studies.he2026.measured.truth import MODELS, Truth
+from hybridsim.studies.he2026.pictures.deviations import edges
+from hybridsim.studies.he2026.pictures.motions import column_title, plain_log
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_COLOURS = "cividis"
+_MOST_STOPS = 8  # larger numbers are drawn as this one
+
+
+def stick_and_stops(truth: Truth) -> Figure:
+    """Draw stick fraction, stops per period and amplitude of the exact motion, with the no-stop boundary."""
+    from matplotlib.colors import BoundaryNorm, LogNorm
+
+    figure = style.figure(11.0, 4.0)
+    figure.suptitle(
+        "The exact steady motion; white: no stops above it (closed form)", fontsize=11, x=0.01, ha="left"
+    )
+    panels = figure.subplots(1, 3, sharey=True)
+    x, y = edges(truth.r), edges(truth.ratios)
+    stick = panels[0].pcolormesh(
+        x, y, 100.0 * truth.stick, cmap=_COLOURS, vmin=0.0, vmax=100.0, rasterized=True
+    )
+    bounds = np.arange(-0.5, _MOST_STOPS + 1.5, 1.0)
+    norm = BoundaryNorm(bounds.tolist(), 256)
+    stops = panels[1].pcolormesh(
+        x, y, np.minimum(truth.stops, _MOST_STOPS), cmap=_COLOURS, norm=norm, rasterized=True
+    )
+    size = 1e6 * np.where(truth.amplitude > 0.0, truth.amplitude, np.nan)
+    amplitude = panels[2].pcolormesh(
+        x,
+        y,
+        size,
+        cmap=_COLOURS,
+        norm=LogNorm(float(np.nanmin(size)), float(np.nanmax(size))),
+        rasterized=True,
+    )
+    figure.colorbar(stick, ax=panels[0], label="share of the period in stick [%]")
+    bar = figure.colorbar(stops, ax=panels[1], label="stops per period")
+    bar.set_ticks(range(_MOST_STOPS + 1), labels=[*map(str, range(_MOST_STOPS)), f"{_MOST_STOPS}+"])
+    bar.ax.minorticks_off()
+    figure.colorbar(amplitude, ax=panels[2], label="amplitude A [µm], N = 40 N")
+    for axes, title in zip(panels, ("stick", "stops", "amplitude"), strict=True):
+        _frame(axes, truth, title)
+    panels[0].set_ylabel("F0/N", fontsize=9)
+    return figure
+
+
+def simpler_models(truth: Truth) -> Figure:
+    """Draw the error of the amplitude of each simpler model."""
+    figure = style.figure(11.0, 4.0)
+    figure.suptitle(
+        "Deviation of the amplitude of simpler models from the exact one; white: no stops above it",
+        fontsize=11, x=0.01, ha="left",
+    )  # fmt: skip
+    panels = figure.subplots(1, len(MODELS), sharey=True)
+    mesh: Any = None
+    for axes, model in zip(panels, MODELS, strict=True):
+        mesh = _deviation(axes, truth.r, truth.ratios, truth.deviation(model))
+        _frame(axes, truth, model)
+    panels[0].set_ylabel("F0/N", fontsize=9)
+    bar = figure.colorbar(mesh, ax=panels, label="deviation of A [%]", extend="both")
+    _percents(bar)
+    return figure
+
+
+def needed_settings(needed: Needed) -> Figure:
+    """Draw the coarsest step and the largest interval for an error of the amplitude below 1 %."""
+    figure = style.figure(9.6, 7.4)
+    figure.suptitle(
+        "The coarsest setting that is within 1 % of the exact amplitude; hatched: the finest is not",
+        fontsize=11, x=0.01, ha="left",
+    )  # fmt: skip
+    panels = figure.subplots(2, 2, sharex=True, sharey=True)
+    rows = ((needed.steps, STEPS, "steps per period, h0"), (needed.eps, EPS, "eps_v [m/s]"))
+    for line, (tables, ladder, label) in zip(panels, rows, strict=True):
+        mesh: Any = None
+        for axes, (name, table) in zip(line, tables.items(), strict=True):
+            mesh = _ladder(axes, needed, table, ladder)
+            axes.set_title(column_title(name), fontsize=10, loc="left")
+        bar = figure.colorbar(mesh, ax=line, label=label)
+        ticks = range(len(ladder)) if len(ladder) < 10 else range(0, len(ladder), 2)
+        bar.set_ticks(list(ticks), labels=[_short(ladder[k]) for k in ticks])
+        bar.ax.minorticks_off()
+        line[0].set_ylabel("F0/N", fontsize=9)
+    for axes in panels[-1]:
+        axes.set_xlabel("frequency ratio r", fontsize=9)
+    return figure
+
+
+def timed_map(race: Race) -> Figure:
+    """Draw the error of the amplitude against the time per point, as median and largest over the sample."""
+    figure = style.figure(7.6, 4.2)
+    figure.suptitle(
+        f"Steady amplitude over a map: {race.side} x {race.side} points, error against time of a point",
+        fontsize=11, x=0.01, ha="left",
+    )  # fmt: skip
+    axes = figure.subplots()
+    for k, (name, entry) in enumerate(race.entries.items()):
+        colour = style.INK if name == "exact" else style.PALETTE[k]
+        low, high = (max(float(f(entry.A)), 1e-16) for f in (np.median, np.max))
+        ms = 1e3 * entry.seconds
+        title = name.split(", ")
+        label = f"rk4-dichotomy, {title[1]}" if len(title) > 2 else name
+        axes.plot([ms, ms], [low, high], color=colour, linewidth=1.2)
+        axes.plot([ms], [low], style.MARKERS[k], color=colour, markersize=7, label=label)
+        axes.plot([ms], [high], "_", color=colour, markersize=10)
+    plain_log(axes.xaxis)
+    axes.set_yscale("log")
+    axes.set_xlabel("time of a point, all threads together [ms]", fontsize=9)
+    axes.set_ylabel("relative error of A: median to largest", fontsize=9)
+    style.dress(axes)
+    axes.legend(fontsize=8, frameon=False, loc="center left", bbox_to_anchor=(1.01, 0.5))
+    return figure
+
+
+def _frame(axes: Axes, truth: Truth, title: str) -> None:
+    r, ratio = truth.boundary
+    low, high = edges(truth.ratios)[[0, -1]]
+    axes.plot(r, np.where(ratio <= 2.0 * high, ratio, np.nan), color="white", linewidth=1.3)
+    axes.set_ylim(low, high)
+    axes.set_xlim(*edges(truth.r)[[0, -1]])
+    axes.set_title(title, fontsize=10, loc="left")
+    axes.set_xlabel("frequency ratio r", fontsize=9)
+    axes.tick_params(labelsize=9)
+
+
+def _deviation(axes: Axes, r: np.ndarray, ratios: np.ndarray, values: np.ndarray) -> Any:
+    from matplotlib.colors import LogNorm
+
+    axes.set_facecolor(style.MARK)  # nothing moves, or the model has no answer
+    shown = np.clip(100.0 * values, 0.01, 1000.0)
+    return axes.pcolormesh(
+        edges(r), edges(ratios), shown, norm=LogNorm(0.01, 1000.0), cmap=_COLOURS, rasterized=True
+    )
+
+
+def _percents(bar: Any) -> None:
+    ticks = [0.01, 0.1, 1, 10, 100, 1000]
+    bar.set_ticks(ticks, labels=[f"{t:g}" for t in ticks])
+    bar.ax.minorticks_off()
+
+
+def _ladder(axes: Axes, needed: Needed, table: np.ndarray, ladder: tuple[float, ...]) -> Any:
+    from matplotlib.colors import BoundaryNorm
+
+    steps = np.argmin(np.abs(np.log(np.nan_to_num(table, nan=1.0)[..., None] / np.array(ladder))), axis=-1)
+    rungs = np.where(np.isnan(table), np.nan, steps)
+    norm = BoundaryNorm(np.arange(-0.5, len(ladder), 1.0).tolist(), 256)
+    axes.set_facecolor("white")
+    x, y = edges(needed.r), edges(needed.ratios)
+    mesh = axes.pcolormesh(x, y, rungs, cmap=_COLOURS, norm=norm, rasterized=True)
+    axes.patch.set(hatch="///", edgecolor=style.FAINT)
+    return mesh
+
+
+def _short(value: float) -> str:
+    return f"{value:g}" if value >= 1.0 else f"{value:.1e}"

@@ -1,0 +1,72 @@
+"""This module draws figures 6 and 7: run time and right-hand sides for a small interval, and for stick."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from hybridsim.plot import style
+from hybridsim.studies.he2026.measured.convergence import CASES
+from hybridsim.studies.he2026.measured.run_times import EPS, WITH, RunTimes
+from hybridsim.studies.he2026.measured.settings import SIGNS
+from hybridsim.studies.he2026.pictures.motions import column_title, plain_log
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def interval_cost(times: RunTimes) -> Figure:
+    """Draw t_d over eps_v for every case, and the right-hand sides next to it."""
+    figure = style.figure(9.2, 3.8)
+    figure.suptitle(
+        f"Figure 6: cost of a smaller zero-velocity interval, mean of {times.repeats} runs of {times.periods} periods",
+        fontsize=11, x=0.01, ha="left",
+    )  # fmt: skip
+    left, right = figure.subplots(1, 2, sharex=True)
+    for k, method in enumerate(WITH):
+        colour = style.PALETTE[k]
+        for i, case in enumerate(CASES):
+            label = column_title(method.name) if i == 0 else None
+            costs = times.by_eps[method.name][case]
+            more = [100.0 * (c.evaluations / costs[0].evaluations - 1.0) for c in costs]
+            shares = [100.0 * value for value in times.t_d(method.name, case)]
+            left.plot(EPS, shares, color=colour, linewidth=0.9, marker=".", label=label)
+            right.plot(EPS, more, color=colour, linewidth=0.9, marker=".", label=label)
+    left.axhline(120.0, color=style.INK, linestyle="--", linewidth=1.0, label="paper, at 1e-7")
+    left.set_ylabel("t_d, more run time than at 8e-4 [%]", fontsize=9)
+    right.set_ylabel("more right-hand sides than at 8e-4 [%]", fontsize=9)
+    for axes in (left, right):
+        axes.set_xscale("log")
+        axes.invert_xaxis()
+        axes.set_xlabel("zero-velocity interval eps_v [m/s]", fontsize=9)
+        style.dress(axes)
+    handles, labels = left.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, fontsize=8, frameon=False)
+    return figure
+
+
+def stick_cost(times: RunTimes) -> Figure:
+    """Draw the milliseconds per run for every method and case."""
+    figure = style.figure(8.6, 4.2)
+    figure.suptitle(
+        f"Figure 7: time of {times.periods} periods, mean of {times.repeats} runs",
+        fontsize=11,
+        x=0.01,
+        ha="left",
+    )
+    axes = figure.subplots()
+    names = [*(v.name for v in SIGNS), *(v.name for v in WITH), "exact"]
+    places = list(range(len(CASES)))
+    for k, name in enumerate(names):
+        colour = style.INK if name == "exact" else style.PALETTE[k]
+        values = [1e3 * times.by_method[name][case].seconds for case in CASES]
+        title = "exact, with stick" if name == "exact" else column_title(name)
+        axes.plot(values, places, style.MARKERS[k], color=colour, markersize=6, label=title)
+    base = [1e3 * 3.25 * times.by_method[SIGNS[0].name][case].seconds for case in CASES]
+    axes.plot(base, places, "|", color=style.FAINT, markersize=12, label="paper: +225 % on sign by step")
+    axes.set_yticks(places, labels=list(CASES))
+    axes.invert_yaxis()
+    plain_log(axes.xaxis)
+    axes.set_xlabel(f"time of {times.periods} periods [ms]", fontsize=9)
+    style.dress(axes)
+    figure.legend(loc="outside lower center", ncols=3, fontsize=8, frameon=False)
+    return figure
