@@ -8,7 +8,7 @@ from typing import Any
 
 import hybridsim
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
+sys.path.insert(0, str(Path(__file__).parent / "make"))
 import figures
 
 project, author = "hybridsim", "The hybridsim developers"
@@ -22,7 +22,7 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["_build", "**/.ipynb_checkpoints"]
+exclude_patterns = ["_build", "examples", "studies/rivals", "**/.ipynb_checkpoints"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 
 myst_enable_extensions = ["deflist", "colon_fence"]
@@ -34,9 +34,9 @@ numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
 
 sphinx_gallery_conf = {
-    "examples_dirs": "../examples",
-    "gallery_dirs": "examples",
-    "image_scrapers": ("example_pictures.take",),  # in scripts
+    "examples_dirs": "examples",
+    "gallery_dirs": "gallery",
+    "image_scrapers": ("example_pictures.take",),  # in docs/make
     "reset_modules": (),
     "only_warn_on_example_error": False,
     "abort_on_example_error": True,

@@ -1,4 +1,4 @@
-"""The edits that bring mended faults back still apply; `studies/faults_put_back.py` runs the trials that find them."""
+"""The edits that bring mended faults back still apply; `docs/studies/faults_put_back.py` runs their trials."""
 
 from __future__ import annotations
 

@@ -112,7 +112,7 @@ def test_the_page_on_floors_has_them_all_in_this_order() -> None:
 
 
 def test_the_picture_has_every_floor() -> None:
-    script = Path(__file__).parents[1] / "scripts" / "floors_graph.py"
+    script = Path(__file__).parents[1] / "docs" / "make" / "floors_graph.py"
     below, sizes = runpy.run_path(str(script))["graph"]()
     assert set(below) == set(FLOORS) == set(sizes)
     assert "engine" in below["integrators"] and not below["errors"]

@@ -161,27 +161,27 @@ def test_the_page_on_sweeps_runs_on_threads_processes_and_a_cluster(tmp_path: Pa
 
 def test_every_study_says_what_makes_its_figures(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each page of a study is in the table, each script that a command names is there, each page gets its foot."""
-    monkeypatch.syspath_prepend(ROOT / "scripts")
-    figures = runpy.run_path(str(ROOT / "scripts" / "figures.py"))
+    monkeypatch.syspath_prepend(ROOT / "docs" / "make")
+    figures = runpy.run_path(str(ROOT / "docs" / "make" / "figures.py"))
     table = figures["table"]()
     studies = {f"studies/{page.name}" for page in (ROOT / "docs" / "studies").glob("*.md")}
     assert studies - {"studies/index.md"} <= set(table)
     assert all((ROOT / "docs" / page).is_file() for page in table)
-    scripts = re.findall(r"(?:studies|scripts)/\w+\.py", str(table))
+    scripts = re.findall(r"docs/(?:studies|make)/\w+\.py", str(table))
     assert len(scripts) > 20
     assert all((ROOT / script).is_file() for script in scripts)
-    assert "studies/speed.py" in figures["footer"]("studies/speed.md")
+    assert "docs/studies/speed.py" in figures["footer"]("studies/speed.md")
     assert figures["footer"]("tutorials/index.md") == ""
 
 
 def test_figures_depend_on_what_their_commands_use() -> None:
     """A page is older where a module that its command reaches has changed, through functions and packages too."""
-    used = runpy.run_path(str(ROOT / "scripts" / "used_sources.py"))["modules_of"]
+    used = runpy.run_path(str(ROOT / "docs" / "make" / "used_sources.py"))["modules_of"]
 
     def reached(command: str) -> set[str]:
         return {path.relative_to(ROOT / "hybridsim").as_posix() for path in used(command)}
 
-    speed, blade = reached("python studies/speed.py"), reached("python studies/blade_damper.py")
+    speed, blade = reached("python docs/studies/speed.py"), reached("python docs/studies/blade_damper.py")
     kernels = {
         "integrators/closed_form/segments.py",
         "engine/linear/motion.py",

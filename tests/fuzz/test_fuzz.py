@@ -1,4 +1,4 @@
-"""A few mutated model files and command lines; `studies/fuzz.py` runs ten thousand of each."""
+"""A few mutated model files and command lines; `docs/studies/fuzz.py` runs ten thousand of each."""
 
 from __future__ import annotations
 

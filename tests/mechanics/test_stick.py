@@ -25,7 +25,7 @@ def test_a_single_block_at_rest_moves_by_no_bit_in_1e5_periods() -> None:
 
 @pytest.mark.parametrize("base", [0.0, 0.2])
 def test_constraints_over_several_coordinates_hold_to_4_ulp_and_do_not_grow(base: float) -> None:
-    """As read from the run, and as the integrator itself has them; 1e5 periods: studies/long_runs.py."""
+    """As read from the run, and as the integrator itself has them; 1e5 periods: docs/studies/long_runs.py."""
     system, period = stuck_system(base), 2 * math.pi / FORCING
     sol = hs.simulate(system, (0, 1e4 * period), rtol=1e-6)
     assert all(m.mode == "stick" for c in system.contacts for m in sol.modes[c.name])
@@ -40,7 +40,7 @@ def test_constraints_over_several_coordinates_hold_to_4_ulp_and_do_not_grow(base
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("seed", [3, 8])
 def test_work_of_friction_is_the_loss_of_energy(seed: int, law: str) -> None:
-    """With forcing and damping, moving bases too; all 60 systems of each law: studies/coupled_contacts.py."""
+    """With forcing and damping, moving bases too; all 60 systems of each law: docs/studies/coupled_contacts.py."""
     sol = hs.simulate(random_system(seed, law, 6), (0, 10), rtol=1e-12)
     found = balance(sol)
     assert len(sol.events) > 5 and found.dissipated > 0.1

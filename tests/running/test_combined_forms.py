@@ -1,4 +1,4 @@
-"""Random whole models that combine forms, against a judge of their own; `studies/combined_forms.py` runs thousands."""
+"""Random models that combine forms, against a judge of their own; `docs/studies/combined_forms.py` runs thousands."""
 
 from __future__ import annotations
 

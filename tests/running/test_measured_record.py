@@ -17,7 +17,7 @@ from scipy.interpolate import PPoly, make_interp_spline
 import hybridsim as hs
 
 ROOT = Path(__file__).parents[2]
-SCRIPT = ROOT / "scripts" / "make_ground_motion.py"
+SCRIPT = ROOT / "docs" / "make" / "make_ground_motion.py"
 
 
 def scene(interpolation: str = "linear") -> hs.Model:

@@ -1,4 +1,4 @@
-"""A few random structures with events against time stepping; `studies/random_structures.py` runs hundreds."""
+"""A few random structures with events against time stepping; `docs/studies/random_structures.py` runs hundreds."""
 
 from __future__ import annotations
 

@@ -1,0 +1,228 @@
+"""Writes the JSON Schema of model files, by which editors complete and check them: docs/reference/model.schema.json.
+
+python docs/make/schema.py
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "model.schema.json"
+
+Schema = dict[str, Any]
+
+
+def said(text: str, schema: Schema) -> Schema:
+    """A schema with what an editor shows."""
+    return {"description": text, **schema}
+
+
+def table(keys: Schema, needed: tuple[str, ...] = ()) -> Schema:
+    """A table of these keys alone."""
+    found: Schema = {"type": "object", "properties": keys, "additionalProperties": False}
+    return found | ({"required": list(needed)} if needed else {})
+
+
+def named(entry: Schema, text: str) -> Schema:
+    """A table of entries under names of the author's choice."""
+    names = {"pattern": "^[A-Za-z_][A-Za-z_0-9]*$"}
+    return said(text, {"type": "object", "propertyNames": names, "additionalProperties": entry})
+
+
+def short(value: Schema, whole: Schema) -> Schema:
+    """A value that stands for a table with it alone."""
+    return {"anyOf": [value, whole]}
+
+
+TEXT, NUMBER, FLAG = {"type": "string"}, {"type": "number"}, {"type": "boolean"}
+EXPRESSION = {"type": ["number", "string"]}
+EXPRESSIONS = {"type": "object", "additionalProperties": EXPRESSION}
+NUMBERS = {"type": "array", "items": NUMBER}
+UNIT = said("the unit, for labels", TEXT)
+START = said("the initial value", EXPRESSION)
+NOMINAL = said("the usual size; the absolute tolerance follows it", NUMBER)
+
+STATE = table(
+    {"start": START, "der": said("its rate", EXPRESSION), "unit": UNIT, "nominal": NOMINAL}, ("start", "der")
+)
+STATE_OF_LAW = table(
+    {"start": START, "der": said("its rate", EXPRESSION), "unit": UNIT, "nominal": NOMINAL}, ("der",)
+)
+CHOICE = table(
+    {
+        "to": said("the mode that follows", TEXT),
+        "when": said("the condition under which this choice is taken", EXPRESSION),
+        "reset": said('states and discrete states that jump, and to what; "+= amount" adds', EXPRESSIONS),
+    },
+    ("to",),
+)
+CHOICES = {"type": "array", "items": {"anyOf": [TEXT, CHOICE]}}
+GUARD = table(
+    {
+        "expr": said("what stays at or above zero while the mode lasts", EXPRESSION),
+        "then": said("choices; the first whose condition holds is taken", {"anyOf": [TEXT, CHOICE, CHOICES]}),
+        "fatal": said("stop the run with this message", TEXT),
+    },
+    ("expr",),
+)  # fmt: skip
+MODE = table(
+    {
+        "guards": named(short(EXPRESSION, GUARD), "what ends the mode"),
+        "der": said("rates that hold in this mode in place of those of [states]", EXPRESSIONS),
+        "set": said("variables of the component, in every mode the same names", EXPRESSIONS),
+        "initial": said("whether the component starts here", FLAG),
+    }
+)
+MODES = {"type": "object", "additionalProperties": MODE, "description": "the modes of an automaton, by name"}
+INITIAL = said("the mode in which the automaton starts", TEXT)
+SURFACE_OF_COMPONENT = table(
+    {
+        "function": said("zero on the surface", EXPRESSION),
+        "unknown": said("the variable that holding solves for", TEXT),
+        "above": TEXT, "below": TEXT, "hold": TEXT,
+        "jump_above": EXPRESSION, "jump_below": EXPRESSION,
+        "unique": said("whether holding has no priority, as on a switching surface", FLAG),
+        "restitution": said("of impacts, where there is no mode below", EXPRESSION),
+    },
+    ("function", "unknown", "above", "hold", "jump_above", "jump_below"),
+)  # fmt: skip
+LIMIT = said(
+    "where to go, after which reset, where its transitions accumulate",
+    {"anyOf": [TEXT, table({"to": TEXT, "reset": EXPRESSIONS}, ("to",))]},
+)
+COMPONENT = table(
+    {"modes": MODES, "initial": INITIAL, "surface": SURFACE_OF_COMPONENT, "limit": LIMIT}, ("modes",)
+)
+POINTS = table(
+    {"at": NUMBERS, "values": NUMBERS, "over": said("the argument; the speed v if not given", TEXT)},
+    ("at", "values"),
+)
+NAMES = {"type": "array", "items": {"anyOf": [TEXT, EXPRESSIONS]}}
+LAW = table(
+    {
+        "title": TEXT, "source": TEXT,
+        "parameters": said("names, or names with their defaults", {"anyOf": [NAMES, EXPRESSIONS]}),
+        "slip": said("magnitude of the force at the speed v >= 0 under the load N", EXPRESSION),
+        "stick": said("largest force at rest", EXPRESSION),
+        "slip_backward": said("slip, where the other direction differs", EXPRESSION),
+        "stick_backward": said("stick, where the other direction differs", EXPRESSION),
+        "force": said("a single force with its sign, in place of slip and stick", EXPRESSION),
+        "states": named(short(EXPRESSION, STATE_OF_LAW), "states of the law itself"),
+        "definitions": EXPRESSIONS,
+        "modes": MODES, "initial": INITIAL,
+        "copies": said("the parameter that says how many copies act in parallel", TEXT),
+        "tables": named(POINTS, "functions given by points, monotone cubics between them"),
+    }
+)  # fmt: skip
+NAMED_LAW = {
+    "type": "object", "properties": {"name": TEXT}, "required": ["name"], "additionalProperties": EXPRESSION,
+}  # fmt: skip
+CONTACT = table(
+    {
+        "velocity": said("the relative velocity", EXPRESSION),
+        "normal": said("the normal load", EXPRESSION),
+        "law": said("the law's name, with its arguments", {"anyOf": [TEXT, NAMED_LAW]}),
+        "opens": said("whether it lifts off where the load would be negative", FLAG),
+        "start": said("initial values of the law's states", EXPRESSIONS),
+        "nominal": said("usual sizes of the law's states", {"type": "object", "additionalProperties": NUMBER}),
+    },
+    ("velocity", "normal", "law"),
+)  # fmt: skip
+SWITCHING = table(
+    {
+        "expr": said("positive on one side, negative on the other", EXPRESSION),
+        "above": said("values of variables where it is positive", EXPRESSIONS),
+        "below": said("values of the same variables where it is negative", EXPRESSIONS),
+    },
+    ("expr",),
+)
+IMPACT = table(
+    {
+        "gap": said("what cannot become negative, over positions", EXPRESSION),
+        "restitution": said("from 0 to 1; it may use the speed of approach, `speed`", EXPRESSION),
+    },
+    ("gap", "restitution"),
+)
+MONITOR = table(
+    {
+        "expr": said("the scalar to watch", EXPRESSION),
+        "direction": {"enum": ["up", "down", "both"]},
+        "action": {"enum": ["record", "terminate", "reset"]},
+        "reset": EXPRESSIONS,
+    },
+    ("expr",),
+)
+TIMES = {"anyOf": [EXPRESSION, {"type": "array", "items": EXPRESSION}]}
+SCHEDULE = table(
+    {
+        "times": TIMES, "start": EXPRESSION, "period": EXPRESSION, "count": {"type": "integer"},
+        "reset": EXPRESSIONS, "terminate": FLAG,
+    }
+)  # fmt: skip
+CLOCK = table(
+    {
+        "period": said("between ticks", EXPRESSION),
+        "offset": said("of the first tick", EXPRESSION),
+        "set": EXPRESSIONS,
+    },
+    ("period",),
+)
+WAVE = {
+    "kind": {"const": "wave"}, "shape": {"enum": ["square", "triangle", "sawtooth", "sine"]}, "period": EXPRESSION,
+    "amplitude": EXPRESSION, "phase": EXPRESSION, "offset": EXPRESSION, "duty": EXPRESSION,
+}  # fmt: skip
+CHIRP = {
+    "kind": {"const": "chirp"}, "f0": EXPRESSION, "f1": EXPRESSION, "duration": EXPRESSION, "amplitude": EXPRESSION,
+    "phase": EXPRESSION,
+}  # fmt: skip
+POINTS_IN_TIME = {
+    "kind": {"const": "table"}, "times": NUMBERS, "values": NUMBERS, "file": said("a CSV beside the model", TEXT),
+    "columns": {"type": "array"}, "interpolation": {"enum": ["linear", "cubic"]},
+}  # fmt: skip
+INPUT = {"oneOf": [table(keys, ("kind",)) for keys in (WAVE, CHIRP, POINTS_IN_TIME)]}
+OUTPUT = table(
+    {"expr": EXPRESSION, "unit": UNIT, "modes": said('"component.mode" = the expression there', EXPRESSIONS)},
+    ("expr",),
+)
+PARAMETER = table({"value": EXPRESSION, "unit": UNIT, "title": TEXT}, ("value",))
+DISCRETE = table({"start": START, "unit": UNIT}, ("start",))
+
+MODEL = {
+    "$schema": "https://json-schema.org/draft/2020-12/schema",
+    "title": "hybridsim model",
+    **table(
+        {
+            "schema": said("the version of this form", {"const": 1}),
+            "name": TEXT, "title": TEXT, "source": TEXT, "description": TEXT,
+            "look": said("what to look at when it runs", TEXT),
+            "duration": said("how long to look", EXPRESSION),
+            "parameters": named(short(EXPRESSION, PARAMETER), "numbers, or expressions of other parameters"),
+            "states": named(STATE, "what the equations integrate"),
+            "discrete": named(short(EXPRESSION, DISCRETE), "what only resets and ticks change"),
+            "definitions": said("named parts of expressions", EXPRESSIONS),
+            "inputs": named(INPUT, "known signals of time"),
+            "laws": said("friction laws", {"type": "object", "additionalProperties": LAW}),
+            "contacts": named(CONTACT, "friction contacts; the name is the force"),
+            "surfaces": named(short(EXPRESSION, SWITCHING), "switching surfaces; the name is the sign"),
+            "impacts": named(IMPACT, "unilateral contacts; the name is the normal force"),
+            "initial": INITIAL, "limit": LIMIT, "modes": MODES,
+            "components": named(COMPONENT, "automata"),
+            "monitors": named(short(EXPRESSION, MONITOR), "scalars watched for zeros"),
+            "schedules": named(short(TIMES, SCHEDULE), "events at known times"),
+            "clocks": named(CLOCK, "events at equal distances"),
+            "outputs": named(short(EXPRESSION, OUTPUT), "what to look at"),
+        }
+    ),
+}  # fmt: skip
+
+
+def text() -> str:
+    """The file."""
+    return json.dumps(MODEL, indent=1, ensure_ascii=False) + "\n"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(text(), encoding="utf-8")
+    print(PAGE)

@@ -1,0 +1,273 @@
+"""How regularised and spring-like laws come to the set-valued one: orders observed beside those of theory.
+
+    python docs/studies/limits_of_laws.py
+
+Writes docs/studies/limits-of-laws.md and docs/images/limits-of-laws.png. The set-valued law is the oscillator's closed
+form (tests/reference), which shares no code with the package.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+import hybridsim as hs
+from hybridsim.plot import style
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
+from reference.dfcs_closed_form import Motion, Oscillator
+
+ROOT = Path(__file__).parents[2]
+PAGE = ROOT / "docs" / "studies" / "limits-of-laws.md"
+PICTURE = ROOT / "docs" / "images" / "limits-of-laws.png"
+# e: v0 over the largest speed, mu N/stiffness over the largest displacement
+SMALL = 10.0 ** -np.arange(1.0, 5.01, 0.5)
+PERIODS, POINTS = 3, 6001
+RTOL = 1e-10  # of the runs: their own errors are below those of the laws by a factor of a hundred and more
+FITTED = 3  # smallest values, a decade, over which the order is fitted
+
+
+@dataclass(frozen=True)
+class Law:
+    """A law that has the set-valued one as its limit, and the order of its error at releases and at reversals."""
+
+    name: str
+    says: str
+    integrator: str
+    at_releases: tuple[float, bool]  # exponent, and whether a logarithm goes with it
+    at_reversals: tuple[float, bool]
+    is_spring: bool = False
+
+
+LAWS = (
+    Law("karnopp", "stopped in the band abs(v) < v0", "exact", (2.0, False), (1.0, False)),
+    Law("tanh", "mu N tanh(v/v0)", "rodas5p", (1.0, True), (1.0, False)),
+    Law("arctan", "mu N (2/pi) atan(v/v0)", "rodas5p", (2 / 3, False), (1.0, True)),
+    Law("jenkins", "spring k, slider mu N", "exact", (1.0, False), (0.5, False), True),
+    Law("dahl", "z' = v - sigma/(mu N) abs(v) z", "dop853", (2 / 3, False), (0.5, False), True),
+    Law(
+        "lugre",
+        "Dahl and the damping sqrt(sigma_0 m) of bristles",
+        "dop853",
+        (2 / 3, False),
+        (0.5, False),
+        True,
+    ),
+)
+COLOURS = dict(zip((law.name for law in LAWS), style.PALETTE))
+MARKERS = dict(zip((law.name for law in LAWS), style.MARKERS))
+
+
+class Scene:
+    """The reference model with a forcing, from a start, and its motion with the set-valued law."""
+
+    def __init__(self, name: str, says: str, force: float, ratio: float, start: tuple[float, float]) -> None:
+        self.name, self.says = name, says
+        base = hs.load("dfcs").with_(F0=force)
+        values = base.parameter_values()
+        omega = ratio * math.sqrt(values["k"] / values["m"])
+        states = [hs.State("x", start[0], "v", nominal=1e-4)]
+        states.append(hs.State("v", start[1], "(F0*sin(omega*t) - c*v - k*x - f)/m", nominal=0.1))
+        self.model = hs.Model("limits", states, base.with_(omega=omega).parameters, contacts=base.contacts)
+        self.m, self.limit = values["m"], values["mu"] * values["N"]
+        self.end = PERIODS * 2.0 * math.pi / omega
+        oscillator = Oscillator(self.m, values["c"], values["k"], self.limit, self.limit, force, omega)
+        self.motion: Motion = oscillator.run(0.0, self.end, *start)
+        self.t = np.linspace(0.0, self.end, POINTS)
+        x, v, mode = np.array([self.motion.state(t) for t in self.t]).T
+        self.x, self.largest, self.fastest = x, abs(x).max(), abs(v).max()
+        self.sticks = float(np.mean(mode == 0))
+        changes = [piece.mode for piece in self.motion.pieces]
+        self.releases = sum(a == 0 for a in changes[:-1])
+        self.reversals = sum(a * b == -1 for a, b in pairwise(changes))
+
+    def expected(self, law: Law) -> tuple[float, bool]:
+        """Order of the error: that of the worst that happens."""
+        orders = [law.at_releases] * bool(self.releases) + [law.at_reversals] * bool(self.reversals)
+        return min(orders, key=lambda order: (order[0], not order[1]))
+
+    def with_law(self, law: Law, small: float) -> hs.Model:
+        """The model with another law, whose width or give is so small."""
+        if not law.is_spring:
+            return self.model.regularized(law.name, v0=small * self.fastest)
+        stiffness = self.limit / (small * self.largest)
+        arguments: dict[str, str | float] = {
+            "jenkins": {"mu": "mu", "k": stiffness},
+            "dahl": {"mu": "mu", "sigma": stiffness},
+            "lugre": {
+                "mu_s": "mu", "mu_k": "mu", "v_s": 1.0,
+                "sigma_0": stiffness, "sigma_1": math.sqrt(stiffness * self.m), "sigma_2": 0.0,
+            },
+        }[law.name]  # fmt: skip
+        nominal = {"F": self.limit} if law.name == "jenkins" else {"z": small * self.largest}
+        contact = hs.Contact("f", "v", "N", law.name, arguments, nominal=nominal)
+        return hs.Model("limits", self.model.states, self.model.parameters, contacts=[contact])
+
+    def error(self, law: Law, small: float) -> float:
+        """Largest difference of the displacement, in units of the largest displacement."""
+        rtol = {} if law.integrator == "exact" else {"rtol": RTOL}
+        sol = hs.simulate(self.with_law(law, small), (0.0, self.end), integrator=law.integrator, **rtol)
+        assert sol.success, (law.name, small, sol.message)
+        return float(np.abs(sol(self.t)[0] - self.x).max() / self.largest)
+
+
+def scenes() -> list[Scene]:
+    """One that sticks now and then, one that sticks most of the time, one that turns round without stick."""
+    turning = hs.steady_state("dfcs", params={"F0": 60, "omega": "1.4*sqrt(k/m)"}).solution
+    x, v = (float(value) for value in turning(0.0))
+    return [
+        Scene("stick and slip", "F0 = 30 N, r = 0.6, from rest", 30.0, 0.6, (0.0, 0.0)),
+        Scene("long sticks", "F0 = 24 N, r = 0.2, from rest", 24.0, 0.2, (0.0, 0.0)),
+        Scene("no stick", "F0 = 60 N, r = 1.4, its steady motion", 60.0, 1.4, (x, v)),
+    ]
+
+
+def slope(errors: np.ndarray) -> float:
+    """Exponent over the smallest values."""
+    return float(np.polyfit(np.log(SMALL[-FITTED:]), np.log(errors[-FITTED:]), 1)[0])
+
+
+def theory(order: tuple[float, bool], errors: np.ndarray) -> np.ndarray:
+    """The law of theory through the last error."""
+    exponent, has_logarithm = order
+    shape = SMALL**exponent * (np.log(1.0 / SMALL) if has_logarithm else 1.0)
+    return errors[-1] * shape / shape[-1]
+
+
+def order_text(order: tuple[float, bool], letter: str = "e") -> str:
+    """An order as it is written."""
+    power = {2.0: f"{letter}^2", 1.0: letter, 2 / 3: f"{letter}^(2/3)", 0.5: f"{letter}^(1/2)"}[order[0]]
+    return f"{power} log(1/{letter})" if order[1] else power
+
+
+def picture(found: dict[str, dict[str, np.ndarray]], every: list[Scene]) -> None:
+    """A panel for each scene."""
+    figure = style.figure(12.0, 4.6)
+    panels = figure.subplots(1, len(every), sharey=True)
+    for panel, scene in zip(panels, every):
+        for law in LAWS:
+            errors, colour = found[scene.name][law.name], COLOURS[law.name]
+            panel.loglog(SMALL, errors, MARKERS[law.name], ms=5, color=colour, label=law.name)
+            panel.loglog(SMALL[2:], theory(scene.expected(law), errors)[2:], "-", lw=1.0, color=colour)
+        panel.set_title(
+            f"{scene.name}: sticks {100 * scene.sticks:.0f} % of the time", fontsize=10, loc="left"
+        )
+        panel.set(xlabel="e = v0/max |v|, or (mu N/stiffness)/max |x|")
+        style.dress(panel)
+    panels[0].set(ylabel="largest error of x / max |x|")
+    panels[0].plot([], [], "-", lw=1.0, color=style.INK, label="order of theory")
+    panels[0].legend(fontsize=8, loc="lower right")
+    style.save(figure, PICTURE)
+
+
+def main() -> None:
+    """Run all, draw, write the page."""
+    every = scenes()
+    found: dict[str, dict[str, np.ndarray]] = {}
+    for scene in every:
+        found[scene.name] = {}
+        for law in LAWS:
+            began = time.perf_counter()
+            errors = np.array([scene.error(law, small) for small in SMALL])
+            found[scene.name][law.name] = errors
+            print(
+                f"{scene.name:15s} {law.name:8s} {slope(errors):.3f} of {order_text(scene.expected(law))}, "
+                f"{time.perf_counter() - began:.0f} s",
+                flush=True,
+            )
+    picture(found, every)
+    PAGE.write_text(page(found, every), encoding="utf-8")
+    print(PAGE)
+
+
+def page(found: dict[str, dict[str, np.ndarray]], every: list[Scene]) -> str:
+    """The page, with its figures."""
+    rows = []
+    for law in LAWS:
+        cells = []
+        for scene in every:
+            errors, order = found[scene.name][law.name], scene.expected(law)
+            expected = slope(theory(order, errors))
+            cells.append(f"{order_text(order)}: {expected:.2f} | {slope(errors):.2f} | {errors[-1]:.1e}")
+        rows.append(f"| `{law.name}` | " + " | ".join(cells) + " |")
+    table = "\n".join(rows)
+    heads = " | ".join(f"{scene.name}: theory | observed | error at 1e-5" for scene in every)
+    about = "\n".join(
+        f"- *{scene.name}*: {scene.says}; {100 * scene.sticks:.0f} % of the time in stick, "
+        f"{scene.releases} releases, {scene.reversals} reversals without stick"
+        for scene in every
+    )
+    forms = "\n".join(
+        f"| `{law.name}` | {law.says} | {order_text(law.at_releases)} | {order_text(law.at_reversals)} |"
+        for law in LAWS
+    )
+    return f"""# Laws that come to Coulomb's in the limit
+
+A velocity v0 over which friction is rounded off, or a stiffness with which a contact gives way: as v0 goes to zero,
+or the stiffness to infinity, the motion becomes that of the set-valued law. How fast? The reference model over
+{PERIODS} periods, against its closed form with the set-valued law, mu_s = mu_k. Made by
+`python docs/studies/limits_of_laws.py`.
+
+{about}
+
+e is v0 over the largest speed, or the give mu N/stiffness over the largest displacement; the error is the largest of x
+over the run.
+
+![Error over the width of a law, six laws in three scenes](../images/limits-of-laws.png)
+
+The order of theory and the one observed, both over the smallest decade of e:
+
+| law | {heads} |
+| --- | {" | ".join(["---"] * (3 * len(every)))} |
+{table}
+
+## The orders of theory
+
+Two things are felt at the order at which they happen: a release from stick, and a reversal without stick. The
+larger error wins.
+
+| law | force | release | reversal |
+| --- | --- | --- | --- |
+{forms}
+
+**Release.** The applied force grows past mu N as r s, s being the time since. By the set-valued law m v = r s^2/2.
+A law whose force is short of mu N by d has m v' = r s + d, in a layer around s = 0 in which d and r s are of one
+size; the velocity with which the body leaves that layer too early is what remains.
+
+- `tanh`: d = 2 mu N exp(-2 v/v0). Then v is of size v0 and s of size v0^(1/2), but for log(1/v0) in v, by which d
+  is brought down from mu N to r s.
+- `arctan`: d = (2/pi) mu N v0/v, which falls no faster than that. With v of size s^2: s^3 of size v0, v of size
+  v0^(2/3).
+- `dahl`, `lugre`: d = mu N exp(-sigma x/(mu N)). Then x is of size 1/sigma, hence s of size sigma^(-1/3) and v of
+  size sigma^(-2/3). The damping of the bristles, sqrt(sigma_0 m) v d/(mu N), is smaller than d by sigma^(-1/6).
+- `jenkins`: d = 0 once mu N is reached. What is left is the ringing of the body on the spring, with which each stop
+  begins: it slips by itself as the applied force grows, until at the release it is of size 1/k in x.
+- `karnopp`: the release is located. At the stop before, the body is held v0/a too early (a being its deceleration),
+  v0^2/(2 a) short of where it would have stopped.
+
+**Reversal.** Friction changes by 2 mu N, at once by the set-valued law.
+
+- `tanh`, `arctan`, `karnopp`: the change takes the time v0/a, in which the velocity is wrong by the order of v0.
+  The tails of `arctan` last: the sum of v0/(a s) over s is v0 log(1/v0).
+- `jenkins`, `dahl`, `lugre`: it takes a distance of the size of 1/stiffness; from rest with a finite acceleration
+  that lasts stiffness^(-1/2), and so large is what is missing of the velocity after it. Half an order: a spring
+  contact is a poor stand-in for Coulomb's law where the body turns round without stick.
+
+Regularisations by a function of the velocity and what they cost: E. Pennestri et al., Nonlinear Dyn. 83 (2016) 1785,
+[doi:10.1007/s11071-015-2485-3](https://doi.org/10.1007/s11071-015-2485-3). That solutions of regularised fields
+come to those of Filippov: A. F. Filippov, *Differential Equations with Discontinuous Righthand Sides* (1988),
+[doi:10.1007/978-94-015-7793-9](https://doi.org/10.1007/978-94-015-7793-9). Karnopp's law:
+[doi:10.1115/1.3140698](https://doi.org/10.1115/1.3140698); Dahl's:
+[doi:10.2514/3.61511](https://doi.org/10.2514/3.61511); LuGre:
+[doi:10.1109/9.376053](https://doi.org/10.1109/9.376053).
+"""
+
+
+if __name__ == "__main__":
+    main()

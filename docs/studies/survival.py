@@ -1,0 +1,286 @@
+"""Whether runs that stop go on to the same bits, and what a sweep loses that is killed.
+
+    python docs/studies/survival.py [--moments N] [--kills N] [--seed S]      (100 and 50 make docs/studies/survival.md)
+
+Every integrator that is compiled or has a fixed step, on scenes with stick and slip, impacts that come to rest,
+clocks and discrete states, jumps of an input, sliding, friction along a stop: a run is stopped at a random step,
+resumed, and compared with one that was never stopped: times, states, events with both their sides, status. A sweep in
+a child process is ended by SIGKILL at random moments until it is done.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+import hybridsim as hs
+
+PAGE = Path(__file__).parents[2] / "docs" / "studies" / "survival.md"
+_SCENES = Path(hs.__file__).parent / "testing" / "scenes"
+# the others are models of the package
+FILES = {name: str(_SCENES / f"{name}.toml") for name in ("bar", "rubbing-stop")}
+# Ends of the runs. A compiled loop looks at its limits between stretches of a thousand segments or of some thousand
+# fixed steps, so that a run has to be several of them long to be stopped at all.
+SCENES = {
+    "dfcs": 0.05,
+    "square-wave": 2.0,
+    "sampled-servo": 0.05,
+    "relay-pair": 3.0,
+    "bouncing-ball": 3.0,
+    "vibrating-table": 0.15,
+    "bar": 2.0,
+    "thrown-block": 2.0,
+    "rubbing-stop": 5.0,
+}
+LONGER = {
+    **{(name, "dfcs"): 20.0 for name in ("exact", "taylor", "dop853", "tsit5")},
+    **{
+        (name, scene): end
+        for name in ("rk4-dichotomy", "rk4-sign", "moreau")
+        for scene, end in {
+            "dfcs": 1.0,
+            "square-wave": 24.0,
+            "sampled-servo": 0.2,
+            "bouncing-ball": 30.0,
+            "vibrating-table": 20.0,
+            "bar": 20.0,
+            "thrown-block": 20.0,
+            "rubbing-stop": 20.0,
+        }.items()
+    },
+}
+# Nothing in these has a period, of which a fixed step would be a share.
+STEPS = dict.fromkeys(("sampled-servo", "bouncing-ball", "bar", "thrown-block", "rubbing-stop"), 1e-3)
+INTEGRATORS = ("exact", "taylor", "dop853", "tsit5", "rodas5p", "rk4-dichotomy", "rk4-sign", "moreau")
+FIXED = ("rk4-dichotomy", "rk4-sign", "moreau")
+FORCES, SPEEDS = 40, 25  # points of the sweep that is killed, by its two parameters
+
+
+# -- resume ------------------------------------------------------------------------------------------------------
+
+
+def difference(one: hs.Solution, other: hs.Solution) -> str:
+    """What differs between two solutions in the last bit; empty where nothing does."""
+    if (one.status, one.message, len(one.events)) != (other.status, other.message, len(other.events)):
+        return f"{one.status} with {len(one.events)} events, {other.status} with {len(other.events)}"
+    for a, b in zip(one.events, other.events, strict=True):
+        same = (a.t, a.kind, a.component, a.guard, a.source, a.target, a.direction) == (
+            b.t, b.kind, b.component, b.guard, b.source, b.target, b.direction,
+        )  # fmt: skip
+        if not same or a.x_minus.tobytes() != b.x_minus.tobytes() or a.x_plus.tobytes() != b.x_plus.tobytes():
+            return f"{a!r} and {b!r}"
+    return (
+        "" if (one.t.tobytes(), one.y.tobytes()) == (other.t.tobytes(), other.y.tobytes()) else "the states"
+    )
+
+
+def resumed(
+    scene: str, integrator: str, moments: int, draws: np.random.Generator
+) -> tuple[int, int, list[str]]:
+    """Moments at which a run was stopped, those at which it was already done, and what differed."""
+    model, span = (
+        hs.load(FILES.get(scene, scene)),
+        (0.0, LONGER.get((integrator, scene), SCENES[scene])),
+    )
+    given = {"step": STEPS[scene]} if integrator in FIXED and scene in STEPS else {}
+    whole = hs.simulate(model, span, integrator=integrator, **given)
+    most, stopped, done, faults = max(int(whole.stats["steps"]), 2), 0, 0, []
+    began = time.perf_counter()
+    for _ in range(moments):
+        steps = int(draws.integers(1, most))
+        part = hs.simulate(model, span, integrator=integrator, limits={"steps": steps}, **given)
+        if part.status == "limit":
+            stopped += 1
+            part = part.resume()
+        else:
+            done += 1
+        if fault := difference(whole, part):
+            faults.append(f"{scene} with {integrator} after {steps} steps: {fault}")
+    print(
+        f"{integrator} {scene}: {most} steps, {stopped} stopped, {time.perf_counter() - began:.1f} s",
+        flush=True,
+    )
+    return stopped, done, faults
+
+
+def resume_rows(moments: int, seed: int) -> tuple[list[str], list[str]]:
+    """The rows of the table, and what differed."""
+    rows, faults = [], []
+    for integrator in INTEGRATORS:
+        cells, draws = [], np.random.default_rng(seed)
+        for scene in SCENES:
+            try:
+                stopped, done, found = resumed(scene, integrator, moments, draws)
+            except hs.UsageError:
+                cells.append("refused")
+                continue
+            cells.append(f"{stopped}" + (f" (+ {done} done)" if done else ""))
+            faults += found
+        rows.append(f"| `{integrator}` | " + " | ".join(cells) + " |")
+        print(rows[-1], *faults[-3:], sep="\n", flush=True)
+    return rows, faults
+
+
+# -- kills -------------------------------------------------------------------------------------------------------
+
+
+def point(model: hs.Model) -> dict[str, float]:
+    """What is measured at a point, which is written down before anything is lost."""
+    values = model.parameter_values()
+    log = os.environ.get("SURVIVAL_LOG")
+    if log:
+        with open(log, "a", encoding="utf-8") as file:
+            file.write(f"{values['F0']!r} {values['omega']!r}\n")
+    sol = hs.simulate(model, (0.0, 0.6), integrator="dop853")
+    return {"x": float(sol.y[0, -1]), "v": float(sol.y[1, -1]), "events": float(len(sol.events))}
+
+
+def swept(journal: Path | None) -> hs.Sweep:
+    """The sweep."""
+    values = {
+        "F0": np.linspace(20.0, 40.0, FORCES).tolist(),
+        "omega": np.linspace(300.0, 500.0, SPEEDS).tolist(),
+    }
+    return hs.sweep("dfcs", values, point, journal=journal, workers=1)
+
+
+def killed(kills: int, seed: int, folder: Path) -> dict[str, float | bool]:
+    """A sweep ended by so many SIGKILLs at random moments, held against one that nobody disturbed."""
+    draws = np.random.default_rng(seed)
+    journal, log = folder / "sweep.journal", folder / "log"
+    point(hs.load("dfcs"))  # so that all is compiled
+    began = time.perf_counter()
+    whole = swept(None)
+    usual = time.perf_counter() - began
+    environment = os.environ | {"SURVIVAL_LOG": str(log)}
+    dealt = begun_anew = most_lost = 0
+    lost: list[int] = []
+    while dealt < kills:
+        known = entries(journal)
+        tried = count_lines(log)
+        child = subprocess.Popen([sys.executable, __file__, "--child", str(journal)], env=environment)
+        # a share of what is left, counted from the moment at which it works
+        while count_lines(log) == tried and child.poll() is None:
+            time.sleep(0.001)
+        time.sleep(float(draws.uniform(0.0, 2.0 * usual / kills)))
+        if child.poll() is not None:
+            begun_anew += 1  # all was done: the sweep begins anew
+            journal.unlink(missing_ok=True)
+            log.unlink(missing_ok=True)
+            continue
+        child.send_signal(signal.SIGKILL)
+        child.wait()
+        dealt += 1
+        tried_now, kept_now = count_lines(log) - tried, entries(journal) - known
+        lost.append(tried_now - kept_now)
+        most_lost = max(most_lost, lost[-1])
+    again = swept(journal)
+    same = all(
+        v.tobytes() == again[name].tobytes() and v.dtype == again[name].dtype
+        for name, v in whole.values.items()
+    )
+    return {
+        "same": bool(same and (whole.status == again.status).all()),
+        "points": FORCES * SPEEDS,
+        "kills": dealt,
+        "begun": begun_anew,
+        "lost": sum(lost),
+        "most": most_lost,
+        "seconds": usual,
+    }
+
+
+def count_lines(path: Path) -> int:
+    """Lines of a file, 0 where there is none."""
+    return path.read_bytes().count(b"\n") if path.exists() else 0
+
+
+def entries(journal: Path) -> int:
+    """Points whose results a journal holds; its last line may be cut."""
+    if not journal.exists():
+        return 0
+    whole = [line for line in journal.read_bytes().splitlines(keepends=True)[1:] if line.endswith(b"\n")]
+    return sum(len(json.loads(line)[0]) for line in whole)
+
+
+# -- the page ----------------------------------------------------------------------------------------------------
+
+TEXT = """# Runs that are stopped, sweeps that are killed
+
+Made by `docs/studies/survival.py`.
+
+## Stopped at a random step and resumed
+
+{moments} random steps of each run, at which it was stopped by `limits={{"steps": ...}}` and went on by `resume()`. The
+numbers are those of runs that were really stopped: a compiled loop looks at its limits between stretches, and a run
+that ended meanwhile is *done*. Compared with a run that was never stopped, in their last bits: the times of all
+steps, the states there, all events with the states on both their sides, status and message.
+
+| integrator | {scenes} |
+| --- | {lines} |
+{rows}
+
+{verdict}
+
+*refused*: the method says that it lacks what the scene needs.
+
+## Killed
+
+A sweep of {points} points in a process of its own, which took {seconds:.1f} s undisturbed, was ended {kills} times by
+SIGKILL at random moments and started again each time (anew, where it was done before: {begun} times). Each point says
+that it is begun in a file of its own, before it is computed.
+
+| | |
+| --- | --- |
+| results equal to those of an undisturbed sweep, to the last bit | {same} |
+| points whose computation was begun more than once, over all kills | {lost} |
+| the most that one kill cost | {most} |
+
+The journal is written by the group: what a kill costs are the points of the group that is under way, with one worker
+here.
+"""
+
+
+def main() -> None:
+    """Run both and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--moments", type=int, default=100)
+    parser.add_argument("--kills", type=int, default=50)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--child", type=Path, help=argparse.SUPPRESS)
+    args = parser.parse_args()
+    if args.child:
+        swept(args.child)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        deaths = killed(args.kills, args.seed, Path(folder))
+    print(deaths, flush=True)
+    rows, faults = resume_rows(args.moments, args.seed)
+    print(*faults, f"{len(faults)} differ", sep="\n")
+    if args.moments >= 100 and args.kills >= 50:
+        verdict = f"{len(faults)} of them differ." if faults else "None of them differs."
+        words = deaths | {"same": "yes" if deaths["same"] else "no"}
+        PAGE.write_text(
+            TEXT.format(
+                moments=args.moments,
+                scenes=" | ".join(f"`{s}`" for s in SCENES),
+                lines=" | ".join("---" for _ in SCENES),
+                rows="\n".join(rows),
+                verdict=verdict,
+                **words,
+            ),
+            encoding="utf-8",
+        )
+
+
+if __name__ == "__main__":
+    main()
