@@ -6,6 +6,7 @@ import ast
 import re
 import runpy
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -13,57 +14,57 @@ import pytest
 import hybridsim
 
 PACKAGE = Path(hybridsim.__file__).parent
+ROOT = Path(__file__).parents[1]
 SOURCES = sorted(PACKAGE.rglob("*.py"))
 
+MAP = runpy.run_path(str(ROOT / "docs" / "make" / "floors.py"))
 # From the ground up. A module may import from its own floor and from the ones before it.
-FLOORS = (
-    "errors",
-    "files",
-    "calls",
-    "forks",
-    "expr",
-    "model",
-    "engine",
-    "integrators",
-    "tables",
-    "colours",
-    "notebook",
-    "readable",
-    "arguments",
-    "solution",
-    "preparation",
-    "mechanics",
-    "simulate",
-    "ivp",
-    "analysis",
-    "testing",
-    "plot",
-    "cli",
-)
+FLOORS: tuple[str, ...] = MAP["FLOORS"]
 
-# The floors that may import a heavy or numerical library at all.
+# The floors that may import a heavy or numerical library at all. A name stands for what is below it, too.
 LIBRARIES = {
-    "sympy": {"expr", "engine"},
-    "numba": {"engine"},
-    "llvmlite": {"engine"},
+    "sympy": {"expr", "engine.lowering", "engine.series"},
+    "numba": {"engine.native", "engine.system"},
+    "llvmlite": {"engine.native"},
     "sksundae": {"integrators"},
-    "scipy": {"engine", "integrators", "solution", "mechanics", "analysis", "testing"},
-    "pandas": {"tables", "solution"},
-    "xarray": {"tables", "solution", "analysis"},
-    "numpy": {
-        "engine",
-        "integrators",
-        "tables",
-        "solution",
-        "arguments",
-        "preparation",
-        "mechanics",
-        "ivp",
-        "analysis",
-        "testing",
-        "plot",
-    },
-    "matplotlib": {"plot"},
+    "scipy": {"engine.system", "engine.linear", "integrators", "mechanics", "analysis", "testing", "studies"},
+    "pandas": {"presentation", "solution"},
+    "xarray": {"presentation", "solution", "analysis"},
+    "numpy": set(FLOORS)
+    - {"errors", "files", "calls", "forks", "expr", "model", "engine.lowering", "simulate", "cli"},
+    "matplotlib": {"plot", "studies"},
+}
+# numba and llvmlite in the engine.system floor: only where functions of a user are compiled
+COMPILES = ("engine/native/", "engine/system/user_functions/")
+
+# Methods of what users hold, which import what does their work when they are called: each closes a circle.
+FACES = {
+    ("model.parts.model", "model.checks.validate"),  # Model.validate
+    ("model.parts.model", "model.toml.read"),  # Model.from_toml
+    ("model.parts.contact", "model.library"),  # Contact(law="name")
+    ("model.toml.laws", "model.library"),  # law = "name" in a file
+    ("mechanics.declaration.system", "mechanics.declaration.as_model"),  # MechanicalSystem.to_model
+    ("solution.solution", "solution.files.archive"),  # Solution.save
+}
+# Objects that a module hands to the helpers it calls, whose files name its class as a type and for nothing else.
+HANDED_ON = {
+    "model.parts.model",
+    "model.parts.contact",
+    "model.smoothing.rewriting",
+    "reference.multiple_precision.reading",
+    "engine.lowering.lower",
+    "engine.events.resolve",
+    "solution.solution",
+    "solution.run",
+    "analysis.compare.comparison",
+    "analysis.sweep.result",
+    "analysis.advise.advice",
+    "analysis.suite.result",
+}
+# A family of integrators takes nothing from another one, but these.
+SHARED = {
+    ("closed_form", "taylor"),  # where closed forms end
+    ("fixed_step", "rosenbrock"),  # solves small linear systems
 }
 
 # Calls that run text as code, or that do so inside SymPy.
@@ -71,24 +72,90 @@ RUNS_TEXT = {"eval", "exec", "compile", "__import__", "sympify", "parse_expr", "
 
 
 def floor_of(path: Path) -> str:
-    """Floor of a module of the package: its top-level folder or file."""
-    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+    """Floor of a module of the package."""
+    return str(MAP["floor_of"](path))
 
 
 def imports(path: Path) -> Iterator[tuple[str, int]]:
-    """Every module that a file imports, at its top or inside a function, with the line."""
-    package = ["hybridsim", *path.relative_to(PACKAGE).parent.parts]
+    """Every module that a file imports, at its top or inside a function, types included, with the line."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            for alias in node.names:
-                yield alias.name, node.lineno
+            yield from ((alias.name, node.lineno) for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
-            base = package[: len(package) + 1 - node.level] if node.level else []
-            module = ".".join([*base, *([node.module] if node.module else [])])
-            yield module, node.lineno
-            if module == "hybridsim":  # `from hybridsim import plot` imports a floor
-                for alias in node.names:
-                    yield f"hybridsim.{alias.name}", node.lineno
+            assert not node.level, f"{path}: imports name the whole path"
+            yield node.module or "", node.lineno
+    yield from MAP["imports"](path)
+
+
+def named(path: Path) -> str:
+    """Module of a file, without the package's own name."""
+    return ".".join(path.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__")
+
+
+def imports_for_types(path: Path) -> set[int]:
+    """Lines that only a type checker reads."""
+    return {
+        line
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"
+        for line in range(node.lineno, (node.end_lineno or node.lineno) + 1)
+    }
+
+
+@cache
+def edges() -> tuple[tuple[str, str, bool], ...]:
+    """Which module imports which, by any kind of import, and whether for types alone."""
+    found: dict[tuple[str, str], bool] = {}
+    for path in SOURCES:
+        for_types, name = imports_for_types(path), named(path)
+        for module, line in MAP["imports"](path):
+            pair = name, module.removeprefix("hybridsim").removeprefix(".")
+            if pair[1] not in ("", name):
+                found[pair] = found.get(pair, True) and line in for_types
+    return tuple((*pair, for_types) for pair, for_types in found.items())
+
+
+def import_graph(faces: set[tuple[str, str]], handed_on: set[str]) -> dict[str, set[str]]:
+    """The modules that each module imports, but for these exceptions."""
+    graph: dict[str, set[str]] = {}
+    for name, target, for_types in edges():
+        if (name, target) not in faces and not (for_types and target in handed_on):
+            graph.setdefault(name, set()).add(target)
+    return graph
+
+
+def circles(graph: dict[str, set[str]]) -> list[list[str]]:
+    """Groups of modules that import each other."""
+    order: list[str] = []
+    seen: set[str] = set()
+
+    def visit(name: str, edges: dict[str, set[str]], found: list[str]) -> None:
+        stack = [(name, iter(edges.get(name, ())))]
+        seen.add(name)
+        while stack:
+            for other in stack[-1][1]:
+                if other not in seen:
+                    seen.add(other)
+                    stack.append((other, iter(edges.get(other, ()))))
+                    break
+            else:
+                found.append(stack.pop()[0])
+
+    for name in graph:
+        if name not in seen:
+            visit(name, graph, order)
+    back: dict[str, set[str]] = {}
+    for name, others in graph.items():
+        for other in others:
+            back.setdefault(other, set()).add(name)
+    seen.clear()
+    groups = []
+    for name in reversed(order):
+        if name not in seen:
+            group: list[str] = []
+            visit(name, back, group)
+            groups.append(sorted(group))
+    return [group for group in groups if len(group) > 1]
 
 
 def identifiers(path: Path) -> Iterator[tuple[str, int]]:
@@ -101,21 +168,19 @@ def identifiers(path: Path) -> Iterator[tuple[str, int]]:
 
 
 def test_every_module_has_its_floor() -> None:
-    outside = {floor_of(path) for path in SOURCES} - set(FLOORS) - {"__init__", "__main__"}
+    outside = {floor_of(path) for path in SOURCES} - set(FLOORS) - {"__init__", "__main__", "engine"}
     assert not outside, f"give these a place in FLOORS: {outside}"
 
 
-def test_the_page_on_floors_has_them_all_in_this_order() -> None:
-    page = (Path(__file__).parents[1] / "docs" / "explanation" / "floors.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| (`.*?`) \|", page, re.MULTILINE)
-    assert tuple(name.strip("`") for row in rows for name in row.split(", ")) == FLOORS
+def test_the_page_on_floors_is_up_to_date() -> None:
+    page = ROOT / "docs" / "explanation" / "floors.md"
+    assert page.read_text(encoding="utf-8") == MAP["page"](), "run: python docs/make/floors.py"
 
 
 def test_the_picture_has_every_floor() -> None:
-    script = Path(__file__).parents[1] / "docs" / "make" / "floors_graph.py"
-    below, sizes = runpy.run_path(str(script))["graph"]()
+    below, sizes = MAP["graph"]()
     assert set(below) == set(FLOORS) == set(sizes)
-    assert "engine" in below["integrators"] and not below["errors"]
+    assert "engine.run" in below["integrators"] and not below["errors"]
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(PACKAGE)))
@@ -127,10 +192,98 @@ def test_imports_point_down_only(path: Path) -> None:
         f"line {line}: {module}"
         for module, line in imports(path)
         if module.startswith("hybridsim.")
-        and module.split(".")[1] in FLOORS
-        and FLOORS.index(module.split(".")[1]) > FLOORS.index(floor)
+        and (other := MAP["floor_of_module"](module)) in FLOORS
+        and FLOORS.index(other) > FLOORS.index(floor)
     ]
     assert not upward, f"{path.name} reaches up from {floor}: {upward}"
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    """Imports for types and inside functions count; the exceptions are the closed lists above."""
+    assert circles(import_graph(FACES, HANDED_ON)) == []
+
+
+@pytest.mark.parametrize("face", sorted(FACES), ids=str)
+def test_each_face_is_needed(face: tuple[str, str]) -> None:
+    assert circles(import_graph(FACES - {face}, HANDED_ON)), "take it off the list"
+
+
+@pytest.mark.parametrize("name", sorted(HANDED_ON))
+def test_each_object_that_is_handed_on_is_needed(name: str) -> None:
+    assert circles(import_graph(FACES, HANDED_ON - {name})), "take it off the list"
+
+
+def test_a_circle_is_seen() -> None:
+    assert circles({"a": {"b"}, "b": {"c"}, "c": {"a"}, "d": {"a"}}) == [["a", "b", "c"]]
+
+
+def test_independent_truths_know_no_engine() -> None:
+    known = {
+        MAP["floor_of_module"](module)
+        for path in (PACKAGE / "reference").rglob("*.py")
+        for module, _ in imports(path)
+        if module.startswith("hybridsim.")
+    }
+    assert known <= {"errors", "expr", "model", "reference"}
+
+
+def test_families_of_integrators_stay_apart() -> None:
+    folder = PACKAGE / "integrators"
+    families = {path.name for path in folder.iterdir() if path.is_dir()}
+    crossed = {
+        (path.relative_to(folder).parts[0], module.split(".")[2])
+        for path in folder.rglob("*/*.py")
+        for module, _ in imports(path)
+        if module.startswith("hybridsim.integrators.") and module.split(".")[2] in families
+    }
+    assert {pair for pair in crossed if pair[0] != pair[1]} == SHARED
+
+
+def test_the_engine_compiles_in_two_places() -> None:
+    elsewhere = [
+        path.name
+        for path in SOURCES
+        if not path.relative_to(PACKAGE).as_posix().startswith(COMPILES)
+        if any(module.split(".")[0] in ("numba", "llvmlite") for module, _ in imports(path))
+    ]
+    assert elsewhere == []
+
+
+def test_folders_are_small_and_say_what_they_are_for() -> None:
+    """The long ones are a list that only gets shorter."""
+    long = {"cli", "model/checks", "plot", "testing/catalogue"}
+    folders = sorted({path.parent for path in SOURCES if path.parent != PACKAGE})
+    found = {
+        folder.relative_to(PACKAGE).as_posix() for folder in folders if len(list(folder.glob("*.py"))) > 18
+    }
+    assert found == long
+    for folder in folders:
+        first = MAP["first_sentence"](folder)
+        assert first.endswith(".") and len(first) > 20, f"{folder} does not say what it is for: {first!r}"
+
+
+def test_the_engine_is_nine_folders() -> None:
+    folders = sorted(
+        path.name for path in (PACKAGE / "engine").iterdir() if path.is_dir() and path.name[0] != "_"
+    )
+    listed = [
+        name.split(".")[1] for name in FLOORS if name.startswith("engine.") and name != "engine.stepping"
+    ]
+    assert folders == sorted(listed) and len(listed) == 9
+    said = MAP["first_sentence"](PACKAGE / "engine")
+    docstring = (
+        ast.get_docstring(ast.parse((PACKAGE / "engine" / "__init__.py").read_text(encoding="utf-8"))) or ""
+    )
+    assert re.findall(r"`(\w+)`", docstring) == listed and said.endswith(".")
+
+
+def test_the_top_level_is_short() -> None:
+    """Examples, studies and what makes pages lie below docs."""
+    if not (ROOT / ".git").exists():
+        pytest.skip("an unpacked copy may have more")
+    tracked = {"docs", "hybridsim", "models", "tests"}
+    there = {path.parent.name for path in ROOT.glob("*/*.py")} - {"build", "dist", "venv", "site"}
+    assert there <= tracked
 
 
 @pytest.mark.parametrize("path", SOURCES, ids=lambda p: str(p.relative_to(PACKAGE)))

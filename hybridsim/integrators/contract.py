@@ -1,4 +1,4 @@
-"""The contract of an integrator, for those who write one."""
+"""The contract of an integrator, for those who write one: `Integrator`, and what it gets and gives."""
 
 from __future__ import annotations
 
@@ -11,9 +11,25 @@ import numpy as np
 
 from hybridsim.engine.record.trajectory import Task, Trajectory
 from hybridsim.engine.run.at_once import carried_out
-from hybridsim.engine.run.stepping import Flow, Leaps, Stepper, Watch
+from hybridsim.engine.run.stepping import Flow, Leaps, Root, Step, Stepper, Watch
+from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
+
+__all__ = [
+    "CAPABILITIES",
+    "NEEDS_TAPE",
+    "Flow",
+    "Integrator",
+    "Root",
+    "Step",
+    "StepFailure",
+    "Stepper",
+    "Task",
+    "Tolerances",
+    "Trajectory",
+    "Watch",
+]
 
 NEEDS_TAPE = "it works on a tape, which is made from expressions"  # reason to lack "functions"
 CAPABILITIES = {

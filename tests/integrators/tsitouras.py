@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from hybridsim.integrators.contract import Integrator
-from hybridsim.integrators.runge_kutta.method import RungeKuttaStepper, Tableau
+from hybridsim.integrators.runge_kutta import RungeKuttaStepper, Tableau
 
 ROWS = """0.161
 -0.008480655492356989 0.335480655492357

@@ -2,3 +2,7 @@
 
 Start with `method`, then `dop853` or `tsit5`. `segments` is the compiled loop.
 """
+
+from hybridsim.integrators.runge_kutta.method import RungeKuttaStepper, Tableau
+
+__all__ = ["RungeKuttaStepper", "Tableau"]

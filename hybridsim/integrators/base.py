@@ -1,0 +1,20 @@
+"""The earlier path of the contract of integrators: deprecated, see `hybridsim.integrators.contract`."""
+
+from __future__ import annotations
+
+import warnings
+from typing import Any
+
+from hybridsim.integrators import contract
+
+
+def __getattr__(name: str) -> Any:
+    if name.startswith("_") or not hasattr(contract, name):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warnings.warn(
+        "hybridsim.integrators.base is deprecated; it will go in version 0.2. Import from "
+        "hybridsim.integrators.contract",
+        DeprecationWarning,
+        stacklevel=2,
+    )
+    return getattr(contract, name)
