@@ -49,7 +49,7 @@ class Place:
 
     @property
     def prefix(self) -> str:
-        """The head of a message, ``file:line: ``, or an empty string if neither is known."""
+        """The head of a message, ``file:line:`` and a space, or an empty string if neither is known."""
         parts = [str(part) for part in (self.file, self.line if self.file else None) if part is not None]
         if not parts and self.line is not None:
             parts = [f"line {self.line}"]

@@ -196,3 +196,24 @@ def test_figures_depend_on_what_their_commands_use() -> None:
     # what a package makes of what it imports, and not only what it hands on
     assert "testing/catalogue/impacts.py" in reached("cd tests && python -m conformance.table")
     assert "reference/closed_forms/affine.py" in reached("hybridsim compare --suite")
+
+
+def test_a_key_of_sources_is_that_of_what_they_do() -> None:
+    """Files, comments, docstrings, texts of errors and imports do not make a figure older; one coefficient does."""
+    key = runpy.run_path(str(ROOT / "docs" / "make" / "source_keys.py"))["key"]
+    law = b"def force(v):\n    if v < 0:\n        raise ValueError('below')\n    return 0.3 * v\n"
+    flow = b"def flow(x):\n    return force(x) - x\n"
+    alike = [
+        [law + flow],
+        [flow, law],
+        [b"# how it moves\n" + law.replace(b"):\n", b'):\n    """It moves."""\n', 1), flow],
+        [law.replace(b"below", b"it is below"), b"from hybridsim.engine.laws import force\n" + flow],
+        [law, b"from hybridsim.engine import laws\n" + flow.replace(b"force", b"laws.force")],
+    ]
+    assert {key(modules, []) for modules in alike} == {key([law, flow], [])}
+    other = [
+        [law.replace(b"0.3", b"0.30000000000000004"), flow],
+        [law.replace(b"ValueError", b"KeyError"), flow],
+    ]
+    assert all(key(modules, []) != key([law, flow], []) for modules in other)
+    assert key([law, flow], [b"mu = 0.3"]) != key([law, flow], [b"mu = 0.4"])

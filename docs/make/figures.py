@@ -4,17 +4,15 @@
     python docs/make/figures.py --make [PAGE ...]  run the commands of these pages, of all older ones if none is named
     python docs/make/figures.py --done PAGE ...    a person has brought these up to date with what the commands print
 
-The pages and their commands stand in docs/figures.toml. What was made is noted in docs/figures.json with a hash of
-those modules of the package that the commands can reach, without docstrings, and of its data; the site says at the foot
-of each page whether they are those that it was built from.
+The pages and their commands stand in docs/figures.toml. What was made is noted in docs/figures.json with a key of
+those modules of the package that the commands can reach (`source_keys`), and of its data; the site says at the foot of
+each page whether they are those that it was built from.
 """
 
 from __future__ import annotations
 
 import argparse
-import ast
 import datetime
-import hashlib
 import json
 import os
 import shlex
@@ -25,6 +23,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+from source_keys import key
 from used_sources import modules_of
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -32,31 +31,11 @@ TABLE, NOTES = ROOT / "docs" / "figures.toml", ROOT / "docs" / "figures.json"
 OF_DATA = (".toml", ".json", ".csv", ".npz")  # kinds of files in the package that results depend on
 
 
-def without_docstrings(source: bytes) -> bytes:
-    """The text of a module but for its docstrings, which no figure depends on."""
-    lines = source.splitlines()
-    for node in ast.walk(ast.parse(source)):
-        if (
-            isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
-            and ast.get_docstring(node) is not None
-        ):
-            text = node.body[0]
-            for line in range(text.lineno - 1, text.end_lineno or text.lineno):
-                lines[line] = b""
-    return b"\n".join(line for line in lines if line.strip())
-
-
 def sources(page: str) -> str:
-    """Hash of what the commands of a page use of the package: equal where every figure would come out alike."""
-    digest = hashlib.sha256()
-    package = ROOT / "hybridsim"
+    """Key of what the commands of a page use of the package: equal where every figure would come out alike."""
     used = set().union(*map(modules_of, table()[page]["commands"]))
-    used |= {path for path in package.rglob("*") if path.suffix in OF_DATA}
-    for path in sorted(used):
-        content = path.read_bytes()
-        digest.update(path.relative_to(package).as_posix().encode())
-        digest.update(without_docstrings(content) if path.suffix == ".py" else content)
-    return digest.hexdigest()[:12]
+    data = sorted(path for path in (ROOT / "hybridsim").rglob("*") if path.suffix in OF_DATA)
+    return key((path.read_bytes() for path in used), (path.read_bytes() for path in data))
 
 
 def table() -> dict[str, dict[str, Any]]:

@@ -8,6 +8,7 @@ The tables hold the first sentence of each folder and file, the picture which fl
 from __future__ import annotations
 
 import ast
+import hashlib
 import re
 from collections import Counter
 from collections.abc import Iterator
@@ -156,6 +157,17 @@ def needed(below: dict[str, set[str]]) -> list[tuple[str, str]]:
     ]
 
 
+def drawn_from() -> str:
+    """What the picture shows, in short; the picture carries it, so that a test sees when it is old."""
+    below, sizes = graph()
+    shown = [
+        needed(below),
+        sorted(sizes.items()),
+        [first_sentence(PACKAGE.joinpath(*n.split("."))) for n in FLOORS],
+    ]
+    return "floors " + hashlib.sha256(repr(shown).encode()).hexdigest()[:16]
+
+
 def draw() -> Path:
     """Draw the picture; returns where it went."""
     import matplotlib
@@ -198,7 +210,7 @@ def draw() -> Path:
     axes.set_ylim(-0.6, len(drawn) - 0.4)
     axes.axis("off")
     path = ROOT / "docs" / "images" / "floors.png"
-    figure.savefig(path, dpi=100)
+    figure.savefig(path, dpi=100, metadata={"Description": drawn_from()})
     plt.close(figure)
     return path
 

@@ -122,7 +122,9 @@ def _named(call: ast.Call) -> list[str]:
             return [module]
         case ast.JoinedStr(values=[ast.Constant(value=str(start)), *_]):
             folder = start.removesuffix(".")
-            return [f"{folder}.{path.stem}" for path in ROOT.joinpath(*folder.split(".")).glob("*.py")]
+            place = ROOT.joinpath(*folder.split("."))
+            files = [path.relative_to(place).with_suffix("") for path in place.rglob("*.py")]
+            return [".".join((folder, *file.parts)).removesuffix(".__init__") for file in files]
     return []
 
 
