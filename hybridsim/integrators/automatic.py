@@ -51,7 +51,7 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
         if not is_watched:
             return Choice("exact", "its modes are linear in the states")
         what = "monitors" if model.monitors else "inputs"
-        rest = f" (they are linear, but with {what} exact cannot go from event to event in compiled code)"
+        rest = f" (exact was not chosen because the model has {what})"
     steps = _steps_for_stability(system, x0, z0, span)
     in_python = is_watched or system.has_corners or span[1] < span[0]
     if steps > _MANY or (steps > _MANY_IN_PYTHON and in_python and _is_apart(system, x0, z0, span[0])):
@@ -59,7 +59,7 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
     if system.has_corners:
         return Choice(
             "dop853",
-            "its modes are not stiff at the start; what jumps inside them is integrated as it stands",
+            "its modes are not stiff at the start; jumps inside modes are not treated as events",
         )
     if rtol < _TIGHT:
         return Choice("taylor", f"its modes are smooth and the tolerance is tight{rest}")

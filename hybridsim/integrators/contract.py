@@ -31,26 +31,26 @@ __all__ = [
     "Watch",
 ]
 
-NEEDS_TAPE = "it works on a tape, which is made from expressions"  # reason to lack "functions"
+NEEDS_TAPE = "it needs rates that are declared as expressions"  # reason to lack "functions"
 CAPABILITIES = {
-    "contacts": "contacts with dry friction, which stick",
-    "located": "events of contacts are located: their number and order are those of the motion",
+    "contacts": "contacts with dry friction that stick",
+    "located": "events of contacts are located, with their right number and order",
     "impacts": "unilateral contacts with restitution",
-    "sliding": "switching surfaces, along which a motion slides",
+    "sliding": "switching surfaces with sliding motions",
     "transitions": "general automata: modes, choices, resets",
     "monitors": "events that change no mode",
     "scheduled": "events and inputs at times known beforehand",
     "multiple-roots": "several zeros of a guard within one step",
-    "accumulation": "events that follow each other ever faster, down to rounding",
-    "tangent-exit": "sliding that is left, at a tangency as ever, where several states make the surface",
-    "poles": "motions that grow without bound towards a time that is not reached",
-    "exact-stick": "a held state is exact, bit for bit",
+    "accumulation": "infinitely many events in finite time, resolved down to rounding",
+    "tangent-exit": "the end of sliding, at a tangency for instance, on a surface of several states",
+    "poles": "motions that grow without bound in finite time",
+    "exact-stick": "a held state stays exactly constant",
     "backward": "time running backward",
-    "corners": "what is left of corners and jumps inside a mode: sign, a condition, a corner that is no component",
+    "corners": "corners and jumps that remain inside a mode, such as a sign or a condition",
     "functions": "models whose rates are a Python function",
-    "stiff": "rates that differ by many decades",
+    "stiff": "time constants that differ by many orders of magnitude",
     "nonlinear": "flows and guards that are not linear in the states",
-    "adaptive": "the error follows rtol and atol",
+    "adaptive": "steps are controlled by rtol and atol",
 }
 
 

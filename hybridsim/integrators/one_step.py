@@ -77,7 +77,7 @@ class OneStepStepper(ABC):
         self.here = self._point(0.0, x0)
         if not np.isfinite(self.here.dx).all():
             names = [n for n, d in zip(flow.system.names, self.here.dx, strict=True) if not np.isfinite(d)]
-            raise StepFailure(f"the derivative of {', '.join(names)} is not a finite number")
+            raise StepFailure(f"the rate of {', '.join(names)} is not a finite number")
         self.h = first_step or self._first_step()
 
     def _point(self, s: float, x: np.ndarray) -> Point:

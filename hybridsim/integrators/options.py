@@ -87,7 +87,7 @@ def in_words(kind: Any) -> str:
         int: "a whole number",
         float: "a number",
         bool: "true or false",
-        str: "a word",
+        str: "a string",
         NoneType: "None",
     }
     return words.get(kind, str(kind))

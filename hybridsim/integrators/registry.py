@@ -46,13 +46,13 @@ def _registered() -> dict[str, type[Integrator]]:
         integrator = entry.load()
         if not (isinstance(integrator, type) and issubclass(integrator, Integrator)):
             raise UsageError(
-                f"the entry point {entry.name} = {entry.value} names no Integrator class",
-                remedy=f"let {entry.value} be a subclass of hybridsim.integrators.contract.Integrator",
+                f"the entry point {entry.name} = {entry.value} does not name an Integrator class",
+                remedy=f"make {entry.value} a subclass of hybridsim.integrators.contract.Integrator",
             )
         if integrator.name in found and found[integrator.name] is not integrator:
             raise UsageError(
-                f"{entry.value} is called {integrator.name!r}, and so is another integrator",
-                remedy="give it a name of its own",
+                f"{entry.value} has the name {integrator.name!r}, which another integrator has",
+                remedy="choose another name",
             )
         found[integrator.name] = integrator
     return found
@@ -82,7 +82,7 @@ def integrator_class(name: str) -> type[Integrator]:
         remedy = nearest(name, found, kind="integrators")
         raise UsageError(
             f"there is no integrator {name!r}",
-            remedy=f"{remedy} (`hybridsim integrators` and hs.list_integrators() name them all)",
+            remedy=f"{remedy} (`hybridsim integrators` and hs.list_integrators() list all)",
         )
     return found[name]
 
@@ -97,8 +97,8 @@ def registered(method: str | type[Integrator]) -> Iterator[str]:
     before = found.get(method.name)
     if before is not None and before is not method:
         raise UsageError(
-            f"{method.__name__} is called {method.name!r}, and so is {before.__name__}",
-            remedy="give it a name of its own",
+            f"{method.__name__} has the name {method.name!r}, which {before.__name__} has",
+            remedy="choose another name",
         )
     found[method.name] = method
     try:
@@ -114,22 +114,22 @@ def option_names(cls: type[Any]) -> tuple[str, ...]:
     return tuple(f.name for f in fields(cls))
 
 
-_START = "the start is x0=..., by name ({'x': 1.0}) or one number for each state in the order of declaration"
-_PARAMETERS = "give values of parameters by params={...}"
-_SPAN = "both ends of the run are t_span=(t0, t1)"
-_STEP = "max_step=... bounds the step; a fixed one is step=... of integrator='moreau' or 'rk4-dichotomy'"
+_START = "pass the start as x0=..., by name ({'x': 1.0}) or one number per state in the order of declaration"
+_PARAMETERS = "pass values of parameters as params={...}"
+_SPAN = "pass both ends of the run as t_span=(t0, t1)"
+_STEP = "use max_step=... to limit the step, or step=... with integrator='moreau' or 'rk4-dichotomy'"
 # What users of SciPy's solve_ivp and of other tools ask for, and where it is here.
 _ELSEWHERE = {
     "y0": _START,
     "u0": _START,
-    "method": "name the method by integrator=..., such as 'scipy-rk45'",
-    "solver": "name the method by integrator=..., such as 'scipy-rk45'",
-    "events": "declare monitors in the model, hs.Monitor(name, expression); a mode's guards are found anyway",
+    "method": "choose the method with integrator=..., such as 'scipy-rk45'",
+    "solver": "choose the method with integrator=..., such as 'scipy-rk45'",
+    "events": "declare monitors in the model, hs.Monitor(name, expression); zeros of guards are always found",
     "args": _PARAMETERS,
     "p": _PARAMETERS,
-    "dense_output": "leave it out: every solution is a function of time, sol(t)",
-    "vectorized": "leave it out: the model is compiled",
-    "jac": "leave it out: derivatives come from the model's own expressions",
+    "dense_output": "omit it: every solution is a function of time, sol(t)",
+    "vectorized": "omit it: the model is compiled",
+    "jac": "omit it: derivatives are computed from the model's expressions",
     "t0": _SPAN,
     "t1": _SPAN,
     "tspan": _SPAN,
@@ -153,13 +153,13 @@ def make_integrator(name: str, options: dict[str, Any], keywords: Iterable[str] 
             remedy = nearest(option, known, kind=f"options of {name}") if known else f"{name} has no options"
             close = near(option, (*known, *keywords))
             remedy = nearest(option, close) if close else remedy
-            what = f"simulate has no argument, and {name} no option {option!r}"
+            what = f"simulate() has no argument {option!r}, and {name} has no option {option!r}"
             what = what if keywords else f"{name} has no option {option!r}"
             raise UsageError(what, remedy=keyword_elsewhere(option) or remedy)
     kinds = get_type_hints(cls) if options else {}
     for option, value in options.items():
         if not fits(value, kinds[option]):
             is_large = isinstance(value, int) and value > LARGEST and fits(1, kinds[option])
-            remedy = f"give {in_words(kinds[option])}" + (f", {LARGEST} at most" if is_large else "")
+            remedy = f"use {in_words(kinds[option])}" + (f", at most {LARGEST}" if is_large else "")
             raise UsageError(f"{name}: {option} is {value!r}", remedy=remedy)
     return cls(**options)

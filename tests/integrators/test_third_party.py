@@ -168,7 +168,7 @@ def test_the_error_follows_the_tolerance(registered: None) -> None:
 
 def test_what_is_no_integrator_is_refused_by_name(monkeypatch: pytest.MonkeyPatch) -> None:
     add(monkeypatch, dict)
-    with pytest.raises(UsageError, match="names no Integrator class"):
+    with pytest.raises(UsageError, match="does not name an Integrator class"):
         hs.list_integrators()
 
 

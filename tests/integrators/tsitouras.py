@@ -35,7 +35,7 @@ class Tsitouras(Integrator):
     order: ClassVar[str] = "5(4)"
     reference: ClassVar[str] = "Tsitouras 2011, doi:10.1016/j.camwa.2011.06.002"
     when: ClassVar[str] = "medium tolerances, smooth modes"
-    lacks: ClassVar[dict[str, str]] = {"stiff": "explicit: its step is bound by the fastest rate"}
+    lacks: ClassVar[dict[str, str]] = {"stiff": "it is explicit: the fastest rate limits its step"}
 
     def start(self, flow, x0, s_bound, tolerances, first_step, watch):
         """Begin a smooth segment."""

@@ -68,5 +68,5 @@ def test_whole_numbers_are_numbers() -> None:
 
 def test_contacts_that_all_share_their_coordinates_need_the_arrays() -> None:
     """The ordinary model evaluates one state from each contact that sticks, one after the other: here there is none."""
-    with pytest.raises(hs.ModelError, match="of f0, f1 go round in a circle"):
+    with pytest.raises(hs.ModelError, match="of f0, f1 depend on each other in a circle"):
         hs.simulate(stuck_system().to_model(), (0, 1))

@@ -51,7 +51,7 @@ SPAN = (0.0, 0.01)
         ({"t_eval": 5}, "t_eval is 5", "times from t0 to t1"),
         ({"t_eval": [[0, 1]]}, r"t_eval is \[0, 1\]", "times from t0 to t1"),
         ({"rtoll": 1e-9}, "no option 'rtoll'", "did you mean 'rtol'"),
-        ({"tspan": SPAN, "integrator": "taylor"}, "no option 'tspan'", "ends of the run are t_span"),
+        ({"tspan": SPAN, "integrator": "taylor"}, "no option 'tspan'", "ends of the run as t_span"),
         ({"maxstep": 1, "integrator": "moreau"}, "no option 'maxstep'", "did you mean 'max_step'"),
         ({"integrator": "rk45"}, "no integrator 'rk45'", "'scipy-rk45'.*hybridsim integrators"),
         ({"rtol": np.float64(2)}, r"rtol is 2\.0", "below 1"),
@@ -109,7 +109,7 @@ def test_a_fixed_step_refuses_tolerances(integrator: str, name: str) -> None:
 
 @pytest.mark.parametrize("integrator", ["rk4-dichotomy", "rk4-sign"])
 def test_a_fixed_step_is_not_above_the_longest(integrator: str) -> None:
-    with pytest.raises(UsageError, match=f"max_step is 0.0001, and the fixed step of {integrator} is 0.0002"):
+    with pytest.raises(UsageError, match=f"max_step is 0.0001, but the fixed step of {integrator} is 0.0002"):
         hs.simulate("dfcs", SPAN, integrator=integrator, step=2e-4, max_step=1e-4)
     assert hs.simulate("dfcs", SPAN, integrator=integrator, step=1e-4, max_step=1e-4).success
 

@@ -143,7 +143,7 @@ def test_what_is_left_is_warned_of_and_the_named_remedy_works() -> None:
     sol = hs.simulate(built, (0.0, 4.0), integrator="dop853")
     assert sol.success and any("1 if u > 0.5 else 0" in warning for warning in sol.warnings)
     assert sol(4.0)[0] == pytest.approx(2.5, abs=1e-6)
-    with pytest.raises(UsageError, match="choose dop853") as refused:
+    with pytest.raises(UsageError, match="use dop853") as refused:
         hs.simulate(built, (0.0, 4.0), integrator="exact")
     assert "taylor" not in refused.value.remedy
 

@@ -237,5 +237,5 @@ def test_a_comparison_of_a_model_of_functions() -> None:
     )
     done, refused = comparison.rows
     assert done.errors is not None and done.errors.state < 1e-7
-    assert "works on a tape" in refused.message
+    assert "declared as expressions" in refused.message
     assert "made of Python functions" in comparison.table() == str(comparison)

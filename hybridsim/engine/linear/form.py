@@ -169,7 +169,7 @@ class LinearReader:
         first = self._read(a)
         if op == SELECT:
             if isinstance(first, dict) or (self.is_open and math.isnan(first)):
-                raise NotLinear("a condition that changes")
+                raise NotLinear("a condition on a state or on time")
             return (self._read(b) if first != 0.0 else self._read(c),)
         if op in _SINGLE:
             if isinstance(first, float):
@@ -186,7 +186,7 @@ class LinearReader:
             return (_plain(_product(_form(first), _form(second))),)
         if op == DIV and isinstance(first, dict) and isinstance(second, float):
             if second == 0.0:
-                raise DividesByZero("a quotient by zero")
+                raise DividesByZero("a division by zero")
             return (_plain({key: weight / second for key, weight in first.items()}),)
         raise NotLinear(_IN_THE_WAY.get(op, _OTHER))
 
@@ -216,12 +216,12 @@ class LinearReader:
 
 
 _ARITHMETIC = {ADD: operator.add, SUB: operator.sub, MUL: operator.mul, DIV: operator.truediv}
-_OTHER = "a corner, a jump or another function of what moves"
+_OTHER = "a corner, a jump or another nonlinear function of a state or of time"
 _IN_THE_WAY = {
-    DIV: "a quotient by what moves",
-    SQRT: "a root of what moves",
-    SINHCOSH: "a hyperbolic function of what moves",
-    TANGENT: "a tangent of what moves",
+    DIV: "a division by a state or by a function of time",
+    SQRT: "a square root of a state or of a function of time",
+    SINHCOSH: "a hyperbolic function of a state or of time",
+    TANGENT: "a tangent or a tanh of a state or of time",
 }
 
 
@@ -258,7 +258,7 @@ def _product(a: Form, b: Form) -> Form:
             elif left == _ONE or right == _ONE:
                 _accumulate(result, right if left == _ONE else left, u * v)
             elif isinstance(left, tuple) or isinstance(right, tuple):
-                raise NotLinear("a product of a state and what changes in time")
+                raise NotLinear("a product of a state and a function of time")
             else:
                 raise NotLinear("a product of states")
     return result
@@ -275,5 +275,5 @@ def _linear_atom(kind: int, form: Form, atoms: Atoms) -> Atom:
         elif isinstance(key, tuple) and len(key) == 1 and atoms.known[key[0][0]].kind == VALUE:
             terms += [(source, weight * w) for source, w in atoms.known[key[0][0]].terms]
         else:
-            raise NotLinear("a sine or an exponential of what is not linear in time alone")
+            raise NotLinear("a sine or an exponential whose argument is not linear in time")
     return Atom(kind, rate, offset, tuple(sorted(terms, key=operator.itemgetter(0))))

@@ -152,7 +152,7 @@ def _first_reason(system: System, p: Sequence[float] | None) -> str | None:
     for cluster in system.clusters:  # what several hold together is solved for with what all of them act by
         names = " and ".join(system.automata[c].name for c in cluster)
         hold = "hold together" if len(cluster) > 1 else "holds"
-        z = vectors[f"where {names} {hold} "] = vectors[""].copy()
+        z = vectors[f"while {names} {hold} "] = vectors[""].copy()
         z[list(cluster)] = [max(system.automata[c].hold, 0) for c in cluster]
     reasons: dict[str, str] = {}
     for place, z in reversed(vectors.items()):
@@ -210,7 +210,7 @@ def refuse_nonlinear(system: System) -> None:
     reason = what_is_not_linear(system)
     if reason is not None:
         raise UsageError(
-            f"exact cannot run {system.model.name}: a closed form takes modes that are linear in the states, "
-            f"and {reason}",
-            remedy="choose dop853" if system.has_corners else "choose taylor or dop853",
+            f"exact cannot run {system.model.name}: it needs modes that are linear in the states, "
+            f"but {reason}",
+            remedy="use dop853" if system.has_corners else "use taylor or dop853",
         )

@@ -36,11 +36,11 @@ def normal_loads(
                     e.free_symbols & set(unknown.values()) for e in slopes.values()
                 ):
                     raise ModelError(
-                        f"{component.name} uses the normal force {declared_name(u)} of an impact otherwise than as a "
-                        "load that friction of slip and stick is proportional to",
+                        f"{component.name} may use the normal force {declared_name(u)} of an impact only as a load to "
+                        "which its slip force and its stick limits are proportional",
                         place=component.place,
-                        remedy="take a law of slip and stick that is linear in its load; write rates with "
-                        f"{declared_name(u)} in them as the rates of states",
+                        remedy="use a friction law that is linear in its load; write rates that contain "
+                        f"{declared_name(u)} as the rates of states",
                     )
                 if own is not None:
                     by_mode = found.setdefault((c, normal[u]), {})

@@ -87,9 +87,9 @@ class HeldStates:
             if not (surface.unique or surface.is_unilateral):
                 raise ModelError(
                     f"{self.lowering.components[c[0]].name}: its relative velocity "
-                    f"'{self.lowering.written(c[0])}' is linear in no state",
+                    f"'{self.lowering.written(c[0])}' is not linear in any state",
                     place=self.lowering.place(c[0]),
-                    remedy="introduce the relative velocity as a state of its own",
+                    remedy="declare the relative velocity as a state",
                 )
         size = -1
         while found and len(found) > size:
@@ -114,17 +114,17 @@ class HeldStates:
         lowering = self.lowering
         components = list(dict.fromkeys(c for c, _ in held))
         titles = dict.fromkeys(lowering.title(c, plural=True) for c in components)
-        remedy = "merge contacts that share one relative velocity, and surfaces that are one"
+        remedy = "merge contacts that share one relative velocity, and surfaces that coincide"
         kinds = [lowering.components[c].surface for c in components]
         if any(surface.is_unilateral for surface in kinds):
             remedy += "; write gaps that are never zero together as mirror images (x and 1 - x), or as modes"
         if not any(surface.unique for surface in kinds):
-            remedy += "; or declare the structure with its matrices, as an hs.MechanicalSystem, which takes "
-            remedy += "more contacts than are needed to hold it"
+            remedy += "; or declare the structure with its matrices as an hs.MechanicalSystem, which accepts "
+            remedy += "redundant contacts"
         return ModelError(
             f"the {' and '.join(titles)} of "
             + ", ".join(lowering.components[c].name for c in components)
-            + " are not independent: holding all of them at zero leaves no state for each",
+            + " are linearly dependent: they cannot all be held at zero by separate states",
             place=lowering.place(components[0]),
             remedy=remedy,
         )
@@ -134,10 +134,10 @@ class HeldStates:
         names = ", ".join(self.lowering.components[c].name for c in components)
         titles = dict.fromkeys(self.lowering.title(c, plural=True) for c in components)
         return ModelError(
-            f"the {' and '.join(titles)} of {names} go round in a circle: there is no order in which each gives one "
-            "state from the others",
+            f"the {' and '.join(titles)} of {names} depend on each other in a circle: no order of them determines "
+            "one state from each",
             place=self.lowering.place(components[0]),
-            remedy="introduce one of them as a state of its own, or run an hs.MechanicalSystem",
+            remedy="declare one of them as a state, or use an hs.MechanicalSystem",
         )
 
     def _match(

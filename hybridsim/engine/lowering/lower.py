@@ -111,8 +111,8 @@ class Lowering:
         if value.has(sp.I, sp.nan, sp.zoo, sp.oo):
             simplified = re.sub(rf"\b{user('')}", "", str(value))
             raise expression.error(
-                f"'{expression.text}' is no finite real number: it simplifies to {simplified}",
-                remedy="look for a root or a logarithm of something negative, or a division by zero.",
+                f"'{expression.text}' is not a finite real number: it simplifies to {simplified}",
+                remedy="look for a root or a logarithm of a negative number, or a division by zero",
             )
         return self._local_angles(value)
 
@@ -213,7 +213,7 @@ class Lowering:
                 raise ModelError(
                     f"impact {self.components[c].name}: the rate of its gap '{self.written(c)}' {fault}",
                     place=self.place(c),
-                    remedy="write the gap over positions, whose rates are velocities; forces change these",
+                    remedy="write the gap with positions, whose rates do not depend on forces",
                 )
             found[c] = rate
         return found
@@ -240,7 +240,7 @@ class Lowering:
                     f"{self.components[c].name}: its {self.title(c)} '{self.written(c)}' uses {names}, which "
                     "depends on a mode",
                     place=self.place(c),
-                    remedy="write it over states, inputs, parameters and t",
+                    remedy="use only states, inputs, parameters and t in it",
                 )
 
     def _foreign(self, e: Any) -> list[Any]:
@@ -308,7 +308,7 @@ class Lowering:
                 if not self.components[c].surface.unique:
                     raise ModelError(
                         f"{declared_name(unknown[c])} does not act on its own {self.title(c)} "
-                        f"'{self.written(c)}' ({self.components[c].name}): it can never hold it",
+                        f"'{self.written(c)}' ({self.components[c].name}), so it cannot hold this at zero",
                         place=self.place(c),
                         remedy=f"use {declared_name(unknown[c])} in the derivative of the velocity state",
                     )
@@ -431,10 +431,10 @@ class Lowering:
                 continue
             if len(overriding) > 1:
                 raise ModelError(
-                    f"the derivative of {state} is changed by modes of both "
-                    f"{' and '.join(self.components[c].name for c in overriding)}",
+                    f"modes of {' and '.join(self.components[c].name for c in overriding)} both change the "
+                    f"derivative of {state}",
                     place=self.components[overriding[-1]].place,
-                    remedy="let one component change it",
+                    remedy="change it in the modes of one component only",
                 )
             free = self.sp.Piecewise((0, self.sp.Symbol("pin", real=True) > 0), (e, True))
             for c in holding or overriding:  # no two that hold one state do so at once

@@ -22,7 +22,7 @@ def refuse_powers(lowering: Lowering, unknown: dict[int, Any], rates: list[Any])
                 raise ModelError(
                     f"surface {component.name}: {name} enters the rate of {declared_name(x)} nonlinearly",
                     place=lowering.place(c),
-                    remedy=f"let {name} enter the rates linearly, or give whole fields as above and below of it",
+                    remedy=f"let {name} enter the rates linearly, or give the rates of both sides (above, below)",
                 )
 
 
@@ -32,22 +32,18 @@ def nonlinear(lowering: Lowering, c: int, d: int, others: set[Any]) -> ModelErro
     name, component = declared_name(unknown), lowering.components[c]
     if not component.surface.unique:
         return ModelError(
-            f"{name} enters the motion of {component.name} nonlinearly: it cannot be solved for",
+            f"{name} must enter the rates linearly, and enters the motion of {component.name} nonlinearly",
             place=lowering.place(c),
-            remedy="let the force enter the derivative of the velocity linearly",
+            remedy="write the derivative of the velocity so that it is linear in the force",
         )
     partners = sorted({name, *map(declared_name, others)})
     if len(partners) == 1:
         message = f"{name} enters the rate of the switching function '{lowering.written(c)}' nonlinearly"
-        remedy = (
-            f"let {name} enter the rates linearly, or give whole fields as above and below of the surface"
-        )
+        remedy = f"let {name} enter the rates linearly, or give the rates of both sides (above, below)"
     else:
         message = (
             f"{' and '.join(partners)} multiply each other in the rate of the switching function "
-            f"'{lowering.written(c)}': where their surfaces meet, the sliding motion is not unique"
+            f"'{lowering.written(c)}': at the intersection of their surfaces the sliding motion is not unique"
         )
-        remedy = (
-            "let the rates be sums of what each surface switches, or write the regions as modes with guards"
-        )
+        remedy = "write the rates as sums of terms with one surface each, or the regions as modes with guards"
     return ModelError(f"surface {component.name}: {message}", place=lowering.place(c), remedy=remedy)

@@ -70,7 +70,7 @@ def ordered(items: Iterable[Item]) -> list[Item]:
             loop = sorted({n.removeprefix("v_") for i in waiting for n in assigned(i)})
             raise ModelError(
                 f"the quantities {', '.join(loop)} depend on each other in a circle",
-                remedy="write one of them so that it does not use the others, or make it a state",
+                remedy="write one of them without the others, or make it a state",
             )
         for item in ready:
             waiting.remove(item)

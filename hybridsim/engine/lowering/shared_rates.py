@@ -47,6 +47,6 @@ def refuse_changed_rates(lowering: Lowering, surfaces: dict[int, Any]) -> None:
                     f"modes of {changing[0].name} change the derivative of {state.name}, and so the rate of the "
                     f"{lowering.title(c)} '{lowering.written(c)}' of {lowering.components[c].name}",
                     place=changing[0].place,
-                    remedy=f'let the modes set a variable, set = {{ w = "..." }}, and use it in the derivative of '
+                    remedy=f'set a variable in the modes, set = {{ w = "..." }}, and use it in the derivative of '
                     f"{state.name}",
                 )

@@ -80,7 +80,7 @@ def help_of_ties(
                 f"the load of {component.name} depends on the normal force of an impact, and {component.name} acts "
                 f"along the gap of {lowering.components[p].name}",
                 place=component.place,
-                remedy="run an hs.MechanicalSystem with moreau",
+                remedy="use an hs.MechanicalSystem with moreau",
             )
         share = -sp.sign(tie.factor) * effect[p, tie.along] / effect[p, p]
         name = f"help_{p}_{tie.along}"

@@ -49,7 +49,7 @@ def cache_root() -> Path | None:
     """Folder of everything hybridsim keeps between runs; None where no folder belongs to this user."""
     root = chosen_root()
     if root is None:
-        note("no cache: this user has no home folder", "set HYBRIDSIM_CACHE to a folder of your own")
+        note("no cache: this user has no home folder", "set HYBRIDSIM_CACHE to a private folder")
         return None
     return root if _is_usable(root) else None
 
@@ -63,9 +63,9 @@ def _is_usable(folder: Path) -> bool:
             make_private(folder)
             reason = why_not(folder)  # somebody may have been faster
         except OSError as fault:
-            reason = f"{folder} cannot be made: {fault.strerror}"
+            reason = f"cannot create {folder}: {fault.strerror}"
     if reason is not None:
-        note(f"no cache: {reason}", "set HYBRIDSIM_CACHE to a folder of your own with mode 700")
+        note(f"no cache: {reason}", "set HYBRIDSIM_CACHE to a private folder with mode 700")
     return reason is None
 
 
@@ -158,8 +158,8 @@ def store(path: Path | None, content: bytes) -> bool:
             with suppress(OSError):
                 os.remove(temporary)
         note(
-            f"the cache {chosen_root()} cannot be written to: {fault.strerror or fault}",
-            "make room, or set HYBRIDSIM_CACHE to another folder",
+            f"cannot write to the cache {chosen_root()}: {fault.strerror or fault}",
+            "free disk space or set HYBRIDSIM_CACHE to another folder",
         )
         return False
     return True

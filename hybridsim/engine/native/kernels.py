@@ -77,7 +77,9 @@ if ENABLED:
                 if compiled.startswith("hybridsim."):
                     _set(_ours())
                     if so_far > _NOTICED:  # a part that no run has needed before, such as derivatives
-                        _tell(f"hybridsim: compiling the engine for this, once (10 to 30 s); {_kept()} ...")
+                        _tell(
+                            f"hybridsim: compiling the engine for a new task (once, 10 to 30 s); {_kept()} ..."
+                        )
                 return
             if of.depth == 0:
                 of.since = time.perf_counter()
@@ -461,11 +463,11 @@ def announce_compilation() -> None:
     folder = kernel_folder() if ENABLED else None
     if ENABLED and (folder is None or not (folder / "announced").exists()):
         store(folder and folder / "announced", b"")
-        _tell(f"hybridsim: compiling the engine, once (half a minute for an integrator); {_kept()} ...")
+        _tell(f"hybridsim: compiling the engine (once, about 30 s per integrator); {_kept()} ...")
 
 
 def _kept() -> str:
-    return "not kept for later runs" if kernel_folder() is None else f"kept for later runs in {cache_root()}"
+    return "not cached" if kernel_folder() is None else f"cached in {cache_root()}"
 
 
 _told: set[str] = set()  # in this process: one line is enough

@@ -30,13 +30,13 @@ def why_not(path: Path) -> str | None:
         except FileNotFoundError:
             return None
         except OSError as fault:
-            return f"{here} cannot be looked at: {fault.strerror}"
+            return f"cannot access {here}: {fault.strerror}"
         if not _has_trusted_owner(found):
             return f"{here} belongs to another user ({_name(found.st_uid)})"
         if stat.S_ISLNK(found.st_mode):
             links += 1
             if links > _LINKS:
-                return f"{path} is a circle of links"
+                return f"{path} contains a loop of symbolic links"
             target = os.readlink(here)
             left.extendleft(reversed([part for part in target.split("/") if part not in ("", ".")]))
             here = "/" if target.startswith("/") else os.path.dirname(here)
@@ -45,7 +45,7 @@ def why_not(path: Path) -> str | None:
             return f"{here} is not a folder"
         is_sticky = bool(found.st_mode & stat.S_ISVTX)  # others may add to it, and change nothing of ours
         if _others_may_write(found) and not (is_sticky and left):
-            return f"others may write to {here} (mode {stat.S_IMODE(found.st_mode):o})"
+            return f"other users may write to {here} (mode {stat.S_IMODE(found.st_mode):o})"
         if not left:
             return None
         part = left.popleft()

@@ -297,8 +297,8 @@ def find_roots(
         pieces += 1
         if pieces > _MOST_PIECES:
             raise StepFailure(
-                f"its zeros could not be told apart within one step in {pieces} pieces: lower max_step, or write it "
-                "so that it has no pole and a value on both sides of its zero"
+                f"its zeros in one step could not be separated with {pieces} subintervals: lower max_step, or write it "
+                "so that it has no pole and is defined on both sides of its zero"
             )
         coefficients = np.empty(DEGREE + 1)
         error, largest = _represent(samples, coefficients)

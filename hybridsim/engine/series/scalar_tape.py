@@ -66,7 +66,9 @@ def scalar_tape(
     corners = [row for row in rows if ABS <= row[0] <= EQUAL or (row[0] == INTEGRAL and row[3] == ANGLE)]
     if corners:
         raise ModelError(
-            f"'{expression.text}' has a corner or a jump", place=expression.place, remedy="write it smoothly."
+            f"'{expression.text}' has a corner or a jump",
+            place=expression.place,
+            remedy="use a smooth expression",
         )
     tape: dict[str, Any] = {
         "states": inputs,
@@ -121,7 +123,8 @@ def _refuse_powers(expression: Expression, form: Any, moving: Sequence[str]) -> 
             whole = power.exp.is_number and float(power.exp).is_integer()
             if not whole:
                 raise ModelError(
-                    f"'{expression.text}' has the power {power.exp} of what is zero at rest: no Taylor series",
+                    f"'{expression.text}' has no Taylor series at rest: its power {power.exp} has a base that is "
+                    "zero there",
                     place=expression.place,
-                    remedy="choose a law with whole powers, or to_model() and dop853.",
+                    remedy="use a law with integer powers, or convert with to_model() and use dop853",
                 )

@@ -64,7 +64,7 @@ class ExactLeaper:
     @place.setter
     def place(self, place: np.ndarray) -> None:
         guards, components = self.system.guard_count, len(self.system.automata)
-        what = "the zeros of guards that were met last"
+        what = "the last zeros of guards"
         whole = len(place) >= 2 and 0.0 <= place[0] < math.inf and 0.0 <= place[1] <= len(place)
         if not whole or len(place) != 2 + int(place[1]) * (components + guards):
             raise damaged(what)

@@ -43,7 +43,7 @@ class Exact(Integrator):
     reference: ClassVar[str] = "Moler and Van Loan 2003, doi:10.1137/S00361445024180 (methods 14 to 18)"
     when: ClassVar[str] = "piecewise linear models: fastest and most accurate"
     lacks: ClassVar[dict[str, str]] = {
-        "nonlinear": "a closed form takes modes that are linear in the states",
+        "nonlinear": "a closed form needs modes that are linear in the states",
         "functions": NEEDS_TAPE,
     }
     dense_is_accurate: ClassVar[bool] = True

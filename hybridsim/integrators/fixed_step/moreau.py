@@ -61,20 +61,20 @@ class Moreau(Integrator):
 
     name: ClassVar[str] = "moreau"
     title: ClassVar[str] = (
-        "Moreau-Jean time stepping: fixed step, forces by complementarity, no event located"
+        "Moreau-Jean time stepping: fixed step, forces by complementarity, events not located"
     )
     order: ClassVar[str] = "1"
     reference: ClassVar[str] = "Jean 1999, doi:10.1016/S0045-7825(98)00383-1"
     when: ClassVar[str] = "many contacts; accumulations; a second opinion"
     lacks: ClassVar[dict[str, str]] = {
         "adaptive": "its step is fixed (options step and steps_per_period)",
-        "located": "no event is located: a stop, a reversal or a contact is dated to where the step that it falls into "
-        "begins, a reversal shows as a stick of one step, and a bounce is no event",
-        "stiff": "where rates are stiff, its Newton iteration converges only with steps that resolve the fastest",
-        "multiple-roots": "it compares signs at both ends of a step, and misses what changes twice in between",
-        "backward": "it runs forward in time only: nothing tells when a contact that sticks began to",
-        "sliding": "it solves for the forces of contacts, and knows no sliding along a switching surface",
-        "functions": "it takes the forces of contacts out of the rates, which needs these as expressions",
+        "located": "events are not located: a stop, a reversal or a contact gets the time at which its step begins, "
+        "a reversal appears as one step of stick, and a bounce is not recorded",
+        "stiff": "with stiff rates its Newton iteration converges only if the step resolves the fastest rate",
+        "multiple-roots": "it compares signs at both ends of a step, and misses two changes within a step",
+        "backward": "it runs forward in time only: backward, the instant at which stick began is not determined",
+        "sliding": "it solves for the forces of contacts, and does not support sliding along a switching surface",
+        "functions": "it separates the forces of contacts from the rates, which have to be expressions",
     }
 
     steps_per_period: float = 1200.0
@@ -86,9 +86,14 @@ class Moreau(Integrator):
 
     def __post_init__(self) -> None:
         for option, value, good, remedy in (
-            ("theta", self.theta, 0.5 <= self.theta <= 1.0, "give a number from 0.5 to 1"),
-            ("tolerance", self.tolerance, 0.0 < self.tolerance < 1.0, "give a small positive number"),
-            ("iterations", self.iterations, self.iterations >= 2, "give a whole number of at least 2"),
+            ("theta", self.theta, 0.5 <= self.theta <= 1.0, "use a number from 0.5 to 1"),
+            (
+                "tolerance",
+                self.tolerance,
+                0.0 < self.tolerance < 1.0,
+                "use a number between 0 and 1, such as 1e-12",
+            ),
+            ("iterations", self.iterations, self.iterations >= 2, "use a whole number of at least 2"),
         ):
             if not good:
                 raise UsageError(f"{self.name}: {option} is {value!r}", remedy=remedy)
@@ -174,5 +179,5 @@ class MoreauMarch:
             return []
         _, tolerance, iterations, _ = self._settings
         return [
-            f"{failed} steps did not converge to {tolerance:g} in {iterations} iterations: take smaller ones"
+            f"{failed} steps did not converge to {tolerance:g} in {iterations} iterations: use a smaller step"
         ]

@@ -39,7 +39,7 @@ def refuse_loads_of_friction(model: Model, integrator: str) -> None:
         used = sorted(seen & (frictions.keys() - {surface.unknown}))
         if used:
             raise UsageError(
-                f"{integrator} takes the load of each contact as given: that of {component.name} depends on the "
-                f"friction force {', '.join(used)}",
+                f"{integrator} does not support loads that depend on friction forces: the load of {component.name} "
+                f"depends on {', '.join(used)}",
                 remedy="use an integrator that locates events, such as exact, taylor or dop853",
             )

@@ -19,12 +19,12 @@ from hybridsim.integrators.fixed_step.step_length import fixed_step_length, refu
 _PAPER = "He et al. 2026, doi:10.3390/sym18010057"
 _FIXED = {
     "adaptive": "its step is fixed (options step and steps_per_period)",
-    "multiple-roots": "it compares signs at both ends of a step, and misses what changes twice in between",
-    "stiff": "explicit, with a fixed step",
-    "backward": "it runs forward in time only: its rule for the zone around zero velocity has no past",
-    "sliding": "its rule for the zone around zero velocity is one of friction, and knows no switching surface",
-    "impacts": "its rule is made for friction forces, not for impulses",
-    "functions": "it is a method for contacts, which are declared by expressions",
+    "multiple-roots": "it compares signs at both ends of a step, and misses two changes within a step",
+    "stiff": "it is explicit and has a fixed step",
+    "backward": "it runs forward in time only: its rule near zero velocity does not determine the past",
+    "sliding": "its rule near zero velocity applies to friction only, not to switching surfaces",
+    "impacts": "its rule applies to friction forces, not to impulses",
+    "functions": "it is a method for contacts, which need rates that are declared as expressions",
 }
 
 
@@ -53,7 +53,7 @@ class Rk4Dichotomy(Integrator):
     """
 
     name: ClassVar[str] = "rk4-dichotomy"
-    title: ClassVar[str] = "the published RK4 with a dichotomy to the zero-velocity interval"
+    title: ClassVar[str] = "the published RK4 with bisection to the zero-velocity interval"
     order: ClassVar[str] = "4 between events, 1 in eps_v at them"
     reference: ClassVar[str] = _PAPER
     when: ClassVar[str] = "to compare with the published figures"
@@ -78,10 +78,11 @@ class Rk4Dichotomy(Integrator):
         _one_of(self.name, "friction", self.friction, ("step", "stage"))
         _one_of(self.name, "after_event", self.after_event, ("full-step", "rest-of-step"))
         if not (math.isfinite(self.eps_v) and self.eps_v > 0.0):
-            raise UsageError(f"{self.name}: eps_v is {self.eps_v!r}", remedy="give a positive number")
+            raise UsageError(f"{self.name}: eps_v is {self.eps_v!r}", remedy="use a positive number")
         if not (isinstance(self.max_bisections, int) and self.max_bisections >= 1):
             raise UsageError(
-                f"{self.name}: max_bisections is {self.max_bisections!r}", remedy="give a whole number"
+                f"{self.name}: max_bisections is {self.max_bisections!r}",
+                remedy="use a positive whole number",
             )
 
     def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
@@ -121,10 +122,10 @@ class Rk4Sign(Integrator):
     title: ClassVar[str] = "RK4 with the sign of the velocity and no stick"
     order: ClassVar[str] = "4 between events, 1 through them"
     reference: ClassVar[str] = _PAPER
-    when: ClassVar[str] = "to see what not modelling stick does"
+    when: ClassVar[str] = "to show the effect of not modelling stick"
     lacks: ClassVar[dict[str, str]] = {
         **_FIXED,
-        "exact-stick": "it has no stick: the velocity chatters around zero",
+        "exact-stick": "it does not model stick: the velocity chatters around zero",
     }
 
     steps_per_period: float = 1200.0
@@ -145,4 +146,4 @@ class Rk4Sign(Integrator):
 
 def _one_of(integrator: str, option: str, value: str, known: tuple[str, ...]) -> None:
     if value not in known:
-        raise UsageError(f"{integrator}: {option} is {value!r}", remedy=f"give one of {', '.join(known)}")
+        raise UsageError(f"{integrator}: {option} is {value!r}", remedy=f"use one of {', '.join(known)}")

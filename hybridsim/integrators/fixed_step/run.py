@@ -162,7 +162,7 @@ class FixedStepRun:
 
     def _go_on_from(self, checkpoint: Checkpoint) -> None:
         if not checkpoint.arrays.keys() >= {*_STATE}:
-            raise damaged("the place where it goes on")
+            raise damaged("the place at which it continues")
         self.origin = checkpoint.instant
         if checkpoint.settled is not None:
             self.timetable.kept(checkpoint.settled)

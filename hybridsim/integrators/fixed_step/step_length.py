@@ -19,15 +19,15 @@ def fixed_step_length(
     """Length of the fixed step: as given, or the forcing's period over the number of steps per period."""
     for label, value in (("step", step), ("period", period), ("steps_per_period", steps_per_period)):
         if value is not None and not (math.isfinite(value) and value > 0.0):
-            raise UsageError(f"{name}: {label} is {value!r}", remedy="give a positive number")
+            raise UsageError(f"{name}: {label} is {value!r}", remedy="use a positive number")
     if step is not None:
         return step
     if period is None:
         period = system_period(system)
     if period is None:
         raise UsageError(
-            f"{name} steps by a share of the forcing's period, and model {system.model.name} has no single one",
-            remedy="give step=... or period=...",
+            f"{name} needs a step size, because model '{system.model.name}' has no forcing period",
+            remedy="pass step=... or period=...",
         )
     return period / steps_per_period
 
@@ -36,7 +36,7 @@ def refuse_longer(step: float, max_step: float, name: str) -> None:
     """A fixed step is not shortened behind the user's back."""
     if step > max_step:
         raise UsageError(
-            f"max_step is {max_step:g}, and the fixed step of {name} is {step:g}",
+            f"max_step is {max_step:g}, but the fixed step of {name} is {step:g}",
             remedy="set step or steps_per_period",
         )
 
@@ -46,6 +46,6 @@ def refuse_endless(step: float, span: tuple[float, float], name: str) -> None:
     count = abs(span[1] - span[0]) / step
     if count > _MOST_STEPS:
         raise UsageError(
-            f"{name} is {step!r}: from {span[0]:g} to {span[1]:g} it would take {count:.0e} steps",
-            remedy=f"give a longer one: more than {_MOST_STEPS:.0e} steps come to no end",
+            f"{name} is {step!r}: a run from {span[0]:g} to {span[1]:g} would take {count:.0e} steps",
+            remedy=f"use a larger step: more than {_MOST_STEPS:.0e} steps would not end",
         )

@@ -36,7 +36,7 @@ class Rodas5P(Integrator):
     title: ClassVar[str] = "compiled Rosenbrock method for stiff modes"
     order: ClassVar[str] = "5(4)"
     reference: ClassVar[str] = "Steinebach 2023, doi:10.1007/s10543-023-00967-x"
-    when: ClassVar[str] = "stiff modes; each restart after an event is at full order"
+    when: ClassVar[str] = "stiff modes; it restarts at full order after an event"
     lacks: ClassVar[dict[str, str]] = {"functions": NEEDS_TAPE}
 
     @property

@@ -90,7 +90,7 @@ class RungeKuttaIntegrator(Integrator):
     """
 
     tableau: ClassVar[Tableau]
-    lacks: ClassVar[dict[str, str]] = {"stiff": "explicit: its step is bound by the fastest rate"}
+    lacks: ClassVar[dict[str, str]] = {"stiff": "it is explicit: the fastest rate limits its step"}
     leaps: ClassVar[bool] = True
 
     @property

@@ -125,8 +125,8 @@ class NativeStepper:
         if 0.0 in found:
             if result.status == 1 and result.t[-1] == 0.0:
                 raise StepFailure(
-                    "solve_ivp stops at an event where it starts: its sign test is closed at both ends of a step, "
-                    "so what is zero at a restart and does not rise fires at once"
+                    "solve_ivp stops at an event at which it restarts: its sign test includes both ends of a step, "
+                    "so a function that is zero at the restart and does not rise fires at once"
                 )
             steps.append(Step(0.0, 0.0, x0, x0, _dense(result.sol), tuple(found[0.0])))
         for s1 in map(float, ends):
@@ -152,7 +152,7 @@ class NativeStepper:
 
     def restep(self, step: Step, s: float) -> Step:
         """Not needed: the step ends at the event."""
-        raise NotImplementedError("solve_ivp ends at its event")
+        raise NotImplementedError("solve_ivp already ends at its event")
 
 
 def _dense(solution: Any) -> Dense:

@@ -15,9 +15,9 @@ from hybridsim.integrators.scipy.native import NativeStepper
 from hybridsim.integrators.scipy.stepper import SolverStepper, series_step
 
 _NOISE = {
-    "accumulation": "events that follow each other within its tolerances are noise: every restart is at order one"
+    "accumulation": "it does not resolve events closer than its tolerances, since each restart is at order one"
 }
-_EXPLICIT = {"stiff": "explicit: its step is bound by the fastest rate"}
+_EXPLICIT = {"stiff": "it is explicit: the fastest rate limits its step"}
 # roots of |R(-z)| = 1 for their stability polynomials
 _STABLE = {
     "RK23": 2.513,
@@ -150,7 +150,7 @@ class ScipyRadau(ScipyIntegrator):
     title: ClassVar[str] = "SciPy Radau"
     order: ClassVar[str] = "5"
     reference: ClassVar[str] = "Hairer and Wanner 1996, doi:10.1007/978-3-642-05221-7, section IV.8"
-    when: ClassVar[str] = "stiff modes, middle tolerances"
+    when: ClassVar[str] = "stiff modes, moderate tolerances"
     solver: ClassVar[str] = "Radau"
     implicit: ClassVar[bool] = True
 
@@ -169,7 +169,7 @@ class ScipyBDF(ScipyIntegrator):
     when: ClassVar[str] = "stiff modes, few events, loose tolerances"
     lacks: ClassVar[dict[str, str]] = {
         **_NOISE,
-        "poles": "where a trial goes beyond a pole it begins again at order one, with steps that doubles of time lack",
+        "poles": "after a trial beyond a pole it restarts at order one, with steps below the rounding of time",
     }
     dense_is_accurate: ClassVar[bool] = True
     solver: ClassVar[str] = "BDF"
@@ -189,7 +189,7 @@ class ScipyLSODA(ScipyIntegrator):
     title: ClassVar[str] = "SciPy LSODA"
     order: ClassVar[str] = "1 to 12"
     reference: ClassVar[str] = "Petzold 1983, doi:10.1137/0904010"
-    when: ClassVar[str] = "stiffness not known"
+    when: ClassVar[str] = "modes that may or may not be stiff"
     lacks: ClassVar[dict[str, str]] = _NOISE
     dense_is_accurate: ClassVar[bool] = True
     solver: ClassVar[str] = "LSODA"

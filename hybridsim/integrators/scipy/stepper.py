@@ -104,7 +104,7 @@ class SolverStepper:
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             message = solver.step()  # a trial that is no number is rejected, not worth a warning
         if solver.status == "failed" or not np.isfinite(solver.y).all():
-            raise StepFailure(f"{solver.__class__.__name__}: {message or 'the state is no number'}")
+            raise StepFailure(f"{solver.__class__.__name__}: {message or 'the state is not a finite number'}")
         if solver is self.solver:
             self.reached, self.last_step = (float(solver.t), solver.y), float(solver.t - s0)
         stages = getattr(solver, "n_stages", 0)

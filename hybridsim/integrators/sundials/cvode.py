@@ -21,7 +21,7 @@ from hybridsim.integrators.first_steps import with_first_steps
 from hybridsim.integrators.past_steps import MOST, converges, through
 
 _NOISE = {
-    "accumulation": "events that follow each other within its tolerances are noise: every restart is at order one"
+    "accumulation": "it does not resolve events closer than its tolerances, since each restart is at order one"
 }
 # More steps than any one output should take; CVODE's default of 500 ends long smooth stretches.
 _MAX_STEPS = 10_000_000
@@ -144,7 +144,7 @@ class CvodeStepper:
 
     def restep(self, step: Step, s: float) -> Step:
         """Not needed: the dense output is as accurate as the method."""
-        raise NotImplementedError("an event of CVODE is taken from the dense output")
+        raise NotImplementedError("events of CVODE are located on its dense output")
 
 
 @dataclass(frozen=True)
@@ -197,7 +197,7 @@ class CvodeAdams(Integrator):
     when: ClassVar[str] = "long smooth stretches, not stiff"
     lacks: ClassVar[dict[str, str]] = {
         **_NOISE,
-        "stiff": "where rates are stiff its iteration converges with very short steps only: use cvode-bdf",
+        "stiff": "with stiff rates its iteration converges only with very short steps: use cvode-bdf",
     }
     dense_is_accurate: ClassVar[bool] = True
 

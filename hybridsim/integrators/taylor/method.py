@@ -92,7 +92,7 @@ class TaylorStepper:
             self.creeping, self.since, self.shortest = 1, self.s, h
         if self.creeping == _CREEPING:
             raise Creeping(
-                f"{_CREEPING} steps in a row, which are left out, were a hundredth of what their series reach, "
+                f"{_CREEPING} consecutive steps, which are left out, were a hundredth of the reach of their series, "
                 f"the last {h:.3g}",
                 self.since,
             )
@@ -171,8 +171,8 @@ class Taylor(Integrator):
     reference: ClassVar[str] = "Jorba and Zou 2005, doi:10.1080/10586458.2005.10128904"
     when: ClassVar[str] = "highest accuracy; smooth modes, not stiff"
     lacks: ClassVar[dict[str, str]] = {
-        "stiff": "explicit: its step is bound by the fastest rate",
-        "corners": "a series follows one side of what jumps inside a mode past its jump ('hybridsim check' names it)",
+        "stiff": "it is explicit: the fastest rate limits its step",
+        "corners": "its series do not detect a jump inside a mode ('hybridsim check' names the jump)",
         "functions": NEEDS_TAPE,
     }
     dense_is_accurate: ClassVar[bool] = True

@@ -312,7 +312,7 @@ def test_verdicts_say_what_there_is_to_say() -> None:
     )
     assert found["no-stop"].verdict == "does not apply"
     exact = next(setting for setting in found.settings if setting.integrator == "exact")
-    assert exact.verdict == "does not apply" and "closed form takes modes that are linear" in exact.why
+    assert exact.verdict == "does not apply" and "closed form needs modes that are linear" in exact.why
     constant = hs.advise("dfcs", "amplitude.x", rungs=["constant-mu-mean"], integrators=False)[
         "constant-mu-mean"
     ]

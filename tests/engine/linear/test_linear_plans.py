@@ -98,7 +98,7 @@ def test_a_quotient_by_zero_is_said() -> None:
     assert hs.simulate(model, (0, 1), integrator="exact").success
     broken = hs.simulate(model.with_(m=0), (0, 1), integrator="exact")
     assert broken.status == "step-failure"
-    assert "the rate of v has a quotient by zero" in broken.message
+    assert "the rate of v has a division by zero" in broken.message
 
 
 def test_a_neighbour_without_numbers_is_left_out() -> None:

@@ -135,19 +135,19 @@ def others_own_a_part(place: Place) -> str:
 
 def all_may_write(place: Place) -> str:
     place.cache.chmod(0o777)
-    return f"others may write to {place.cache} (mode 777)"
+    return f"other users may write to {place.cache} (mode 777)"
 
 
 def all_may_write_a_part(place: Place) -> str:
     (part,) = place.cache.glob("engine-*")
     part.chmod(0o707)
-    return f"others may write to {part} (mode 707)"
+    return f"other users may write to {part} (mode 707)"
 
 
 def group_may_write(place: Place) -> str:
     os.chown(place.cache, -1, SOMEBODY)
     place.cache.chmod(0o770)
-    return f"others may write to {place.cache} (mode 770)"
+    return f"other users may write to {place.cache} (mode 770)"
 
 
 def link_of_others(place: Place) -> str:
@@ -174,7 +174,7 @@ def link_of_others_within(place: Place) -> str:
 
 def all_may_rename_it(place: Place) -> str:
     place.folder.chmod(0o777)
-    return f"others may write to {place.folder} (mode 777)"
+    return f"other users may write to {place.folder} (mode 777)"
 
 
 @needs_root
@@ -304,7 +304,7 @@ def test_a_full_disk_is_named(tmp_path: Path) -> None:
         found = Place(tmp_path)
         done = found.run(cache=small)
         assert done.stdout == "-0.25\n", done.stderr
-        assert f"{small} cannot be written to: No space left on device" in done.stderr
+        assert f"cannot write to the cache {small}: No space left on device" in done.stderr
         assert done.stderr.count("cannot be written") == 1
     finally:
         subprocess.run(["umount", str(small)], check=True)
