@@ -1,4 +1,4 @@
-"""This folder turns the expressions of a model into a program and into the tapes that kernels read.
+"""This package converts the expressions of a model to a program and to the tapes that kernels read.
 
-Beside `expr` this is the only folder that imports SymPy. Start with `program`, then `lower` and `emit`.
+Besides `expr` this is the only package that imports SymPy. Start with `program`, then `lower` and `emit`.
 """

@@ -1,4 +1,4 @@
-"""Which modes keep the flow of a lowered model linear in its states."""
+"""Find the modes in which the flow of a lowered model is linear in its states."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 def affine_modes(
     lowering: Lowering, der: list[Any], definitions: dict[Any, Any], surfaces: dict[int, Any]
 ) -> dict[str, tuple[bool, ...]]:
-    """Which modes keep the flow linear in the states (unknowns that are solved for included)."""
+    """Return which modes have a flow linear in the states, including the solved unknowns."""
     free = set(lowering.states) | {
         lowering.symbols[n] for c in lowering.components for m in c.modes for n in m.set
     }

@@ -1,4 +1,4 @@
-"""Which contacts act on each other, and by how much normal forces load friction: the data of joint solves."""
+"""Data of joint solves: which contacts act on each other, and how normal forces load friction."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 def normal_loads(
     lowering: Lowering, unknown: dict[int, Any], definitions: dict[Any, Any]
 ) -> dict[tuple[int, int], dict[str, Any]]:
-    """By how much the force of slip of a contact grows with a normal force, by (contact, impact) and mode.
+    """Return the derivative of a contact's slip force by a normal force, by (contact, impact) and mode.
 
-    A normal force that a contact's guards alone use has an entry without modes.
+    A normal force that only the contact's guards use has an entry without modes.
     """
     normal = {u: d for d, u in unknown.items() if lowering.components[d].surface.is_unilateral}
     found: dict[tuple[int, int], dict[str, Any]] = {}
@@ -52,7 +52,7 @@ def normal_loads(
 def clusters_of(
     order: list[int], effect: dict[tuple[int, int], Any], loads: Container[tuple[int, int]]
 ) -> list[list[int]]:
-    """Components whose unknowns act on each other's surface, or load each other, in groups."""
+    """Group the components whose unknowns act on each other's surface or load each other."""
 
     def act(c: int, d: int) -> bool:
         return effect[c, d] != 0 or (c, d) in loads

@@ -1,4 +1,4 @@
-"""Linear equations of a program, solved by elimination: items that set the unknowns."""
+"""Solve the linear equations of a program by elimination: return items that set the unknowns."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ def eliminated(
     prefix: str = "",
     label: Callable[[Row], str] = str,
 ) -> list[Item]:
-    """Gaussian elimination without exchanges: of matrices whose leading minors do not vanish.
+    """Return the items of a Gaussian elimination without pivoting, for matrices with non-zero leading minors.
 
-    The effects of forces on accelerations are definite, and those of relays that keep their surfaces have positive
+    The effects of forces on accelerations are definite, and the effects of relays that hold their surfaces have positive
     principal minors.
     """
     items: list[Item] = []

@@ -1,4 +1,4 @@
-"""From a lowered program to the text of a Python module: functions to compile, and the tape as data."""
+"""Convert a lowered program to the text of a Python module: functions to compile, and the tape as data."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def _printer() -> Any:
     from sympy.printing.pycode import PythonCodePrinter
 
     class Printer(PythonCodePrinter):
-        """Plain Python with `math` names: numbers to the last digit, powers that stay real."""
+        """Print plain Python with `math` names, numbers with all digits, and powers that stay real."""
 
         def __init__(self) -> None:
             super().__init__({"fully_qualified_modules": False, "standard": "python3"})
@@ -87,7 +87,7 @@ def _printer() -> Any:
 
 
 class Emitter:
-    """Writes the module of one program."""
+    """Write the module of one program."""
 
     def __init__(self, program: Program, lowering: Lowering) -> None:
         self.program = program
@@ -96,7 +96,7 @@ class Emitter:
         self.inputs = self._inputs()
 
     def _inputs(self) -> dict[str, str]:
-        """Where each external name of the program is read from."""
+        """Map each external name of the program to the place from which it is read."""
         program, layout = self.program, self.program.layout
         where = {"s": "t", "origin": f"p[{layout.origin_at}]", "pin": f"p[{layout.pin_at}]"}
         where |= {user(q.name): f"p[{i}]" for i, q in enumerate(program.model.parameters)}
@@ -111,7 +111,7 @@ class Emitter:
         return where
 
     def module(self) -> str:
-        """The text of the whole module."""
+        """Return the text of the whole module."""
         program, model = self.program, self.program.model
         states = range(len(model.states))
         guards = sorted(
@@ -143,7 +143,7 @@ class Emitter:
         return [(f"out[{k}]", e) for k, (_, e) in enumerate(self.quantities())]
 
     def quantities(self) -> list[tuple[str, Any]]:
-        """Every named quantity that is no state: inputs, definitions, variables of modes, outputs."""
+        """Return every named quantity that is not a state: inputs, definitions, mode variables and outputs."""
         model, lowering = self.program.model, self.lowering
         forces = told(lowering, lowering.ties)
         result: dict[str, Any] = {i.name: user(i.name) for i in model.inputs}
@@ -167,7 +167,7 @@ class Emitter:
         return rows
 
     def _prelude(self, expressions: Iterable[Any]) -> list[str]:
-        """Lines that compute whatever the given names and expressions depend on."""
+        """Return lines that compute everything on which the given names and expressions depend."""
         names: set[str] = set()
         for e in expressions:
             names |= {e} if isinstance(e, str) else {s.name for s in e.free_symbols}
@@ -216,7 +216,7 @@ class Emitter:
         return "\n".join([*lines, "    return 0"])
 
     def _tangent(self) -> str:
-        """The rate of a change of the states, J dx with J the Jacobian of the flow: dx stands behind x."""
+        """Return the function for J dx, the rate of a change of the states; dx follows x in the state array."""
         program, n = self.program, len(self.program.model.states)
         lines = ["def tangent(t, x, p, z, out):"]
         moving = {f"raw_{i}": f"x[{n + i}]" for i in range(n)}
@@ -235,7 +235,7 @@ class Emitter:
         return "\n".join([*lines, "    return 0"])
 
     def _changes(self, branch: Iterable[Assign], moving: dict[str, str]) -> dict[str, str]:
-        """The change of each name of a branch, in order, as text over what moves; empty where it does not."""
+        """Return the change of each name of a branch as text, in order; it is empty for a zero change."""
         moving, found = dict(moving), {}
         for assign in branch:
             terms = []
@@ -249,7 +249,7 @@ class Emitter:
         return found
 
     def _choose(self) -> str:
-        """The number of the choice that is taken; component, mode and index of the guard stand behind z."""
+        """Return the function for the number of the chosen branch; component, mode and guard index follow z."""
         count = len(self.program.components)
         lines = ["def choose(t, x, p, z, out):", "    out[0] = -1.0"]
         for (c, m, g), conditions in self.program.conditions.items():
@@ -272,9 +272,9 @@ class Emitter:
         return "\n".join([*lines, "    return 0"])
 
     def resets(self) -> list[tuple[tuple[Any, ...], Any]]:
-        """(what, mapping) of every reset of the model: of choices, limits, monitors and schedules, in this order.
+        """Return (key, mapping) of every reset of the model: of choices, limits, monitors and schedules, in this order.
 
-        Behind them, by `added`, stand the amounts of those that add.
+        After them come the amounts of the resets that add, with keys from `added`.
         """
         model = self.program.model
         found: list[tuple[Any, Any]] = []
@@ -290,7 +290,10 @@ class Emitter:
         return found + [(added(key), amounts) for key, reset in found if (amounts := amounts_of(reset))]
 
     def _reset(self) -> str:
-        """Write what a reset sets into out, states first, then discrete states; its number stands behind the modes."""
+        """Return the function that writes the values of a reset to out, first states, then discrete states.
+
+        The number of the reset follows the modes.
+        """
         model, count = self.program.model, len(self.program.components)
         names = [*(s.name for s in model.states), *(d.name for d in model.discrete)]
         place = {name: f"out[{i}]" for i, name in enumerate(names)}
@@ -357,7 +360,7 @@ class Emitter:
         }
 
     def _fixed(self) -> set[str]:
-        """Names of parameters, and of what is made of them alone."""
+        """Return the names of parameters, and of definitions that depend only on parameters."""
         found = {user(q.name) for q in self.program.model.parameters}
         for item in self.program.items:
             if isinstance(item, Assign) and {s.name for s in item.expression.free_symbols} <= found:
@@ -378,6 +381,6 @@ def _by_numbers(name: str) -> tuple[int, ...]:
 
 
 def emit(model: Any) -> str:
-    """The generated module of a model."""
+    """Return the text of the generated module of a model."""
     lowering = Lowering(model)
     return Emitter(lowering.lower(), lowering).module()

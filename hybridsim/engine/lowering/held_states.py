@@ -1,4 +1,4 @@
-"""How a holding mode keeps what it holds at zero: a state evaluated from each constraint, or a projection onto them."""
+"""How holding modes keep constraints at zero: by evaluating a state from each, or by projection."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from hybridsim.expr.simplify import simplified
 if TYPE_CHECKING:
     from hybridsim.engine.lowering.lower import Lowering
 
-# Newton's method from a step's error of 1e-3, which no tolerance is above, is at rounding after two corrections; the
-# third is for stages of a step, which may be further away.
+# From an error of 1e-3, the largest tolerance, Newton's method reaches rounding after two corrections. The
+# third correction is for stages of a step, which may be farther away.
 _CORRECTIONS = 3
 
 Held = tuple[int, int]
@@ -21,18 +21,19 @@ Held = tuple[int, int]
 
 
 class HeldStates:
-    """Which states the surfaces of a model hold, and the items that evaluate them.
+    """The states that the surfaces of a model hold, and the items that evaluate them.
 
     Parameters
     ----------
-    surfaces : what holding modes keep at zero, over states, t and parameters; of those alone that a mode can hold.
+    surfaces : functions of states, t and parameters that holding modes keep at zero; only those that a mode can hold.
 
     Attributes
     ----------
-    pins : constraint to the index of the one state that is evaluated, where it is linear in it with a coefficient that
-        no state changes: it is exact then. Two that never hold at once, such as two stops of one body, may share it.
-    projected : constraint to the indices of its states, for any other: they are moved along the gradients of
-        those that are held, by Newton's method. So are constraints that share a state with one of these.
+    pins : maps a constraint to the index of the one state that is evaluated from it, if the constraint is linear in that
+        state with a coefficient free of states. The evaluation is then exact. Two constraints that never hold at the same
+        time, such as two stops of one body, may share a state.
+    projected : maps any other constraint to the indices of its states. They are moved along the gradients of
+        the held constraints by Newton's method. Constraints that share a state with one of these are projected, too.
     """
 
     def __init__(self, lowering: Lowering, surfaces: dict[Held, Any]) -> None:
@@ -55,7 +56,7 @@ class HeldStates:
         self._lengths: dict[Held, Any] = {c: lowering.sp.Integer(0) for c in self.projected}
 
     def by_component(self, states: dict[Held, Any]) -> dict[int, tuple[int, ...]]:
-        """Pins or projected states (an index or several for each constraint) as the engine knows them."""
+        """Return pins or projected states (an index or several per constraint) in the form that the engine uses."""
         found: dict[int, tuple[int, ...]] = {}
         for (c, _), i in states.items():
             found[c] = tuple(sorted({*found.get(c, ()), *(i if isinstance(i, tuple) else (i,))}))
@@ -64,9 +65,9 @@ class HeldStates:
     # -- which ----------------------------------------------------------------------------------------------
 
     def _linear_in(self, c: Held) -> list[int]:
-        """States in which a constraint is linear with a coefficient free of states, the plainest first.
+        """Return states in which a constraint is linear with a coefficient free of states, simplest first.
 
-        For the rate of a gap velocities come before positions.
+        For the rate of a gap, velocities come before positions.
         """
         sp, fixed = self.lowering.sp, set(self.states)
         found = []
@@ -80,7 +81,7 @@ class HeldStates:
         return tuple(i for i, x in enumerate(self.states) if x in self.surfaces[c].free_symbols)
 
     def _without_choice(self, choices: dict[Held, list[int]]) -> set[Held]:
-        """Constraints that are projected: those linear in no state, and what shares states with them."""
+        """Return the projected constraints: those not linear in any state, and those that share states with them."""
         found = {c for c, states in choices.items() if not states}
         for c in found:
             surface = self.lowering.components[c[0]].surface
@@ -99,12 +100,12 @@ class HeldStates:
         return found
 
     def _chosen(self, choices: dict[Held, list[int]], free: set[Held]) -> dict[Held, int] | None:
-        """One state for each constraint that is not projected, no two alike, no circle; None where there is none."""
+        """Return a distinct state for each constraint that is not projected, without cycles, or None."""
         pinned = {c: found for c, found in choices.items() if c not in free}
         return self._match(list(pinned), pinned, {})
 
     def _refuse_dependent(self, linear: list[Held]) -> None:
-        """Refuse surfaces of which one is zero where the others are."""
+        """Refuse surfaces that are linearly dependent."""
         sp = self.lowering.sp
         slopes = sp.Matrix([[sp.diff(self.surfaces[c], x) for x in self.states] for c in linear])
         if not slopes.free_symbols & set(self.states) and slopes.rank() < len(linear):
@@ -153,18 +154,18 @@ class HeldStates:
         return None
 
     def _may_share(self, one: Held, other: Held) -> bool:
-        """Whether two constraints never hold at once, or are one: the rate of a gap and a contact along it."""
+        """Return whether two constraints never hold together or are equal: a gap's rate and a contact along it."""
         rates = {one, other}
         tied = any(rates == {(tie.gap, 1), (tie.along, 0)} for tie in self.lowering.ties)
         return tied or self._exclude(one[0], other[0])
 
     def _exclude(self, c: int, d: int) -> bool:
-        """Whether two gaps, or two other surfaces, are never zero at once: parallel, and always as far apart."""
+        """Return whether two gaps or two other surfaces are parallel at a constant distance, so never both zero."""
         is_gap, is_other = (self.lowering.components[i].surface.is_unilateral for i in (c, d))
         if c == d or is_gap != is_other:
             return False
         sp, one, other = self.lowering.sp, self.surfaces[c, 0], self.surfaces[d, 0]
-        ratio = sp.Integer(-1)  # of gaps: one grows as the other shrinks, by as much
+        ratio = sp.Integer(-1)  # for gaps: one grows by as much as the other shrinks
         if not is_gap:
             if self._uses((c, 0)) != self._uses((d, 0)):
                 return False
@@ -191,7 +192,7 @@ class HeldStates:
     # -- how ------------------------------------------------------------------------------------------------
 
     def items(self) -> list[Item]:
-        """Effective states: a held one from its constraint, every other as integrated."""
+        """Return the effective states: a held state from its constraint, every other as integrated."""
         sp = self.lowering.sp
         moved = {i for states in self.projected.values() for i in states}
         items: list[Item] = self._projection(sorted(moved)) if moved else []
@@ -201,7 +202,7 @@ class HeldStates:
             if not holding and i not in moved:
                 items.append(Assign(x.name, raw))
             before = raw
-            for c in holding:  # no two of them hold at once
+            for c in holding:  # at most one of them holds at a time
                 name = x.name if c == holding[-1] else f"pinned_{i}_{c[0]}"
                 items.append(self._pinned(c, x, name, raw, before))
                 before = sp.Symbol(name, real=True)
@@ -213,7 +214,7 @@ class HeldStates:
         return self._in_hold(c[0], name, _where_pinned(sp, value, raw), before)
 
     def holding(self, i: int) -> list[int]:
-        """The components that evaluate a state while they hold."""
+        """Return the components that evaluate a state while they hold."""
         return [c for (c, _), j in self.pins.items() if i == j]
 
     def _in_hold(self, c: int, name: str, value: Any, otherwise: Any) -> Switch:
@@ -224,7 +225,7 @@ class HeldStates:
         )
 
     def _projection(self, moved: list[int]) -> list[Item]:
-        """Corrections x -= sum over held c of l_c grad s_c, with sum over d of (grad s_c . grad s_d) l_d = s_c."""
+        """Return corrections x -= sum over held c of l_c grad s_c, where sum_d (grad s_c . grad s_d) l_d = s_c."""
         sp, states = self.lowering.sp, self.states
         items: list[Item] = []
         order = list(self.projected)
@@ -265,11 +266,10 @@ class HeldStates:
         return items
 
     def turned(self, derivatives: list[str]) -> tuple[list[Item], list[str]]:
-        """Rates of the states as they are integrated, from those on the surfaces: the normals turn on the way.
+        """Return the rates of the states as integrated, from the rates on the surfaces, whose normals turn with the motion.
 
-        The projection of x + sum of l_c grad s_c(x) is x, so that what is integrated, off the surface by its errors,
-        moves by x' + sum of l_c d(grad s_c)/dt with the l_c as they are: its projection moves by x' then, to first
-        order.
+        The projection of x + sum of l_c grad s_c(x) is x. The integrated point is off the surface by its errors and
+        moves by x' + sum of l_c d(grad s_c)/dt with constant l_c. Its projection then moves by x' to first order.
         """
         sp, states = self.lowering.sp, self.states
         items: list[Item] = []
@@ -288,15 +288,15 @@ class HeldStates:
 
 
 def _label(c: Held) -> str:
-    """A constraint in names of the program."""
+    """Return a constraint's label in names of the program."""
     return f"{c[0]}" if c[1] == 0 else f"{c[0]}r"
 
 
 def _raw(sp: Any, i: int) -> Any:
-    """A state as it is integrated."""
+    """Return the symbol of a state as it is integrated."""
     return sp.Symbol(f"raw_{i}", real=True)
 
 
 def _where_pinned(sp: Any, value: Any, raw: Any) -> Any:
-    """A value where states are to be held, the state as integrated where they are wanted as they are."""
+    """Return a value if held states are to be evaluated, else the state as integrated."""
     return sp.Piecewise((value, sp.Symbol("pin", real=True) > 0), (raw, True))

@@ -1,8 +1,8 @@
-"""What a generated module says of impacts: what impulses do to the states, to gaps and to velocities; restitutions.
+"""Functions of a generated module for impacts: effects of impulses, derivatives of gaps, and restitutions.
 
-For m surfaces in the order of the module and n states, behind each other: d(u_k)/dx (m, n), u_k the rate of a gap or a
-relative velocity; d(rates)/d(unknown_k) (m, n); by how much a unit of the load d lets the friction force k grow at the
-onset of slip, forward and backward (m, m) each.
+For m surfaces in the order of the module and n states the output contains, one after the other: d(u_k)/dx (m, n) with
+u_k the rate of a gap or a relative velocity; d(rates)/d(unknown_k) (m, n); and the growth of friction force k per unit
+of load d at the onset of slip, forward and backward, (m, m) each.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ Rows = list[tuple[str, Any]]
 
 
 def speed_name(k: int) -> str:
-    """Name in the program of the speed of approach at the surface k."""
+    """Return the name in the program of the approach speed at surface k."""
     return f"speed_{k}"
 
 
 def impulses(lowering: Lowering) -> Rows:
-    """The rows of the function ``impulses``; none without unilateral contacts."""
+    """Return the rows of the function ``impulses``, or none without unilateral contacts."""
     if not _unilateral(lowering):
         return []
     return [(f"out[{i}]", value) for i, value in enumerate(_values(lowering))]
 
 
 def gap_slopes(lowering: Lowering) -> Rows:
-    """The rows of the function ``gap_slopes``: d(gap)/dx (m, n) of the surfaces; only those of gaps are set."""
+    """Return the rows of the function ``gap_slopes``: d(gap)/dx (m, n) of the surfaces, set for gaps only."""
     n = len(lowering.states)
     gaps = [(k, lowering.inlined(lowering.components[c].surface.function)) for k, c in _unilateral(lowering)]
     return [
@@ -44,7 +44,7 @@ def gap_slopes(lowering: Lowering) -> Rows:
 
 
 def restitutions(lowering: Lowering) -> Rows:
-    """The rows of the function ``restitutions``, one for each surface; speeds of approach stand behind the states."""
+    """Return the rows of the function ``restitutions``, one per impact; approach speeds follow the states."""
     rows = []
     for k, c in _unilateral(lowering):
         names = {**lowering.symbols, SPEED: lowering.sp.Symbol(speed_name(k), real=True)}
@@ -53,7 +53,7 @@ def restitutions(lowering: Lowering) -> Rows:
 
 
 def _unilateral(lowering: Lowering) -> list[tuple[int, int]]:
-    """Place among the surfaces, and component."""
+    """Return the surface number and the component number of each unilateral contact."""
     order = enumerate(lowering.held_rates)
     return [(k, c) for k, c in order if lowering.components[c].surface.is_unilateral]
 
@@ -73,7 +73,7 @@ def _values(lowering: Lowering) -> Iterator[Any]:
 
 
 def _onset(lowering: Lowering, c: int, backward: bool) -> Any:
-    """Friction force at the onset of slip, but for terms without a load: the limit of stick less what it drops by."""
+    """Return the friction force at the onset of slip: the stick limit less the drop, up to terms without load."""
     component = lowering.components[c]
     surface = component.surface
     if surface.unique or surface.is_unilateral:

@@ -1,4 +1,4 @@
-"""From a declared model to a program: angles in local time, held states, unknowns of holding modes solved for."""
+"""Convert a declared model to a program: angles in local time, held states, solved unknowns of holding modes."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass
 class Program:
-    """The lowered model: items in order, and the names under which results are found in it."""
+    """The lowered model: items in order, and the names of its results."""
 
     model: Model
     components: tuple[Any, ...]
@@ -38,12 +38,12 @@ class Program:
     derivatives: list[str]
     surfaces: list[tuple[int, str]]  # (component, name of s)
     pins: dict[int, tuple[int, ...]]  # component -> indices of the states that its holding mode evaluates
-    projected: dict[int, tuple[int, ...]]  # component -> those that its holding mode projects instead
+    projected: dict[int, tuple[int, ...]]  # component -> indices of the states that its holding mode projects
     rates: list[Any]  # SymPy, parameters only
     clusters: list[list[int]]  # surface components whose unknowns act on each other's surface
-    ties: list[Tie]  # gaps with contacts along them
+    ties: list[Tie]  # gaps with friction contacts along them
     jumps: list[tuple[int, Any, Any]]  # (component, jump above, jump below)
-    linear: dict[str, tuple[bool, ...]]  # component -> which of its modes have a flow linear in the states
+    linear: dict[str, tuple[bool, ...]]  # component -> whether the flow is linear in the states, by mode
     conditions: dict[tuple[int, int, int], tuple[Any, ...]] = field(default_factory=dict)
     layout: Layout = field(init=False)
 
@@ -53,7 +53,7 @@ class Program:
 
 
 class Lowering:
-    """The steps from a `Model` to a `Program`; holds the symbol table while they run."""
+    """The steps from a `Model` to a `Program`, with the symbol table that they share."""
 
     def __init__(self, model: Model) -> None:
         import sympy as sp
@@ -73,21 +73,21 @@ class Lowering:
         self.parameters = {self.symbols[p.name] for p in model.parameters}
         self.states = [self.symbols[s.name] for s in model.states]
         self.rates: list[Any] = []
-        self.unknown: dict[int, Any] = {}  # of each surface
+        self.unknown: dict[int, Any] = {}  # unknown of each surface
         self.definitions: dict[Any, Any] = {}
-        self.effects: list[Any] = []  # of each unknown on the rate of its own surface
-        # what each unknown acts on the rate of: a surface, or the rate of a gap
+        self.effects: list[Any] = []  # effect of each unknown on the rate of its own surface
+        # held quantity of each unknown: a surface function, or the rate of a gap
         self.held_rates: dict[int, Any] = {}
-        self.open_rates: list[Any] = []  # of the states, over the unknowns
+        self.open_rates: list[Any] = []  # rates of the states as functions of the unknowns
         # components whose unknown does not act on the rate of their surface
         self.never_held: set[int] = set()
-        self.partners: dict[int, Partner] = {}  # of those that are held by the surface of their rate
+        self.partners: dict[int, Partner] = {}  # relays that the surface of their rate holds
         self.ties: list[Tie] = []
-        self.effect: dict[tuple[int, int], Any] = {}  # of unknowns on what is held
+        self.effect: dict[tuple[int, int], Any] = {}  # effect of unknowns on the rates of held quantities
         self.angles = self._defined_angles()
 
     def _defined_angles(self) -> dict[Any, Any]:
-        """Definitions that grow linearly in time, such as theta = omega*t, written out for their sine and cosine."""
+        """Write out definitions that grow linearly in time, such as theta = omega*t, for sines and cosines of them."""
         waiting = {self.symbols[n]: to_sympy(e, self.symbols) for n, e in self.model.definitions}
         found: dict[Any, Any] = {}
         while True:
@@ -98,14 +98,14 @@ class Lowering:
             found |= grow
 
     def _rate(self, e: Any) -> Any:
-        """de/dt where it is a parameter's worth and not zero, else None."""
+        """Return de/dt if it depends on parameters alone and is not zero, else None."""
         if self.t not in e.free_symbols:
             return None
         rate = self.sp.diff(e, self.t)
         return None if rate == 0 or rate.free_symbols - self.parameters else rate
 
     def convert(self, expression: Expression) -> Any:
-        """A declared expression in SymPy, angles that grow in time written in local time."""
+        """Return a declared expression in SymPy, with angles that grow in time written in local time."""
         sp = self.sp
         value = to_sympy(expression, self.symbols)
         if value.has(sp.I, sp.nan, sp.zoo, sp.oo):
@@ -138,7 +138,7 @@ class Lowering:
         return e
 
     def signal(self, index: int) -> Any:
-        """The current piece of an input as an expression of local time."""
+        """Return the current piece of an input as an expression of local time."""
         sp = self.sp
         kind = self.model.inputs[index].kind
         c = [sp.Symbol(f"signal_{index}_{j}", real=True) for j in range(SIGNAL_SLOTS)]
@@ -150,10 +150,10 @@ class Lowering:
         return c[5] + c[3] * sp.sin(c[0] + d * (c[1] + d * c[2]))
 
     def lower(self) -> Program:
-        """Run all the steps."""
+        """Run all steps."""
         model, sp = self.model, self.sp
         self.definitions = definitions = {self.symbols[n]: self.convert(e) for n, e in model.definitions}
-        # a circle could not be put in without end
+        # substituting a cycle of definitions would not end
         ordered([Assign(k.name, e) for k, e in definitions.items()])
         signals = {self.symbols[i.name]: self.signal(k) for k, i in enumerate(model.inputs)}
         der = [self.convert(s.der) for s in model.states]
@@ -200,7 +200,7 @@ class Lowering:
     def _gap_rates(
         self, surfaces: dict[int, Any], der: list[Any], definitions: dict[Any, Any]
     ) -> dict[int, Any]:
-        """Rates of the gaps of unilateral contacts, by component, over states, t and parameters."""
+        """Return the rates of the gaps of unilateral contacts, by component, in states, t and parameters."""
         found: dict[int, Any] = {}
         for c, s in surfaces.items():
             if not self.components[c].surface.is_unilateral:
@@ -219,15 +219,15 @@ class Lowering:
         return found
 
     def inlined(self, expression: Expression) -> Any:
-        """A declared expression in SymPy with the definitions put in."""
+        """Return a declared expression in SymPy with definitions substituted."""
         return self.inline(self.convert(expression), self.definitions)
 
     def _rate_in_time(self, s: Any) -> Any:
-        """The rate of an expression while the states stay."""
+        """Return the rate of an expression at constant states."""
         return self.sp.diff(s, self.s) + self.sp.diff(s, self.t)
 
     def inline(self, e: Any, definitions: dict[Any, Any]) -> Any:
-        """An expression with definitions put in, and those that these use."""
+        """Substitute definitions in an expression, repeatedly, until none is left."""
         while e.free_symbols & definitions.keys():
             e = e.subs(definitions)
         return e
@@ -244,13 +244,13 @@ class Lowering:
                 )
 
     def _foreign(self, e: Any) -> list[Any]:
-        """The names in an expression that depend on a mode."""
+        """Return the names in an expression that depend on a mode."""
         allowed = self.parameters | set(self.states) | {self.t, self.s}
         allowed |= {self.symbols[d.name] for d in self.model.discrete}
         return [n for n in e.free_symbols - allowed if n.name.startswith("v_")]
 
     def title(self, c: int, plural: bool = False) -> str:
-        """What a surface's function is called."""
+        """Return the term for a surface's function."""
         one, many = "relative velocity", "relative velocities"
         if self.components[c].surface.unique:
             one, many = "switching function", "switching functions"
@@ -259,11 +259,11 @@ class Lowering:
         return many if plural else one
 
     def written(self, c: int) -> str:
-        """A surface's function as it was written."""
+        """Return a surface's function as declared."""
         return " ".join(str(self.components[c].surface.function.text).split())
 
     def place(self, c: int) -> Place | None:
-        """Where a surface's function was written."""
+        """Return the place where a surface's function is declared."""
         component = self.components[c]
         return component.surface.function.place or component.place
 
@@ -279,7 +279,7 @@ class Lowering:
     def _unknowns(
         self, surfaces: dict[int, Any], der: list[Any], definitions: dict[Any, Any]
     ) -> tuple[list[Item], list[list[int]]]:
-        """Mode values of the unknowns; in a holding mode the one that keeps ds/dt = 0, solved jointly."""
+        """Return the mode values of the unknowns; in a holding mode, those that jointly keep ds/dt = 0."""
         sp = self.sp
         order = list(surfaces)
         unknown = {c: self.symbols[self.components[c].surface.unknown] for c in order}
@@ -333,7 +333,7 @@ class Lowering:
         return items, clusters
 
     def _blends(self) -> dict[Any, Any]:
-        """Variables that surfaces set, as they are in any of their modes: over the unknowns."""
+        """Return the variables that surfaces set, as expressions of the unknowns that are valid in all their modes."""
         found: dict[Any, Any] = {}
         for component in self.components:
             if component.surface and component.surface.unique:
@@ -364,10 +364,12 @@ class Lowering:
             value = -rate[c] / effect[c, c]
             if value.count_ops() < 200 and is_short(value):
                 value = written_out(value)
-            value = value.xreplace({sp.zoo: sp.nan})  # where a sign in the effect is zero: it cannot be held
+            value = value.xreplace(
+                {sp.zoo: sp.nan}
+            )  # a sign in the effect is zero: the surface cannot be held
             return [branches(c, unknown[c].name, value)]
-        # joint solve: rows of components that do not hold read "unknown = its declared value", less what that has from
-        # normal forces among the unknowns; it is 0 in the mode of one that never holds, which is not entered
+        # joint solve: rows of components that do not hold read "unknown = its declared value", less the part from
+        # normal forces among the unknowns. The row of a component that can never hold sets its unknown to 0.
         matrix: dict[tuple[int, int], Any] = {}
         right: dict[int, Any] = {}
         for c in cluster:
@@ -395,9 +397,9 @@ class Lowering:
         return items + eliminated(cluster, unknown, matrix, right)
 
     def in_modes(self, c: int, name: str, in_hold: Any, otherwise: Any = None, without: Any = None) -> Switch:
-        """A name with one value in the holding mode; in the others another, or what they declare for the unknown.
+        """Return a switch that sets a name to one value in the holding mode and to another value in the other modes.
 
-        otherwise : by mode. without : values of names in what is declared.
+        otherwise : value by mode; without it, the unknown's declared value. without : values substituted in declared values.
         """
         component = self.components[c]
         surface = component.surface
@@ -437,7 +439,7 @@ class Lowering:
                     remedy="change it in the modes of one component only",
                 )
             free = self.sp.Piecewise((0, self.sp.Symbol("pin", real=True) > 0), (e, True))
-            for c in holding or overriding:  # no two that hold one state do so at once
+            for c in holding or overriding:  # components that hold the same state never do so together
                 component = self.components[c]
                 hold = component.surface.hold if holding else None
                 target = name if c == (holding or overriding)[-1] else f"{name}_{c}"
@@ -476,7 +478,7 @@ class Lowering:
         return items, conditions
 
     def _count_phases(self) -> None:
-        """Meet the frequencies that resets and outputs alone have: they are written out when phases are counted."""
+        """Register the frequencies that occur only in resets and outputs, before the phases are counted."""
         choices = [c for k in self.components for m in k.modes for g in m.guards for c in g.then]
         choices += [k.limit for k in self.components if k.limit]
         for part in (*choices, *self.model.monitors, *self.model.schedules):
@@ -487,7 +489,7 @@ class Lowering:
                 self.convert(e)
 
     def _jump(self, c: int) -> tuple[int, Any, Any]:
-        """Jumps of the unknown on release, simplified so that equal limits give an exact zero."""
+        """Return the jumps of the unknown on release, simplified so that equal limits give an exact zero."""
         sp = self.sp
         surface = self.components[c].surface
 

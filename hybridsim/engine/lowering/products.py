@@ -1,10 +1,10 @@
-"""Unknowns that multiply each other in the rate of a surface: linear for given values of all but one of them.
+"""Products of unknowns in the rate of a surface, which is linear if all unknowns but one have known values.
 
-An unknown whose own surface no other acts on is known beforehand, in sliding as well. Where at most one of the other
-factors holds its surface, they have the values that their modes declare, and the rate is linear in that one. With g for
-these values (0 for what holds) every product is replaced by its tangent there: u*w by g_w u + g_u w - g_u g_w, which is
-the product itself as long as one of the two does not hold. Where both hold, the motion is not determined by the rates
-on the sides: such modes are not admitted.
+An unknown is known beforehand, also in sliding, if no other unknown acts on its surface. If at most one of the other
+factors holds its surface, the others have the values that their modes declare, and the rate is linear in that one.
+With g for these values (0 for a holding factor) every product is replaced by its tangent: u*w by g_w u + g_u w - g_u g_w.
+This is the product itself as long as one of the two does not hold. If both hold, the rates on the sides do not
+determine the motion, and such modes are not admitted.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
 
 
 class Products:
-    """What the modes give of unknowns that are multiplied with others, and which of them never hold together."""
+    """The values that modes give to unknowns in products, and the unknowns that never hold together."""
 
     def __init__(self, lowering: Lowering, unknown: dict[int, Any]) -> None:
         self.lowering, self.unknown = lowering, unknown
         self.number = {u: c for c, u in unknown.items()}
         self.pairs: set[tuple[int, int]] = set()
-        self.known: set[tuple[int, int]] = set()  # a surface, and an unknown that is known in its rate
+        self.known: set[tuple[int, int]] = set()  # (surface, unknown with a known value in its rate)
 
     def linear(self, c: int, totals: dict[int, Any], row: dict[int, Any]) -> tuple[dict[int, Any], Any]:
-        """The effects of all unknowns on the rate of the surface c, and the rest of it, linear as modes are given.
+        """Return the effects of all unknowns on the rate of surface c and its remainder, linear for the declared values.
 
-        totals : the rates of all surfaces over the unknowns. row : the derivatives of this one with respect to them.
+        totals : the rates of all surfaces as functions of the unknowns. row : the derivatives of this rate by the unknowns.
         """
         multiplied: set[int] = set()
         for d, slope in row.items():
@@ -53,7 +53,7 @@ class Products:
         return effects, rest - sum(value * effects[self.number[u]] for u, value in given.items())
 
     def items(self) -> list[Item]:
-        """The values that modes give, and whether they hold."""
+        """Return items for the values that modes give to unknowns, and for whether the modes hold."""
         found: list[Item] = []
         for d in sorted({d for pair in self.pairs for d in pair}):
             component = self.lowering.components[d]
@@ -63,13 +63,13 @@ class Products:
         return found
 
     def not_together(self, c: int, pull: Any) -> Any:
-        """How strongly the surface c attracts, below zero while what its unknown is multiplied with holds, too."""
+        """Return how strongly surface c attracts; it is negative while a factor of its unknown also holds."""
         for d in sorted({e for pair in self.pairs if c in pair for e in pair} - {c}):
             pull = pull * (1 - self._holds(d)) - self._holds(d)
         return pull
 
     def diagonal(self, c: int, entry: Any) -> Any:
-        """The effect on its own surface, with a value where what it is multiplied with holds as well."""
+        """Return the effect on its own surface, made non-zero while a factor of the unknown also holds."""
         return entry + sum(
             self._holds(c) * self._holds(d)
             for d in sorted({e for p in self.pairs if c in p for e in p} - {c})

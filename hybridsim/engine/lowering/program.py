@@ -1,4 +1,4 @@
-"""A model as an ordered program of assignments: straight ones, and ones that depend on a component's mode."""
+"""A model as an ordered program of assignments, some of which depend on the mode of a component."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hybridsim.errors import ModelError
 
 @dataclass(frozen=True)
 class Assign:
-    """``name = expression`` (a SymPy expression over names)."""
+    """The assignment ``name = expression`` (a SymPy expression over names)."""
 
     name: str
     expression: Any
@@ -29,7 +29,7 @@ Item = Assign | Switch
 
 
 def changed(item: Item, change: Callable[[Any], Any]) -> Item:
-    """An item with each of its expressions changed."""
+    """Return an item with a change applied to each of its expressions."""
     if isinstance(item, Assign):
         return Assign(item.name, change(item.expression))
     branches = (tuple(Assign(a.name, change(a.expression)) for a in branch) for branch in item.branches)
@@ -37,14 +37,14 @@ def changed(item: Item, change: Callable[[Any], Any]) -> Item:
 
 
 def assigned(item: Item) -> set[str]:
-    """Names that an item gives a value to."""
+    """Return the names that an item sets."""
     if isinstance(item, Assign):
         return {item.name}
     return {a.name for branch in item.branches for a in branch}
 
 
 def used(item: Item) -> set[str]:
-    """Names that an item reads, in any mode, and does not set itself."""
+    """Return the names that an item reads, in any mode, and does not set itself."""
     if isinstance(item, Assign):
         return {s.name for s in item.expression.free_symbols}
     names: set[str] = set()
@@ -57,7 +57,7 @@ def used(item: Item) -> set[str]:
 
 
 def ordered(items: Iterable[Item]) -> list[Item]:
-    """The items so that each name is set before it is read; a loop among them is an error that names it."""
+    """Sort the items so that each name is set before it is read; raise an error that names any cycle."""
     waiting = list(items)
     pending: dict[str, int] = {}
     for item in waiting:
@@ -81,7 +81,7 @@ def ordered(items: Iterable[Item]) -> list[Item]:
 
 
 def needed(items: list[Item], names: Iterable[str]) -> list[Item]:
-    """The items, in order, that the given names depend on."""
+    """Return the items, in order, on which the given names depend."""
     wanted = set(names)
     kept: list[Item] = []
     for item in reversed(items):

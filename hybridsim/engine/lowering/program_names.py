@@ -1,4 +1,4 @@
-"""Names inside a generated program: those of declared quantities start with v_, and no internal one does."""
+"""Names inside a generated program: names of declared quantities start with v_, internal names never do."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import Any
 
 
 def user(name: str) -> str:
-    """Name of a declared quantity inside the generated program; no internal name starts so."""
+    """Return the name of a declared quantity inside the generated program; internal names never have its prefix."""
     return "v_" + name
 
 
 def declared_name(symbol: Any) -> str:
-    """The declared name of a symbol of the program."""
+    """Return the declared name of a symbol of the program."""
     return str(symbol.name).removeprefix("v_")

@@ -1,4 +1,4 @@
-"""Keys of resets: which reset of a model it is, and which parts of it add to a variable."""
+"""Keys of resets, which identify a reset of a model and the parts of it that add to a variable."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from hybridsim.expr import Expression, Increment
 
 
 def added(key: tuple[Any, ...]) -> tuple[Any, ...]:
-    """The key of the amounts that a reset adds."""
+    """Return the key of the amounts that a reset adds."""
     return ("added", *key)
 
 
 def is_added(key: tuple[Any, ...]) -> bool:
-    """Whether it is the key of amounts to add, not of new values."""
+    """Return whether a key denotes amounts to add instead of new values."""
     return bool(key[0] == "added")
 
 
 def amounts_of(reset: Mapping[str, Expression]) -> dict[str, Expression]:
-    """The part of a reset that adds."""
+    """Return the part of a reset that adds."""
     return {name: amount for name, amount in reset.items() if isinstance(amount, Increment)}
 
 
 def declared_reset(model: Any, key: tuple[Any, ...]) -> Mapping[str, Expression]:
-    """What a reset of a model is declared to do, by its key."""
+    """Return the declaration of a model's reset, by its key."""
     kind, *numbers = key
     if kind == "choice":
         c, m, g, k = numbers

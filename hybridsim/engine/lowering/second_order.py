@@ -1,10 +1,10 @@
-"""Relays that act on the second derivative of their function: held where that and its rate are zero.
+"""Relays that act on the second derivative of their function, which are held if it and its rate are zero.
 
-Where du/dt = k w for the functions u and w of two relays and a number k, the motion that stays at u = 0 stays at
-w = 0 as well. There dw/dt = a + b U + c W with both relays anywhere between -1 and 1: Filippov's rates hold both at
-zero as long as |a| <= |b| + |c| (sliding of second order, as that of a twisting controller: A. Levant, Int. J. Control
-58 (1993) 1247, doi:10.1080/00207179308923053). What each relay gives is not determined by that, only what they give
-together; here both give the same share of what they can.
+If du/dt = k w for the functions u and w of two relays and a number k, a motion that stays at u = 0 also stays at
+w = 0. There dw/dt = a + b U + c W with both relays anywhere between -1 and 1. Filippov's rates hold both at
+zero as long as |a| <= |b| + |c|. This is sliding of second order, as in a twisting controller (A. Levant, Int. J.
+Control 58 (1993) 1247, doi:10.1080/00207179308923053). The condition determines only the sum of both relays. Here
+both take the same fraction of their largest effect.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Partner:
-    """The surface of the rate of another: du/dt = factor * w.
+    """The relay whose surface is the rate of another relay's function: du/dt = factor * w.
 
     Parameters
     ----------
-    component : of w.
-    factor : k, a number that is not zero.
+    component : component of w.
+    factor : k, a non-zero number.
     """
 
     component: int
     factor: Any
 
     def share(self, c: int, d: int, sp: Any) -> Any:
-        """The row of the joint solve that gives the relay c the share of its partner: its entry for component d."""
+        """Return the entry for component d of the joint solve's row that gives relay c its partner's fraction."""
         if d == c:
             return sp.Integer(1)
         return -sp.sign(self.factor) if d == self.component else sp.Integer(0)
@@ -44,9 +44,9 @@ class Partner:
 def partners(
     lowering: Lowering, surfaces: dict[int, Any], rate: dict[int, Any], effect: dict[tuple[int, int], Any]
 ) -> dict[int, Partner]:
-    """The partners of the relays that act on no rate of their own; those that have none can never be held.
+    """Return the partners of the relays that do not act on the rate of their own function; without one they never hold.
 
-    rate : of each surface's function without any relay. effect : of each relay (second) on each such rate (first).
+    rate : rate of each surface's function without any relay. effect : effect of each relay (second) on each rate (first).
     """
     found = {}
     for c in sorted(lowering.never_held):
@@ -65,7 +65,7 @@ def partners(
 
 
 def attraction(lowering: Lowering, c: int, partner: Partner, effect: dict[tuple[int, int], Any]) -> Item:
-    """How strongly the relay c pulls to its surface: by its effect on the second derivative, its partner held."""
+    """Return how strongly relay c attracts to its surface through the second derivative, while its partner holds."""
     sp, other = lowering.sp, lowering.components[partner.component]
     name = user(ATTRACTION + lowering.components[c].surface.unknown)
     pull = -partner.factor * effect[partner.component, c]

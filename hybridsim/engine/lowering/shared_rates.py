@@ -1,8 +1,8 @@
-"""Rates that a relay gives while it slides along its surface: from the surface, not from the forces that keep it.
+"""Rates that follow from the surface along which a relay slides, instead of from the forces that hold it.
 
-While s(x) = 0 is kept, the one rate that the relay acts on follows from the others, f_k = -(ds/dt + sum of g_i f_i over
-i != k)/g_k with g the slopes of s. Added up from forces it would be as wrong as these are rounded: a speed that dies
-out along x + v = 0 would be noise of either sign in the end, and friction would see it turn around without end.
+While s(x) = 0 is held, the one rate on which the relay acts follows from the others, f_k = -(ds/dt + sum of g_i f_i over
+i != k)/g_k with g the gradient of s. A sum of forces would carry their rounding errors: a decaying speed
+along x + v = 0 would become noise of either sign in the end, and friction would detect endless reversals.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 
 def kept_rates(lowering: Lowering, i: int, der: list[Any], held: HeldStates) -> Iterator[tuple[int, Any]]:
-    """The relays that give the rate of a state while they slide, each with the rate.
+    """Yield the relays that determine the rate of a state while they slide, each with the rate.
 
-    Of those whose state is evaluated from their surface, another than this one; which act on this rate alone of all
-    that the rate of the surface has; and whose slope along this state no state changes.
+    The relay's held state must be evaluated from its surface and must be another state. Of the rates in ds/dt the relay
+    must act only on this one, and the derivative of s by this state must not depend on states.
     """
     sp, x = lowering.sp, lowering.states[i]
     for c, unknown in lowering.unknown.items():
@@ -38,7 +38,7 @@ def kept_rates(lowering: Lowering, i: int, der: list[Any], held: HeldStates) -> 
 
 
 def refuse_changed_rates(lowering: Lowering, surfaces: dict[int, Any]) -> None:
-    """Refuse modes that change a rate by which a surface moves: what holds it is solved for from the declared one."""
+    """Refuse modes that change a rate in ds/dt of a surface, since the holding force uses the declared rate."""
     for c, s in surfaces.items():
         for x, state in zip(lowering.states, lowering.model.states, strict=True):
             changing = [d for d in lowering.components if any(state.name in m.der for m in d.modes)]

@@ -1,8 +1,8 @@
-"""What a generated module says of contacts to time stepping, in models with impacts: rates, effects and loads.
+"""The function of a generated module for time stepping with impacts: rates, effects and loads of contacts.
 
-For m surfaces in the order of the module and n states, behind each other: u_k (m,), the rate of a gap or a relative
-velocity; d(u_k)/dx (m, n); d(rates)/d(unknown_k) (m, n); and by how much a unit of the normal force d lets the friction
-force k grow that slips above and below, and its upper and lower limit of stick, (m, m) each.
+For m surfaces in the order of the module and n states the output contains, one after the other: u_k (m,), the rate of
+a gap or a relative velocity; d(u_k)/dx (m, n); d(rates)/d(unknown_k) (m, n); and the growth of friction force k per
+unit of normal force d. The last are (m, m) each for slip above, slip below, and the upper and lower limit of stick.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def stepped(lowering: Lowering) -> list[tuple[str, Any]]:
-    """The rows of the function ``stepped``; none without unilateral contacts."""
+    """Return the rows of the function ``stepped``, or none without unilateral contacts."""
     if not any(lowering.components[c].surface.is_unilateral for c in lowering.unknown):
         return []
     return [(f"out[{i}]", value) for i, value in enumerate(_values(lowering))]
@@ -37,9 +37,9 @@ def _values(lowering: Lowering) -> Iterator[Any]:
 
 
 def _bound(lowering: Lowering, c: int, bound: int) -> Any:
-    """A friction force in terms of normal forces: of slip above, below, at the upper, at the lower limit of stick.
+    """Return a friction force as a function of normal forces: slip above, slip below, upper or lower limit of stick.
 
-    A guard of stick is the distance to its limit: what it has beside the force itself is the limit.
+    A guard of stick is the distance to its limit: without the force itself it is the limit.
     """
     component = lowering.components[c]
     surface = component.surface

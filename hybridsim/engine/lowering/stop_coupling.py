@@ -1,9 +1,9 @@
-"""Friction along a gap: a contact whose relative velocity goes with the rate of a gap, as of a block that meets a stop.
+"""Friction along a gap: a contact whose relative velocity is proportional to the rate of a gap.
 
-Both would hold one velocity. Where that is the same at rest (the rate of the gap is a*v), nothing says which part of a
-push the friction takes. While both hold, the stop takes all of it here, and what pulls the bodies apart counts against
-the friction: the gap opens where that is beyond the limit of stick. The motion is the same for any other share. Where
-the velocities differ (a stop beside a belt) the two never hold at once.
+An example is a sliding block that meets a stop. Both contacts would then hold one velocity. If both velocities are zero
+together (the rate of the gap is a*v), the share of the friction in a push is not determined. Here the stop takes the
+whole push while both hold, and a pull acts against the friction: the gap opens if the pull exceeds the limit of stick.
+The motion is the same for any other share. If the velocities differ (a stop beside a belt), the two never hold together.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
 
 
 class Tie(NamedTuple):
-    """A gap of a unilateral contact and a friction contact along it, as numbers of components."""
+    """A gap of a unilateral contact and a friction contact along it, given by their component numbers."""
 
     gap: int
     along: int
     factor: Any  # rate of the gap over the relative velocity; a number, not zero
-    is_one: bool  # the gap rests where the contact sticks
+    is_one: bool  # the rate of the gap is zero when the contact sticks
 
 
 def ties(lowering: Lowering, surfaces: dict[int, Any], gap_rates: dict[int, Any]) -> list[Tie]:
-    """All pairs of a gap and a contact whose velocities have one direction."""
+    """Return all pairs of a gap and a contact whose velocities are proportional."""
     sp, found = lowering.sp, []
     for p, rate in gap_rates.items():
         for c, velocity in surfaces.items():
@@ -49,7 +49,7 @@ def ties(lowering: Lowering, surfaces: dict[int, Any], gap_rates: dict[int, Any]
 def without_share(
     lowering: Lowering, pairs: list[Tie], c: int, d: int, entry: Any, of_held: Any
 ) -> tuple[list[Item], Any]:
-    """Items and name of what stands in the row of contact c: `of_held` while a gap that it is along is closed."""
+    """Return items and name of the entry in the row of contact c: `of_held` while a gap along it is closed."""
     items: list[Item] = []
     for tie in pairs:
         if tie.along == c:
@@ -65,7 +65,7 @@ def without_share(
 def help_of_ties(
     lowering: Lowering, pairs: list[Tie], p: int, effect: dict[tuple[int, int], Any]
 ) -> tuple[list[Item], Any]:
-    """Items and value of what friction in stick adds to the force at which a closed gap opens."""
+    """Return items and value of the force that sticking friction adds to the force at which a closed gap opens."""
     sp, total = lowering.sp, lowering.sp.Integer(0)
     items: list[Item] = []
     for tie in pairs:
@@ -93,7 +93,7 @@ def help_of_ties(
 
 
 def told(lowering: Lowering, pairs: list[Tie]) -> dict[Any, Any]:
-    """Forces as they are told of, by name: a stop does not pull, what does is the friction's."""
+    """Return the forces to report, by name: a stop does not pull, so that a pull is reported as friction."""
     sp, found = lowering.sp, {}
     for tie in pairs:
         if tie.is_one:

@@ -1,5 +1,5 @@
-"""This folder compiles kernels, keeps them on disk, and gives them their arrays.
+"""This package compiles the kernels, caches them on disk and passes arrays to them.
 
-This is the only folder beside `system/user_functions` that imports numba or llvmlite. Start with `kernels`, then
+Only this package and `system/user_functions` import numba or llvmlite. Read `kernels` first, then
 `cache`.
 """

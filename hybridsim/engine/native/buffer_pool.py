@@ -1,7 +1,7 @@
-"""Large blocks of memory, handed on to the next who asks once nobody holds them.
+"""A pool of large memory blocks, which are reused after their last array is gone.
 
-A fresh block of such a size the system gives page by page, as it is first written to: inside of a compiled loop that
-costs as much as a sixth of a run of thousands of steps.
+The operating system maps a fresh block of this size page by page, when it is first written. In a compiled loop
+this can cost a sixth of the time of a run of thousands of steps.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-_KEPT = 4  # free blocks of one size
+_KEPT = 4  # most free blocks in a pool
 
 
 class Lender:
-    """Blocks of one size in bytes.
+    """A pool of blocks of one size in bytes.
 
-    What is lent is a buffer of its own over the memory. Every array over it, and every view of one, holds that buffer,
-    whatever NumPy makes of chains of views; when it goes, the memory is free again.
+    Each block is lent as a buffer object over its memory. Every array over the buffer, and every view of such an
+    array, keeps the buffer alive. The memory returns to the pool when the buffer is deleted.
     """
 
     def __init__(self, size: int) -> None:
@@ -27,7 +27,7 @@ class Lender:
         self._kind = _lent(size, self._free)
 
     def block(self) -> np.ndarray:
-        """A block, with whatever was written there before."""
+        """Return a block; its contents are undefined."""
         try:
             memory = self._free.pop()
         except IndexError:
@@ -38,12 +38,12 @@ class Lender:
 
 
 def _lent(size: int, free: list[bytearray]) -> Any:
-    """A type of buffers over so many bytes, which give their memory back when they go."""
+    """Return a buffer type of a size in bytes whose instances return their memory to the pool when deleted."""
 
-    class Lent(ctypes.c_char * size):  # type: ignore[misc]  # made when it is needed
+    class Lent(ctypes.c_char * size):  # type: ignore[misc]  # the size is known at run time
         memory: bytearray
 
-        def __del__(self, kept: int = _KEPT) -> None:  # at the end of Python globals may be gone
+        def __del__(self, kept: int = _KEPT) -> None:  # globals may be gone while Python shuts down
             if len(free) < kept:
                 free.append(self.memory)
 

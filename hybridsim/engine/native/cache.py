@@ -1,7 +1,7 @@
-"""Where compiled things live on disk: one folder for generated model modules, one for the engine's own kernels.
+"""The cache on disk has one folder for generated model modules and one for the engine's compiled kernels.
 
-What is found there runs. The folder is therefore this user's own (see `hybridsim.engine.native.private_folder`);
-without such a folder nothing is kept, and each process compiles for itself.
+Files in the cache are executed. The folder must therefore be private to this user (see
+`hybridsim.engine.native.private_folder`). Without such a folder nothing is cached, and each process compiles again.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from pathlib import Path
 from hybridsim.engine.native.private_folder import HAS_OWNERS, is_trusted_file, make_private, why_not
 
 _PACKAGE = Path(__file__).resolve().parents[2]
-_KERNEL_FLOORS = ("engine", "integrators", "ensemble", "mechanics")  # the floors that define kernels
-_MODEL_FLOORS = ("expr", "model", "engine")  # the floors that write the modules of models
-_MARK = "hybridsim.cache"  # a file in each folder that hybridsim made
+_KERNEL_FLOORS = ("engine", "integrators", "ensemble", "mechanics")  # packages that define kernels
+_MODEL_FLOORS = ("expr", "model", "engine")  # packages that determine the modules of models
+_MARK = "hybridsim.cache"  # name of a file in each folder that hybridsim created
 _MARK_TEXT = b"Compiled code of hybridsim. `hybridsim cache clear` deletes this folder.\n"
 _DIGEST = hashlib.sha256().digest_size
 
 
 def chosen_root() -> Path | None:
-    """The folder that is meant to hold the cache: ``$HYBRIDSIM_CACHE``, else the user's cache folder.
+    """Return the folder chosen for the cache: ``$HYBRIDSIM_CACHE``, else hybridsim's folder in the user's cache folder.
 
-    None where the system does not say what the user's folder is.
+    Return None if the user has no home folder.
     """
     chosen = os.environ.get("HYBRIDSIM_CACHE")
     if chosen:
@@ -46,7 +46,7 @@ def chosen_root() -> Path | None:
 
 
 def cache_root() -> Path | None:
-    """Folder of everything hybridsim keeps between runs; None where no folder belongs to this user."""
+    """Return the folder of everything that hybridsim caches, or None if no private folder is available."""
     root = chosen_root()
     if root is None:
         note("no cache: this user has no home folder", "set HYBRIDSIM_CACHE to a private folder")
@@ -56,12 +56,12 @@ def cache_root() -> Path | None:
 
 @cache
 def _is_usable(folder: Path) -> bool:
-    """Whether a folder is there, or could be made, and nobody else could have put code into it; if not, say why."""
+    """Return whether a folder exists or can be created and is private; print the reason if not."""
     reason = why_not(folder)
     if reason is None:
         try:
             make_private(folder)
-            reason = why_not(folder)  # somebody may have been faster
+            reason = why_not(folder)  # another process may have created it meanwhile
         except OSError as fault:
             reason = f"cannot create {folder}: {fault.strerror}"
     if reason is not None:
@@ -69,11 +69,11 @@ def _is_usable(folder: Path) -> bool:
     return reason is None
 
 
-_noted: set[str] = set()  # in this process: one line of a kind is enough
+_noted: set[str] = set()  # messages that this process has printed already
 
 
 def note(text: str, remedy: str) -> None:
-    """Say once, on stderr, why compiled code is not kept."""
+    """Print once, on stderr, why compiled code is not cached."""
     if text not in _noted:
         _noted.add(text)
         print(f"hybridsim: {text}; compiled code is not kept ({remedy})", file=sys.stderr, flush=True)
@@ -81,10 +81,10 @@ def note(text: str, remedy: str) -> None:
 
 @cache
 def engine_key() -> str:
-    """Hash of the engine's sources and of the versions that shape its machine code.
+    """Return a hash of the engine's sources and of the versions that affect its machine code.
 
-    numba notices an edit in the file of a cached function, but not in a file that it calls into
-    (numba issue 1833); a folder named after all the sources leaves nothing stale.
+    numba detects an edit in the file of a cached function, but not in a file that the function calls into
+    (numba issue 1833). A folder named after all sources excludes stale code.
     """
     from importlib.metadata import version
 
@@ -96,12 +96,12 @@ def engine_key() -> str:
 
 @cache
 def _model_key() -> str:
-    """Hash of the sources that say what the module of a model contains."""
+    """Return a hash of the sources that determine the contents of a model's module."""
     return _of_sources(_MODEL_FLOORS).hexdigest()[:16]
 
 
 def _of_sources(floors: tuple[str, ...]) -> hashlib._Hash:
-    """Hash of all sources of some floors, each with its path and its length: what is in one file is not in another."""
+    """Return a hash of all sources of some packages, with the path and the length of each file."""
     digest = hashlib.sha256()
     for floor in floors:
         for path in sorted((_PACKAGE / floor).glob("**/*.py")):
@@ -112,7 +112,7 @@ def _of_sources(floors: tuple[str, ...]) -> hashlib._Hash:
 
 
 def kernel_folder() -> Path | None:
-    """Folder of the engine's compiled kernels, valid for these sources and versions only; None where none is kept."""
+    """Return the folder of compiled kernels for these sources and versions, or None without a cache."""
     root = cache_root()
     if root is None:
         return None
@@ -122,7 +122,7 @@ def kernel_folder() -> Path | None:
 
 @cache
 def _is_marked(folder: Path) -> bool:
-    """Whether a folder for these sources is usable; it is made, with our mark, if it can be."""
+    """Return whether a folder for these sources is usable; create and mark it if it does not exist."""
     if not _is_usable(folder):
         return False
     if not (folder / _MARK).exists():
@@ -131,7 +131,7 @@ def _is_marked(folder: Path) -> bool:
 
 
 def model_folder() -> Path | None:
-    """Folder of generated model modules and their compiled functions; None where none is kept."""
+    """Return the folder of generated model modules and their compiled functions, or None without a cache."""
     kernels = kernel_folder()
     if kernels is None:
         return None
@@ -140,9 +140,9 @@ def model_folder() -> Path | None:
 
 
 def store(path: Path | None, content: bytes) -> bool:
-    """Keep something in one move, so that another process never reads half a file; return whether it is kept.
+    """Write a file atomically, so that another process never reads half a file; return whether it was written.
 
-    A disk that is full, or a folder that may only be read, costs the time to compile again and no more.
+    A full disk or a read-only folder only has the effect that code is compiled again.
     """
     if path is None:
         return False
@@ -166,12 +166,12 @@ def store(path: Path | None, content: bytes) -> bool:
 
 
 def store_whole(path: Path | None, content: bytes) -> bool:
-    """Keep something together with its digest, for `load_whole`."""
+    """Write some content together with its digest, for `load_whole`."""
     return store(path, hashlib.sha256(content).digest() + content)
 
 
 def load_whole(path: Path | None) -> bytes | None:
-    """What `store_whole` kept; None where it is not there, not whole, or not this user's own."""
+    """Return the content written by `store_whole`, or None if it is missing, damaged or not private."""
     if path is None or not is_trusted_file(path):
         return None
     try:
@@ -183,7 +183,7 @@ def load_whole(path: Path | None) -> bytes | None:
 
 
 def _made_by_us(root: Path) -> tuple[list[Path], list[Path]]:
-    """Folders of compiled code in a folder that carry our mark, and those that only have such a name."""
+    """List the folders of compiled code that carry our mark, and those that only have such a name."""
     ours, others = [], []
     for entry in sorted(root.glob("engine-*")):
         is_folder = entry.is_dir() and not entry.is_symlink()
@@ -197,7 +197,7 @@ def _made_by_us(root: Path) -> tuple[list[Path], list[Path]]:
 
 
 def clear() -> tuple[int, list[Path]]:
-    """Delete the folders that carry our mark; return the bytes freed, and what has such a name and is left alone."""
+    """Delete the folders that carry our mark; return the freed bytes and the similar folders without a mark."""
     root = cache_root()
     if root is None:
         return 0, []

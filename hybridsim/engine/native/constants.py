@@ -1,4 +1,4 @@
-"""Constants that several floors share, each with its unit and its reason."""
+"""Constants that several packages share, each with its unit and its reason."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     pass
 
-EXACTLY = 3  # order of states up to which events are judged: they are divided by their order
+EXACTLY = 3  # order of derivatives up to which events are decided
 
 
 # So many steps in a row, each shorter than this share of local time, stand still: near a singularity they get too short

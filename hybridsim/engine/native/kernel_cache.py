@@ -1,9 +1,10 @@
-"""Compiled kernels on disk, kept as the rest of the cache is: whole, this user's own, and made again if they are not.
+"""Cache of compiled kernels on disk with the safety rules of the rest of the cache.
 
-numba's own cache loads whatever pickle lies at a name that anyone can work out, ends with a traceback where one is cut
-short, numbers its files so that two processes may exchange them, and gives up on a folder that may only be read.
+A cached kernel is private to this user and checked against its digest; a damaged file is compiled again. numba's own
+cache loads any pickle under a predictable name and ends with a traceback if a file is truncated. Two of its processes
+may exchange their numbered files, and it fails in a read-only folder.
 
-The parts of numba used here are those that it calls a cache. Without them each process would compile all kernels.
+This module uses only the cache interface of numba. Without it each process would compile all kernels.
 """
 
 from __future__ import annotations
@@ -20,20 +21,20 @@ from hybridsim.engine.native.cache import _PACKAGE, engine_key, kernel_folder, l
 
 
 def keep_on_disk(dispatcher: Any, function: Any) -> None:
-    """Let a compiled function of numba, or a callback for C, look for its code on disk, and leave it there."""
+    """Make a compiled function of numba, or a callback for C, load its code from the cache and store it there."""
     folder = kernel_folder()
     if folder is not None:
         dispatcher._cache = KernelCache(function, folder)
 
 
 class _Place:
-    """The place and the source of one function's code, under the names by which numba asks for them."""
+    """The folder and the source of one function's code, under the attribute names that numba expects."""
 
     def __init__(self, function: Any, folder: Path) -> None:
         code = function.__code__
         self._py_file, self.line = code.co_filename, code.co_firstlineno
         source = Path(self._py_file)
-        if source.is_relative_to(_PACKAGE):  # wherever it is installed
+        if source.is_relative_to(_PACKAGE):  # independent of the place of installation
             self.folder = folder / "kernels" / source.relative_to(_PACKAGE).with_suffix("")
             self._stamp = engine_key()
         else:
@@ -41,23 +42,23 @@ class _Place:
             self._stamp = _digest_of(source)
 
     def ensure_cache_path(self) -> None:
-        """The folder is made when something is kept."""
+        """Do nothing: the folder is created when a file is stored."""
 
     def get_cache_path(self) -> str:
-        """Folder of the file's functions."""
+        """Return the folder of the functions of this source file."""
         return str(self.folder)
 
     def get_source_stamp(self) -> str:
-        """What changes with the source."""
+        """Return a stamp that changes with the source."""
         return self._stamp
 
     def get_disambiguator(self) -> str:
-        """What tells functions of one name in one file from each other."""
+        """Return a string that distinguishes functions of the same name in one file."""
         return str(self.line)
 
 
 class _Form(CompileResultCacheImpl):
-    """How compiled functions are written, as numba has it; the place is ours, whatever else is set."""
+    """The format of numba's compiled functions, with a folder of our cache whatever the settings of numba are."""
 
     def __init__(self, function: Any, folder: Path) -> None:
         self._lineno = function.__code__.co_firstlineno
@@ -66,7 +67,7 @@ class _Form(CompileResultCacheImpl):
 
 
 class _Versions:
-    """The compiled versions of one function, a file for each."""
+    """The compiled versions of one function, each in its own file."""
 
     def __init__(self, folder: Path, name: str, stamp: str) -> None:
         self._folder, self._name, self._stamp = folder, name, stamp
@@ -75,11 +76,11 @@ class _Versions:
         return self._folder / f"{self._name}.{hashlib.sha256(str(key).encode()).hexdigest()[:24]}.nbc"
 
     def save(self, key: Any, data: Any) -> None:
-        """Keep a version, with what it is of."""
+        """Store a version together with its key."""
         store_whole(self._path(key), dumps((self._stamp, key, data)))
 
     def load(self, key: Any) -> Any:
-        """The version for a key; None if this source has no such version."""
+        """Return the version for a key, or None if this source has no such version."""
         content = load_whole(self._path(key))
         if content is None:
             return None
@@ -87,11 +88,11 @@ class _Versions:
         return data if (stamp, found) == (self._stamp, key) else None
 
     def flush(self) -> None:
-        """Nothing is remembered between calls."""
+        """Do nothing: no index is held in memory."""
 
 
 class KernelCache(FunctionCache):
-    """numba's cache of one function, with files of ours."""
+    """A numba cache of one function that stores files in our format."""
 
     def __init__(self, function: Any, folder: Path) -> None:
         self._name, self._py_func = repr(function), function
@@ -102,7 +103,7 @@ class KernelCache(FunctionCache):
         self.enable()
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """A compiled version; None where it is to be compiled."""
+        """Return a compiled version, or None if it has to be compiled."""
         try:
             return super().load_overload(sig, target_context)
         except (

@@ -1,4 +1,4 @@
-"""The one door to numba: compiled kernels, and calls of model functions through their addresses.
+"""The only interface to numba: it compiles kernels and calls model functions through their addresses.
 
 A model function has one signature, ``f(t, x, p, z, out) -> status``. With the compiler on it is a C function
 reached through its address, so that a kernel is compiled once and never per model; with ``HYBRIDSIM_JIT=0`` the
@@ -25,10 +25,10 @@ ENABLED = os.environ.get("HYBRIDSIM_JIT", "1") != "0"
 if ENABLED:
     import numba
 
-    ENABLED = not numba.config.DISABLE_JIT  # of everything, by NUMBA_DISABLE_JIT=1
+    ENABLED = not numba.config.DISABLE_JIT  # NUMBA_DISABLE_JIT=1 turns all compilation off
 
-_NOTICED = 1.0  # seconds of compiling that a person wonders about
-_reached: list[Any] = []  # by address, and kept alive
+_NOTICED = 1.0  # seconds of compilation after which a message is printed
+_reached: list[Any] = []  # functions by their number, kept alive here
 
 
 def _fill_nan(out: Any) -> None:
@@ -53,30 +53,30 @@ if ENABLED:
     SIGNATURE = types.int32(types.float64, _DOUBLES, _DOUBLES, _LONGS, _DOUBLES)
 
     class _Spent(threading.local):
-        """Of a thread: how deep it is in compiling, since when, and the seconds of all times before."""
+        """The compile time of a thread: current depth, start of the current compilation, and seconds before it."""
 
         depth, since, spent = 0, 0.0, 0.0
 
     class _Compiling(event.Listener):
-        """Adds up what each thread spends on compiling kernels, or on reading them from the cache; sets the effort.
+        """Measure the seconds that each thread spends on compiling or loading kernels, and set the optimisation level.
 
-        Compiling holds numba's lock, so the settings, which are everybody's, are ours meanwhile.
+        Compilation holds numba's lock, so the global settings can be changed meanwhile.
         """
 
         def __init__(self) -> None:
             self.of = _Spent()
-            self.others: list[Any] = []  # settings before each of the kernels that are being compiled
+            self.others: list[Any] = []  # settings to restore, one entry per nested compilation
 
         def on_start(self, event: Any) -> None:
-            """A kernel, or one that another needs."""
+            """Note that a kernel, or a kernel that it calls, starts to compile."""
             of = self.of
-            if event.kind == _COMPILING:  # it was not in the cache
+            if event.kind == _COMPILING:  # not in the cache
                 compiled = event.data["dispatcher"].py_func.__module__ or ""
                 so_far = of.spent + (time.perf_counter() - of.since if of.depth else 0.0)
                 self.others.append(_settings())
                 if compiled.startswith("hybridsim."):
                     _set(_ours())
-                    if so_far > _NOTICED:  # a part that no run has needed before, such as derivatives
+                    if so_far > _NOTICED:  # a part that no earlier run needed, such as derivatives
                         _tell(
                             f"hybridsim: compiling the engine for a new task (once, 10 to 30 s); {_kept()} ..."
                         )
@@ -86,7 +86,7 @@ if ENABLED:
             of.depth += 1
 
         def on_end(self, event: Any) -> None:
-            """The kernel is ready."""
+            """Note that the kernel is compiled."""
             of = self.of
             if event.kind == _COMPILING:
                 _set(self.others.pop())
@@ -100,7 +100,7 @@ if ENABLED:
     _LEVEL = 2  # of LLVM's passes
 
     def _settings() -> tuple[Any, Any]:
-        """Level of LLVM's passes, and the machine whose costs they go by; None where numba does not tell it."""
+        """Return LLVM's optimisation level and target machine, or None if numba does not provide them."""
         return numba.config.OPT, getattr(cpu_target.target_context.codegen(), "_tm", None)
 
     def _set(settings: tuple[Any, Any]) -> None:
@@ -110,7 +110,7 @@ if ENABLED:
 
     @cache
     def _plain_machine() -> Any:
-        """This machine with what it has, and the costs of none in particular; None where numba does not tell it."""
+        """Return this machine with its features and a generic cost model, or None if numba does not provide it."""
         features = getattr(cpu_target.target_context.codegen(), "_tm_features", None)
         if features is None or _settings()[1] is None:
             return None
@@ -120,11 +120,11 @@ if ENABLED:
         )
 
     def _ours() -> tuple[Any, Any]:
-        """The settings for kernels.
+        """Return the settings for kernels.
 
-        At the second level the engine is ready an eighth sooner than at numba's default, the third, and is as fast. For
-        some machines (AMD's Zen 4 and 5) LLVM unrolls loops of unknown length by the dozen. Ours have two or three
-        turns: so unrolled, `exact` takes a fifth longer.
+        At level 2 the engine compiles in seven eighths of the time of numba's default, level 3, and runs as fast.
+        For some machines (AMD's Zen 4 and 5) LLVM unrolls loops of unknown length a dozen times. Our loops have two
+        or three turns, and `exact` takes a fifth longer with such unrolling.
         """
         return min(numba.config.OPT, type(numba.config.OPT)(_LEVEL)), _plain_machine()
 
@@ -134,7 +134,7 @@ if ENABLED:
         event.register(_kind, _compiling)
 
     def _free_in_child() -> None:
-        """A child that was forked while another thread was compiling finds numba's lock free."""
+        """Release numba's lock in a child process that was forked while another thread was compiling."""
         if hasattr(compiler_lock.global_compiler_lock, "_lock"):
             compiler_lock.global_compiler_lock._lock = threading.RLock()
 
@@ -142,14 +142,14 @@ if ENABLED:
         os.register_at_fork(after_in_child=_free_in_child)
 
     def seconds_compiling() -> float:
-        """Seconds that this thread has spent so far on getting kernels ready."""
+        """Return the seconds that this thread has spent on compiling or loading kernels."""
         return _compiling.of.spent
 
     def _compiled(function: Callable[..., Any], **options: Any) -> Any:
-        """A kernel with numba's options; literal arguments make versions of it, which run up to twice as fast.
+        """Compile a kernel with our options of numba; literal arguments make specialised versions, up to twice as fast.
 
-        Without the option `_nrt` each read of an array from a pack would be two calls that count references, across
-        which nothing stays in a register.
+        Without the option `_nrt`, each read of an array from a pack would include two calls that count references, and
+        no value would stay in a register across them.
         """
         made = numba.njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)
         keep_on_disk(made, function)
@@ -160,19 +160,19 @@ if ENABLED:
         return _compiled(function, _nrt=False)
 
     def allocating_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-        """A kernel that makes arrays of its own."""
+        """Compile a kernel that allocates arrays."""
         return _compiled(function, _nrt=True)
 
     def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
-        """A short kernel, made part of its callers."""
+        """Inline a short kernel into its callers."""
         return _compiled(function, forceinline=True, _nrt=False)
 
     def merged(function: Callable[..., Any]) -> Callable[..., Any]:
-        """A part of the one kernel that calls it, with a name of its own; it is never compiled by itself."""
+        """Inline a function into the one kernel that calls it; it is never compiled separately."""
         return _compiled(function, inline="always", _nrt=False)
 
     def polynomial_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-        """A short kernel, made part of its callers, whose products and sums may be fused, as Horner's rule likes it."""
+        """Inline a short kernel whose products and sums may be fused, as in Horner's rule."""
         return _compiled(function, forceinline=True, fastmath={"contract"}, _nrt=False)
 
     def _entry(function: Any, arguments: tuple[Any, ...]) -> Callable[..., Any]:
@@ -186,7 +186,7 @@ if ENABLED:
         return compile_text(module.__loader__.get_source(module.__name__), name, kept)
 
     def texts_to_compile(module: Any) -> list[str]:
-        """The texts of the functions of a generated module whose machine code is not on disk."""
+        """Return the texts of the functions of a generated module whose machine code is not cached."""
         path, text = getattr(module, "__file__", None), module.__loader__.get_source(module.__name__)
         return [
             definition_in(text, name)
@@ -197,11 +197,11 @@ if ENABLED:
     def compile_series(
         kept: Path | None, names: Sequence[str], written: Callable[[], str]
     ) -> tuple[list[int], Any]:
-        """Addresses of functions of series, for `call_series`, and the object that keeps them alive."""
+        """Return the addresses of series functions, for `call_series`, and the object that keeps them alive."""
         return ready(None if kept is None else _of_this_machine(kept), names, written)
 
     def is_kept(kept: Path | None) -> bool:
-        """Whether functions of series are on disk."""
+        """Return whether the compiled series functions are cached."""
         return kept is not None and _of_this_machine(kept).exists()
 
     def _of_this_machine(kept: Path) -> Path:
@@ -209,7 +209,7 @@ if ENABLED:
 
     @intrinsic
     def fused(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
-        """a b + c of three doubles, rounded once where the processor can do so."""
+        """Compute a b + c of three doubles, rounded once if the processor supports it."""
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             double = ir.DoubleType()
@@ -223,7 +223,7 @@ if ENABLED:
     def call_series(
         typingctx: Any, address: Any, s: Any, error: Any, x: Any, guards: Any, constants: Any, out: Any
     ) -> Any:
-        """Call the function of series at an address (see `engine.series.emit_series`) with contiguous arrays."""
+        """Call the series function at an address (see `engine.series.emit_series`) with contiguous arrays."""
         signature = types.void(types.int64, types.float64, types.float64, x, guards, constants, out)
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -241,7 +241,7 @@ if ENABLED:
         return signature, generate
 
     def _type_by_address(given: Any) -> Any:
-        """Of a pack, of a number, or of an array, of which a kernel that is reached by address gets the elements."""
+        """Return the type of a pack, a number, or the elements of an array, for a kernel called by address."""
         found = numba.typeof(given)
         return types.CPointer(found.dtype) if isinstance(found, types.Array) else found
 
@@ -280,7 +280,7 @@ if ENABLED:
 
     @intrinsic
     def array_at(typingctx: Any, elements: Any, size: Any) -> Any:
-        """The array (size,) whose elements a kernel was given that is reached by its address."""
+        """Return the array (size,) over elements that a kernel received by address."""
         kind = types.Array(elements.dtype, 1, "C")
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -293,9 +293,9 @@ if ENABLED:
 
     @intrinsic
     def call_apart(typingctx: Any, kernel: Any, arguments: Any) -> Any:
-        """Call a kernel with a tuple of arguments, and keep it out of its caller.
+        """Call a kernel with a tuple of arguments and prevent its inlining.
 
-        LLVM copies even long kernels into all that call them, and compiles each copy anew.
+        LLVM inlines even long kernels into all callers and compiles each copy again.
         """
         called = kernel.get_call_type(typingctx, tuple(map(types.unliteral, arguments.types)), {})
 
@@ -337,7 +337,7 @@ if ENABLED:
 else:
 
     def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-        """The function itself: the compiler is switched off. As in compiled code, NaN is no warning."""
+        """Return the function itself, because the compiler is off; NaN raises no warning, as in compiled code."""
 
         @wraps(function)
         def quiet(*arguments: Any) -> Any:
@@ -347,14 +347,14 @@ else:
         return quiet
 
     def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
-        """The function itself: what calls it is a kernel."""
+        """Return the function itself, because its caller is a Python function."""
         return function
 
     merged = polynomial_kernel = inlined
     allocating_kernel = kernel
 
     def seconds_compiling() -> float:
-        """None: nothing is compiled."""
+        """Return None, because nothing is compiled."""
         return 0.0
 
     def _entry(function: Any, arguments: tuple[Any, ...]) -> Callable[..., Any]:
@@ -363,25 +363,25 @@ else:
     def compile_series(
         kept: Path | None, names: Sequence[str], written: Callable[[], str]
     ) -> tuple[list[int], Any]:
-        """Nothing is compiled: series are those of the interpreter."""
+        """Raise an error: without a compiler this is never called."""
         raise NotImplementedError
 
     def is_kept(kept: Path | None) -> bool:
-        """Nothing is kept."""
+        """Return False, because nothing is cached."""
         return False
 
     def fused(a: float, b: float, c: float) -> float:
-        """a b + c."""
+        """Compute a b + c."""
         return a * b + c
 
     def call_series(
         address: int, s: float, error: float, x: Any, guards: Any, constants: Any, out: Any
     ) -> None:
-        """Nothing is compiled, and never called."""
+        """Raise an error: without a compiler this is never called."""
         raise NotImplementedError
 
     def _type_by_address(given: Any) -> Any:
-        """Nothing is compiled."""
+        """Return no type, because nothing is compiled."""
         return None
 
     def _kernel_at(function: Callable[..., int], key: tuple[Any, ...]) -> int:
@@ -390,15 +390,15 @@ else:
         return _reached.index(function)
 
     def call_kernel(address: int, arguments: tuple[Any, ...]) -> int:
-        """Call a function."""
+        """Call a function by its number."""
         return int(_reached[address](*arguments))
 
     def array_at(elements: Any, size: int) -> Any:
-        """The array itself."""
+        """Return the array itself."""
         return elements
 
     def compile_model_function(module: Any, name: str) -> tuple[Any, Any]:
-        """Guard the function as compiled code is: what raises in Python is NaN there."""
+        """Wrap the function so that a Python exception gives NaN, as in compiled code."""
         function = getattr(module, name)
 
         def guarded(t: float, x: Any, p: Any, z: Any, out: Any) -> int:
@@ -411,7 +411,7 @@ else:
         return guarded, guarded
 
     def texts_to_compile(module: Any) -> list[str]:
-        """Nothing is compiled."""
+        """Return no texts, because nothing is compiled."""
         return []
 
     def call_apart(kernel: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
@@ -427,11 +427,11 @@ _addresses: dict[tuple[Any, ...], int] = {}  # of kernels, by the types of what 
 
 
 def kernel_address(function: Callable[..., int], *given: Any) -> int:
-    """Address of a kernel that returns a whole number and is called with the like of what is given; see `call_kernel`.
+    """Return the address of a kernel that returns an integer, for arguments of the given types; see `call_kernel`.
 
-    It is compiled if need be. A kernel that calls others is compiled together with them, again for each caller; large
-    ones that are reached by their address are compiled once. Of an array they get the elements alone: see `array_at`.
-    Without a compiler it is a number by which the function is found.
+    The kernel is compiled if necessary. A kernel that calls others directly is compiled together with them, again for
+    each caller; large kernels are compiled once because they are called by address. Only the elements of an array are
+    passed: see `array_at`. Without a compiler the address is a number that identifies the function.
     """
     key = tuple(map(_type_by_address, given))
     if (function, key) not in _addresses:
@@ -440,9 +440,9 @@ def kernel_address(function: Callable[..., int], *given: Any) -> int:
 
 
 class Door:
-    """A kernel whose arguments are of the same types at every call: they are looked at once.
+    """A kernel whose argument types are the same at every call, so that they are resolved only once.
 
-    To look at them takes longer than a short run where there are packs among them.
+    Resolving the types of packs takes longer than a short run.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
@@ -450,7 +450,7 @@ class Door:
         self._entry: Callable[..., Any] | None = None
 
     def __call__(self, *arguments: Any) -> Any:
-        """What the kernel returns."""
+        """Call the kernel and return its result."""
         if self._entry is None:
             self._entry = _entry(self._function, arguments)
         return self._entry(*arguments)
@@ -458,7 +458,7 @@ class Door:
 
 @cache
 def announce_compilation() -> None:
-    """Say once, on stderr, that the engine is being compiled, if no run of it has been announced here yet."""
+    """Print once, on stderr, that the engine is being compiled, unless an earlier run has printed it."""
     # the folder alone proves nothing: it is made as soon as a kernel is defined
     folder = kernel_folder() if ENABLED else None
     if ENABLED and (folder is None or not (folder / "announced").exists()):

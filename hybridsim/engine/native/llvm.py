@@ -34,7 +34,7 @@ _COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "=="
 
 
 class Translator(ast.NodeVisitor):
-    """Writes one function of a generated module into an LLVM module."""
+    """Translate one function of a generated module into an LLVM module."""
 
     def __init__(self, module: ir.Module, definition: ast.FunctionDef) -> None:
         self.module = module
@@ -51,7 +51,7 @@ class Translator(ast.NodeVisitor):
     # -- statements -----------------------------------------------------------------------------------------
 
     def statement(self, node: ast.stmt) -> None:
-        """One line, or an if with its branches."""
+        """Translate one assignment, or an if statement with its branches."""
         if isinstance(node, ast.Assign):
             self._assign(node.targets[0], self.number(node.value))
         elif isinstance(node, ast.If):
@@ -66,7 +66,7 @@ class Translator(ast.NodeVisitor):
         self.builder.store(value, place)
 
     def _place(self, target: Any) -> Any:
-        """Where a variable lives; in registers, once the optimiser has seen it."""
+        """Return the stack slot of a variable; the optimiser moves it to a register."""
         if target.id not in self.places:
             with self.builder.goto_block(self.entry):
                 self.builder.position_at_start(self.entry)
@@ -88,14 +88,14 @@ class Translator(ast.NodeVisitor):
     # -- expressions ----------------------------------------------------------------------------------------
 
     def number(self, node: ast.expr) -> Any:
-        """An expression as a double; a condition is 1 or 0."""
+        """Translate an expression to a double; a condition becomes 1 or 0."""
         value = self.visit(node)
         if value.type == _BIT:
             return self.builder.uitofp(value, _DOUBLE)
         return value if value.type == _DOUBLE else self.builder.sitofp(value, _DOUBLE)
 
     def truth(self, node: ast.expr) -> Any:
-        """An expression as a condition."""
+        """Translate an expression to a condition."""
         value = self.visit(node)
         if value.type == _BIT:
             return value
@@ -104,13 +104,13 @@ class Translator(ast.NodeVisitor):
         return compare("!=", value, zero)
 
     def visit_Constant(self, node: ast.Constant) -> Any:
-        """A number; whole ones stand for modes and exponents."""
+        """Translate a number; integers are modes and exponents."""
         if isinstance(node.value, bool):
             return ir.Constant(_BIT, int(node.value))
         return ir.Constant(_LONG if isinstance(node.value, int) else _DOUBLE, node.value)
 
     def visit_Name(self, node: ast.Name) -> Any:
-        """A variable, the time or a constant of mathematics."""
+        """Translate a variable, the time or a mathematical constant."""
         if node.id in self.values:
             return self.values[node.id]
         if node.id in _NAMED:
@@ -122,11 +122,11 @@ class Translator(ast.NodeVisitor):
         return self.builder.gep(self.arrays[node.value.id], [index])  # type: ignore[attr-defined]  # a name
 
     def visit_Subscript(self, node: ast.Subscript) -> Any:
-        """An element of a state, parameter or mode array."""
+        """Translate an element of a state, parameter or mode array."""
         return self.builder.load(self._element(node))
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> Any:
-        """A sign, or not."""
+        """Translate a sign or a negation."""
         if isinstance(node.op, ast.Not):
             return self.builder.not_(self.truth(node.operand))
         value = self.visit(node.operand)
@@ -135,7 +135,7 @@ class Translator(ast.NodeVisitor):
         return self.builder.fneg(value) if value.type == _DOUBLE else self.builder.neg(value)
 
     def visit_BinOp(self, node: ast.BinOp) -> Any:
-        """Arithmetic on doubles; powers are whole."""
+        """Translate arithmetic on doubles; exponents are integers."""
         if isinstance(node.op, ast.Pow):
             return self._power(self.number(node.left), node.right)
         left, right = self.number(node.left), self.number(node.right)
@@ -148,7 +148,7 @@ class Translator(ast.NodeVisitor):
         return operation(left, right)
 
     def _power(self, base: Any, exponent: ast.expr) -> Any:
-        """A whole power by squaring."""
+        """Compute an integer power by repeated squaring."""
         n = ast.literal_eval(exponent)
         assert isinstance(n, int) and n > 0
         result = None
@@ -161,7 +161,7 @@ class Translator(ast.NodeVisitor):
         return result
 
     def visit_Compare(self, node: ast.Compare) -> Any:
-        """Comparisons; of chained ones all hold."""
+        """Translate a comparison; a chained comparison is the conjunction of its parts."""
         operands = [node.left, *node.comparators]
         found = None
         for left, op, right in zip(operands, node.ops, operands[1:], strict=False):
@@ -182,7 +182,7 @@ class Translator(ast.NodeVisitor):
         return compare(op, left, right)
 
     def visit_BoolOp(self, node: ast.BoolOp) -> Any:
-        """and, or: of values without effects, so that all may be worked out."""
+        """Translate and, or; all operands are evaluated, since they have no side effects."""
         found, *others = [self.truth(value) for value in node.values]
         join = self.builder.and_ if isinstance(node.op, ast.And) else self.builder.or_
         for other in others:
@@ -190,7 +190,7 @@ class Translator(ast.NodeVisitor):
         return found
 
     def visit_IfExp(self, node: ast.IfExp) -> Any:
-        """One of two values; the other is not worked out."""
+        """Translate a conditional expression; only the chosen value is evaluated."""
         builder = self.builder
         then, otherwise, after = (builder.append_basic_block() for _ in range(3))
         builder.cbranch(self.truth(node.test), then, otherwise)
@@ -207,10 +207,10 @@ class Translator(ast.NodeVisitor):
         return merged
 
     def visit_Call(self, node: ast.Call) -> Any:
-        """A function of mathematics."""
+        """Translate a call of a mathematical function."""
         name = node.func.id  # type: ignore[attr-defined]  # a name
         values = [self.number(argument) for argument in node.args]
-        if name in ("min", "max"):  # as Python has it: the first of equals, and of a NaN
+        if name in ("min", "max"):  # as in Python, the first of equal values or of a NaN
             a, b = values
             takes_b = self.builder.fcmp_ordered("<" if name == "min" else ">", b, a)
             return self.builder.select(takes_b, b, a)
@@ -226,13 +226,13 @@ class Translator(ast.NodeVisitor):
         return self.builder.call(function, values)
 
     def generic_visit(self, node: ast.AST) -> Any:
-        """Nothing else is ever generated."""
+        """Reject a node that generated modules never contain."""
         raise NotImplementedError(ast.dump(node))
 
 
 @cache
 def _prepare() -> None:
-    """Make LLVM ready for this machine, and tell it where the functions of the C library are."""
+    """Initialise LLVM for this machine and register the functions of the C library."""
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
     library = ctypes.CDLL(ctypes.util.find_library("m")) if sys.platform != "win32" else ctypes.cdll.msvcrt
@@ -242,7 +242,7 @@ def _prepare() -> None:
 
 
 def _machine() -> Any:
-    """This machine as LLVM sees it; whatever compiles takes one of its own."""
+    """Return a new LLVM target machine for this computer; each compilation uses its own."""
     _prepare()
     return binding.Target.from_default_triple().create_target_machine(
         cpu=binding.get_host_cpu_name(), features=binding.get_host_cpu_features().flatten(), opt=2
@@ -250,19 +250,19 @@ def _machine() -> Any:
 
 
 def compile_text(text: str, name: str, kept: Path | None) -> tuple[int, Any]:
-    """Address of a function of a generated module, whose text is given, and what keeps it alive.
+    """Compile a function of a generated module from the module's text; return its address and the object to keep alive.
 
-    kept: where its machine code is on disk, if anywhere; written there the first time.
+    kept: path of its cached machine code, if any; written at the first compilation.
     """
     addresses, engine = ready(kept, (name,), lambda: _translated(text, name))
     return addresses[0], engine
 
 
 def ready(kept: Path | None, names: Sequence[str], written: Callable[[], str]) -> tuple[list[int], Any]:
-    """Addresses of functions of a module of LLVM, and what keeps them alive.
+    """Return the addresses of functions of an LLVM module and the object that keeps them alive.
 
-    kept: where its machine code is on disk, if anywhere. If it is not there, it is compiled from the text that
-    `written` gives, and kept.
+    kept: path of the cached machine code, if any. If the file does not exist, the text that `written` returns is
+    compiled and stored.
     """
     code = load_whole(kept)
     if code is None:
@@ -276,26 +276,26 @@ def ready(kept: Path | None, names: Sequence[str], written: Callable[[], str]) -
 
 
 def _translated(text: str, name: str) -> str:
-    """A function of a generated module as a module of LLVM."""
+    """Translate a function of a generated module into an LLVM module."""
     module = ir.Module(name)
     Translator(module, python_tree(definition_in(text, name)).body[0])
     return str(module)
 
 
 def functions_in(text: str) -> list[str]:
-    """The names of the functions of a generated module that are compiled."""
+    """Return the names of the functions of a generated module that are compiled."""
     return re.findall(r"^def (\w+)\(t, x, p, z, out", text, re.MULTILINE)
 
 
 def definition_in(text: str, name: str) -> str:
-    """The lines of one function of a generated module: to parse all of a large one for each function takes seconds."""
+    """Return the lines of one function of a generated module, without parsing the whole module."""
     found = re.search(rf"^def {name}\(.*?(?=^\S|\Z)", text, re.MULTILINE | re.DOTALL)
     assert found is not None, f"the module has no function {name}"
     return found.group()
 
 
 def _compiled(text: str) -> bytes:
-    """A module of LLVM as an object file for this machine."""
+    """Compile an LLVM module to an object file for this machine."""
     machine = _machine()
     parsed = binding.parse_assembly(text)
     parsed.triple = machine.triple
@@ -307,7 +307,7 @@ def _compiled(text: str) -> bytes:
 
 @cache
 def machine_name() -> str:
-    """A short name of this kind of machine, which code is compiled for."""
+    """Return a short name of the machine type for which code is compiled."""
     features = binding.get_host_cpu_features().flatten()
     described = f"{binding.get_default_triple()} {binding.get_host_cpu_name()} {features}"
     return hashlib.sha256(described.encode()).hexdigest()[:12]

@@ -1,4 +1,4 @@
-"""Lines of machine code as LLVM reads it: values of one function, each worked out once, and what is around them."""
+"""LLVM assembly text: values of one function, each computed once, and the function around them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from hybridsim.engine.native.constants import EXACTLY
 
-# A function of so many lines is compiled in half a second; a longer one is left to the interpreter.
+# A function of this many lines compiles in half a second; the interpreter evaluates a longer one.
 _LONGEST = 12000
 _COMMUTES = ("fadd", "fmul")
 ZERO, ONE, NAN, INF = "0.0", "1.0", "0x7FF8000000000000", "0x7FF0000000000000"
@@ -27,30 +27,30 @@ declare double @c_tanh(double)
 
 
 class TooLong(Exception):
-    """The code of a tape would take too long to compile."""
+    """An error that means that the code of a tape would take too long to compile."""
 
 
 def number(value: float) -> str:
-    """A double as LLVM writes it, exactly."""
+    """Write a double exactly in LLVM's hexadecimal notation."""
     return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
 
 
 class Lines:
-    """The lines of one function, each value once."""
+    """The lines of one function, in which each value is computed once."""
 
     def __init__(self, prefix: str = "v") -> None:
         self.lines: list[str] = []
-        self._prefix = prefix  # of the names of values
+        self._prefix = prefix  # first letters of value names
         self._known: dict[tuple[str, ...], str] = {}
 
     def put(self, line: str) -> None:
-        """A line that gives no value."""
+        """Append a line that has no value."""
         self.lines.append(line)
         if len(self.lines) > _LONGEST:
             raise TooLong
 
     def value(self, form: str, *parts: str) -> str:
-        """The value that a line gives; its parts are put for the braces of its form."""
+        """Return the value of a line, with operands inserted into its template; reuse an equal earlier line."""
         key = (form, *parts)
         if key not in self._known:
             name = f"%{self._prefix}{len(self._known)}"
@@ -59,46 +59,46 @@ class Lines:
         return self._known[key]
 
     def op(self, name: str, a: str, b: str) -> str:
-        """Arithmetic of two doubles."""
+        """Emit an arithmetic operation on two doubles."""
         if name in _COMMUTES and b < a:
             a, b = b, a
         return self.value(name + " double {}, {}", a, b)
 
     def negative(self, a: str) -> str:
-        """-a."""
+        """Emit -a."""
         return self.value("fneg double {}", a)
 
     def call(self, name: str, a: str) -> str:
-        """A function of one double."""
+        """Emit a call of a function of one double."""
         return self.value("call double @" + name + "(double {})", a)
 
     def over(self, a: str, k: int) -> str:
-        """a / k, as states have it."""
+        """Emit a / k, rounded as in the series of the states."""
         if k == 1:
             return a
         return self.op("fdiv", a, number(k)) if k <= EXACTLY else self.op("fmul", a, number(1.0 / k))
 
     def load(self, array: str, i: int) -> str:
-        """An element of an array that nobody writes to."""
+        """Load an element of an array that the function never writes."""
         place = self.value("getelementptr inbounds double, ptr {}, i64 " + str(i), array)
         return self.value("load double, ptr {}", place)
 
     def store(self, value: str, array: str, i: int) -> None:
-        """Write an element."""
+        """Write an element of an array."""
         place = self.value("getelementptr inbounds double, ptr {}, i64 " + str(i), array)
         self.put(f"  store double {value}, ptr {place}")
 
     def fused(self, a: str, b: str, c: str) -> str:
-        """a b + c."""
+        """Emit a b + c."""
         return self.value("call double @llvm.fmuladd.f64(double {}, double {}, double {})", a, b, c)
 
     def choice(self, condition: str, a: str, b: str, then: str, otherwise: str) -> str:
-        """One of two values, by a comparison of a and b."""
+        """Emit a choice between two values by a comparison of a and b."""
         is_so = self.value("fcmp " + condition + " double {}, {}", a, b)
         return self.value("select i1 {}, double {}, double {}", is_so, then, otherwise)
 
 
 def function(name: str, lines: Iterable[str]) -> str:
-    """A function of these lines."""
+    """Return a function that consists of these lines."""
     arguments = "double %s, double %e, ptr noalias %x, ptr noalias %g, ptr noalias %c, ptr noalias %out"
     return "\n".join((f"define void @{name}({arguments}) {{", *lines, "  ret void", "}", ""))

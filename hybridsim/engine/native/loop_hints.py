@@ -1,6 +1,6 @@
-"""Loops over a few numbers in compiled code, that are left as they are written.
+"""Loops over short arrays that LLVM must not unroll or vectorise.
 
-Where arrays have two or three entries, most of what a compiler makes of a loop over them is what prepares it for many.
+For arrays of two or three entries most of the code of a vectorised loop only prepares it for long arrays.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ if ENABLED:
     from numba.extending import intrinsic
 
     def left_as_it_is(builder: Any) -> None:
-        """Code that is none, of which the compiler does not know that: it leaves the loop around it alone."""
+        """Emit an opaque empty statement: LLVM will not vectorise or unroll the loop around it."""
         nothing = ir.InlineAsm(ir.FunctionType(ir.VoidType(), []), "", "", side_effect=True)
         call = builder.call(nothing, [])
         call.attributes.add("nounwind")
@@ -23,7 +23,7 @@ if ENABLED:
 
     @intrinsic
     def few(typingctx: Any) -> Any:
-        """Says in a loop that it has few turns."""
+        """Mark the loop around this call as short."""
 
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             left_as_it_is(builder)
@@ -34,12 +34,12 @@ if ENABLED:
 else:
 
     def few() -> None:
-        """Nothing."""
+        """Do nothing."""
 
 
 @inlined
 def put(source: Any, out: Any) -> None:
-    """Copy an array; a slice assignment takes ten times as long for a few numbers."""
+    """Copy a short array; a slice assignment takes ten times as long for a few numbers."""
     for i in range(source.shape[0]):
         few()
         out[i] = source[i]
@@ -47,7 +47,7 @@ def put(source: Any, out: Any) -> None:
 
 @inlined
 def fill(out: Any, value: Any) -> None:
-    """Write one value to all of an array."""
+    """Write one value to all elements of a short array."""
     for i in range(out.shape[0]):
         few()
         out[i] = value

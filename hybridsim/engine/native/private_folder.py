@@ -1,6 +1,6 @@
-"""Folders that nobody else can write to: code that is found in them may be run.
+"""Check that a folder is private, so that code found in it may be executed.
 
-Whoever can put a file where compiled code is looked for runs code as this user. A folder is used only if this user or
+Anybody who can put a file in the cache can run code as this user. A folder is used only if this user or
 the superuser owns it and every folder above it, and nobody else may write to them.
 """
 
@@ -13,13 +13,13 @@ from contextlib import suppress
 from pathlib import Path
 
 HAS_OWNERS = hasattr(os, "geteuid")  # on Windows a user's own folder is private by its access list
-_LINKS = 40  # in one path, as Linux has it
+_LINKS = 40  # most links in one path, as in Linux
 
 
 def why_not(path: Path) -> str | None:
-    """Return the reason why others could have put code at a path; None if they could not.
+    """Return the reason why other users could have put code at a path; None if they could not.
 
-    Missing parts of the path are no reason: this user makes them.
+    Missing parts of the path are accepted, since this user creates them.
     """
     if not HAS_OWNERS:
         return None
@@ -43,7 +43,7 @@ def why_not(path: Path) -> str | None:
             continue
         if not stat.S_ISDIR(found.st_mode):
             return f"{here} is not a folder"
-        is_sticky = bool(found.st_mode & stat.S_ISVTX)  # others may add to it, and change nothing of ours
+        is_sticky = bool(found.st_mode & stat.S_ISVTX)  # other users may add files but not change ours
         if _others_may_write(found) and not (is_sticky and left):
             return f"other users may write to {here} (mode {stat.S_IMODE(found.st_mode):o})"
         if not left:
@@ -53,7 +53,7 @@ def why_not(path: Path) -> str | None:
 
 
 def is_trusted_file(path: str | Path) -> bool:
-    """Whether a path is a regular file that only this user or the superuser can have written."""
+    """Return whether a path is a regular file that only this user or the superuser can have written."""
     try:
         found = os.lstat(path)
     except OSError:
@@ -64,7 +64,7 @@ def is_trusted_file(path: str | Path) -> bool:
 
 
 def make_private(path: Path) -> None:
-    """Make a folder, and those above it that are missing, with mode 700."""
+    """Create a folder and its missing parents with mode 700."""
     for folder in (*reversed(path.parents), path):
         with suppress(FileExistsError):
             if not folder.is_dir():
@@ -79,7 +79,7 @@ def _has_trusted_owner(found: os.stat_result) -> bool:
 
 
 def _unmapped() -> int | None:
-    """Return the number of users that this name space does not know; None where it knows all of them."""
+    """Return the user number that stands for unmapped users in this namespace; None if all are mapped."""
     try:
         with open("/proc/self/uid_map") as mapped, open("/proc/sys/kernel/overflowuid") as number:
             knows_all = mapped.read().split() == ["0", "0", "4294967295"]
@@ -95,7 +95,7 @@ def _others_may_write(found: os.stat_result) -> bool:
 
 
 def _is_group_of_one(group: int) -> bool:
-    """Whether a group is the one that many systems make for each user: it has the user's name and no other member."""
+    """Return whether a group has the user's name and no other member, as many systems create one per user."""
     if group != os.getegid():
         return False
     import grp

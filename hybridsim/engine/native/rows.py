@@ -9,13 +9,13 @@ from hybridsim.engine.native.kernels import allocating_kernel, call, kernel
 
 @kernel
 def evaluate(function: Any, t: float, x: Any, p: Any, z: Any, out: Any) -> None:
-    """One evaluation: out = function(t, x)."""
+    """Evaluate a model function once: out = function(t, x)."""
     call(function, t, x, p, z, out)
 
 
 @kernel
 def evaluate_rows(function: Any, times: Any, states: Any, p: Any, z: Any, out: Any) -> None:
-    """out[k] = function(times[k], states[k]) for every row."""
+    """Evaluate out[k] = function(times[k], states[k]) for every row."""
     for k in range(times.shape[0]):
         call(function, times[k], states[k], p, z, out[k])
 
@@ -24,7 +24,7 @@ def evaluate_rows(function: Any, times: Any, states: Any, p: Any, z: Any, out: A
 def project_and_evaluate(
     project: Any, function: Any, times: Any, states: Any, p: Any, z: Any, out: Any
 ) -> None:
-    """Put held states on their constraints in place, then evaluate a function there."""
+    """Project held states onto their constraints in place, then evaluate a function there."""
     work = states[0].copy()
     for k in range(times.shape[0]):
         work[:] = states[k]

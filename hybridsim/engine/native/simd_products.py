@@ -1,7 +1,7 @@
 """Products of small matrices and vectors in compiled code, four numbers at a time.
 
-A matrix is kept in panels, four rows side by side, or by its rows, for one at a time; vectors have zeros behind them up
-to the next multiple of four, and so have the columns that go with them.
+A matrix is stored in panels of four rows, or row by row for single rows. Vectors are padded with zeros up to the
+next multiple of four, and so are the columns that they multiply.
 """
 
 from __future__ import annotations
@@ -14,21 +14,21 @@ import numpy as np
 from hybridsim.engine.native.kernels import ENABLED, inlined
 from hybridsim.engine.native.loop_hints import few
 
-LANES = 4  # rows of a panel, and columns that are taken at once
+LANES = 4  # rows of a panel, and columns processed at once
 
 
 def filled_up(count: int) -> int:
-    """So many, up to the next multiple of four."""
+    """Round a count up to the next multiple of four."""
     return -(-count // LANES) * LANES
 
 
 def vector_of(count: int) -> np.ndarray:
-    """Room for so many numbers, with zeros behind them."""
+    """Allocate a vector of a given length, padded with zeros."""
     return np.zeros(filled_up(count))[:count]
 
 
 def rows_of(matrix: np.ndarray, parts: Sequence[int] = ()) -> np.ndarray:
-    """Matrices (..., rows, columns) with zeros behind their columns; parts: lengths of the vectors these go with."""
+    """Pad the columns of matrices (..., rows, columns) with zeros; parts: lengths of the vectors they multiply."""
     parts = parts or (matrix.shape[-1],)
     out = np.zeros((*matrix.shape[:-1], sum(map(filled_up, parts))))
     source = target = 0
@@ -39,7 +39,7 @@ def rows_of(matrix: np.ndarray, parts: Sequence[int] = ()) -> np.ndarray:
 
 
 def panels_of(matrix: np.ndarray, parts: Sequence[int] = ()) -> np.ndarray:
-    """Matrices (..., rows, columns) in panels (..., rows/4, columns, 4), filled up with zeros."""
+    """Arrange matrices (..., rows, columns) in zero-padded panels (..., rows/4, columns, 4)."""
     wide = rows_of(matrix, parts)
     *lead, rows, columns = wide.shape
     out = np.zeros((*lead, filled_up(rows), columns))
@@ -66,7 +66,7 @@ if ENABLED:
         return builder.load(builder.bitcast(place, kind.as_pointer()), align=_BYTES)
 
     def _address(context: Any, builder: Any, kind: Any, value: Any, at: Any, numbers: Any) -> Any:
-        """Where the part of an array begins that these leading indices name."""
+        """Return the address of the subarray that the leading indices select."""
         array = context.make_array(kind)(context, builder, value)
         place = builder.bitcast(array.data, ir.IntType(8).as_pointer())
         strides = cgutils.unpack_tuple(builder, array.strides, kind.ndim)
@@ -78,9 +78,10 @@ if ENABLED:
     def _over_fours(
         context: Any, builder: Any, kind: Any, value: Any, row: Any, wide: int, body: Any, sums: Any
     ) -> Any:
-        """Sums over a vector, four entries at a time; row: what goes with its begin, so many numbers to an entry.
+        """Emit a loop over a vector that accumulates sums, four entries at a time.
 
-        body(entries, row, sums) gives the next of the sums. Returns the sums, and what goes with the next vector.
+        row: address of the matrix elements that belong to the start of the vector. wide: matrix elements per entry.
+        body(entries, row, sums) returns the next sums. Return the sums and the row address for the next vector.
         """
         array = context.make_array(kind)(context, builder, value)
         (count,) = cgutils.unpack_tuple(builder, array.shape, 1)
@@ -110,7 +111,7 @@ if ENABLED:
 
     @intrinsic
     def times(typingctx: Any, panels: Any, at: Any, vectors: Any) -> Any:
-        """Four sums: a panel times the vectors of a tuple, one behind the other; `at` is a tuple of its indices."""
+        """Multiply a panel by the concatenated vectors of a tuple: four sums; `at` holds the panel's indices."""
         result = types.UniTuple(types.float64, LANES)
 
         def body(builder: Any, entries: Any, rows: Any, sums: Any) -> Any:
@@ -145,7 +146,7 @@ if ENABLED:
 
     @intrinsic
     def dot(typingctx: Any, rows: Any, at: Any, vectors: Any) -> Any:
-        """A row times the vectors of a tuple, one behind the other; `at` is a tuple of its indices."""
+        """Multiply a row by the concatenated vectors of a tuple; `at` holds the row's indices."""
 
         def body(builder: Any, entries: Any, row: Any, sums: Any) -> Any:
             four, other = _loaded(builder, entries, 0, _FOUR), _loaded(builder, row, 0, _FOUR)
@@ -175,19 +176,19 @@ else:
         )
 
     def times(panels: Any, at: tuple[int, ...], vectors: tuple[Any, ...]) -> tuple[float, ...]:
-        """Four sums."""
+        """Compute the four sums."""
         entries = _entries(vectors)
         return tuple((entries @ panels[at][: len(entries)]).tolist())
 
     def dot(rows: Any, at: tuple[int, ...], vectors: tuple[Any, ...]) -> float:
-        """A sum."""
+        """Compute the sum."""
         entries = _entries(vectors)
         return float(entries @ rows[at][: len(entries)])
 
 
 @inlined
 def product(panels: Any, k: int, vectors: Any, out: Any) -> None:
-    """The matrix number k of some (K, Q, m, 4), times the vectors of a tuple; only the rows that `out` has."""
+    """Multiply matrix k of an array (K, Q, m, 4) by the vectors of a tuple; compute only the rows of `out`."""
     i = 0
     while i < out.shape[0]:
         few()

@@ -1,6 +1,6 @@
 """Powers of a step and sums of series over them as machine code, four terms at a time.
 
-The same as by `tabulate` and `sum_sizes` of `hybridsim.engine.series.interpreter`, to the last bit.
+The results equal those of `tabulate` and `sum_sizes` of `hybridsim.engine.series.interpreter` to the last bit.
 """
 
 from __future__ import annotations
@@ -9,9 +9,9 @@ from hybridsim.engine.native.llvm_text import ONE, Lines, number
 
 
 class Powers:
-    """a**k for k = 0..order as `tabulate` of `engine.series.interpreter` makes them, and sums of series with them.
+    """The powers a**k for k = 0..order as in `tabulate` of `engine.series.interpreter`, and sums of series with them.
 
-    Powers and terms are worked out four at a time, from the last ones on; the first order % 4 are by themselves.
+    Powers and terms are computed four at a time from the highest order down; the lowest order % 4 ones are scalar.
     """
 
     def __init__(self, code: Lines, a: str, order: int) -> None:
@@ -34,7 +34,7 @@ class Powers:
         return "<" + ", ".join(f"double {number(value)}" for value in values) + ">"
 
     def four(self, k: int) -> str:
-        """Powers k to k + 3."""
+        """Return the powers k to k + 3."""
         if k not in self._fours and k > 4:
             self._fours[k] = self._of_two("fmul", self.four(k - 4), self._fourth)
         elif k not in self._fours:
@@ -44,7 +44,7 @@ class Powers:
         return self._fours[k]
 
     def store(self, array: str) -> None:
-        """Write all powers."""
+        """Write all powers to an array."""
         for k in range(self.order % 4 + 1):
             self.code.store(self._first[k], array, k)
         for k in self.begins:
@@ -66,7 +66,7 @@ class Powers:
         return self.code.value("call <4 x double> @llvm.fabs.v4f64(<4 x double> {})", a)
 
     def _together(self, a: str) -> str:
-        """The sum of the four of a vector."""
+        """Add the four elements of a vector."""
         form = "shufflevector <4 x double> {}, <4 x double> poison, <2 x i32> <i32 {first}, i32 {second}>"
         halves = [self.code.value(form.format("{}", first=i, second=i + 1), a) for i in (0, 2)]
         two = self.code.value("fadd <2 x double> {}, {}", *halves)
@@ -75,7 +75,7 @@ class Powers:
         )
 
     def sum(self, array: str, at: int, is_size: bool) -> str:
-        """sum_k c_k a**k, or of |c_k|, over k > 0, of the series that begins at a place of an array."""
+        """Compute sum_k c_k a**k, or of |c_k|, over k > 0, for the series that begins at a place of an array."""
         code, total = self.code, self._constants([0.0] * 4)
         for k in self.begins:
             c = self._load(array, at + k)
@@ -88,7 +88,7 @@ class Powers:
         return found
 
     def terms(self, array: str, at: int) -> tuple[str, str, str]:
-        """Over k > 0 the sums of the terms c_k a**k, of k times them, and of their sizes."""
+        """Compute the sums over k > 0 of the terms c_k a**k, of k times the terms, and of their sizes."""
         code, zero = self.code, self._constants([0.0] * 4)
         value, slope, size = zero, zero, zero
         for k in self.begins:

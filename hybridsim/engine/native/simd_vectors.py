@@ -1,7 +1,7 @@
-"""Eight doubles at once: vectors as a type of kernels, which the compiler would not make of so short loops.
+"""A vector type of eight doubles for kernels, because LLVM does not vectorise such short loops well.
 
-A loop over a few lanes is made into vectors of sixteen and a rest that runs one by one; here it is all vectors, and the
-arrays are longer by what the last one needs. Processors with shorter vectors take two or four of theirs. A product
+LLVM turns a loop over a few lanes into vectors of sixteen and a scalar rest. Here all operations are on vectors, and
+arrays are padded to whole vectors. Processors with shorter vectors use two or four of theirs. A product
 and a sum may be fused. Without the compiler a vector is an array.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 from hybridsim.engine.native.kernels import ENABLED, inlined
 
 WIDTH = 8
-_LINE = 64  # bytes of such a vector, and of a line of the cache
+_LINE = 64  # bytes of a vector and of a cache line
 
 if ENABLED:
     from llvmlite import ir
@@ -27,7 +27,7 @@ if ENABLED:
     _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 
     class EightType(types.Type):
-        """Type of eight doubles."""
+        """The numba type of eight doubles."""
 
         def __init__(self) -> None:
             super().__init__(name="Eight")
@@ -40,7 +40,7 @@ if ENABLED:
             super().__init__(manager, kind, _VECTOR)
 
     def _binary(symbol: Any, instruction: str) -> None:
-        """Make a sign of Python's work on vectors."""
+        """Define a binary operator of Python for vectors."""
 
         @infer_global(symbol)
         class _Typed(ConcreteTemplate):
@@ -61,7 +61,7 @@ if ENABLED:
 
     @intrinsic
     def load(typingctx: Any, array: Any, at: Any) -> Any:
-        """Eight numbers from a place on, counted through all rows of an array."""
+        """Load eight numbers, starting at a flat index into an array."""
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             return builder.load(_place(context, builder, sig.args[0], *args), align=8)
@@ -70,7 +70,7 @@ if ENABLED:
 
     @intrinsic
     def store(typingctx: Any, array: Any, at: Any, value: Any) -> Any:
-        """Put eight numbers into an array."""
+        """Store eight numbers in an array."""
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             builder.store(args[2], _place(context, builder, sig.args[0], *args[:2]), align=8)
@@ -80,7 +80,7 @@ if ENABLED:
 
     @intrinsic
     def put(typingctx: Any, array: Any, at: Any, value: Any) -> Any:
-        """Put one number into an array, at a place as of `store`."""
+        """Store one number in an array, at a flat index as in `store`."""
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             data = context.make_array(sig.args[0])(context, builder, args[0]).data
@@ -91,7 +91,7 @@ if ENABLED:
 
     @intrinsic
     def splat(typingctx: Any, value: Any) -> Any:
-        """One number eight times."""
+        """Return a vector with one number in all lanes."""
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             blank = ir.Constant(_VECTOR, ir.Undefined)
@@ -102,7 +102,7 @@ if ENABLED:
 
     @intrinsic
     def choose(typingctx: Any, mask: Any, value: Any, other: Any) -> Any:
-        """A value where the mask is not zero, the other where it is."""
+        """Select a value in lanes whose mask is not zero, and the other value elsewhere."""
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             is_set = builder.fcmp_unordered("!=", args[0], ir.Constant(_VECTOR, [0.0] * WIDTH))
@@ -112,7 +112,7 @@ if ENABLED:
 
     @intrinsic
     def larger(typingctx: Any, value: Any, other: Any) -> Any:
-        """The larger of two, the other where one is no number."""
+        """Return the larger of two values, or the other value if one is NaN."""
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             return builder.select(builder.fcmp_ordered(">", *args), *args)
@@ -121,7 +121,7 @@ if ENABLED:
 
     @intrinsic
     def all_larger(typingctx: Any, value: Any, other: Any) -> Any:
-        """Whether each number of one is larger than that of the other."""
+        """Return whether each number of one vector is larger than that of the other."""
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             bits = builder.bitcast(builder.fcmp_ordered(">", *args), ir.IntType(WIDTH))
@@ -131,7 +131,7 @@ if ENABLED:
 
     @intrinsic
     def size(typingctx: Any, value: Any) -> Any:
-        """Absolute values."""
+        """Return absolute values."""
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             kind = ir.FunctionType(_VECTOR, [_VECTOR])
@@ -143,46 +143,46 @@ if ENABLED:
 else:
 
     def load(array: Any, at: int) -> Any:
-        """Eight numbers from a place on, counted through all rows of an array; before the first is its end."""
+        """Load eight numbers, starting at a flat index; negative indices count from the end."""
         return array.reshape(-1)[np.arange(at, at + WIDTH)]
 
     def store(array: Any, at: int, value: Any) -> None:
-        """Put eight numbers into an array."""
+        """Store eight numbers in an array."""
         array.reshape(-1)[np.arange(at, at + WIDTH)] = value
 
     def put(array: Any, at: int, value: float) -> None:
-        """Put one number into an array, at a place as of `store`."""
+        """Store one number in an array, at a flat index as in `store`."""
         array.reshape(-1)[at] = value
 
     def splat(value: float) -> Any:
-        """One number eight times."""
+        """Return a vector with one number in all lanes."""
         return np.full(WIDTH, value)
 
     def choose(mask: Any, value: Any, other: Any) -> Any:
-        """A value where the mask is not zero, the other where it is."""
+        """Select a value in lanes whose mask is not zero, and the other value elsewhere."""
         return np.where(mask != 0.0, value, other)
 
     def larger(value: Any, other: Any) -> Any:
-        """The larger of two, the other where one is no number."""
+        """Return the larger of two values, or the other value if one is NaN."""
         return np.where(value > other, value, other)
 
     def all_larger(value: Any, other: Any) -> bool:
-        """Whether each number of one is larger than that of the other."""
+        """Return whether each number of one vector is larger than that of the other."""
         return bool((value > other).all())
 
     def size(value: Any) -> Any:
-        """Absolute values."""
+        """Return absolute values."""
         return abs(value)
 
 
 @inlined
 def whole_vectors(count: int) -> int:
-    """So many numbers, and those that fill the last vector."""
+    """Round a count up to whole vectors."""
     return (count + WIDTH - 1) & -WIDTH
 
 
 def room_for(rows: int, columns: int, before: int = 0) -> np.ndarray:
-    """Zeros (rows, columns) that begin on a line of the cache; vectors may reach beyond the end, or so far before."""
+    """Allocate zeros (rows, columns) aligned to a cache line, with padding for vectors at both ends."""
     ahead = -(-before // WIDTH) * WIDTH
     whole = np.zeros(ahead + rows * columns + 2 * WIDTH)
     skip = ahead + (-whole.ctypes.data // whole.itemsize) % WIDTH

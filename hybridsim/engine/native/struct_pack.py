@@ -1,9 +1,9 @@
-"""Many arrays for a kernel behind one pointer.
+"""Named tuples of many arrays that are passed to kernels by one pointer.
 
-A kernel that is given a tuple of arrays gets seven words for each of them, copied at every call, and counts references
-to each; with a hundred arrays that costs more than the kernel's own work, and most of its compilation. A packed tuple
-is the address of a table of the arrays' addresses and shapes. In a kernel its fields are read as those of the tuple.
-Whoever calls the kernel holds the arrays meanwhile.
+A kernel that is given a tuple of arrays receives seven words per array, copied at every call, and counts references
+to each. With a hundred arrays that costs more than the kernel's own work and most of its compile time. A packed tuple
+is the address of a table of the arrays' addresses and shapes. Kernels read its fields like those of the tuple.
+The caller must keep the arrays alive during the call.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ import numpy as np
 from hybridsim.engine.native.buffer_pool import Lender
 from hybridsim.engine.native.kernels import ENABLED, kernel
 
-_WORDS = 6  # of an array in the table: its address, and up to five lengths
-ALIGNED = 64  # bytes; numbers of any kind may begin there
-_LARGE, LARGEST = 1 << 18, 1 << 21  # bytes of blocks that are handed on when they are free
-_RETURNED = 2  # first blocks that a sheet keeps at hand
+_WORDS = 6  # words per array in the table: its address and up to five lengths
+ALIGNED = 64  # bytes; suitable for numbers of any kind
+_LARGE, LARGEST = 1 << 18, 1 << 21  # bytes of blocks that go through a pool
+_RETURNED = 2  # first blocks that a sheet keeps for reuse
 _REST = [(0,) * (_WORDS - 1 - dimensions) for dimensions in range(_WORDS)]
 
 if ENABLED:
@@ -43,30 +43,30 @@ if ENABLED:
     from numba.np.numpy_support import from_dtype
 
     class Packed:
-        """A named tuple of C-contiguous arrays, as kernels take it: by the table of their addresses and shapes."""
+        """A named tuple of C-contiguous arrays in the form that kernels take: a table of addresses and shapes."""
 
         def __init__(self, arrays: Any, table: np.ndarray, numba_type: PackType, address: int) -> None:
             self.arrays, self.table, self.numba_type, self.address = arrays, table, numba_type, address
             if arrays is not None:
-                vars(self).update(arrays._asdict())  # read as those of the tuple
+                vars(self).update(arrays._asdict())  # fields are attributes, as in the tuple
 
         if TYPE_CHECKING:
 
             def __getattr__(self, name: str) -> Any: ...
 
     class PackType(types.Type):
-        """Type of a packed tuple: its name, and (name, dtype, dimensions) of each field."""
+        """The numba type of a packed tuple: its name, and (name, dtype, dimensions) of each field."""
 
         def __init__(self, title: str, fields: tuple[tuple[str, str, int], ...]) -> None:
             self.title, self.fields = title, fields
             super().__init__(name=f"Pack({title}, {fields})")
 
         def place(self, name: str) -> int:
-            """Row of a field in the table."""
+            """Return the row of a field in the table."""
             return [field[0] for field in self.fields].index(name)
 
         def array(self, name: str) -> Any:
-            """Type of a field."""
+            """Return the numba type of a field."""
             _, dtype, dimensions = self.fields[self.place(name)]
             return types.Array(from_dtype(np.dtype(dtype)), dimensions, "C")
 
@@ -107,7 +107,7 @@ if ENABLED:
         def loaded(i: int) -> Any:
             place = builder.add(address, word(8 * (row + i)))
             value = builder.load(builder.inttoptr(place, ir.PointerType(word)))
-            value.set_metadata("invariant.load", constant)  # nobody moves the arrays while a kernel runs
+            value.set_metadata("invariant.load", constant)  # arrays do not move while a kernel runs
             return value
 
         array = context.make_array(array_type)(context, builder)
@@ -124,18 +124,18 @@ if ENABLED:
 
     @intrinsic
     def pack_at(typingctx: Any, address: Any, like: Any) -> Any:
-        """The pack whose table is at an address, of the type of another."""
+        """Return the pack whose table is at an address, with the type of another pack."""
         return like(types.int64, like), lambda context, builder, signature, arguments: arguments[0]
 
 else:
 
     def pack_at(address: int, like: Any) -> Any:
-        """Nothing is compiled: there are no addresses."""
+        """Raise an error: without a compiler there are no addresses."""
         raise NotImplementedError
 
 
 def packed(arrays: Any) -> Any:
-    """A named tuple of arrays as kernels take it; the tuple itself where the compiler is switched off."""
+    """Pack a named tuple of arrays for kernels; return the tuple itself if the compiler is off."""
     if not ENABLED:
         return arrays
     words: list[int] = []
@@ -150,7 +150,7 @@ def packed(arrays: Any) -> Any:
 
 @kernel
 def _lay_out(words: Any, steps: Any, owners: Any, skipped: Any, blocks: Any, table: Any) -> int:
-    """The table of arrays in some blocks; its address. See `Sheet`."""
+    """Fill the table of arrays that lie in some blocks and return its address; see `Sheet`."""
     for k in range(words.shape[0]):
         for i in range(words.shape[1]):
             table[k, i] = words[k, i] + skipped[k] * steps[k, i]
@@ -165,24 +165,24 @@ def _whole_numbers(numbers: tuple[int, ...]) -> np.ndarray:
 
 
 class Sheet:
-    """Arrays of rows that lie one behind the other in a few blocks of memory.
+    """A layout of arrays of rows that lie one behind the other in a few blocks of memory.
 
-    Where each lies is worked out once; a fresh block is a single allocation, and a pack of all a few sums. A block goes
-    when the last array in it does: what is needed for different lengths of time belongs into different ones.
+    Offsets are computed once; a new block is a single allocation, and packing all arrays takes a few additions. A block
+    is freed with the last array in it, so arrays with different lifetimes belong in different blocks.
 
     Parameters
     ----------
     kind : type of the named tuple.
-    fields : dtype, shape and number of the block of each array.
+    fields : dtype, shape and block number of each array.
     """
 
     def __init__(self, kind: Any, fields: Sequence[tuple[Any, tuple[int, ...], int]]) -> None:
         self._kind = kind
         self._places: list[tuple[tuple[int, ...], np.dtype[Any], int, int]] = []
         self._sizes = [0] * (1 + max(block for *_, block in fields))
-        # the table, but for the blocks' addresses
+        # the table without the addresses of the blocks
         self._words = np.zeros((len(fields), _WORDS), dtype=np.int64)
-        self._steps = np.zeros_like(self._words)  # what a row that is skipped adds to it
+        self._steps = np.zeros_like(self._words)  # change of the table per skipped row
         self._owners = np.array([block for *_, block in fields], dtype=np.int64)
         for k, (name, shape, block) in enumerate(fields):
             dtype, offset = np.dtype(name), self._sizes[block]
@@ -198,10 +198,10 @@ class Sheet:
         self._from_the_first = np.zeros(len(fields), dtype=np.int64)
 
     def blank(self) -> tuple[np.ndarray, ...]:
-        """Blocks that nobody holds, with anything in them."""
+        """Return uninitialised blocks that nothing else uses."""
         try:
             first = self._returned.pop()
-        except IndexError:  # asked beforehand, another thread may take the last one
+        except IndexError:  # another thread may take the last one after a test
             first = self._block(0)
         return first, *map(self._block, range(1, len(self._sizes)))
 
@@ -210,12 +210,12 @@ class Sheet:
         return np.empty(self._sizes[k], dtype=np.uint8) if lender is None else lender.block()
 
     def take_back(self, block: np.ndarray) -> None:
-        """A first block of which nobody holds any part: the next one."""
+        """Return an unused first block to the sheet, which uses it again for the next call."""
         if len(self._returned) < _RETURNED:
             self._returned.append(block)
 
     def packed(self, blocks: tuple[np.ndarray, ...], skipped: Sequence[int] | None = None) -> Any:
-        """The arrays as kernels take them, without so many rows of each at the beginning."""
+        """Pack the arrays for kernels; skipped: rows to omit at the start of each array."""
         if not ENABLED:
             arrays = self.rows(blocks)
             first = skipped or self._from_the_first
@@ -226,7 +226,7 @@ class Sheet:
         return Packed(None, table, self._type, address)
 
     def rows(self, blocks: tuple[np.ndarray | None, ...]) -> Any:
-        """The arrays; None in place of those of blocks that are missing."""
+        """Return the arrays, with None for arrays in missing blocks."""
         return self._kind(
             *[
                 None if blocks[k] is None else np.ndarray(shape, dtype, blocks[k], offset)
@@ -235,6 +235,6 @@ class Sheet:
         )
 
     def row(self, blocks: tuple[np.ndarray, ...], name: str, i: int) -> np.ndarray:
-        """A copy of a row of the array of a name."""
+        """Return a copy of row i of the array with this name."""
         shape, dtype, k, offset = self._places[self._kind._fields.index(name)]
         return np.ndarray(shape, dtype, blocks[k], offset)[i].copy()

@@ -1,4 +1,4 @@
-"""Steps whose length is a number that times add without rounding."""
+"""Step lengths that can be added to the time without rounding."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ _COARSE = 2.0**-42
 
 @inlined
 def on_the_grid(s: float, h: float) -> float:
-    """The length of a step from s that ends at a double of time: the one next to s + h, or 0 if there is none.
+    """Return the step length from s to the double next to s + h, or 0 if there is none.
 
-    A step that is tried with one length and taken with another, an ulp of time apart, is another step where a state
-    moves far in an ulp. A length of few ulps is never rounded up: a step that is rejected is to be followed by a
+    A step that is tried with one length and accepted with a length an ulp of time different is another step if a state
+    moves far in an ulp. A length of few ulps is never rounded up, because a rejected step must be followed by a
     shorter one.
     """
     end = s + h
     if abs(h) < _COARSE * abs(end) and abs(end - s) > abs(h):
-        # it was rounded away from s: three quarters of an ulp less lead to the double before
+        # rounded away from s; three quarters of an ulp less give the previous double
         end = s + (h - math.copysign(0.75 * 2.0**-52 * abs(end), h))
     moved = end - s
     return moved if moved * h > 0.0 else 0.0

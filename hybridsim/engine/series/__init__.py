@@ -1,5 +1,5 @@
-"""This folder computes Taylor coefficients along a flow from a tape of operations.
+"""This package computes Taylor coefficients along a flow from a tape of operations.
 
 Start with `tape`, then `interpreter` (plain coefficients) and `bounded` (coefficients with error bounds). The files
-`emit_*` write the same recurrences as straight machine code.
+`emit_*` write the same recurrences as straight-line machine code.
 """

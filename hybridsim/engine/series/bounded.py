@@ -50,12 +50,12 @@ from hybridsim.engine.series.tape import (
 )
 
 UNIT = 2.0**-53  # unit roundoff of a double
-ORDER = 3  # guards are judged by their derivatives up to the third
+ORDER = 3  # order of the derivatives by which events are decided
 
 
 @inlined
 def _pair(V: Any, E: Any, a: int, b: int, i: int, j: int, u: float, v: float) -> tuple[float, float]:
-    """u a_i b_j + v a_j b_i and its error bound, for whole numbers u and v of which the products are rounded, too."""
+    """Compute u a_i b_j + v a_j b_i and its error bound, for integers u and v whose products are also rounded."""
     first, second = u * V[a, i] * V[b, j], v * V[a, j] * V[b, i]
     error = u * (abs(V[a, i]) * E[b, j] + E[a, i] * (abs(V[b, j]) + E[b, j]))
     error += v * (abs(V[a, j]) * E[b, i] + E[a, j] * (abs(V[b, i]) + E[b, i]))
@@ -65,9 +65,9 @@ def _pair(V: Any, E: Any, a: int, b: int, i: int, j: int, u: float, v: float) ->
 
 @kernel
 def _inner(V: Any, E: Any, a: int, b: int, k: int, weighted: bool) -> tuple[float, float]:
-    """sum_{i=1}^{k-1} a_i b_{k-i}, or of i a_i b_{k-i}, and its error bound.
+    """Compute sum_{i=1}^{k-1} a_i b_{k-i}, or the sum of i a_i b_{k-i} if weighted, and its error bound.
 
-    Summed as in `hybridsim.engine.series.interpreter`.
+    The order of summation is that of `hybridsim.engine.series.interpreter`.
     """
     total, error, m = 0.0, 0.0, k // 2
     if k > 0 and k % 2 == 0:
@@ -84,7 +84,7 @@ def _inner(V: Any, E: Any, a: int, b: int, k: int, weighted: bool) -> tuple[floa
 
 @inlined
 def _product(V: Any, E: Any, a: int, b: int, k: int) -> tuple[float, float]:
-    """sum_{i=0}^{k} a_i b_{k-i} and its error bound."""
+    """Compute sum_{i=0}^{k} a_i b_{k-i} and its error bound."""
     if k == 0:
         total = V[a, 0] * V[b, 0]
         error = abs(V[a, 0]) * E[b, 0] + E[a, 0] * (abs(V[b, 0]) + E[b, 0]) + UNIT * abs(total)
@@ -97,7 +97,7 @@ def _product(V: Any, E: Any, a: int, b: int, k: int) -> tuple[float, float]:
 
 @inlined
 def _slope(V: Any, E: Any, a: int, b: int, k: int) -> tuple[float, float]:
-    """sum_{i=1}^{k} i a_i b_{k-i} and its error bound: the product a' b, times k."""
+    """Compute sum_{i=1}^{k} i a_i b_{k-i} and its error bound; the sum is k times the integral of a' b."""
     inner, error = call_apart(_inner, (V, E, a, b, k, True))
     last = k * V[a, k] * V[b, 0]
     error += k * (abs(V[a, k]) * E[b, 0] + E[a, k] * (abs(V[b, 0]) + E[b, 0])) + 2.0 * UNIT * abs(last)
@@ -106,7 +106,7 @@ def _slope(V: Any, E: Any, a: int, b: int, k: int) -> tuple[float, float]:
 
 @kernel
 def _first_sign(V: Any, a: int, k: int) -> float:
-    """Sign of a series just after its origin, from its leading non-zero coefficient up to order k."""
+    """Return the sign of a series just after its origin, from its leading non-zero coefficient up to order k."""
     for i in range(k + 1):
         if V[a, i] > 0.0:
             return 1.0
@@ -131,7 +131,7 @@ def _put(V: Any, E: Any, out: int, k: int, value: float, error: float) -> None:
 
 @inlined
 def _divide(V: Any, E: Any, out: int, k: int, numerator: float, error: float, b: int) -> None:
-    """V[out, k] = numerator / b_0 with the bound of a quotient."""
+    """Compute V[out, k] = numerator / b_0 with the error bound of a quotient."""
     divisor = V[b, 0]
     value = numerator / divisor
     V[out, k] = value
@@ -140,7 +140,7 @@ def _divide(V: Any, E: Any, out: int, k: int, numerator: float, error: float, b:
 
 @inlined
 def _multiply(V: Any, E: Any, out: int, k: int, factor: float, error: float, b: int) -> None:
-    """V[out, k] = factor (1 / b_0) with the bound of a quotient whose reciprocal is rounded, too."""
+    """Compute V[out, k] = factor (1 / b_0) with the error bound of a quotient with rounded reciprocal."""
     divisor = V[b, 0]
     value = factor * (1.0 / divisor)
     V[out, k] = value
@@ -149,10 +149,10 @@ def _multiply(V: Any, E: Any, out: int, k: int, factor: float, error: float, b: 
 
 @kernel
 def _leading(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int) -> None:
-    """Order 0 of the operations whose higher orders follow from a differential equation."""
+    """Compute order 0 of the operations whose higher orders follow from a differential equation."""
     u, du = V[a, 0], E[a, 0]
     if op == EXP:
-        y = math.inf if u >= 709.0 else math.exp(u)  # math.exp raises where it overflows
+        y = math.inf if u >= 709.0 else math.exp(u)  # math.exp raises an exception if it overflows
         _put(V, E, out, 0, y, abs(y) * (du + 2.0 * UNIT))
     elif op == SINCOS:
         s, co = math.sin(u), math.cos(u)
@@ -189,7 +189,7 @@ def _leading(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int) -> None:
 
 @kernel
 def _higher(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) -> None:
-    """Order k >= 1 of the operations that follow a differential equation."""
+    """Compute order k >= 1 of the operations that follow a differential equation."""
     part = 1.0 / k
     if op == EXP:
         y, e = _slope(V, E, a, out, k)
@@ -232,7 +232,7 @@ def _higher(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) -
 
 @kernel
 def _logic(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) -> None:
-    """Order k of comparisons, choices and corners; a corner takes the side its argument goes to."""
+    """Compute order k of comparisons, choices and corners; a corner takes the side to which its argument moves."""
     if op == ABS:
         sign = _first_sign(V, a, k)
         _put(V, E, out, k, sign * V[a, k], E[a, k])
@@ -267,7 +267,7 @@ def _logic(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) ->
 
 @kernel
 def _with_constant(op: int, V: Any, E: Any, a: int, b: int, out: int, k: int) -> None:
-    """Order k of the operations of the lean tape: on a series a and a constant b, or the sine of a linear angle."""
+    """Compute order k of the lean tape's operations on a series and a constant, or of the sine of a linear angle."""
     u, du, v, dv = V[a, k], E[a, k], V[b, 0], E[b, 0]
     if op == SCALE:
         y = u * v
@@ -296,7 +296,7 @@ def _with_constant(op: int, V: Any, E: Any, a: int, b: int, out: int, k: int) ->
 
 @kernel
 def _advance(row: Any, V: Any, E: Any, k: int) -> None:
-    """Order k of one operation."""
+    """Compute order k of one operation."""
     op, a, b, c, out = row[0], row[1], row[2], row[3], row[4]
     if op == COPY:
         _put(V, E, out, k, V[a, k], E[a, k])
@@ -344,9 +344,9 @@ def _advance(row: Any, V: Any, E: Any, k: int) -> None:
 
 @kernel
 def run_tape(rows: Any, order: int, states: Any, derivatives: Any, V: Any, E: Any) -> None:
-    """Fill the Taylor coefficients V[register, k] and bounds E for k = 0..order along the flow.
+    """Compute the Taylor coefficients V[register, k] and error bounds E for k = 0..order along the flow.
 
-    `rows` (m, 5) int64; registers of constants, time, parameters and the states' order 0 are set by the caller;
+    `rows` (m, 5) int64. The caller sets the registers of constants, time and parameters and order 0 of the states.
     states[i] is the register of x_i, derivatives[i] that of dx_i/dt.
     """
     for k in range(order + 1):
@@ -373,9 +373,9 @@ def run_series(
     V: Any,
     E: Any,
 ) -> None:
-    """Set the inputs of a lean tape and run it to the order that V and E have room for.
+    """Set the inputs of a lean tape and run it up to the order for which V and E have room.
 
-    inputs: as `hybridsim.engine.system.system.Inputs`. derivatives: registers of the states' rates.
+    inputs: see `hybridsim.engine.system.system.Inputs`. derivatives: registers of the states' rates.
     """
     constants, values, parameters = inputs.constants, inputs.values, inputs.parameters
     sources, phases, time, states = inputs.sources, inputs.phases, inputs.time[0], inputs.states

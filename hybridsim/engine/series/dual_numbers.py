@@ -1,6 +1,7 @@
-"""Numbers with derivatives, for the functions of a model that run as plain Python: resets, projections, rates.
+"""Dual numbers, for the functions of a model that run as plain Python: resets, projections and rates.
 
-Each carries a row of derivatives; a generated function is run on them by giving it mathematics that knows them.
+Each number carries a row of derivatives. A generated function is run on dual numbers with mathematical functions that
+accept them.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 
 
 class Dual:
-    """A value and its derivatives (D,)."""
+    """A value with its derivatives (D,)."""
 
     __slots__ = ("slope", "value")
 
@@ -78,7 +79,7 @@ class Dual:
     def __eq__(self, other: object) -> bool:
         return bool(self.value == _parts(other)[0])
 
-    __hash__ = None  # type: ignore[assignment]  # as Python has it: == without a hash
+    __hash__ = None  # type: ignore[assignment]  # as usual in Python for a class with ==
 
 
 def _parts(other: Any) -> tuple[float, Any]:
@@ -88,7 +89,7 @@ def _parts(other: Any) -> tuple[float, Any]:
 def _smooth(
     function: Callable[[float], float], slope: Callable[[float, float], float]
 ) -> Callable[[Any], Any]:
-    """A function of one number; slope takes the argument and the value."""
+    """Return a function of one dual number; slope computes its derivative from argument and value."""
 
     def lifted(u: Any) -> Any:
         if not isinstance(u, Dual):
@@ -112,7 +113,7 @@ def _pow(base: Any, exponent: Any) -> Any:
 
 
 def _copysign(size: Any, sign: Any) -> Any:
-    return math.copysign(size, float(sign))  # generated code takes the sign of something alone
+    return math.copysign(size, float(sign))  # generated code uses only the sign of the result
 
 
 _FUNCTIONS: dict[str, Any] = {
@@ -135,17 +136,17 @@ _FUNCTIONS: dict[str, Any] = {
 
 
 def with_slopes(values: Any, slopes: np.ndarray) -> list[Dual]:
-    """Numbers (n,) with derivatives (n, D)."""
+    """Return dual numbers (n,) from values (n,) and derivatives (n, D)."""
     return [Dual(float(v), d) for v, d in zip(values, slopes, strict=True)]
 
 
 def differentiated(function: FunctionType) -> Callable[..., Any]:
-    """A generated function of a model that takes numbers with derivatives."""
+    """Return a version of a generated function that accepts dual numbers."""
     return FunctionType(function.__code__, function.__globals__ | _FUNCTIONS, function.__name__)
 
 
 def values_and_slopes(numbers: list[Any], directions: int) -> tuple[np.ndarray, np.ndarray]:
-    """Values (n,) and derivatives (n, D) of numbers, of which some may be plain."""
+    """Return the values (n,) and derivatives (n, D) of numbers, some of which may be plain."""
     values = np.array([float(n) for n in numbers])
     slopes = [n.slope if isinstance(n, Dual) else np.zeros(directions) for n in numbers]
     return values, np.array(slopes).reshape(len(numbers), directions)

@@ -1,7 +1,6 @@
-"""Power series to Bernstein form as straight code, for the few degrees that series of one order have.
+"""Straight-line code that converts power series to Bernstein form, for the few degrees of series of one order.
 
-The sums are those of `to_bernstein` in `hybridsim.engine.roots.first_exit`, to the last bit, without the loops around
-them.
+The sums equal those of `to_bernstein` in `hybridsim.engine.roots.first_exit` to the last bit, without the loops.
 """
 
 from __future__ import annotations
@@ -13,14 +12,15 @@ from hybridsim.engine.native.cache import model_folder
 from hybridsim.engine.native.kernels import compile_series
 from hybridsim.engine.native.llvm_text import Lines, function, number
 
-LEADING = 4  # so many numbers of leading coefficients that are zero by decree
+LEADING = 4  # number of cases for the count of leading coefficients set to zero
 
 
 @cache
 def bernstein_code(order: int) -> tuple[list[int], Any]:
-    """Addresses of functions for the series of an order, without 0, 1, .. of their first coefficients; what keeps them.
+    """Return the addresses of conversion functions for series of one order, and the object that keeps them alive.
 
-    The functions are void f(., ., a, ., ., b), as of series: coefficients of powers, and where those of Bernstein go.
+    There is one function per count of omitted leading coefficients. The functions are void f(., ., a, ., ., b), as for
+    series: a are the power coefficients, b the Bernstein coefficients.
     """
     names = [f"bernstein_{size}" for size in range(order + 1, order + 1 - LEADING, -1)]
     folder = model_folder()
@@ -29,7 +29,7 @@ def bernstein_code(order: int) -> tuple[list[int], Any]:
 
 
 def bernstein_text(order: int) -> str:
-    """A module with these functions."""
+    """Return the text of a module with these functions."""
     sizes = range(order + 1, order + 1 - LEADING, -1)
     return "".join(_function(f"bernstein_{size}", size) for size in sizes)
 

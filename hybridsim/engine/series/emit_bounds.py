@@ -1,10 +1,10 @@
-"""The short series of the guards of one vector of modes, with bounds of their rounding errors, as straight code.
+"""Straight-line code for the short series of the guards of one vector of modes, with bounds of their rounding errors.
 
 Each operation is that of `hybridsim.engine.series.bounded`, in the same order, so that both give the same to the last
-bit where values are finite. What is exact has no bound to be carried along, and adds nothing to others.
+bit if values are finite. Exact values carry no bound and add nothing to other bounds.
 
-The functions are void f(s, s_error, x, x_error, p, out): local time and state with the bounds of their errors, run-time
-vector, and where the coefficients of the guards (guards, ORDER + 1) go, followed by their bounds.
+The functions are void f(s, s_error, x, x_error, p, out): local time and state with the bounds of their errors, the
+run-time vector, and the output with the coefficients of the guards (guards, ORDER + 1) followed by their bounds.
 """
 
 from __future__ import annotations
@@ -26,14 +26,14 @@ from hybridsim.engine.series.tape import ADD, COPY, DIV, EXP, LESS, LESS_EQUAL, 
 
 _UNIT = 2.0**-53  # unit roundoff of a double
 _ORDER = 3  # as in `hybridsim.engine.series.bounded`
-_ASKED = frozenset((LESS, LESS_EQUAL))  # comparisons, which are of constants here
+_ASKED = frozenset((LESS, LESS_EQUAL))  # comparisons, here only between constants
 
 Term = tuple[str, str]  # a coefficient and the bound of its error
 
 
 @dataclass(frozen=True)
 class Given:
-    """Where the constants of a tape come from: numbers with their errors, places in p, which of these are phases."""
+    """Sources of a tape's constants: numbers with their errors, places in p, and which of these are phases."""
 
     numbers: Mapping[int, tuple[float, float]]
     sources: Mapping[int, int]
@@ -41,7 +41,7 @@ class Given:
 
 
 class _Bounded(Lines):
-    """Coefficients 0..ORDER of every register with their bounds."""
+    """The coefficients 0..ORDER of every register with their error bounds."""
 
     def __init__(self, tape: ModeTape, constant_rows: Sequence[tuple[int, ...]], given: Given) -> None:
         super().__init__()
@@ -53,7 +53,7 @@ class _Bounded(Lines):
             self.series[tape.time] = [("%s", "%e"), (ONE, ZERO)] + [(ZERO, ZERO)] * (_ORDER - 1)
         for row in constant_rows:
             self._run(row, 0)
-        for row in constant_rows:  # their further coefficients are zero
+        for row in constant_rows:  # their higher coefficients are zero
             for r in (row[4], row[4] + 1) if row[0] in TWINS else (row[4],):
                 self.series[r] += [(ZERO, ZERO)] * _ORDER
         for k in range(_ORDER + 1):
@@ -73,7 +73,7 @@ class _Bounded(Lines):
             self.series.setdefault(r, []).append(term)
 
     def at(self, r: int, k: int) -> Term:
-        """Coefficient k of a register."""
+        """Return coefficient k of a register."""
         if r in self.series:
             return self.series[r][k]
         if k > 0:
@@ -87,28 +87,28 @@ class _Bounded(Lines):
     # -- arithmetic of bounds, which are not negative: what is zero falls away ---------------------------------
 
     def plus(self, *terms: str) -> str:
-        """The sum, from left to right."""
+        """Add terms from left to right."""
         total = ZERO
         for term in terms:
             total = term if total == ZERO else total if term == ZERO else self.op("fadd", total, term)
         return total
 
     def times(self, a: str, b: str) -> str:
-        """The product of a coefficient or bound with another."""
+        """Multiply a coefficient or bound by another."""
         if ZERO in (a, b):
             return ZERO
         return b if a == number(1.0) else a if b == number(1.0) else self.op("fmul", a, b)
 
     def size(self, a: str) -> str:
-        """|a|."""
+        """Compute |a|."""
         return a if a in (ZERO, ONE) else self.call("llvm.fabs.f64", a)
 
     def share(self, units: float, a: str) -> str:
-        """So many units of roundoff of |a|."""
+        """Compute a number of roundoff units of |a|."""
         return self.times(number(units * _UNIT), self.size(a))
 
     def mixed(self, u: Term, v: Term) -> str:
-        """|u| dv + du (|v| + dv)."""
+        """Compute |u| dv + du (|v| + dv)."""
         inner = self.times(u[1], self.plus(self.size(v[0]), v[1]))
         return self.plus(self.times(self.size(u[0]), v[1]), inner)
 
@@ -149,7 +149,7 @@ class _Bounded(Lines):
         return total, self.plus(self.plus(e, d), self.share(1.0, total))
 
     def _slope(self, a: int, b: int, k: int) -> Term:
-        """The product a' b, over k as its integral has it."""
+        """Compute coefficient k of the integral of a' b."""
         inner, error = self._inner(a, b, k, True)
         last, e = self._weighted(k, self.at(a, k), self.at(b, 0))
         error = self.plus(error, self.plus(e, self.share(2.0, last)))
@@ -158,7 +158,7 @@ class _Bounded(Lines):
         return self.op("fmul", total, part), self.times(error, part)
 
     def _quotient(self, n: str, error: str, b: int, k: int) -> Term:
-        """n / b_0; at higher orders by the reciprocal, which is rounded, too."""
+        """Compute n / b_0; higher orders use the rounded reciprocal."""
         divisor, e = self.at(b, 0)
         value = self.op("fdiv", n, divisor) if k == 0 else self.op("fmul", n, self.op("fdiv", ONE, divisor))
         above = self.plus(error, self.times(self.size(value), e))
@@ -206,7 +206,7 @@ class _Bounded(Lines):
         return y, self.plus(error, self.share(1.0, y))
 
     def _ratio(self, u: str, du: str, b: int, out: int, k: int) -> Term:
-        """Order k >= 1 of a quotient of two series."""
+        """Compute order k >= 1 of a quotient of two series."""
         y, e = self._inner(out, b, k, False)
         first, d = self._weighted(1, self.at(out, 0), self.at(b, k))
         e = self.plus(e, self.plus(d, self.share(1.0, first)))
@@ -236,7 +236,7 @@ class _Bounded(Lines):
         value = self.op("fdiv", n, root)
         above = self.op("fdiv", self.plus(error, self.times(self.size(value), d)), self.size(root))
         bound = self.plus(above, self.share(1.0, value))
-        # nothing under a root of nothing
+        # sqrt(0) of an exact zero
         is_something = self.op("fadd", self.op("fadd", self.size(root), self.size(n)), below)
         return (
             self.choice("oeq", is_something, ZERO, ZERO, value),
@@ -244,7 +244,7 @@ class _Bounded(Lines):
         )
 
     def _start(self, op: int, a: int, b: int) -> tuple[Term, ...]:
-        """Order 0 of an operation with a companion."""
+        """Compute order 0 of an operation with a companion."""
         u, du = self.at(a, 0)
         if op != TANGENT:
             s, c = self.call("llvm.sin.f64", u), self.call("llvm.cos.f64", u)
@@ -265,7 +265,7 @@ class _Bounded(Lines):
         )
 
     def _twins(self, op: int, a: int, b: int, out: int, k: int) -> tuple[Term, ...]:
-        """Order k >= 1 of an operation with a companion."""
+        """Compute order k >= 1 of an operation with a companion."""
         if op == SINCOS_LINEAR:
             (rate, e), part = self.at(a, 1), number(1.0 / k)
             turn = self.op("fmul", rate, part), self.times(self.plus(e, self.share(2.0, rate)), part)
@@ -286,7 +286,7 @@ class _Bounded(Lines):
 
 
 def can_bound(tape: ModeTape, constant_rows: Sequence[tuple[int, ...]]) -> bool:
-    """Whether every operation can be written out."""
+    """Return whether every operation can be written as straight-line code."""
     return tape.is_known and all(row[0] in KNOWN | _ASKED for row in constant_rows)
 
 
@@ -297,9 +297,9 @@ def bounds_text(
     numbers: Sequence[int],
     guards: int,
 ) -> str:
-    """A module with the function bounds_0; numbers: of the tape's active guards, among so many in all.
+    """Return a module with the function bounds_0; numbers: indices of the tape's active guards among all guards.
 
-    TooLong where it would take too long to compile.
+    Raise TooLong if it would take too long to compile.
     """
     code, size = _Bounded(tape, constant_rows, given), _ORDER + 1
     for g, r in zip(numbers, tape.guards, strict=True):

@@ -1,17 +1,20 @@
-"""The series of one vector of modes as straight code: every operation of its lean tape written out, order by order.
+"""Straight-line code for the series of one vector of modes: every operation of its lean tape, order by order.
 
-An interpreter of a tape spends more on finding out what to do next than on doing it. Here each coefficient is a value
-of its own, equal ones are worked out once, and what nobody asks for falls away. Each operation is that of
-`hybridsim.engine.series.interpreter`, so that both give the same to the last bit and either may take the place of the
+An interpreter of a tape spends more time on dispatch than on arithmetic. Here each coefficient is a value
+of its own, equal values are computed once, and unused values are omitted. Each operation is that of
+`hybridsim.engine.series.interpreter`, so that both give the same to the last bit and either may replace the
 other.
 
-The functions are void f(s, known, x, guards, constants, out): local time, whether order 0 is known, states, where the
-active guards' coefficients go, the constants of the tape in their registers, and where those of the states go. Sines,
-exponentials and the like at order 0 are left in their registers among the constants: a step begins where the one before
-it was looked at last, and need not work them out again. That of what is `ahead` is void f(s, d, series, guards,
-constants, out), see `hybridsim.engine.roots.defect_check`; that of sizes void f(h, ., ., guards, ., out), see
-`measure` in `hybridsim.engine.series.interpreter`. Those of Runge-Kutta methods know nothing of a step before: void
-f(s, ., x, guards, constants, out), x the states, or along a step their coefficients.
+The step functions are void f(s, known, x, guards, constants, out). s is the local time, known says whether order 0 is
+known, x are the states. guards receives the coefficients of the active guards, constants holds the tape's constants in
+their registers, and out receives the coefficients of the states. Order 0 of sines, exponentials and similar operations
+stays in its registers among the constants: a step begins where the step before it was evaluated last, so that these
+values can be reused.
+
+The other functions have the same type. `ahead` is void f(s, d, series, guards, constants, out), see
+`hybridsim.engine.roots.defect_check`. `sizes` is void f(h, ., ., guards, ., out), see `measure` in
+`hybridsim.engine.series.interpreter`. Functions for Runge-Kutta methods do not use an earlier step: void
+f(s, ., x, guards, constants, out), where x are the states or, along a step, their coefficients.
 """
 
 from __future__ import annotations
@@ -56,8 +59,8 @@ from hybridsim.engine.series.tape import (
     TANGENT,
 )
 
-TWINS = (SINCOS, SINCOS_LINEAR, TANGENT)  # they keep a companion series in the next register
-_COSTLY = (*TWINS, EXP)  # of which order 0 takes as long as all other orders
+TWINS = (SINCOS, SINCOS_LINEAR, TANGENT)  # operations with a companion series in the next register
+_COSTLY = (*TWINS, EXP)  # order 0 of these takes as long as all other orders
 KNOWN = frozenset(
     (
         COPY, ADD, SUB, NEG, MUL, DIV, SQRT, EXP, SINCOS, TANGENT, SELECT, LESS,
@@ -67,14 +70,17 @@ KNOWN = frozenset(
 
 
 def _results(op: int) -> int:
-    """How many registers an operation fills."""
+    """Return the number of registers that an operation fills."""
     return 2 if op in TWINS else 1
 
 
 @dataclass(frozen=True)
 class ModeTape:
-    """What is needed of the lean tape of one vector of modes: rows, those of high orders, registers of time, states,
-    rates, active guards, arguments of what may fade; conditions that hold while time goes on."""
+    """The parts of a mode vector's lean tape that the code needs.
+
+    These are its rows, the rows of high orders, the registers of time, states, rates, active guards and arguments of
+    fading functions, and the conditions that stay constant as time passes.
+    """
 
     rows: tuple[tuple[int, ...], ...]
     high: tuple[tuple[int, ...], ...]
@@ -87,12 +93,12 @@ class ModeTape:
 
     @property
     def is_known(self) -> bool:
-        """Whether every operation can be written out."""
+        """Return whether every operation can be written as straight-line code."""
         return all(row[0] in KNOWN for row in self.rows)
 
 
 class _Expansion(Lines):
-    """Coefficients 0..order of every register; is_known: sines and the like at order 0 are in their registers."""
+    """The coefficients 0..order of every register; is_known: order 0 of sines etc. is in their registers."""
 
     def __init__(self, tape: ModeTape, order: int, stride: int, is_known: bool = False) -> None:
         super().__init__("v" if is_known else "u")
@@ -100,7 +106,7 @@ class _Expansion(Lines):
         self.expand("%s", [self.load("%x", i) for i in range(len(tape.states))])
 
     def expand(self, s: str, x: list[str]) -> None:
-        """All coefficients from a local time and a state on."""
+        """Compute all coefficients, starting from a local time and a state."""
         tape, order = self.tape, self.order
         self.series: dict[int, list[str]] = {r: [value] for r, value in zip(tape.states, x, strict=True)}
         self._set_time(s)
@@ -115,7 +121,7 @@ class _Expansion(Lines):
                     self.series[r].append(self.over(rate, k + 1))
 
     def _run(self, rows: Iterable[tuple[int, ...]], k: int) -> None:
-        """Coefficient k of every operation, in order."""
+        """Compute coefficient k of every operation, in order."""
         for op, a, b, c, out in rows:
             if k == 0 and op in _COSTLY and self.is_known:
                 values = tuple(self.load("%c", r * self.stride) for r in (out, out + 1)[: _results(op)])
@@ -129,7 +135,7 @@ class _Expansion(Lines):
             self.series[self.tape.time] = [s, ONE] + [ZERO] * self.order
 
     def at(self, r: int, k: int) -> str:
-        """Coefficient k of a register."""
+        """Return coefficient k of a register."""
         if r in self.series:
             return self.series[r][k]
         return self.load("%c", r * self.stride) if k == 0 else ZERO
@@ -176,7 +182,7 @@ class _Expansion(Lines):
         return self.fused(self.at(a, k), self.at(b, 0), self.op("fmul", inner, part))
 
     def _factor(self, flags: int, b: int, c: int) -> str:
-        """What flags make of two constants; see `hybridsim.engine.series.high_orders`."""
+        """Combine two constants according to flags; see `hybridsim.engine.series.high_orders`."""
         f = ONE
         for has, over, r in ((HAS_B, OVER_B, b), (HAS_C, OVER_C, c)):
             if flags & has:
@@ -185,18 +191,18 @@ class _Expansion(Lines):
         return self.negative(f) if flags & NEGATIVE else f
 
     def _scaled(self, a: str, flags: int, b: int, c: int, part: str) -> str:
-        """A coefficient times a factor."""
+        """Multiply a coefficient by a factor."""
         f = self._factor(flags, b, c)
         return self.op("fmul", a, part if f == ONE else f if part == ONE else self.op("fmul", f, part))
 
     def _reciprocal(self, a: str, flags: int, b: int, c: int, out: int, k: int) -> str:
-        """Coefficient k of a constant over b."""
+        """Compute coefficient k of a constant over b."""
         part = self.op("fdiv", ONE, self.at(b, 0))
         factor = self.op("fmul", self.op("fmul", self.at(out, 0), part), self._factor(flags ^ NEGATIVE, 0, c))
         return self.fused(a, factor, self.negative(self.op("fmul", self._inner(out, b, k), part)))
 
     def _advance(self, op: int, a: int, b: int, c: int, out: int, k: int) -> tuple[str, ...]:
-        """Coefficient k of an operation, and of its companion."""
+        """Compute coefficient k of an operation, and of its companion."""
         if op in TWINS:
             return self._start(op, a, b) if k == 0 else self._twins(op, a, b, out, k)
         u = self.at(a, k)
@@ -253,7 +259,7 @@ class _Expansion(Lines):
         return self.choice("oeq", root, ZERO, self.choice("oeq", rest, ZERO, ZERO, quotient), quotient)
 
     def _start(self, op: int, a: int, b: int) -> tuple[str, ...]:
-        """Order 0 of an operation with a companion."""
+        """Compute order 0 of an operation with a companion."""
         u = self.at(a, 0)
         if op != TANGENT:
             return self.call("llvm.sin.f64", u), self.call("llvm.cos.f64", u)
@@ -262,7 +268,7 @@ class _Expansion(Lines):
         return y, self.op("fadd", ONE, square if b == 0 else self.negative(square))
 
     def _twins(self, op: int, a: int, b: int, out: int, k: int) -> tuple[str, ...]:
-        """Order k >= 1 of an operation with a companion."""
+        """Compute order k >= 1 of an operation with a companion."""
         if op == SINCOS_LINEAR:
             rate = self.op("fmul", self.at(a, 1), number(1.0 / k))
             sine, cosine = self.at(out, k - 1), self.at(out + 1, k - 1)
@@ -275,7 +281,7 @@ class _Expansion(Lines):
 
 
 def series_function(name: str, tape: ModeTape, order: int) -> str:
-    """The function that writes the coefficients (n, order + 1) of the states and (guards + fading, order + 1)."""
+    """Return the function that writes the series (n, order + 1) of the states and (guards + fading, order + 1)."""
     code, size = _Expansion(tape, order, order + 1, is_known=True), order + 1
     for array, registers in (("%out", tape.states), ("%g", tape.guards + tape.fading)):
         for i, r in enumerate(registers):
@@ -286,7 +292,7 @@ def series_function(name: str, tape: ModeTape, order: int) -> str:
 
 
 def short_function(name: str, tape: ModeTape, order: int, count: int, stride: int) -> str:
-    """The function that writes the coefficients (n, order + 1) of the states and (guards, count).
+    """Return the function that writes the coefficients (n, order + 1) of the states and (guards, count) of the guards.
 
     stride: columns of the array with the constants.
     """
@@ -299,7 +305,7 @@ def short_function(name: str, tape: ModeTape, order: int, count: int, stride: in
 
 
 def values_function(name: str, tape: ModeTape, stride: int) -> str:
-    """The function that writes the rates of the states and the values of the guards."""
+    """Return the function that writes the rates of the states and the values of the guards."""
     code = _start(tape, stride)
     for array, registers in (("%out", tape.rates), ("%g", tape.guards)):
         for i, r in enumerate(registers):
@@ -334,12 +340,12 @@ class _Ahead(_Expansion):
 
 
 def ahead_function(name: str, tape: ModeTape, order: int) -> str:
-    """The function that writes what is ahead of series of an order."""
+    """Return the function `ahead` for series of an order; see `hybridsim.engine.roots.defect_check`."""
     return function(name, _kept_order(_Ahead(tape, order)).lines)
 
 
 class _Along(_Expansion):
-    """Coefficients of the guards, those of the states being given."""
+    """The coefficients of the guards along states with given coefficients."""
 
     def __init__(self, tape: ModeTape, order: int) -> None:
         Lines.__init__(self, "u")
@@ -355,7 +361,7 @@ class _Along(_Expansion):
 
 
 def along_function(name: str, tape: ModeTape, order: int) -> str:
-    """The function that writes the coefficients (guards, order + 1) along states whose own (n, order + 1) are given."""
+    """Return the function that writes guard series (guards, order + 1) from given state series (n, order + 1)."""
     code, size = _Along(tape, order), order + 1
     for i, r in enumerate(tape.guards):
         for k in range(size):
@@ -364,7 +370,7 @@ def along_function(name: str, tape: ModeTape, order: int) -> str:
 
 
 def sizes_function(name: str, guards: int, order: int) -> str:
-    """The function of h that writes its powers, and for each guard sum_k |c_k| h**k."""
+    """Return the function of h that writes its powers, and for each guard sum_k |c_k| h**k."""
     code, size = Lines(), order + 1
     powers = Powers(code, "%s", order)
     powers.store("%out")
@@ -375,12 +381,12 @@ def sizes_function(name: str, guards: int, order: int) -> str:
 
 
 def _start(tape: ModeTape, stride: int) -> _Expansion:
-    """Order 0, of which what is costly is left in its registers."""
+    """Return the code for order 0, whose costly values stay in their registers."""
     return _kept_order(_Expansion(tape, 0, stride))
 
 
 def _kept_order(code: _Expansion) -> _Expansion:
-    """Code with stores of what is costly at order 0."""
+    """Return the code with stores of the costly values of order 0."""
     tape, stride = code.tape, code.stride
     for op, *_, out in tape.rows:
         if op in _COSTLY:
@@ -390,10 +396,10 @@ def _kept_order(code: _Expansion) -> _Expansion:
 
 
 def ends_text(tape: ModeTape, terms: int, first: int, order: int) -> str:
-    """A module with ends_0, first_0, along_0 and values_0.
+    """Return a module with the functions ends_0, first_0, along_0 and values_0.
 
-    ends_0: so many terms; first_0: the states up to an order of their own; see `short_function`. along_0: guards up to
-    the last order; see `along_function`.
+    ends_0 has the given number of terms. first_0 expands the states up to the order `first`; see `short_function`.
+    along_0 expands the guards up to the last order; see `along_function`.
     """
     stride = order + 1
     parts = (
@@ -406,7 +412,7 @@ def ends_text(tape: ModeTape, terms: int, first: int, order: int) -> str:
 
 
 def series_text(tape: ModeTape, order: int) -> str:
-    """A module with series_0, values_0, ahead_0 and sizes_0; TooLong where it would take too long to compile."""
+    """Return a module with series_0, values_0, ahead_0 and sizes_0; raise TooLong if it is too long to compile."""
     parts = (
         series_function("series_0", tape, order),
         values_function("values_0", tape, order + 1),

@@ -1,9 +1,9 @@
-"""Rows for the high orders of a lean tape: the rates along shorter chains of operations.
+"""Rows for the high orders of a lean tape, in which the rates follow from shorter chains of operations.
 
-A coefficient waits for the one before it through every operation between a state and its rate, and with a compiled tape
-this wait is most of a step's time. Constants that follow each other become one factor, what a sum takes last is what
-comes last, and the last factor of a rate takes up the division by the order. Rounded differently than along the rows of
-the lean tape; so they stay as they are for the orders by which events are judged, and for guards at any order.
+A coefficient depends on the one before it through every operation between a state and its rate. With a compiled tape
+this latency is most of a step's time. Successive constants become one factor, a sum adds its latest term last, and the
+last factor of a rate includes the division by the order. The rounding differs from that of the lean tape's rows.
+Therefore the orders by which events are decided keep those rows, and so do guards at any order.
 """
 
 from __future__ import annotations
@@ -34,24 +34,24 @@ RECIPROCAL = 128
 HAS_B, OVER_B, HAS_C, OVER_C, NEGATIVE = 1, 2, 4, 8, 16
 
 Row = tuple[int, ...]
-_SAME, _TURNED = (ADD_CONSTANT, SUB_CONSTANT), (NEG, CONSTANT_SUB)  # at high orders
-# cycles until a result is there; of what is not among them a sum of products
+_SAME, _TURNED = (ADD_CONSTANT, SUB_CONSTANT), (NEG, CONSTANT_SUB)  # copies and negations at high orders
+# latency in cycles; operations that are not listed are sums of products
 _WAITS = {ADD: 3, SUB: 3, NEG: 1, SCALE: 3, DIVIDE_BY: 3, DIV: 12, SQRT: 15}
 _PRODUCT = 6
 _MOST = 2  # constants of a factor
-_EARLY = -(10**6)  # what does not wait for any state
+_EARLY = -(10**6)  # cycle of a value that does not depend on a state
 
 
 @dataclass(frozen=True)
 class _Scaled:
-    """A register as a multiple of another: its constants, each with whether it is divided by, and its sign."""
+    """A register as a multiple of another: constants, each with whether it is a divisor, and a sign."""
 
     base: int
     constants: tuple[tuple[int, bool], ...] = ()
     is_negative: bool = False
 
     def row(self, kind: int, out: int) -> Row:
-        """The row for it."""
+        """Return the row that computes the multiple."""
         places, flags = [0, 0], NEGATIVE if self.is_negative else 0
         for i, (register, divides) in enumerate(self.constants):
             places[i] = register
@@ -64,14 +64,14 @@ class _Scaled:
 def high_rows(
     rows: Sequence[Row], states: Sequence[int], rates: Sequence[int], watched: Iterable[int]
 ) -> list[Row]:
-    """The rows that give the next coefficients of the states, and those of watched registers, at high orders."""
+    """Return the rows that compute the states and the watched registers at high orders."""
     made = _Rewriting(rows, states, rates, set(watched))
     integrals = [made.scaled(rate).row(INTEGRATE, state) for state, rate in zip(states, rates, strict=True)]
     return [*needed_rows(made.rows, made.watched | {row[1] for row in integrals}), *integrals]
 
 
 class _Rewriting:
-    """Rows with their chains made short, in `rows`; those that watched registers need are as they were."""
+    """Rows with shortened chains, in `rows`; rows that watched registers need are unchanged."""
 
     def __init__(
         self, rows: Sequence[Row], states: Sequence[int], rates: Sequence[int], watched: set[int]
@@ -84,9 +84,9 @@ class _Rewriting:
         self._forms: dict[int, _Scaled] = {}
         ready = self._ready_after(dict.fromkeys(states, 0))
         ends = [ready.get(rate, _EARLY) for rate in rates]
-        # of the states some come before others
+        # some states have their coefficients before others
         self._ready = self._ready_after({x: end - max(ends) for x, end in zip(states, ends, strict=True)})
-        self._lent: set[int] = set()  # registers of sums that are a part of others
+        self._lent: set[int] = set()  # registers of inner sums, available for reuse
         self._sums: dict[int, tuple[list[tuple[int, bool]], list[int]]] = {}
         for row in reversed(rows):
             if row[0] in (ADD, SUB) and row not in self._kept and row[4] not in self._lent:
@@ -96,11 +96,11 @@ class _Rewriting:
             self._rewrite(row)
 
     def scaled(self, register: int) -> _Scaled:
-        """A register by what it is a multiple of."""
+        """Return a register as a multiple of another."""
         return self._forms.get(register, _Scaled(register))
 
     def _ready_after(self, ready: dict[int, int]) -> dict[int, int]:
-        """When registers have their coefficients, in cycles, the states' being given."""
+        """Return the cycle at which each register has its coefficient, with the states given at the start."""
         for row in self._of.values():
             op, out = row[0], row[4]
             wait = _EARLY if op == SINCOS_LINEAR else 0 if op in _SAME else _WAITS.get(op, _PRODUCT)
@@ -128,7 +128,7 @@ class _Rewriting:
             self.rows.append(row)
 
     def _reciprocal(self, b: int, out: int) -> Row:
-        """What does not change over a register."""
+        """Return a row for a constant over a register."""
         form = self.scaled(b)
         if len(form.constants) > 1:
             form = _Scaled(b)
@@ -138,7 +138,7 @@ class _Rewriting:
         return (RECIPROCAL + flags, form.base, b, register, out)
 
     def _sum(self, out: int, terms: Sequence[tuple[int, bool]], inner: Sequence[int]) -> None:
-        """A sum that takes last what comes last; the sums it is made of lend their registers."""
+        """Append rows of a sum that adds its latest term last; they reuse the registers of the inner sums."""
         (total, is_negative), *others = sorted(terms, key=lambda term: self._ready.get(term[0], _EARLY))
         for (register, turns), to in zip(others, (*inner, out), strict=True):
             if turns == is_negative:
@@ -150,9 +150,9 @@ class _Rewriting:
             total = to
 
     def _take_apart(self, row: Row) -> None:
-        """Find the registers of a sum, each with whether it is subtracted, and the sums in it that nobody else reads.
+        """Record the registers of a sum, each with whether it is subtracted, and its inner sums with no other reader.
 
-        One of negative terms alone stays as it is.
+        A sum that has only negative terms stays unchanged.
         """
         found: list[tuple[int, bool]] = []
         inner: list[int] = []
@@ -172,7 +172,7 @@ class _Rewriting:
             self._lent.update(inner)
 
     def _is_inner(self, register: int, operations: tuple[int, ...]) -> bool:
-        """Whether a register is of one of these operations, and read but once."""
+        """Return whether a register is the result of one of these operations and is read only once."""
         row = self._of.get(register)
         return (
             row is not None

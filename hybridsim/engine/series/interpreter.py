@@ -1,13 +1,14 @@
-"""Taylor coefficients of any order along a flow, and how far they reach.
+"""Taylor coefficients of any order along a flow, and the step size for which they are accurate.
 
 The recurrences are those of automatic differentiation (A. Jorba and M. Zou, Experimental Mathematics 14 (2005) 99,
-doi:10.1080/10586458.2005.10128904), over the lean tape and without the error bounds that
-`hybridsim.engine.series.bounded` keeps.
+doi:10.1080/10586458.2005.10128904). They use the lean tape, without the error bounds of
+`hybridsim.engine.series.bounded`.
 
-Sums run from the middle of a convolution outward: what is newest, at both ends, comes last, so that little waits for
-it. What is divided by an order, or at higher orders by one and the same number, is multiplied by the reciprocal. The
-generated code of `hybridsim.engine.series.emit_series` does each operation alike, to the last bit, and so does
-`hybridsim.engine.series.bounded` up to the order by which events are judged; beyond it products and sums are fused.
+Sums run from the middle of a convolution outward. The newest coefficients, at both ends, are added last, so that few
+operations depend on them. Divisions by an order, or at higher orders by a fixed number, are multiplications by the
+reciprocal. The generated code of `hybridsim.engine.series.emit_series` does the same operations, to the last bit. So
+does `hybridsim.engine.series.bounded` up to the order by which events are decided; beyond it products and sums are
+fused.
 """
 
 from __future__ import annotations
@@ -68,17 +69,17 @@ from hybridsim.engine.series.tape import (
 )
 
 # Step control: the last two coefficients of each state and each guard stay below the tolerance at the end of a step.
-_SHORTER = 0.5  # factor on a step over which a guard's series does not reach, where nothing tells more
+_SHORTER = 0.5  # factor on a step that is too long for a guard's series, without a better estimate
 # Of a guard's terms over the tolerance: one that is a state is not to shorten that state's own step.
 SLACK = 1.5
-_TRIALS = 60  # halvings: down to nothing
-_FIRST, _SURELY = 4, 0.9  # terms that are looked at for a shorter step; share of it that serves surely
-_LEAST, _MANTISSA, _ONE = 1e-300, (1 << 52) - 1, 1023 << 52  # of a double
+_TRIALS = 60  # most halvings of a step
+_FIRST, _SURELY = 4, 0.9  # terms that determine a shorter step; safety factor on it
+_LEAST, _MANTISSA, _ONE = 1e-300, (1 << 52) - 1, 1023 << 52  # bit fields of a double
 
 
 @kernel
 def _inner(V: Any, a: int, b: int, k: int) -> float:
-    """sum_{i=1}^{k-1} a_i b_{k-i}."""
+    """Compute sum_{i=1}^{k-1} a_i b_{k-i}."""
     total = V[a, k // 2] * V[b, k // 2] if k > 0 and k % 2 == 0 else 0.0
     if k <= EXACTLY:
         for i in range((k - 1) // 2, 0, -1):
@@ -88,7 +89,7 @@ def _inner(V: Any, a: int, b: int, k: int) -> float:
         for i in range((k - 1) // 2, 0, -1):
             total = fused(2.0 * V[a, i], V[a, k - i], total)
         return total
-    other = 0.0  # beside it, so that neither waits for the other
+    other = 0.0  # a second sum, independent of the first
     for i in range((k - 1) // 2, 0, -1):
         total, other = fused(V[a, i], V[b, k - i], total), fused(V[a, k - i], V[b, i], other)
     return total + other
@@ -96,7 +97,7 @@ def _inner(V: Any, a: int, b: int, k: int) -> float:
 
 @inlined
 def _product(V: Any, a: int, b: int, k: int) -> float:
-    """sum_{i=0}^{k} a_i b_{k-i}."""
+    """Compute sum_{i=0}^{k} a_i b_{k-i}."""
     if k == 0:
         return V[a, 0] * V[b, 0]
     inner = call_apart(_inner, (V, a, b, k))
@@ -109,7 +110,7 @@ def _product(V: Any, a: int, b: int, k: int) -> float:
 
 @kernel
 def _weighted(V: Any, a: int, b: int, k: int) -> float:
-    """sum_{i=1}^{k-1} i a_i b_{k-i}."""
+    """Compute sum_{i=1}^{k-1} i a_i b_{k-i}."""
     total = k // 2 * V[a, k // 2] * V[b, k // 2] if k % 2 == 0 else 0.0
     if k <= EXACTLY:
         for i in range((k - 1) // 2, 0, -1):
@@ -124,7 +125,7 @@ def _weighted(V: Any, a: int, b: int, k: int) -> float:
 
 @inlined
 def _rise(V: Any, a: int, b: int, k: int) -> float:
-    """Coefficient k of the integral of a' b; at high orders the newest product waits for nothing but its sum."""
+    """Compute coefficient k of the integral of a' b; at high orders the newest product is added last."""
     if k <= EXACTLY:
         return _slope(V, a, b, k) * (1.0 / k)
     return fused(V[a, k], V[b, 0], call_apart(_weighted, (V, a, b, k)) * (1.0 / k))
@@ -132,16 +133,16 @@ def _rise(V: Any, a: int, b: int, k: int) -> float:
 
 @inlined
 def _slope(V: Any, a: int, b: int, k: int) -> float:
-    """sum_{i=1}^{k} i a_i b_{k-i}: coefficient k - 1 of a' b."""
+    """Compute sum_{i=1}^{k} i a_i b_{k-i}, which is coefficient k - 1 of a' b."""
     return call_apart(_weighted, (V, a, b, k)) + k * V[a, k] * V[b, 0]
 
 
 @kernel
 def _leading(op: int, V: Any, a: int, b: int, c: int, out: int) -> None:
-    """Order 0 of the operations that follow a differential equation."""
+    """Compute order 0 of the operations that follow a differential equation."""
     u = V[a, 0]
     if op == EXP:
-        V[out, 0] = math.inf if u >= 709.0 else math.exp(u)  # math.exp raises where it overflows
+        V[out, 0] = math.inf if u >= 709.0 else math.exp(u)  # math.exp raises an exception if it overflows
     elif op in (SINCOS, SINCOS_LINEAR):
         V[out, 0], V[out + 1, 0] = math.sin(u), math.cos(u)
     elif op == SINHCOSH:
@@ -166,7 +167,7 @@ def _leading(op: int, V: Any, a: int, b: int, c: int, out: int) -> None:
 
 @kernel
 def _higher(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
-    """Order k >= 1 of the operations that follow a differential equation."""
+    """Compute order k >= 1 of the operations that follow a differential equation."""
     if op == EXP:
         V[out, k] = _rise(V, a, out, k)
     elif op == SINCOS:
@@ -190,7 +191,7 @@ def _higher(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
 
 @kernel
 def _logic(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
-    """Order k of comparisons, choices and corners; a corner takes the side its argument goes to."""
+    """Compute order k of comparisons, choices and corners; a corner takes the side to which its argument moves."""
     if op in (ABS, MIN, MAX):
         sign = 0.0
         for i in range(k + 1):
@@ -229,7 +230,7 @@ def _logic(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
 
 @inlined
 def _factor(flags: int, V: Any, b: int, c: int) -> float:
-    """What flags make of two constants; see `hybridsim.engine.series.high_orders`."""
+    """Combine two constants according to flags; see `hybridsim.engine.series.high_orders`."""
     f = 1.0
     if flags & HAS_B:
         f = 1.0 / V[b, 0] if flags & OVER_B else V[b, 0]
@@ -240,7 +241,7 @@ def _factor(flags: int, V: Any, b: int, c: int) -> float:
 
 @kernel
 def advance(rows: Any, V: Any, k: int) -> None:
-    """Coefficient k of every operation, in order."""
+    """Compute coefficient k of every operation, in order."""
     for r in range(rows.shape[0]):
         op, a, b, c, out = rows[r, 0], rows[r, 1], rows[r, 2], rows[r, 3], rows[r, 4]
         if op == SCALE:
@@ -300,10 +301,11 @@ def advance(rows: Any, V: Any, k: int) -> None:
 
 @kernel
 def expand(rows: Any, high: Any, places: Any, order: int, s: float, x: Any, V: Any) -> None:
-    """Coefficients 0..order along the flow from x at local time s: of all registers, or of what `high` leaves.
+    """Compute the coefficients 0..order along the flow from x at local time s, of all registers or of those in `high`.
 
-    high: rows for the orders beyond `EXACTLY` (`hybridsim.engine.series.high_orders`); none: they are as at the lower
-    ones. places: registers of time (-1: none), of the states and of their derivatives. Constants are set beforehand.
+    high: rows for the orders beyond `EXACTLY` (`hybridsim.engine.series.high_orders`); if empty, all orders use the
+    same rows. places: registers of time (-1: none), of the states and of their derivatives. The caller sets the
+    constants.
     """
     time, states, derivatives = places
     if time >= 0:
@@ -323,7 +325,7 @@ def expand(rows: Any, high: Any, places: Any, order: int, s: float, x: Any, V: A
 
 @inlined
 def tabulate(h: float, order: int, powers: Any) -> None:
-    """powers[k] = h**k for k = 0..order, order >= 1; from the fifth on four at a time."""
+    """Compute powers[k] = h**k for k = 0..order, order >= 1; from the fifth on four at a time."""
     powers[0], powers[1] = 1.0, h
     for k in range(2, min(order, 4) + 1):
         powers[k] = powers[k // 2] * powers[k - k // 2]
@@ -333,7 +335,7 @@ def tabulate(h: float, order: int, powers: Any) -> None:
 
 @inlined
 def sum_sizes(U: Any, r: int, order: int, powers: Any) -> float:
-    """sum_k |U[r, k]| h**k, the powers given: four sums side by side, from the last terms on."""
+    """Compute sum_k |U[r, k]| h**k from given powers, as four interleaved sums that begin with the last terms."""
     a, b, c, d = 0.0, 0.0, 0.0, 0.0
     for k in range(order - 3, 0, -4):
         a, b = fused(abs(U[r, k]), powers[k], a), fused(abs(U[r, k + 1]), powers[k + 1], b)
@@ -346,9 +348,9 @@ def sum_sizes(U: Any, r: int, order: int, powers: Any) -> float:
 
 @inlined
 def measure(code: int, U: Any, watched: Any, order: int, h: float, powers: Any, totals: Any) -> None:
-    """Powers of h, and for the series in the watched rows of U what `sum_sizes` makes of them.
+    """Compute the powers of h and, for the series in the watched rows of U, the sums of `sum_sizes`.
 
-    code: address of a function that does so for all rows, where the totals follow on the powers in memory (`sizes` of
+    code: address of a function that does so for all rows, with the totals after the powers in memory (`sizes` of
     `hybridsim.engine.series.emit_series`); 0 for none.
     """
     if code != 0:
@@ -361,16 +363,16 @@ def measure(code: int, U: Any, watched: Any, order: int, h: float, powers: Any, 
 
 @inlined
 def _root(x: float, n: int) -> float:
-    """x**(1/n) for x >= 0, to some digits: cheaper than a power."""
+    """Approximate x**(1/n) for x >= 0 to a few digits, faster than a power."""
     return math.exp(math.log(x) / n) if 0.0 < x < math.inf else x
 
 
 @polynomial_kernel
 def rough_inverse_root(x: float, n: int) -> float:
-    """x**(-1/n) for x >= 0, to three digits: cheaper than a power.
+    """Approximate x**(-1/n) for x >= 0 to three digits, faster than a power.
 
-    Exponent and mantissa are taken apart in the bits of a double; between powers of two the logarithm and the
-    exponential are cubics, good to 8e-4 / n and 1e-4.
+    Exponent and mantissa are read from the bits of a double. Between powers of two the logarithm and the
+    exponential are cubics with errors of 8e-4 / n and 1e-4.
     """
     if not _LEAST <= x < math.inf:
         return math.inf if x == 0.0 else 1.0 / _root(x, n)
@@ -386,10 +388,11 @@ def rough_inverse_root(x: float, n: int) -> float:
 
 @inlined
 def shorter_reach(U: Any, r: int, order: int, rtol: float, h: float, is_before: bool) -> float:
-    """A step below h over which the last term of a series is below rtol of one of its first four, or half of h.
+    """Return a step below h over which the last term of a series is below rtol of one of its first four, or h/2.
 
-    is_before: the last but one, which is larger. One of the first four is the largest, or not much less, over a step
-    that serves: of exp(w t) with rtol = 1e-12 and order 24 the fourth. They tell the step at once.
+    is_before: use the last term but one, which is larger. Over a useful step one of the first four terms is the
+    largest, or not much smaller; for exp(w t) with rtol = 1e-12 and order 24 it is the fourth. These terms give the
+    step directly.
     """
     last = order - 1 if is_before else order
     found = 0.0
@@ -415,13 +418,13 @@ def reach(
     powers: Any,
     totals: Any,
 ) -> float:
-    """The step h up to which the series hold to the tolerance, at most `longest`.
+    """Return the step h, at most `longest`, up to which the series meet the tolerance.
 
-    powers (order + 1,) are h**k then, totals those of `sum_sizes` for the functions; code: see `measure`.
+    On return powers (order + 1,) are h**k and totals are those of `sum_sizes` for the functions; code: see `measure`.
 
     states: rows of V with the series of the states, watched: rows of U with those of functions. The last two terms of
-    each state are below atol + rtol |x|; those of each function below rtol of its largest term, times the slack. NaN
-    where a coefficient is no number.
+    each state are below atol + rtol |x|, and those of each function below rtol of its largest term, times the slack.
+    The result is NaN if a coefficient is not finite.
     """
     h, first, last = longest, 0.0, 0.0  # the last two terms over the tolerance, without the powers of h
     for i in range(states.shape[0]):
@@ -444,9 +447,9 @@ def reach(
             largest = max(abs(U[r, 0]), abs(U[r, 1]) * powers[1])
             if term <= slack * rtol * largest or term == 0.0:
                 break
-            if not term > slack * rtol * totals[j]:  # else none of them is large enough
+            if not term > slack * rtol * totals[j]:  # otherwise none of the terms is large enough
                 a, b, c = 0.0, 0.0, 0.0
-                for k in range(2, order - 3, 3):  # three lines, which do not wait for each other
+                for k in range(2, order - 3, 3):  # three independent lines
                     a = max(a, abs(U[r, k]) * powers[k])
                     b = max(b, abs(U[r, k + 1]) * powers[k + 1])
                     c = max(c, abs(U[r, k + 2]) * powers[k + 2])
@@ -461,7 +464,7 @@ def reach(
 
 @kernel
 def evaluate_series(V: Any, registers: Any, order: int, d: float, out: Any) -> None:
-    """Values of the series of some registers at a distance d from their origin (Horner)."""
+    """Evaluate the series of some registers at a distance d from their origin (Horner)."""
     for i in range(registers.shape[0]):
         total = V[registers[i], order]
         for k in range(order - 1, -1, -1):
@@ -471,9 +474,9 @@ def evaluate_series(V: Any, registers: Any, order: int, d: float, out: Any) -> N
 
 @polynomial_kernel
 def polynomials(coefficients: Any, d: Any, out: Any) -> None:
-    """out[j, i] = sum_k coefficients[i, k] d[j]**k.
+    """Compute out[j, i] = sum_k coefficients[i, k] d[j]**k.
 
-    To the last bit as `hybridsim.engine.record.series_block` has it.
+    The result equals that of `hybridsim.engine.record.series_block` to the last bit.
     """
     order = coefficients.shape[1] - 1
     for j in range(d.shape[0]):

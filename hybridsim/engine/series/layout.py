@@ -1,4 +1,4 @@
-"""Where everything sits in the run-time vector p: parameters, discrete states, time origin, phases, signals."""
+"""Layout of the run-time vector p: parameters, discrete states, time origin, phases and input coefficients."""
 
 from __future__ import annotations
 
@@ -19,35 +19,35 @@ class Layout:
 
     @cached_property
     def discrete_at(self) -> int:
-        """First discrete state."""
+        """Return the offset of the first discrete state."""
         return self.parameters
 
     @cached_property
     def discrete_slice(self) -> slice:
-        """Where the discrete states stand."""
+        """Return the slice of the discrete states."""
         return slice(self.discrete_at, self.discrete_at + self.discrete)
 
     @cached_property
     def origin_at(self) -> int:
-        """The origin that local time is counted from, as a double (for expressions in plain t)."""
+        """Return the offset of the origin of local time, as a double (for expressions in plain t)."""
         return self.parameters + self.discrete
 
     @cached_property
     def pin_at(self) -> int:
-        """1 where states held by a mode are evaluated from their constraint, 0 where they are integrated."""
+        """Return the offset of a flag: 1 if held states follow from their constraint, 0 if they are integrated."""
         return self.origin_at + 1
 
     @cached_property
     def phases_at(self) -> int:
-        """Angles rate*origin modulo 2 pi, one for each rate at which an angle grows in time."""
+        """Return the offset of the angles rate*origin modulo 2 pi, one per rate of an angle that grows in time."""
         return self.pin_at + 1
 
     @cached_property
     def signals_at(self) -> int:
-        """Coefficients of the current piece of each input."""
+        """Return the offset of the coefficients of the current piece of each input."""
         return self.phases_at + self.phases
 
     @cached_property
     def size(self) -> int:
-        """Length of p."""
+        """Return the length of p."""
         return self.signals_at + SIGNAL_SLOTS * self.signals

@@ -1,8 +1,8 @@
-"""The tape of one vector of modes made lean: copies gone, what is constant in time worked out once.
+"""The lean tape of one vector of modes, without copies and with its constants in time computed once.
 
-The rows of a tape (see `hybridsim.engine.series.tape`) are sorted by what they depend on: a row over constants has one
-coefficient and runs once; a product with a constant, and the sine of an angle that grows linearly, cost one
-multiplication an order instead of a convolution.
+The rows of a tape (see `hybridsim.engine.series.tape`) are sorted by their operands. A row over constants has one
+coefficient and runs once. A product with a constant, and the sine of an angle that grows linearly, cost one
+multiplication per order instead of a convolution.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ from hybridsim.engine.series.tape import (
     TANGENT,
 )
 
-# Operations of the lean tape beyond those of the tape: on a series a and a constant b.
+# Additional operations of the lean tape, on a series a and a constant b.
 ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB, SCALE, DIVIDE_BY, SINCOS_LINEAR = range(40, 46)
 
-CONSTANT, LINEAR, SERIES = range(3)  # what a register is in time
+CONSTANT, LINEAR, SERIES = range(3)  # dependence of a register on time
 PAIRED = (SINCOS, SINHCOSH, TANGENT)  # operations with a companion in the next register
 _ONE = (
     COPY,
@@ -50,18 +50,18 @@ _ONE = (
     SINCOS,
     SINHCOSH,
     TANGENT,
-)  # of one register; the rest are of two
+)  # operations on one register; the others use two
 _KEEP_LINEAR = (ADD, SUB, NEG)
 
 
 @dataclass(frozen=True)
 class LeanTape:
-    """Rows (operation, a, b, c, out) over the registers of the tape they come from.
+    """Rows (operation, a, b, c, out) over the registers of the tape from which they are made.
 
     Parameters
     ----------
-    constant_rows : run once a segment, at order 0.
-    rows : run at every order.
+    constant_rows : rows that run once per segment, at order 0.
+    rows : rows that run at every order.
     states, derivatives, guards, surfaces, monitors : registers of the states, their rates and the results.
     """
 
@@ -75,10 +75,10 @@ class LeanTape:
 
 
 def twins_of(tape: dict[str, Any]) -> dict[int, int]:
-    """Registers that are constant in some modes and not in others, with the register that each has where it is.
+    """Map each register that is constant in some modes only to the register that it uses in those modes.
 
-    A compiled loop keeps its registers from mode to mode and writes of a constant the leading coefficient alone: what
-    another mode has left behind that would still stand there.
+    A compiled loop keeps its registers from mode to mode and writes only the leading coefficient of a constant.
+    Without separate registers, the higher coefficients of another mode would remain.
     """
     kinds = [dict.fromkeys(tape["states"], SERIES) | {tape["time"]: LINEAR} for _ in range(2)]
     least, most = kinds
@@ -113,9 +113,9 @@ def lean(
     active: Iterable[int],
     twins: Mapping[int, int] = MappingProxyType({}),
 ) -> LeanTape:
-    """The lean form of the rows of one vector of modes, with its active guards; twins as found by `twins_of`."""
+    """Return the lean form of one mode vector's rows with its active guards; twins: see `twins_of`."""
     kind = dict.fromkeys(tape["states"], SERIES) | {tape["time"]: LINEAR}
-    same: dict[int, int] = {}  # a copy -> what it is a copy of
+    same: dict[int, int] = {}  # copy -> original register
     constant_rows: list[tuple[int, ...]] = []
     series_rows: list[tuple[int, ...]] = []
     for op, *given, out in rows:
@@ -148,7 +148,7 @@ def lean(
 
 
 def has_corners(tape: dict[str, Any]) -> bool:
-    """Whether a corner or a jump (abs, min, max, sign, a condition) depends on what moves, in any mode."""
+    """Return whether a corner or a jump (abs, min, max, sign, a condition) depends on a state or time, in any mode."""
     kind = dict.fromkeys(tape["states"], SERIES) | {tape["time"]: LINEAR}
     agreeing = set()
     for _, branches in tape["parts"]:
@@ -172,7 +172,7 @@ def _array(rows: list[tuple[int, ...]]) -> np.ndarray:
 
 
 def _registers(op: int) -> int:
-    """How many of a, b, c are registers; the others are flags of the operation."""
+    """Return how many of a, b, c are registers; the others are flags of the operation."""
     return 1 if op in _ONE else 3 if op == SELECT else 2
 
 
@@ -185,7 +185,7 @@ def _kind(op: int, kinds: list[int]) -> int:
 
 
 def _special(op: int, a: int, b: int, c: int, kinds: list[int]) -> tuple[int, int, int, int]:
-    """The cheaper operation where one operand is constant or an angle is linear."""
+    """Return the cheaper operation for a constant operand or a linear angle."""
     if op == SINCOS and kinds[0] == LINEAR:
         return SINCOS_LINEAR, a, b, c
     if len(kinds) == 2 and kinds[1] == CONSTANT:
@@ -198,17 +198,17 @@ def _special(op: int, a: int, b: int, c: int, kinds: list[int]) -> tuple[int, in
 
 
 def arguments_of(row: tuple[int, ...]) -> tuple[int, ...]:
-    """The registers whose series a row reads."""
+    """Return the registers whose series a row reads."""
     return row[1 : 2 if row[0] >= ADD_CONSTANT else 1 + _registers(row[0])]
 
 
 def needed_rows(rows: list[tuple[int, ...]], wanted: set[int]) -> list[tuple[int, ...]]:
-    """The rows that the wanted registers depend on, in order."""
+    """Return the rows on which the wanted registers depend, in order."""
     wanted = set(wanted)
     kept = []
     for row in reversed(rows):
         out = row[4]
         if out in wanted or (row[0] in (*PAIRED, SINCOS_LINEAR) and out + 1 in wanted):
             kept.append(row)
-            wanted |= set(row[1:4])  # flags among them only keep a row too many
+            wanted |= set(row[1:4])  # flags among them can only keep an unneeded row
     return kept[::-1]

@@ -1,4 +1,4 @@
-"""Where the inputs of a tape are among its registers, as index arrays that kernels take."""
+"""Registers of the inputs of a tape, as index arrays for kernels."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ from hybridsim.expr import own_roundoff
 
 
 class Inputs(NamedTuple):
-    """Registers of a tape's inputs: constants with values and error bounds (m, 2), parameters and their places in p,
-    phases, time (1,) (-1: none), states."""
+    """Registers of a tape's inputs, as index arrays.
+
+    These are constants with values and error bounds (m, 2), parameters and their places in p, phases, time (1,) (-1:
+    none) and states.
+    """
 
     constants: np.ndarray
     values: np.ndarray
@@ -26,7 +29,7 @@ class Inputs(NamedTuple):
 
 
 class Registers:
-    """Where the tape's inputs are, as index arrays."""
+    """Registers of a tape's inputs, as index arrays for kernels."""
 
     def __init__(self, tape: dict[str, Any], layout: Layout) -> None:
         self.twins = twins_of(tape)
@@ -43,7 +46,7 @@ class Registers:
         )
 
     def with_roundoff(self, p: np.ndarray) -> Inputs:
-        """The inputs with the roundoff of each number itself: parameters as constants that have an error."""
+        """Return the inputs with the roundoff of each number; parameters become constants that have an error."""
         known: Inputs = self.inputs
         numbers = np.concatenate([known.values[:, 0], p[known.sources]])
         errors = np.array([own_roundoff(number) for number in numbers.tolist()])

@@ -1,4 +1,4 @@
-"""A function of a few arguments as a lean tape: which of them move in time, which are constants of each instance."""
+"""A function of a few arguments as a lean tape; each argument varies in time or is constant per instance."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ScalarTape:
-    """Rows of a lean tape (see `hybridsim.engine.series.optimise`) and the registers of what goes in and comes out.
+    """Rows of a lean tape (see `hybridsim.engine.series.optimise`) and the registers of its arguments and its value.
 
     Parameters
     ----------
-    registers : how many there are.
-    constant_rows, rows : run once, and at every order.
+    registers : number of registers.
+    constant_rows, rows : rows that run once, and rows that run at every order.
     moving, constants : register of each argument.
     numbers : register and value of each number in the expression.
     out : register of the value.
@@ -44,17 +44,17 @@ class ScalarTape:
 def scalar_tape(
     expression: Expression, moving: tuple[str, ...], constants: tuple[str, ...], positive: str
 ) -> ScalarTape:
-    """The tape of an expression.
+    """Return the tape of an expression.
 
     Parameters
     ----------
-    moving, constants : names of the arguments that move in time, and of those that do not.
-    positive : the moving argument that is never negative.
+    moving, constants : names of the arguments that vary in time, and of the constant ones.
+    positive : name of the argument that varies in time and is never negative.
 
     Raises
     ------
     ModelError
-        Where the expression has a corner or a jump, or a power that has no Taylor series at zero.
+        If the expression has a corner or a jump, or a power that has no Taylor series at zero.
     """
     form = _form(expression, (*moving, *constants), positive)
     _refuse_powers(expression, form, moving)
@@ -92,7 +92,7 @@ def scalar_tape(
 
 @lru_cache(maxsize=256)
 def is_same(first: Expression, second: Expression, at_zero: str) -> bool:
-    """Whether two expressions agree, by algebra, where one of their arguments is zero."""
+    """Return whether two expressions agree algebraically when one of their arguments is zero."""
     import sympy as sp
 
     from hybridsim.expr.simplify import simplified

@@ -1,7 +1,7 @@
-"""A tape: expressions as rows (operation, a, b, c, out) over numbered registers, for one pre-compiled interpreter.
+"""A tape stores expressions as rows (operation, a, b, c, out) over numbered registers for a pre-compiled interpreter.
 
 The tape is data. It is built once from SymPy expressions when a model is first lowered, stored beside the
-generated source, and run by `hybridsim.engine.series.bounded` to get Taylor coefficients with error bounds.
+generated source, and run by `hybridsim.engine.series.bounded` to compute Taylor coefficients with error bounds.
 """
 
 from __future__ import annotations
@@ -15,22 +15,22 @@ from hybridsim.expr.grammar import WHOLE_POWERS
 # Operations. INTEGRAL gives y with y' * a = b' (log, atan, asin: the derivative is a quotient).
 COPY, ADD, SUB, MUL, DIV, NEG, SQRT, EXP, SINCOS, INTEGRAL = range(10)
 SINHCOSH, TANGENT, ABS, SIGN, MIN, MAX, LESS, LESS_EQUAL, AND, OR, NOT, SELECT, EQUAL = range(10, 23)
-# what LESS has in c where what is chosen by it is one function on both sides
+# c of a LESS whose two choices are the same function
 AGREEING = 1
-# how INTEGRAL finds its own leading coefficient from the argument c
+# how INTEGRAL computes its leading coefficient from the argument c
 LOG, ASIN, ACOS, ATAN, ANGLE = range(30, 35)
 
 _UNIT = 2.0**-53  # unit roundoff of a double
-# Twelve squarings; exp(n log u), which has no value for u < 0, only beyond
+# Twelve squarings; beyond it exp(n log u), which is undefined for u < 0
 _MAX_INTEGER_POWER = 4096
 
 
 class TapeBuilder:
-    """Turns SymPy expressions over named registers into rows; equal subexpressions share a register.
+    """Convert SymPy expressions over named registers to rows; equal subexpressions share a register.
 
     Parameters
     ----------
-    fixed : names of what is constant in a segment: parameters, and what is made of them alone.
+    fixed : names of the values that are constant in a segment: parameters and functions of parameters alone.
     """
 
     def __init__(self, fixed: Set[str] = frozenset()) -> None:
@@ -40,13 +40,13 @@ class TapeBuilder:
         self.count = 0
 
     def register(self, name: str) -> int:
-        """The register of a name, made on first use."""
+        """Return the register of a name, allocated on first use."""
         if name not in self.registers:
             self.registers[name] = self._new()
         return self.registers[name]
 
     def rows(self, assignments: list[tuple[str, Any]], known: dict[Any, int]) -> list[tuple[int, ...]]:
-        """Rows that put each expression into the register of its name; `known` shares subexpressions."""
+        """Return rows that put each expression into the register of its name; `known` shares subexpressions."""
         rows: list[tuple[int, ...]] = []
         for name, expression in assignments:
             source = self._emit(expression, known, rows)
@@ -99,7 +99,7 @@ class TapeBuilder:
         import sympy as sp
 
         if e.is_Mul:
-            # negative powers only: exp(-u) over one would be infinite where it is nothing
+            # negative powers only, since exp(-u) over one would be infinite instead of 0
             below = [a for a in e.args if a.is_Pow and a.exp.is_number and a.exp.is_negative]
             saturating = [a for a in below if _grows_without_bound(a.base, a.exp)]
             numerator = sp.Mul(*(a for a in e.args if a not in below))
@@ -126,7 +126,7 @@ class TapeBuilder:
     def _emit_power(
         self, base: Any, exponent: Any, known: dict[Any, int], rows: list[tuple[int, ...]]
     ) -> int:
-        """Whole and half powers as products of the base or its root, so that they have a value at 0 and below."""
+        """Emit integer and half-integer powers as products of the base or its root, defined at 0 and below."""
         import sympy as sp
 
         if _grows_without_bound(base, exponent):
@@ -156,13 +156,13 @@ class TapeBuilder:
         return self._whole(source, self._emit(exponent, known, rows), power, known, rows)
 
     def _unless_zero(self, rows: list[tuple[int, ...]], power: int, base: int, exponent: int) -> int:
-        """A power of what is zero at its corner: nothing there for a positive exponent, and without a series."""
+        """Emit a power that is 0 at a zero base if the exponent is positive; it has no series there."""
         nothing = self._constant(0.0)
         at_zero = self._op(rows, SELECT, self._op(rows, LESS, nothing, exponent), nothing, power)
         return self._op(rows, SELECT, self._op(rows, LESS, nothing, base), power, at_zero)
 
     def _over(self, base: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
-        """1/(c + d e^u) and 1/cosh(u), which are nothing where the exponential is infinite, by q = e^-|u|."""
+        """Emit 1/(c + d e^u) and 1/cosh(u), which are 0 if the exponential is infinite, by q = e^-|u|."""
         found = _with_exponential(base)
         rest, factor, u = found or (None, None, base.args[0])
         exponent, one = self._emit(u, known, rows), self._constant(1.0)
@@ -183,7 +183,7 @@ class TapeBuilder:
     def _whole(
         self, source: int, exponent: int, power: int, known: dict[Any, int], rows: list[tuple[int, ...]]
     ) -> int:
-        """A power whose exponent may turn out to be whole: it has a value at 0 and below then."""
+        """Emit a power whose exponent may be an integer at run time; it is then defined at 0 and below."""
         one = self._constant(1.0)
         for n in WHOLE_POWERS:
             product = self._products(source, abs(n), known, rows) if n else one
@@ -193,7 +193,7 @@ class TapeBuilder:
         return power
 
     def _products(self, source: int, n: int, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
-        """A register to the power n >= 1 by squaring."""
+        """Emit the power n >= 1 of a register by repeated squaring."""
         if n == 1:
             return source
         key = ("power", source, n)
@@ -245,7 +245,7 @@ class TapeBuilder:
             return self._op(rows, EQUAL, a[0], a[1])
         if kind is sp.ITE:
             return self._op(rows, SELECT, a[0], a[1], a[2])
-        if kind is sp.cot:  # SymPy makes it of tan(u + pi/2)
+        if kind is sp.cot:  # SymPy rewrites tan(u + pi/2) as cot(u)
             return self._op(rows, DIV, one, self._op(rows, TANGENT, a[0]))
         if kind is sp.Ne:
             return self._op(rows, NOT, self._op(rows, EQUAL, a[0], a[1]))
@@ -274,13 +274,13 @@ class TapeBuilder:
                 rows, INTEGRAL, self._op(rows, ADD, one, self._op(rows, MUL, a[0], a[0])), a[0], ATAN
             )
         if kind is sp.atan2:
-            # on the unit circle turned by the leading angle the rest is an ordinary arc tangent
+            # after a rotation by the leading angle the rest is an ordinary arc tangent
             return self._op(rows, INTEGRAL, a[1], a[0], ANGLE)
         raise NotImplementedError(f"no Taylor recurrence for {kind}")
 
 
 def _with_exponential(base: Any) -> tuple[Any, Any, Any] | None:
-    """(c, d, u) of a sum c + d e^u in which nothing else grows as fast; None of anything else."""
+    """Return (c, d, u) of a sum c + d e^u in which no other term grows as fast, or None."""
     import sympy as sp
 
     if not base.is_Add:
@@ -298,7 +298,7 @@ def _with_exponential(base: Any) -> tuple[Any, Any, Any] | None:
 
 
 def _grows_without_bound(base: Any, exponent: Any) -> bool:
-    """Whether a power is one over what has no series where an exponential in it is infinite, and is nothing there."""
+    """Return whether a power is the reciprocal of a base that becomes infinite with an exponential in it."""
     import sympy as sp
 
     is_below = exponent.is_Integer and exponent.is_negative

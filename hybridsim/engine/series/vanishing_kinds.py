@@ -1,4 +1,4 @@
-"""Kinds of functions whose series shows nothing of what comes, and their numbers."""
+"""Kinds of functions whose series does not show what happens later, such as exponentials, and their numbers."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from hybridsim.engine.native.kernels import inlined
 HYPERBOLIC, EXPONENTIAL, ROOT, KINDS = range(4)
 
 
-MOST_POWER = 64  # that is told apart
+MOST_POWER = 64  # largest power that is distinguished
 
 
 @inlined
 def register_of(number: int) -> int:
-    """The register that a number of `hybridsim.engine.system.programs.mode_code.fading` is of."""
+    """Return the register to which a number of `hybridsim.engine.system.programs.mode_code.fading` belongs."""
     return number // (KINDS * MOST_POWER)
 
 
 @inlined
 def power_of(number: int) -> int:
-    """The power to which what fades is raised, at most: u times as much is the argument of what it comes to."""
+    """Return the largest power to which the fading function is raised."""
     return number // KINDS % MOST_POWER + 1
