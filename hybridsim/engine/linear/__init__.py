@@ -1,4 +1,4 @@
-"""This folder recognises modes that are linear in the states, and gives their motion in closed form.
+"""This package detects modes that are linear in the states and computes their motion in closed form.
 
-Start with `form` and `modes` (when a mode is linear), then `tables` and `motion`.
+Start with `form` and `modes` (conditions for a linear mode), then `tables` and `motion`.
 """

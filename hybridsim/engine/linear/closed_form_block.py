@@ -1,4 +1,4 @@
-"""Segments in closed form, in the arrays that the compiled loop of linear modes wrote them to."""
+"""Segments in closed form, stored in the arrays that the compiled loop of linear modes writes."""
 
 from __future__ import annotations
 
@@ -21,9 +21,10 @@ from hybridsim.engine.system.system import System
 def closed_form_states(
     project: Any, pinned: bool, lin: Any, index: Any, s: Any, record: Any, room: Any, out: Any
 ) -> None:
-    """States out (m, n) at local times s (m,) of the segments of these numbers; see `ClosedFormBlock`.
+    """Compute states out (m, n) at local times s (m,) in the segments with the given numbers; see `ClosedFormBlock`.
 
-    room: for modal coordinates, states, values of atoms, functions of time, and terms near a start.
+    room: scratch arrays for modal coordinates, states, values of atoms, functions of time, and terms near a
+    start.
     """
     ends, rows, coordinates, modes, vectors, jumps = record
     c, x, factors, w, terms = room
@@ -48,14 +49,14 @@ def closed_form_states(
 
 @dataclass(frozen=True)
 class ClosedFormBlock(Sequence[Segment]):
-    """N segments from local time 0 on; see `hybridsim.engine.record.blocks.SegmentBlock`.
+    """N consecutive segments that start at local time 0; see `hybridsim.engine.record.blocks.SegmentBlock`.
 
     Parameters
     ----------
-    tables, rows : the linear modes, and which of them each segment is in (N,).
+    tables, rows : the linear modes, and the row of each segment in them (N,).
     ends : (N,) local times of the ends.
     coordinates : (N, J) modal coordinates at the starts.
-    origins, modes, vectors : (N, 2), (N, C), (N, P) of each segment.
+    origins, modes, vectors : (N, 2), (N, C), (N, P) time origin, modes and run-time vector of each segment.
     jumps : (N, 3, n), states at the start, x- and x+ at the end of each segment.
     """
 
@@ -74,17 +75,17 @@ class ClosedFormBlock(Sequence[Segment]):
 
     @cached_property
     def spans(self) -> np.ndarray:
-        """Local times of start and end (N, 2)."""
+        """Return the local times of start and end (N, 2)."""
         return np.stack([np.zeros(len(self)), self.ends], axis=1)
 
     @property
     def until(self) -> Instant:
-        """End of the last segment."""
+        """Return the end of the last segment."""
         high, low = self.origins[-1].tolist()
         return Instant(high, low).plus(float(self.ends[-1]))
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """States (k, n) in the segments of these numbers, at local times (k,)."""
+        """Return states (k, n) at local times (k,) in the segments with the given numbers."""
         n, pinned = self.system.n, self.system.can_hold
         out = np.empty((len(s), n))
         closed_form_states(
@@ -111,20 +112,20 @@ class ClosedFormBlock(Sequence[Segment]):
         )
 
     def at_end(self) -> Segment:
-        """The end of the last segment."""
+        """Return the data at the end of the last segment."""
         return end_point(self.until, self.modes[-1], self.vectors[-1], self.jumps[-1, 1])
 
     def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Start and end, states there, run-time vector and modes of a segment."""
+        """Return start and end, the states there, the run-time vector and the modes of a segment."""
         return np.array([0.0, self.ends[i]]), self.jumps[i, :2], self.vectors[i], self.modes[i]
 
     def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Numbers of segments, local times and states at start and end of each segment."""
+        """Return segment numbers, local times and states at the start and the end of each segment."""
         index = np.repeat(np.arange(len(self)), 2)
         return index, self.spans.ravel(), self.jumps[:, :2].reshape(len(index), -1)
 
     def since(self, first: int) -> ClosedFormBlock:
-        """Those from the first on."""
+        """Return the block of the segments from the given one on."""
         rows = (self.rows, self.ends, self.coordinates, self.origins, self.modes, self.vectors, self.jumps)
         return ClosedFormBlock(self.system, self.tables, *(r[first:] for r in rows))
 

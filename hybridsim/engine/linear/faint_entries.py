@@ -1,19 +1,20 @@
-"""Faint entries of the basis of an invariant subspace, which rounding hides, worked out from those that are clear.
+"""Compute small entries of an invariant subspace's basis, which rounding hides, from its large entries.
 
-A basis is found as well as its largest entry. What couples weakly, or not at all, to a motion that grows has an entry
-of that size of error there, and the growth makes something of it. The equation of the subspace gives the entry itself.
+A basis has an absolute error relative to its largest entry. A state with weak or no coupling to a growing
+motion has an entry of the size of this error, and the growth amplifies it. The equation of the subspace gives
+the entry itself.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-_FAINT = 2.0**-10  # of the largest row
-_CLOSE = 1e-14  # of the largest row: by how much a row may change, else it was no question of rounding
+_FAINT = 2.0**-10  # size of a small row relative to the largest row
+_CLOSE = 1e-14  # largest change of a row relative to the largest row; a larger change is not rounding
 
 
 def with_faint_rows(A: np.ndarray, V: np.ndarray, T: np.ndarray) -> np.ndarray:
-    """V (m, k) of A V = V T with its faint rows from A_ff V_f - V_f T = -A_fc V_c, of these again the fainter."""
+    """Correct the small rows of V (m, k) in A V = V T by A_ff V_f - V_f T = -A_fc V_c, recursively."""
     V, sizes = V.astype(complex), np.abs(V).max(axis=1, initial=0.0)
     largest = sizes.max(initial=0.0)
     faint = sizes < _FAINT * largest
@@ -32,7 +33,7 @@ def with_faint_rows(A: np.ndarray, V: np.ndarray, T: np.ndarray) -> np.ndarray:
 
 
 def _solved(A: np.ndarray, T: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """X of A X - X T = -known; not a number where there is none."""
+    """Return X of A X - X T = -known, or NaN if there is no solution."""
     from scipy.linalg import solve_sylvester
 
     try:

@@ -1,8 +1,9 @@
-"""Which modes are linear, read off the tape: each register as a linear form over states and functions of time.
+"""Linear forms of the registers of a tape over states and functions of time; they show which modes are linear.
 
-A register that depends on time alone is a polynomial over atoms: local time, sines and cosines of angles that grow
-linearly, exponentials of linear time, and values that are constant in a segment. Derivatives of such polynomials are
-such polynomials, so the states and the monomials that occur obey one linear system with constant coefficients.
+A register that depends on time alone is a polynomial over atoms: local time, sines and cosines of angles that
+grow linearly, exponentials of linear time, and values that are constant in a segment. Derivatives of such
+polynomials are such polynomials, so the states and the monomials that occur obey one linear system with
+constant coefficients.
 """
 
 from __future__ import annotations
@@ -37,20 +38,20 @@ Factor = tuple[int, int]  # an atom's number; 1 for the cosine of an angle, else
 Monomial = tuple[Factor, ...]  # sorted; () is 1
 Key = int | Monomial  # a state's index, or a monomial over atoms
 Form = dict[Key, float]
-Read = Form | float  # a register that is one number is kept as that
+Read = Form | float  # a register that is a plain number is stored as a float
 
 _ONE: Monomial = ()
 _PAIRED = (SINCOS, SINHCOSH, TANGENT)
 _SINGLE = (NEG, ABS, SIGN, NOT, EXP, SQRT, SINCOS, SINHCOSH, TANGENT)
-_HIGHEST = 8  # degree of a monomial; beyond it the closure under derivatives would be large
+_HIGHEST = 8  # largest degree of a monomial; the closure under derivatives would be large beyond it
 
 
 class NotLinear(StepFailure):
-    """A rate or a guard that is no linear form; the message says which kind of operation is in the way."""
+    """An error for a rate or a guard that is not a linear form; the message names the nonlinear operation."""
 
 
 class DividesByZero(NotLinear):
-    """A form over a number that is zero: forces that several holding modes cannot keep apart have no values."""
+    """An error for a division by zero, as for forces that several holding modes cannot distinguish."""
 
 
 @dataclass(frozen=True)
@@ -64,19 +65,19 @@ class Atom:
 
 
 class Atoms:
-    """The atoms met so far, numbered; number 0 is local time."""
+    """The numbered atoms found so far; number 0 is local time."""
 
     def __init__(self) -> None:
         self.known: list[Atom] = [Atom(TIME, 1.0, 0.0, ())]
 
     def number(self, atom: Atom) -> int:
-        """The number of an atom, a new one where it has not been met."""
+        """Return the number of an atom; a new atom gets the next number."""
         if atom not in self.known:
             self.known.append(atom)
         return self.known.index(atom)
 
     def derivative(self, monomial: Monomial) -> Form:
-        """d/dt of a monomial."""
+        """Return d/dt of a monomial."""
         result: Form = {}
         for i, (a, part) in enumerate(monomial):
             rest, atom = monomial[:i] + monomial[i + 1 :], self.known[a]
@@ -90,7 +91,7 @@ class Atoms:
         return result
 
     def closure(self, monomials: Iterable[Monomial]) -> list[Monomial]:
-        """These monomials and all that their derivatives are made of."""
+        """Return these monomials and all monomials that occur in their derivatives."""
         found: list[Monomial] = []
         waiting = sorted(set(monomials))
         while waiting:
@@ -108,13 +109,14 @@ def _accumulate(form: Form, key: Key, weight: float) -> None:
 
 
 class LinearReader:
-    """Linear forms of the registers of one tape, at given values of the parameters.
+    """Linear forms of the registers of one tape at given values of the parameters.
 
-    constants: (register, value); parameters: (register, source in p); varying: sources that differ from segment to
-    segment; p: the run-time vector, of which only the other sources are read, as numbers or as numbers of a
-    `hybridsim.engine.linear.recipe`. None: for whatever values. A parameter is then NaN, and so is all that is made
-    of it alone; a condition on that is none that can be read. What is a linear form so is one at any values, since
-    these can only let terms vanish.
+    constants: (register, value); parameters: (register, source in p); varying: sources that differ from
+    segment to segment; p: the run-time vector, from which only the other sources are read, as numbers or as
+    numbers of a `hybridsim.engine.linear.recipe`. If p is None, the form must hold for any values: a
+    parameter and everything computed from parameters alone is then NaN, and a condition on it cannot be read.
+    A register that is a linear form in this case is one at any values, since special values can only make
+    terms vanish.
     """
 
     def __init__(
@@ -139,7 +141,7 @@ class LinearReader:
                 self.forms[register] = math.nan if p is None else p[source]
 
     def read(self, rows: Iterable[tuple[int, ...]]) -> None:
-        """Add the results of these rows; what is no linear form is kept as the reason."""
+        """Process these rows; a result that is not a linear form is stored as the reason."""
         for op, a, b, c, out in rows:
             if op == COPY:
                 self.forms[out] = self.forms[a]
@@ -156,7 +158,7 @@ class LinearReader:
                 self.forms[out + 1] = found[1]
 
     def form(self, register: int) -> Form:
-        """The linear form of a register; raises NotLinear."""
+        """Return the linear form of a register; raise NotLinear."""
         return _form(self._read(register))
 
     def _read(self, register: int) -> Read:
@@ -191,7 +193,7 @@ class LinearReader:
         raise NotLinear(_IN_THE_WAY.get(op, _OTHER))
 
     def _of_form(self, op: int, form: Form) -> tuple[Read, ...]:
-        """An operation of one operand that is no number."""
+        """Apply an operation with one operand that is not a number."""
         if op == NEG:
             return ({key: -weight for key, weight in form.items()},)
         if op == SINCOS:
@@ -202,7 +204,7 @@ class LinearReader:
         raise NotLinear(_IN_THE_WAY.get(op, _OTHER))
 
     def _evaluated(self, op: int, b: int, c: int, *values: float) -> tuple[Read, ...]:
-        """An operation on numbers; b and c are flags where there is one operand."""
+        """Apply an operation to numbers; b and c are flags if there is one operand."""
         if op == NEG:
             return (-values[0],)
         if self.is_open and any(map(math.isnan, values)):
@@ -232,7 +234,7 @@ def _form(read: Read) -> Form:
 
 
 def _plain(form: Form) -> Read:
-    """A form that is one number as that."""
+    """Convert a form that is a single number to that number."""
     if not form:
         return 0.0
     return form[_ONE] if len(form) == 1 and _ONE in form else form
@@ -246,7 +248,7 @@ def _sum(a: Form, b: Form, sign: float) -> Form:
 
 
 def _product(a: Form, b: Form) -> Form:
-    """The product of two forms, if it is one."""
+    """Return the product of two forms if it is a form, else raise NotLinear."""
     result: Form = {}
     for left, u in a.items():
         for right, v in b.items():
@@ -265,7 +267,7 @@ def _product(a: Form, b: Form) -> Form:
 
 
 def _linear_atom(kind: int, form: Form, atoms: Atoms) -> Atom:
-    """The atom of an angle or an exponent; it has to be linear in time and free of states."""
+    """Return the atom of an angle or an exponent, which must be linear in time and free of states."""
     rate, offset, terms = 0.0, 0.0, []
     for key, weight in form.items():
         if key == _ONE:

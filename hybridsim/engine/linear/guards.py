@@ -1,4 +1,4 @@
-"""Guards of linear modes as series: Taylor coefficients in states and in modal coordinates, with their bounds."""
+"""Guards of linear modes as series: Taylor coefficients in states and in modal coordinates, with error bounds."""
 
 from __future__ import annotations
 
@@ -10,17 +10,16 @@ from hybridsim.engine.native.kernels import kernel
 from hybridsim.engine.series.bounded import ORDER, UNIT
 
 _FACTORIAL = float(math.factorial(BOUND_TERMS))
-FARTHEST = 8.0  # in units of the fastest rate: the bound by so few terms ends before
-_ROUNDINGS = (
-    8.0  # of a coefficient when it is read off the tape: a chain of that many operations is a long one
-)
+FARTHEST = 8.0  # in units of the fastest rate; a bound with this number of terms holds for less
+_ROUNDINGS = 8.0  # roundings of a coefficient read from the tape, for a chain of this many operations
 
 
 @kernel
 def guard_series(A: Any, rows: Any, series: Any, roundings: Any) -> None:
-    """Of rows (K, G, m), functions of y with y' = A y: Taylor coefficients, and what rounding makes of each entry.
+    """Compute the Taylor coefficients of guards along y' = A y, and the rounding error of each entry.
 
-    rows are used up; A (K, m, m); series, roundings (K, G, ORDER + 1, m).
+    rows (K, G, m) are functions of y and are overwritten. A (K, m, m). series, roundings (K, G, ORDER + 1,
+    m).
     """
     modes, guards, size = rows.shape
     for k in range(modes):
@@ -60,10 +59,11 @@ def modal_guards(
     turning: Any,
     waves: Any,
 ) -> None:
-    """Of Re(gamma c) with gamma = row basis along c' = B c: coefficients, bounds of |c|'s factors, reach, waves.
+    """Compute the series of Re(gamma c) with gamma = row basis along c' = B c, with bounds, ranges and undamped waves.
 
-    flows: `hybridsim.engine.linear.modal.Modals` with |B**BOUND_TERMS|; gamma (J,) is room. The rest is what
-    `hybridsim.engine.linear.tables` describes, prepared for guards that are zero.
+    flows: `hybridsim.engine.linear.modal.Modals` with |B**BOUND_TERMS|; gamma (J,) is scratch space. The
+    other arrays are described in `hybridsim.engine.linear.tables` and are initialised for guards that are
+    zero.
     """
     counts, values, upper, ends, basis = flows.counts, flows.values, flows.upper, flows.ends, flows.full_basis
     modes, guards, size = rows.shape
@@ -72,7 +72,7 @@ def modal_guards(
             is_zero = True
             for m in range(size):
                 is_zero = is_zero and rows[k, g, m] == 0.0
-            if is_zero:  # a guard of other modes: all is as it was prepared
+            if is_zero:  # a guard of other modes: the initial values are right
                 continue
             for j in range(counts[k]):
                 total = 0.0 + 0.0j
@@ -91,7 +91,7 @@ def modal_guards(
             fastest = growing = 0.0
             while first < counts[k]:
                 end, square = ends[k, first], 0.0
-                # what a guard does not see now it may see later, of another coordinate of the block
+                # a guard may see another coordinate of the block later
                 for j in range(first, end):
                     square += gamma[j].real ** 2 + gamma[j].imag ** 2
                 for j in range(first, end):
@@ -119,13 +119,13 @@ def modal_guards(
 
 @kernel
 def _wave(gamma: Any, count: int, values: Any, upper: Any) -> int:
-    """The coordinate that turns, where Re(gamma c) is a constant and one undamped wave; else -1."""
+    """Return the oscillating coordinate if Re(gamma c) is a constant plus one undamped wave, else -1."""
     found = -1
     for j in range(count):
         if gamma[j] == 0.0:
             continue
         for i in range(count):
-            if upper[j, i] != 0.0:  # what others drive is no wave
+            if upper[j, i] != 0.0:  # a driven coordinate is not a wave
                 return -1
         if values[j] != 0.0:
             if found >= 0:

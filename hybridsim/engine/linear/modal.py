@@ -1,8 +1,9 @@
-"""Block diagonalisation of a real matrix: blocks with closed forms of their exponentials, a well conditioned basis.
+"""Block diagonalisation of a real matrix with a well-conditioned basis and closed-form block exponentials.
 
-Eigenvalues that belong to (nearly) parallel eigenvectors share a block, whose basis is an orthonormal basis of their
-invariant subspace (C. A. Bavely and G. W. Stewart, SIAM J. Numer. Anal. 16 (1979) 359, doi:10.1137/0716028). In the
-worst case all of them share one, and the basis is that of the Schur form.
+Eigenvalues that belong to (nearly) parallel eigenvectors share a block, whose basis is an orthonormal basis
+of their invariant subspace (C. A. Bavely and G. W. Stewart, SIAM J. Numer. Anal. 16 (1979) 359,
+doi:10.1137/0716028). In the worst case all eigenvalues share one block, and the basis is that of the Schur
+form.
 """
 
 from __future__ import annotations
@@ -16,33 +17,34 @@ import numpy as np
 from hybridsim.engine.linear.faint_entries import with_faint_rows
 from hybridsim.engine.native.kernels import kernel
 
-_CONDITION = 1e2  # of the basis, at most: so many roundings of the state does the change of basis cost
-_MISSED = 2.0**-48  # of the largest entry: by how much A v may differ from lambda v
-_GROWING, _SILENT = 3.0, 1e-12  # rates that matter: times the time at hand, and of the largest entry
-_SLOWEST = 4.0  # over the horizon: the time at hand is 1 to 1/16 of it, and powers of the time have units of their own
-_SWEEPS = 8  # of balancing
+_CONDITION = 1e2  # largest condition of the basis: factor of rounding errors in a change of basis
+_MISSED = 2.0**-48  # largest error of A v - lambda v, relative to the largest entry of A
+_GROWING, _SILENT = (
+    3.0,
+    1e-12,
+)  # growth that matters, as a product with the horizon and relative to the largest entry
+_SLOWEST = 4.0  # product with the horizon; the run time is 1 to 1/16 of the horizon
+_SWEEPS = 8  # most sweeps of balancing
 
 
 @dataclass(frozen=True)
 class Modal:
-    """x' = A x in coordinates c = inverse x, x = Re(basis c), c' = B c with B upper triangular in blocks.
+    """The system x' = A x in coordinates c = inverse x, x = Re(basis c), c' = B c with B upper triangular in blocks.
 
-    Of a block and its conjugate one is kept, with twice its basis. `values` (J,) is the diagonal of B, `upper` (J, J)
-    the rest of it, `ends` (J,) the end of the block that each coordinate belongs to, full_basis (m, J), inverse (J, m).
-    growth and speeds (J,) are those of the block: |exp(B s)| <= exp(growth s) for s >= 0, and |B|.
+    Of a block and its conjugate one is stored, with twice its basis. |exp(B s)| <= exp(growth s) for s >= 0.
     """
 
-    values: np.ndarray
-    upper: np.ndarray
-    ends: np.ndarray
-    full_basis: np.ndarray
-    inverse: np.ndarray
-    growth: np.ndarray
-    speeds: np.ndarray
+    values: np.ndarray  # (J,) diagonal of B
+    upper: np.ndarray  # (J, J) strictly upper part of B
+    ends: np.ndarray  # (J,) end of the block of each coordinate
+    full_basis: np.ndarray  # (m, J)
+    inverse: np.ndarray  # (J, m)
+    growth: np.ndarray  # (J,) growth rate of the block of each coordinate
+    speeds: np.ndarray  # (J,) |B| of the block of each coordinate
 
     def power(self, exponent: int) -> np.ndarray:
-        """|B**exponent| (J,) of the block of each coordinate."""
-        with np.errstate(over="ignore"):  # a bound of infinity is one that nothing is decided by
+        """Return |B**exponent| (J,) of the block of each coordinate."""
+        with np.errstate(over="ignore"):  # an infinite bound decides nothing
             result, first = self.speeds**exponent, 0
         while first < len(result):
             end = int(self.ends[first])
@@ -56,16 +58,16 @@ class Modal:
 
 @dataclass(frozen=True)
 class _Cluster:
-    """Eigenvalues that share a block: numbers of those with imaginary part >= 0; folded: with their conjugates."""
+    """Eigenvalues that share a block: indices of those with imaginary part >= 0; folded: conjugates included."""
 
     members: tuple[int, ...]
-    folded: bool  # real eigenvalues are
+    folded: bool  # True for real eigenvalues
 
 
 class _Block(NamedTuple):
-    """A cluster's triangular block, for the basis `vectors @ rotation`.
+    """The triangular block of a cluster, for the basis `vectors @ rotation`.
 
-    vectors: an orthonormal basis of its invariant subspace, a real one where it is folded.
+    vectors: an orthonormal basis of its invariant subspace, real if the block is folded.
     """
 
     triangular: np.ndarray
@@ -74,12 +76,13 @@ class _Block(NamedTuple):
 
 
 class Modals(NamedTuple):
-    """Block diagonal forms of many matrices: the fields of `Modal` one behind the other, filled up with zeros.
+    """Block diagonal forms of many matrices: the fields of `Modal` with a leading axis K, padded with zeros.
 
-    counts (K,): the coordinates of each. powers (K, J): |B**exponent| of the block, for the exponent that was asked.
+    counts (K,): the coordinates of each. powers (K, J): |B**exponent| of the block, for the exponent that was
+    asked.
     """
 
-    counts: np.ndarray
+    counts: np.ndarray  # (K,) number of coordinates of each matrix
     values: np.ndarray
     upper: np.ndarray
     ends: np.ndarray
@@ -87,34 +90,34 @@ class Modals(NamedTuple):
     inverse: np.ndarray
     growth: np.ndarray
     speeds: np.ndarray
-    powers: np.ndarray
+    powers: np.ndarray  # (K, J) |B**exponent| of the block of each coordinate, for the requested exponent
 
 
 def modal(A: np.ndarray, horizon: float = math.inf) -> Modal:
-    """Block diagonal form of a square real matrix (m, m), for times up to about `horizon`."""
+    """Return the block diagonal form of a square real matrix (m, m), for times up to about `horizon`."""
     return Modal(*(field[0] for field in modals(A[None], horizon)[1:-1]))
 
 
 def modals(
     A: np.ndarray, horizon: float = math.inf, exponent: int = 1, multiple: int = 1, least: int = 0
 ) -> Modals:
-    """The same for many matrices (K, m, m); J is filled up to a multiple, and to `least`."""
+    """Return the forms of many matrices (K, m, m), with J padded to a multiple and at least `least`."""
     scales = np.ones(A.shape[:2])
     _balance(np.abs(A), _SLOWEST / horizon, scales)
     balanced = A * scales[:, None, :] / scales[:, :, None]
     values, vectors = np.linalg.eig(balanced)
     values, vectors = values.astype(complex, copy=False), vectors.astype(complex, copy=False)
-    # Real and imaginary part of an eigenvector stand for it and its conjugate: inverted in complex arithmetic the two
-    # would be each other's conjugates only to within the condition of the basis.
+    # Real and imaginary part of an eigenvector represent it and its conjugate. A complex inverse would make the two
+    # conjugates of each other only to within the condition of the basis.
     inverses = _inverses(np.where((values.imag < 0.0)[:, None, :], -vectors.imag, vectors.real))
-    # the norm of Frobenius bounds that which makes the condition; no column's norm is above 1
-    with np.errstate(over="ignore", invalid="ignore"):  # the inverse of what is nearly singular
+    # the Frobenius norm bounds the 2-norm of the inverse; no column of the basis has a norm above 1
+    with np.errstate(over="ignore", invalid="ignore"):  # inverses of nearly singular matrices
         is_diagonal = A.shape[1] * (inverses**2).sum(axis=(1, 2)) <= _CONDITION**2
-    # LAPACK balances once more, without the diagonal, and of entries that are nothing may make all of an eigenvector
+    # LAPACK balances again, without the diagonal, so that negligible entries may dominate an eigenvector
     missed = np.abs(balanced @ vectors - vectors * values[:, None, :]).max(axis=(1, 2), initial=0.0)
     largest = np.abs(balanced).max(axis=(1, 2), initial=0.0)
     are_right = missed <= _MISSED * largest
-    # of a motion that grows, rounding in the basis grows too
+    # rounding errors of the basis grow with a growing motion
     grows = values.real.max(axis=1, initial=0.0) > np.maximum(_GROWING / horizon, _SILENT * largest)
     is_diagonal &= are_right & ~grows
     others = {
@@ -142,10 +145,10 @@ def modals(
 
 
 def _inverses(vectors: np.ndarray) -> np.ndarray:
-    """Inverses (K, m, m), infinite for what has none: what is found for one matrix does not depend on the others."""
+    """Return inverses (K, m, m), infinite for singular matrices; each result is independent of the others."""
     try:
         return np.linalg.inv(vectors)
-    except np.linalg.LinAlgError:  # of one of them
+    except np.linalg.LinAlgError:  # one of them is singular
         if len(vectors) == 1:
             return np.full_like(vectors, np.inf)
         return np.concatenate([_inverses(one[None]) for one in vectors])
@@ -155,7 +158,7 @@ def _inverses(vectors: np.ndarray) -> np.ndarray:
 def _diagonal(
     values: Any, vectors: Any, inverses: Any, scales: Any, chosen: Any, exponent: int, out: Any
 ) -> None:
-    """A block for each eigenvalue, of which LAPACK gives conjugates in a row."""
+    """Write a block for each eigenvalue; LAPACK returns conjugate pairs in a row."""
     for k in range(values.shape[0]):
         if not chosen[k]:
             continue
@@ -182,12 +185,12 @@ def _by_blocks(
     scale: np.ndarray,
     are_right: bool,
 ) -> Modal:
-    """Eigenvalues in common blocks until the basis is well conditioned."""
+    """Merge eigenvalues into common blocks until the basis is well conditioned."""
     if not are_right:
         values = _schur_values(balanced)
     partners = _partners(values)
     clusters = [_Cluster((i,), partners[i] == i) for i in range(len(values)) if values[i].imag >= 0.0]
-    known: dict[_Cluster, _Block] = {}  # one of two is merged at a time, the others stay
+    known: dict[_Cluster, _Block] = {}  # each merge changes one or two clusters, the others stay
 
     def found(cluster: _Cluster) -> _Block:
         if cluster not in known:
@@ -209,19 +212,19 @@ def _by_blocks(
 
 
 def _schur_values(A: np.ndarray) -> np.ndarray:
-    """Eigenvalues by the Schur form of A as it is, pairs of conjugates in a row."""
+    """Return the eigenvalues from the Schur form of A without balancing, with conjugate pairs in a row."""
     from scipy.linalg import schur
 
     triangular = schur(A, output="real")[0]
     values = np.diag(triangular).astype(complex)
-    for i in np.flatnonzero(np.diag(triangular, -1)):  # LAPACK's blocks have equal diagonals
+    for i in np.flatnonzero(np.diag(triangular, -1)):  # LAPACK's 2x2 blocks have equal diagonals
         speed = math.sqrt(abs(triangular[i, i + 1])) * math.sqrt(abs(triangular[i + 1, i]))
         values[i : i + 2] += [1j * speed, -1j * speed]
     return values
 
 
 def _partners(values: np.ndarray) -> list[int]:
-    """The number of each eigenvalue's conjugate, its own for a real one; LAPACK gives exact pairs in a row."""
+    """Return the index of each eigenvalue's conjugate, its own for a real one; pairs from LAPACK are exact."""
     partners = list(range(len(values)))
     for i, value in enumerate(values):
         if value.imag > 0.0:
@@ -231,13 +234,15 @@ def _partners(values: np.ndarray) -> list[int]:
 
 @kernel
 def _balance(sizes: Any, slowest: float, scales: Any) -> None:
-    """Powers of two, in place of ones (k, m), that make rows and columns of D^-1 A D about equally large.
+    """Write powers of two to scales (k, m) that make rows and columns of D^-1 A D about equally large.
 
-    After E. E. Osborne, J. ACM 7 (1960) 338; sizes (k, m, m), the absolute values of A, are used up.
+    The method is that of E. E. Osborne, J. ACM 7 (1960) 338. sizes (k, m, m), the absolute values of A, are
+    overwritten.
 
-    Their 2-norms, with the diagonal: without it couplings that are nothing beside the diagonal would be blown up, and
-    its roundings with them (R. James, J. Langou and B. R. Lowery, arXiv:1401.5766). So would those below the rate
-    `slowest`, which do nothing over the time at hand: exponentials that are 1 but for little would have to cancel.
+    The 2-norms include the diagonal. Without it, couplings that are negligible compared with the diagonal
+    would be scaled up with its roundings (R. James, J. Langou and B. R. Lowery, arXiv:1401.5766). Couplings
+    below the rate `slowest` are not scaled up either: they have almost no effect during the run, and
+    exponentials close to 1 would have to cancel.
     """
     for k in range(sizes.shape[0]):
         size, scale = sizes[k], scales[k]
@@ -247,14 +252,14 @@ def _balance(sizes: Any, slowest: float, scales: Any) -> None:
         for _ in range(_SWEEPS):
             moved = False
             for i in range(m):
-                row = column = 0.0  # the largest entries off the diagonal
+                row = column = 0.0  # largest off-diagonal entries
                 for j in range(m):
                     if j != i:
                         row, column = max(row, size[i, j]), max(column, size[j, i])
                 if row == 0.0 and column == 0.0:
                     continue
                 row, column = max(row, size[i, i]), max(column, size[i, i])
-                if row == 0.0 or column == 0.0:  # over all times
+                if row == 0.0 or column == 0.0:  # a horizon of infinity
                     continue
                 rows = columns = 0.0
                 for j in range(m):
@@ -276,7 +281,7 @@ def _balance(sizes: Any, slowest: float, scales: Any) -> None:
 
 
 def _columns(clusters: list[_Cluster], blocks: list[_Block]) -> np.ndarray:
-    """The whole basis: that of each block, real and imaginary parts of one that is not its own conjugate."""
+    """Return the whole basis: real and imaginary parts of the blocks that differ from their conjugates."""
     parts = [
         b.vectors if c.folded else np.concatenate([b.vectors.real, b.vectors.imag], axis=1)
         for c, b in zip(clusters, blocks, strict=True)
@@ -290,7 +295,7 @@ def _condition(clusters: list[_Cluster], blocks: list[_Block]) -> float:
 
 
 def _merged(clusters: list[_Cluster], values: np.ndarray) -> list[_Cluster]:
-    """The two closest clusters in one; or one that is closest to its own conjugate, folded."""
+    """Merge the two closest clusters into one, or fold one that is closest to its own conjugate."""
     best, pair = np.inf, (0, 0)
     for i, a in enumerate(clusters):
         upper = values[list(a.members)]
@@ -309,7 +314,7 @@ def _merged(clusters: list[_Cluster], values: np.ndarray) -> list[_Cluster]:
 
 
 def _block(A: np.ndarray, cluster: _Cluster, values: np.ndarray, partners: list[int]) -> _Block:
-    """The triangular block of a cluster; an empty one where it cannot be told from the others."""
+    """Return the triangular block of a cluster, or an empty one if it cannot be separated from the others."""
     from scipy.linalg import rsf2csf, schur
 
     members = list(cluster.members)
@@ -326,14 +331,14 @@ def _block(A: np.ndarray, cluster: _Cluster, values: np.ndarray, partners: list[
             triangular, vectors, count = schur(A.astype(complex), output="complex", sort=inside)
             return _Block(triangular[:count, :count], vectors[:, :count], np.eye(count))
         triangular, vectors, count = schur(A, output="real", sort=inside)
-    except np.linalg.LinAlgError:  # rounding does not tell them from the others
+    except np.linalg.LinAlgError:  # rounding hides the difference from the others
         return _Block(np.empty((0, 0)), np.empty((len(A), 0)), np.empty((0, 0)))
     triangular, rotation = rsf2csf(triangular[:count, :count], np.eye(count))
     return _Block(triangular, vectors[:, :count], rotation)
 
 
 def _joined(A: np.ndarray, clusters: list[_Cluster], blocks: list[_Block], scale: np.ndarray) -> Modal:
-    """All blocks as arrays, one for each pair of conjugates."""
+    """Return all blocks as arrays, one for each conjugate pair."""
     inverse = np.linalg.inv(_columns(clusters, blocks))
     kept = sum(len(b.triangular) for b in blocks)
     values, ends = np.empty(kept, dtype=complex), np.empty(kept, dtype=np.int64)
@@ -343,7 +348,9 @@ def _joined(A: np.ndarray, clusters: list[_Cluster], blocks: list[_Block], scale
     at = source = 0
     for cluster, (block, vectors, rotation) in zip(clusters, blocks, strict=True):
         size = len(block)
-        if size == 0:  # two orders of arithmetic tell eigenvalues that nearly coincide apart differently
+        if (
+            size == 0
+        ):  # nearly equal eigenvalues may be separated in one order of arithmetic and not in another
             continue
         here = slice(at, at + size)
         values[here], ends[here], upper[here, here] = np.diag(block), at + size, np.triu(block, 1)

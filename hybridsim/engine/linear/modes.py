@@ -1,4 +1,4 @@
-"""Whether the modes of a system are linear, and their rates and guards as linear forms."""
+"""Decide whether the modes of a system are linear; return their rates and guards as linear forms."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from hybridsim.engine.system.system import System
 from hybridsim.errors import UsageError
 from hybridsim.model.toml.automata import SINGLE
 
-_KEPT = 64  # answers of a structure, one for each set of parameter values
+_KEPT = 64  # most cached answers per structure, one for each set of parameter values
 
 
 class LinearMode:
-    """Forms of the rates and active guards of one vector of modes; raises NotLinear with what is in the way.
+    """Linear forms of the rates and active guards of one mode vector; NotLinear gives the reason if there are none.
 
-    p: the run-time vector, or None for whatever values.
+    p: the run-time vector, or None for any values.
     """
 
     def __init__(self, system: System, atoms: Atoms, z: np.ndarray, p: Sequence[float] | None) -> None:
@@ -32,13 +32,13 @@ class LinearMode:
             self.guards[g] = _named(reader, tape["guards"][g], system.guard_title(g, z))
 
     def monomials(self) -> set[Monomial]:
-        """The functions of time in it."""
+        """Return the functions of time in the forms."""
         forms = [*self.rates, *self.guards.values()]
         return {key for form in forms for key in form if isinstance(key, tuple)}
 
 
 def _reader(system: System, atoms: Atoms, z: np.ndarray, p: Sequence[float] | None) -> LinearReader:
-    """The forms of all registers in one vector of modes."""
+    """Return the forms of all registers in one mode vector."""
     tape, layout = system.code.data["tape"], system.layout
     varying = range(layout.discrete_at, layout.size)
     parameters = [(r, s) for r, s in tape["parameters"] if s != layout.pin_at]
@@ -57,23 +57,24 @@ def _named(reader: LinearReader, register: int, title: str) -> Form:
 
 
 class NoMode:
-    """In the place of a vector of modes that has no motion: its rates are no numbers."""
+    """A placeholder for a mode vector without a motion: its rates are NaN."""
 
     def __init__(self, system: System) -> None:
         self.rates: list[Form] = [{(): math.nan} for _ in system.names]
         self.guards: dict[int, Form] = {}
 
     def monomials(self) -> set[Monomial]:
-        """It has no functions of time."""
+        """Return no functions of time."""
         return set()
 
 
 def modes_of(
     system: System, atoms: Atoms, met: np.ndarray, p: Sequence[float] | None, first: int = 0
 ) -> list[LinearMode | NoMode]:
-    """The forms of vectors of modes (K, components) of one run, some of which may only be neighbours of what it met.
+    """Return the forms of mode vectors (K, components) of one run.
 
-    first: those before it are left out.
+    Some of the vectors may only be neighbours of those that the run entered. first: number of vectors to
+    skip.
     """
     found: list[LinearMode | NoMode] = []
     for z in met[first:]:
@@ -87,7 +88,7 @@ def modes_of(
 
 
 def single_changes(system: System) -> np.ndarray:
-    """Vectors of modes: the first of each component, and those that differ from it in one."""
+    """Return mode vectors: the first mode of each component, and all vectors that differ from it in one mode."""
     first = np.zeros(len(system.automata), dtype=np.int64)
     vectors = [first]
     for c, automaton in enumerate(system.automata):
@@ -98,14 +99,14 @@ def single_changes(system: System) -> np.ndarray:
 
 
 def is_always_linear(system: System) -> bool:
-    """Whether a model is linear in each of its modes whatever the values of its parameters."""
+    """Return whether a model is linear in each of its modes for any values of its parameters."""
     return bool(system.code.shared("is linear", lambda: _first_reason(system, None) is None))
 
 
 def holds_constants(system: System) -> bool:
-    """Whether each surface is a multiple of one state and a constant, at any values: what is held there is a number.
+    """Return whether each surface is linear in one state with constant coefficients; held values are then numbers.
 
-    On another surface the held state follows other states, or time, and is none of the modal coordinates.
+    On another surface the held state follows other states or time, and is not one of the modal coordinates.
     """
     return bool(system.code.shared("holds constants", lambda: _holds_constants(system)))
 
@@ -124,17 +125,18 @@ def _holds_constants(system: System) -> bool:
 
 
 def what_is_not_linear(system: System) -> str | None:
-    """What keeps a model from being linear in each of its modes, in words; None where nothing does.
+    """Return the reason why a model is not linear in each of its modes, or None if it is.
 
-    Each mode of each component is looked at; other combinations of modes are when they are entered. Most models are
-    linear at any values of their parameters or at none; the others are looked at for each set of values.
+    Each mode of each component is checked once; other combinations of modes are checked when they are
+    entered. Most models are linear at all values of their parameters or at none; the others are checked for
+    each set of values.
     """
     if is_always_linear(system):
         return None
     known: dict[tuple[float, ...], str | None] = system.code.shared("what is not linear", dict)
     values = tuple(system.values.values())
     reason = known.get(values, "")
-    if reason == "":  # not looked at yet
+    if reason == "":  # not known yet
         reason = _first_reason(system, values)
         if len(known) >= _KEPT:
             known.clear()
@@ -149,7 +151,7 @@ def _first_reason(system: System, p: Sequence[float] | None) -> str | None:
             name = f"mode {mode}" if automaton.name == SINGLE else f"{automaton.name}.{mode}"
             z = vectors[f"in {name} "] = vectors[""].copy()
             z[c], of_mode[f"in {name} "] = m, (c, m)
-    for cluster in system.clusters:  # what several hold together is solved for with what all of them act by
+    for cluster in system.clusters:  # components that hold together are solved jointly
         names = " and ".join(system.automata[c].name for c in cluster)
         hold = "hold together" if len(cluster) > 1 else "holds"
         z = vectors[f"while {names} {hold} "] = vectors[""].copy()
@@ -164,7 +166,7 @@ def _first_reason(system: System, p: Sequence[float] | None) -> str | None:
             reasons[place] = str(reason)
     if not reasons:
         return None
-    # the mode with which none is linear: others may only stand beside it
+    # the mode with which no vector is linear; the other modes may not be the cause
     to_blame = (
         place
         for place, (c, m) in of_mode.items()
@@ -177,7 +179,7 @@ def _first_reason(system: System, p: Sequence[float] | None) -> str | None:
 
 
 def is_linear_beside_corners(system: System) -> bool:
-    """Whether each mode is linear on both sides of each corner as well, at the values of the parameters."""
+    """Return whether each mode is linear on both sides of each corner, at the values of the parameters."""
     known: dict[tuple[float, ...] | None, bool] = system.code.shared("is linear beside corners", dict)
     for p in (None, tuple(system.values.values())):
         if p not in known:
@@ -206,7 +208,7 @@ def _is_linear_beside_corners(system: System, p: Sequence[float] | None) -> bool
 
 
 def refuse_nonlinear(system: System) -> None:
-    """Refuse a model of which some mode is not linear."""
+    """Refuse a model with a mode that is not linear."""
     reason = what_is_not_linear(system)
     if reason is not None:
         raise UsageError(

@@ -1,6 +1,6 @@
-"""Linear modes in compiled code: functions of time, exponentials of blocks, guards' series, first zeros of guards.
+"""Linear modes in compiled code: functions of time, block exponentials, series of guards, first zeros of guards.
 
-Arrays are those of `hybridsim.engine.linear.tables`.
+The arrays are those of `hybridsim.engine.linear.tables`.
 """
 
 from __future__ import annotations
@@ -27,30 +27,33 @@ from hybridsim.engine.roots.certify import (
 from hybridsim.engine.roots.first_exit import FOUND, NEVER, OPEN
 from hybridsim.engine.series.bounded import ORDER, UNIT
 
-_SPREAD = 2.0  # norm up to which the exponential of a block less its mean is summed in one piece
-_PARTS = 10**6  # of that size: a second's work
+_SPREAD = 2.0  # largest norm for which the exponential of a block less its mean is summed in one part
+_PARTS = 10**6  # most parts of that size, about one second of work
 _ITERATIONS = 100
-_TERMS = 30  # of a series near its start, at most, beyond as many as there are states
-# From so many points a guard is followed: a second; a run that is to be stopped must not wait for more. A block of many
-# coordinates moves as much more slowly as it has entries.
+_TERMS = 30  # most terms of a series near its start, in addition to the number of states
+# A guard is followed from at most this many points, which takes a second, so that a run can be interrupted. Points of a
+# block with many coordinates count in proportion to its entries.
 POINTS = 10**6
-# A row's rounding is at least ten units of the row in absolute values: what errors of y make of it, in terms of that.
+# A row's rounding is at least ten units of its absolute values: the effect of errors of y, relative to that.
 _IN_UNITS = 0.125 / UNIT
-# What is damped grows going back: by exp(1) at most over this share of how far a polynomial is used ahead.
-_TURNED = 2.0  # roundings, in the speed and in its product with the time
+# A damped motion grows backward, by at most exp(1) over this share of the forward range of a polynomial.
+_TURNED = 2.0  # roundings: of the speed and of its product with the time
 _BACK, _BACKWARD = 1.0 / FARTHEST, 4.0
 
 
 @inlined
 def size_of(z: complex) -> float:
-    """A bound of a complex number's modulus, at most 1.5 times too large and cheaper than a root."""
+    """Return a bound of a complex modulus, at most 1.5 times too large and cheaper than a square root."""
     return abs(z.real) + abs(z.imag)
 
 
 @inlined
 def functions_of_time(lin: Any, s: float, p: Any, factors: Any, w: Any) -> None:
-    """Monomials at local time s. factors: room for values of atoms, (2 A + 1, 2) with one at its end, and behind each
-    a bound of what its argument errs by, but for s."""
+    """Compute the monomials w at local time s.
+
+    factors: scratch space for values of atoms, (2 A + 1, 2), with a one at its end. The second column holds a
+    bound of the error of each argument, without the error of s.
+    """
     for a in range(lin.kinds.shape[0]):
         kind, rate, angle = lin.kinds[a], lin.rates[a], lin.offsets[a]
         value, other = factors[2 * a], factors[2 * a + 1]
@@ -76,7 +79,7 @@ def functions_of_time(lin: Any, s: float, p: Any, factors: Any, w: Any) -> None:
         if kind == ANGLE:
             value[0], other[0] = math.sin(angle), math.cos(angle)
         elif kind == GROWTH:
-            value[0] = math.inf if angle >= 709.0 else math.exp(angle)  # math.exp raises beyond
+            value[0] = math.inf if angle >= 709.0 else math.exp(angle)  # math.exp raises an exception beyond
         else:
             value[0] = angle
     for m in range(w.shape[0]):
@@ -90,7 +93,7 @@ def functions_of_time(lin: Any, s: float, p: Any, factors: Any, w: Any) -> None:
 
 @inlined
 def errors_of_time(lin: Any, s_error: float, factors: Any, w_error: Any) -> None:
-    """Bounds of the errors of `functions_of_time`, which was asked last, at a local time good to s_error."""
+    """Bound the errors of the last call of `functions_of_time`, for a local time with error s_error."""
     for a in range(lin.kinds.shape[0]):
         kind, value, other = lin.kinds[a], factors[2 * a], factors[2 * a + 1]
         if kind == TIME:
@@ -123,7 +126,7 @@ def errors_of_time(lin: Any, s_error: float, factors: Any, w_error: Any) -> None
 def linear_coefficient(
     lin: Any, k: int, g: int, order: int, x: Any, x_error: Any, work: Any
 ) -> tuple[float, float]:
-    """A Taylor coefficient of a guard of the modes in row k at y = (x, w), with its bound."""
+    """Return a Taylor coefficient of a guard of the modes in row k at y = (x, w), with its bound."""
     w, w_error, sizes, w_sizes, bound = work.w, work.w_error, work.sizes, work.w_sizes, 0.0
     for m in range(x.shape[0]):
         few()
@@ -141,7 +144,7 @@ def linear_coefficient(
 
 @inlined
 def size_of_point(x: Any, x_error: Any, w: Any, w_error: Any) -> float:
-    """Of y = (x, w): a coefficient's bound is at most the largest of its roundings times this."""
+    """Return the size of y = (x, w); a coefficient's bound is at most its largest rounding times this size."""
     size = 0.0
     for m in range(x.shape[0]):
         few()
@@ -154,7 +157,7 @@ def size_of_point(x: Any, x_error: Any, w: Any, w_error: Any) -> float:
 
 @inlined
 def clear_sign(lin: Any, k: int, g: int, order: int, x: Any, w: Any, size: float) -> int:
-    """Sign of a Taylor coefficient of a guard of the modes in row k at y = (x, w), of that size; 0 where in doubt."""
+    """Return the sign of a guard's Taylor coefficient in row k at y = (x, w) of that size, or 0 if uncertain."""
     value = dot(lin.series, (k, g, order), (x, w))
     if not abs(value) > lin.largest[k, g, order] * size:
         return 0
@@ -165,14 +168,14 @@ def clear_sign(lin: Any, k: int, g: int, order: int, x: Any, w: Any, size: float
 def linear_side(
     lin: Any, k: int, g: int, decreed: int, x: Any, x_error: Any, work: Any
 ) -> tuple[int, int, bool]:
-    """As `hybridsim.engine.events.choice.verdict.side_after`.
+    """Return the side as in `hybridsim.engine.events.choice.verdict.side_after`, and whether rounding leaves it open.
 
-    Coefficient by coefficient; and whether it is a question of rounding.
+    The coefficients are evaluated one at a time.
     """
     is_open, size = False, size_of_point(x, x_error, work.w, work.w_error)
     for order in range(decreed, ORDER + 1):
         sign = clear_sign(lin, k, g, order, x, work.w, size)
-        if sign != 0:  # far beyond its bound
+        if sign != 0:  # certain
             return sign, order, False
         value, bound = linear_coefficient(lin, k, g, order, x, x_error, work)
         if value > bound:
@@ -185,7 +188,7 @@ def linear_side(
 
 @inlined
 def to_modal(lin: Any, k: int, x: Any, w: Any, c: Any) -> None:
-    """Modal coordinates of y = (x, w)."""
+    """Compute the modal coordinates of y = (x, w)."""
     for q in range(lin.inverse.shape[1]):
         few()
         a, b, d, e = times(lin.inverse, (k, q), (x, w))
@@ -194,7 +197,7 @@ def to_modal(lin: Any, k: int, x: Any, w: Any, c: Any) -> None:
 
 @inlined
 def moved(lin: Any, k: int, c: Any, d: float, out: Any) -> None:
-    """Modal coordinates after a time d: exp(B d) c."""
+    """Compute the modal coordinates after a time d: exp(B d) c."""
     j = 0
     values, ends, count = lin.values[k], lin.ends[k], lin.counts[k]
     while j < count:
@@ -211,7 +214,7 @@ def moved(lin: Any, k: int, c: Any, d: float, out: Any) -> None:
         else:
             call_apart(_move_block, (lin, k, j, end, c, d, out))
         j = end
-    while j < out.shape[0]:  # what others left there
+    while j < out.shape[0]:  # clear old values
         few()
         out[j] = 0.0
         j += 1
@@ -219,7 +222,7 @@ def moved(lin: Any, k: int, c: Any, d: float, out: Any) -> None:
 
 @allocating_kernel
 def _move_block(lin: Any, k: int, first: int, end: int, c: Any, d: float, out: Any) -> None:
-    """A block of several coordinates: exp(mean d) times the series of the rest; NaN where that takes too many parts."""
+    """Advance a block of several coordinates by exp(mean d) times a series; NaN if it needs too many parts."""
     size = end - first
     mean = 0.0 + 0.0j
     for j in range(first, end):
@@ -245,7 +248,7 @@ def _move_block(lin: Any, k: int, first: int, end: int, c: Any, d: float, out: A
             total[j] = term[j] = out[first + j]
         for order in range(1, _ITERATIONS):
             grown, whole = 0.0, 0.0
-            for j in range(size):  # upper triangular: row j needs no term before it
+            for j in range(size):  # upper triangular: row j uses no earlier coordinate
                 value = (lin.values[k, first + j] - mean) * term[j]
                 for i in range(j + 1, size):
                     value += lin.upper[k, first + j, first + i] * term[i]
@@ -260,16 +263,16 @@ def _move_block(lin: Any, k: int, first: int, end: int, c: Any, d: float, out: A
 
 @inlined
 def states_of(lin: Any, k: int, c: Any, x: Any) -> None:
-    """States at modal coordinates c."""
+    """Compute the states at modal coordinates c."""
     product(lin.states, k, (c,), x)
 
 
 @kernel
 def states_near_start(lin: Any, k: int, x: Any, w: Any, s: float, terms: Any, out: Any) -> None:
-    """States a short time s after y = (x, w), each to rounding of itself: the Taylor series, summed term by term.
+    """Compute states a short time s after y = (x, w), each with small relative error, by summing the Taylor series.
 
-    Modal coordinates know a state to rounding of the largest one alone, and one that grows from zero is less than that
-    at first. terms (2, n + M): room. See `LinearTables.near`.
+    Modal coordinates give a state with an error relative to the largest state, and a state that grows from
+    zero is smaller than this error at first. terms (2, n + M): scratch space. See `LinearTables.near`.
     """
     n, size = x.shape[0], terms.shape[1]
     term, following = terms[0], terms[1]
@@ -278,7 +281,7 @@ def states_near_start(lin: Any, k: int, x: Any, w: Any, s: float, terms: Any, ou
     for i in range(n):
         out[i] = x[i]
     for order in range(1, size + _TERMS):
-        is_small = order > size  # until then a state may have no term yet
+        is_small = order > size  # before it a state may have no term yet
         for i in range(size):
             total = 0.0
             for j in range(size):
@@ -296,15 +299,15 @@ def states_near_start(lin: Any, k: int, x: Any, w: Any, s: float, terms: Any, ou
 
 @inlined
 def slopes_of(lin: Any, k: int, x: Any, w: Any, out: Any) -> None:
-    """Rates of the states at y = (x, w)."""
+    """Compute the rates of the states at y = (x, w)."""
     product(lin.slopes, k, (x, w), out)
 
 
 @inlined
 def state_sizes(lin: Any, k: int, before: Any, after: Any, larger: Any, scale: Any) -> None:
-    """What the states are summed from, in size, with modal coordinates before and after at the ends of a segment.
+    """Compute the sizes of the terms of each state, from modal coordinates before and after at the ends of a segment.
 
-    larger: room for their sizes.
+    larger: scratch space for the sizes of the coordinates.
     """
     for j in range(before.shape[0]):
         few()
@@ -314,9 +317,10 @@ def state_sizes(lin: Any, k: int, before: Any, after: Any, larger: Any, scale: A
 
 @inlined
 def guard_terms(lin: Any, k: int, g: int, c: Any, terms: Any) -> tuple[float, float]:
-    """Taylor coefficients of a guard at c into `terms`; (a bound of its size, of the first coefficient left out).
+    """Write the Taylor coefficients of a guard at c to `terms`; return bounds of the guard and of the remainder.
 
-    The latter holds from here on as long as no block grows: |gamma| |B**m| |c|/m!, block by block.
+    The bound of the first omitted coefficient holds from here on as long as no block grows: |gamma| |B**m|
+    |c|/m!, block by block.
     """
     size, rest = 0.0, 0.0
     first, second = splat(0.0), splat(0.0)  # BOUND_TERMS are two vectors
@@ -338,7 +342,7 @@ def guard_terms(lin: Any, k: int, g: int, c: Any, terms: Any) -> tuple[float, fl
 
 @inlined
 def first_zero_of_wave(lin: Any, k: int, g: int, c: Any, bound: float) -> tuple[int, float]:
-    """As `first_zero`, for a guard a + r cos(omega s + phase), positive now; OPEN where it hardly gets below zero."""
+    """As `first_zero`, for a positive guard a + r cos(omega s + phase); OPEN if it hardly falls below zero."""
     j, terms = lin.waves[k, g], lin.terms
     level, size = 0.0, 0.0
     for i in range(lin.counts[k]):
@@ -364,13 +368,14 @@ def first_zero_of_wave(lin: Any, k: int, g: int, c: Any, bound: float) -> tuple[
 
 @kernel
 def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, room: Any) -> tuple[int, float]:
-    """When a guard first goes negative on (0, bound]: (NEVER, bound), (FOUND, s), or (OPEN, s): a question of rounding.
+    """Find when a guard first becomes negative on (0, bound]: (NEVER, bound), (FOUND, s), or (OPEN, s).
 
-    The guard is positive just after 0; its first `orders` coefficients are zero by decree, to within `floors`. starts,
-    row i: its Taylor coefficients at 0, and behind them the bounds that come with them. hints: where it may be zero (0:
-    no idea); if it is, and positive up to there for certain, that is the zero. Else, from point to point, the guard is
-    bounded from below by its Taylor polynomial less the largest remainder, so that no zero is jumped over; once the
-    polynomial holds to rounding up to the zero, that is the polynomial's.
+    OPEN means that rounding leaves the zero undecided. The guard is positive just after 0; its first `orders`
+    coefficients are set to zero, with an uncertainty `floors`. Row i of `starts` holds its Taylor
+    coefficients at 0, followed by their bounds. `hints` holds a guess of its zero (0: none). A guess that is
+    a zero, with a certainly positive guard before it, is the result. Otherwise the guard is followed from
+    point to point: its Taylor polynomial less the largest remainder is a lower bound, so that no zero is
+    passed over. Once the polynomial is accurate to rounding up to the zero, its zero is the result.
     """
     side, order, floor = state.sides[g], state.orders[g], state.floors[g]
     c, v, start, hint, terms, lower = (

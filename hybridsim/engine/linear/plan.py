@@ -1,4 +1,4 @@
-"""Where the numbers of linear modes come from: what is read off the tape once, for all values that are alike."""
+"""Plans that map a model's tape to the matrices of its linear modes, read once for all similar parameter values."""
 
 from __future__ import annotations
 
@@ -14,18 +14,19 @@ from hybridsim.engine.linear.recipe import Numbers, Recipe
 from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
 
-_MOST = 16  # plans of a structure for the same modes; more of them differ in zeros or conditions
-_MOST_VECTORS = 64  # sets of modes that plans are kept for
+_MOST = 16  # most plans per structure and modes; plans differ in zeros or conditions
+_MOST_VECTORS = 64  # most sets of modes with cached plans
 
-Entries = np.ndarray  # (2, entries): where each goes, and the register that has its value
+Entries = np.ndarray  # (2, entries): place of each entry, and the register of its value
 
 _lock = SharedLock()
 
 
 class LinearPlan:
-    """Matrices of some vectors of modes (K, components) as entries whose values are registers of a recipe.
+    """Matrices of some mode vectors (K, components), as entries whose values are registers of a recipe.
 
-    begun: a plan of the first of these vectors, at values for which it holds; the others are read in addition to it.
+    begun: a plan of the first of these vectors, at values for which it holds; the other vectors are added to
+    it.
     """
 
     def __init__(
@@ -48,7 +49,7 @@ class LinearPlan:
         motion = [(place[m], atoms.derivative(m)) for m in monomials]  # the same in all modes
 
         def entries(rows: Iterable[tuple[int, Form]]) -> Entries:
-            """Places in a matrix of `size` columns, and registers."""
+            """Return places in a matrix of `size` columns, and registers."""
             found = [(row * size + place[k], numbers.place(w)) for row, form in rows for k, w in form.items()]
             return np.array(found, dtype=np.int64).reshape(-1, 2).T.copy()
 
@@ -86,10 +87,10 @@ class LinearPlan:
         self.recipe: Recipe = Recipe(numbers, None if begun is None else begun.recipe)
 
     def _first_read(self, system: System, met: np.ndarray) -> Iterable[Monomial]:
-        """Functions of time that do not depend on which modes a run meets first: the order of sums hangs on them.
+        """Return functions of time in an order that does not depend on which modes a run enters first.
 
-        Where all vectors of modes are met they are read in their order; else those that differ in one component come
-        first, in which there is nearly all that the others have.
+        The order of sums depends on it. If all mode vectors are entered, they are read in their order.
+        Otherwise vectors that differ in one component come first; they contain almost all functions of time.
         """
         if len(met) == math.prod(len(a.modes) for a in system.automata):
             return ((),)
@@ -97,7 +98,7 @@ class LinearPlan:
         return {(), *(m for mode in read for m in mode.monomials())}
 
     def matrices(self, registers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """A (K, m, m) of the flows y' = A y, and rows (K, G, m) of the guards as functions of y.
+        """Return A (K, m, m) of the flows y' = A y, and rows (K, G, m) of the guards as functions of y.
 
         registers: (R,), or (points, R) for as many of each.
         """
@@ -108,12 +109,12 @@ class LinearPlan:
         return A, rows
 
     def atoms(self, registers: np.ndarray) -> dict[str, np.ndarray]:
-        """The atoms and monomials as arrays; registers as for `matrices`."""
+        """Return the atoms and monomials as arrays; registers as for `matrices`."""
         return self._fixed | {name: registers[..., places] for name, places in self._computed.items()}
 
 
 def _factors(monomials: Sequence[Sequence[int]], one: int) -> np.ndarray:
-    """What each is a product of, filled up with ones."""
+    """Return the factors of each monomial, padded with ones."""
     factors = np.full((len(monomials), max(map(len, monomials))), one, dtype=np.int64)
     for row, monomial in zip(factors, monomials, strict=True):
         row[: len(monomial)] = monomial
@@ -121,7 +122,7 @@ def _factors(monomials: Sequence[Sequence[int]], one: int) -> np.ndarray:
 
 
 def plan_of(system: System, met: np.ndarray, p: np.ndarray) -> tuple[LinearPlan, np.ndarray]:
-    """The plan of these vectors of modes that holds at the parameters in p, and its registers there."""
+    """Return the plan of these mode vectors that holds at the parameters in p, and its registers there."""
     kept: dict[bytes, list[LinearPlan]] = system.code.shared("linear plans", dict)
     inputs = p[: system.layout.parameters]
     with _lock:
@@ -132,7 +133,7 @@ def plan_of(system: System, met: np.ndarray, p: np.ndarray) -> tuple[LinearPlan,
         if found is None:
             begun = _begun(kept, met, inputs)
             found = _with_values(LinearPlan(system, met, p, begun), inputs)
-            if found is None:  # what is new is otherwise at the values of the plan that was begun
+            if found is None:  # otherwise new entries would have the values of the earlier plan
                 found = _with_values(LinearPlan(system, met, p), inputs)
                 assert found is not None  # the comparisons are those of these inputs
             if len(plans) >= _MOST:
@@ -147,12 +148,12 @@ def _with_values(plan: LinearPlan, inputs: np.ndarray) -> tuple[LinearPlan, np.n
 
 
 def _that_holds(plans: Iterable[LinearPlan], inputs: np.ndarray) -> tuple[LinearPlan, np.ndarray] | None:
-    """The first of some plans that holds at these inputs, and its registers there."""
+    """Return the first plan that holds at these inputs, and its registers there."""
     return next((found for plan in plans if (found := _with_values(plan, inputs)) is not None), None)
 
 
 def _begun(kept: dict[bytes, list[LinearPlan]], met: np.ndarray, inputs: np.ndarray) -> LinearPlan | None:
-    """The plan of as many as possible of the first vectors: what a run meets grows by a few at the end, many times."""
+    """Return the plan of as many leading vectors as possible; a run's vectors grow by a few at the end, many times."""
     whole = met.tobytes()
     for key in sorted((key for key in kept if whole.startswith(key)), key=len, reverse=True):
         found = _that_holds(kept[key], inputs)

@@ -1,7 +1,7 @@
-"""Arithmetic on numbers written down while it is done, to be done again with other numbers in compiled code.
+"""Arithmetic on numbers that is recorded while it is done, to be repeated with other numbers in compiled code.
 
-What is done may depend on the numbers: whether one is zero, whether two are equal. Such comparisons are written down
-with their results, and a recipe holds for other numbers where all of them come out the same.
+The operations may depend on the numbers: whether one is zero, or whether two are equal. Such comparisons are
+recorded with their results, and a recipe holds for other numbers if all comparisons have the same results.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from hybridsim.engine.native.kernels import kernel
 from hybridsim.engine.series.interpreter import advance
 from hybridsim.engine.series.tape import ADD, DIV, MUL, NEG, SUB
 
-_PLAIN = {ADD: operator.add, SUB: operator.sub, MUL: operator.mul}  # the same in Python, and faster
+_PLAIN = {ADD: operator.add, SUB: operator.sub, MUL: operator.mul}  # equal results in Python, and faster
 
 
 def computed(op: int, values: Sequence[float], b: int, c: int) -> tuple[float, float]:
-    """An operation of the tape on numbers: the second result is 0 for most. b and c are flags for a single operand."""
+    """Apply an operation of the tape to numbers; the second result is 0 for most. b and c may be flags."""
     if op in _PLAIN:
         return _PLAIN[op](values[0], values[1]), 0.0
     V = np.zeros((4, 1))
@@ -30,7 +30,7 @@ def computed(op: int, values: Sequence[float], b: int, c: int) -> tuple[float, f
 
 
 class Numbers:
-    """The registers of a recipe in the making: inputs first, then constants and results as they come."""
+    """The registers of a recipe under construction: inputs first, then constants and results in order."""
 
     def __init__(self, inputs: Sequence[float]) -> None:
         self.values = list(inputs)
@@ -40,24 +40,24 @@ class Numbers:
         self.inputs = [Traced(value, self, i) for i, value in enumerate(self.values)]
 
     def place(self, value: float) -> int:
-        """The register of a number; one that was not computed here is a constant."""
+        """Return the register of a number; a number that was not computed here is a constant."""
         if isinstance(value, Traced):
             return value.register
-        name = float(value).hex()  # tells zeros by their signs
+        name = float(value).hex()  # distinguishes 0.0 and -0.0
         if name not in self._constants:
             self._constants[name] = len(self.values)
             self.values.append(value)
         return self._constants[name]
 
     def operation(self, op: int, values: Sequence[float], b: int = 0, c: int = 0) -> tuple[Traced, Traced]:
-        """An operation of the tape on numbers; b and c are flags where there is one operand."""
+        """Record an operation of the tape on numbers; b and c are flags if there is one operand."""
         places, out = [self.place(value) for value in values], len(self.values)
         self.rows.append((op, places[0], places[1] if len(places) > 1 else b, c, out))
         self.values += computed(op, [self.values[i] for i in places], b, c)
         return Traced(self.values[out], self, out), Traced(self.values[out + 1], self, out + 1)
 
     def equal(self, a: float, b: float) -> bool:
-        """Whether two numbers are equal, written down."""
+        """Return whether two numbers are equal, and record the comparison."""
         i, j = self.place(a), self.place(b)
         found = self.values[i] == self.values[j]
         self.comparisons.append((i, j, found))
@@ -65,14 +65,14 @@ class Numbers:
 
 
 class Traced(float):
-    """A number that knows its register."""
+    """A float with its register."""
 
     __slots__ = ("numbers", "register")
     numbers: Numbers
     register: int
 
     def __new__(cls, value: float, numbers: Numbers, register: int) -> Traced:
-        """The number in a register."""
+        """Return the number in a register."""
         self = super().__new__(cls, value)
         self.numbers, self.register = numbers, register
         return self
@@ -111,16 +111,16 @@ class Traced(float):
         return not self == other
 
     __hash__ = float.__hash__
-    # a decision that is not written down must not be taken
-    __bool__ = __lt__ = __le__ = __gt__ = __ge__ = None  # type: ignore[assignment]  # refused by being no function
+    # decisions that are not recorded are forbidden
+    __bool__ = __lt__ = __le__ = __gt__ = __ge__ = None  # type: ignore[assignment]  # None makes these operators raise TypeError
 
 
-# registers, rows, and of comparisons both registers and how they came out
+# registers, rows, and comparisons (both registers and the result)
 _NOTHING = np.empty((0, 1)), np.empty((0, 5), dtype=np.int64), np.empty((0, 3), dtype=np.int64)
 
 
 class Recipe:
-    """What was written down, for other inputs; begun: of what the same numbers were some operations ago."""
+    """The recorded operations, for other inputs; begun: the recipe of the same numbers some operations earlier."""
 
     def __init__(self, numbers: Numbers, begun: Recipe | None = None) -> None:
         self._inputs = len(numbers.inputs)
@@ -133,7 +133,7 @@ class Recipe:
         self._left, self._right, self._found = compared[:, 0], compared[:, 1], compared[:, 2] != 0
 
     def values(self, inputs: Any) -> np.ndarray | None:
-        """All registers at these inputs; None where a comparison comes out otherwise than it did."""
+        """Return all registers at these inputs, or None if a comparison has another result."""
         V = self._start.copy()
         V[: self._inputs, 0] = inputs
         advance(self._rows, V, 0)
@@ -142,7 +142,7 @@ class Recipe:
         return registers if same.all() else None
 
     def values_at(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """All registers (points, R) at the inputs of many points; where (points,) the comparisons come out alike."""
+        """Return all registers (points, R) at many inputs, and where (points,) all comparisons agree."""
         found = np.empty((len(inputs), len(self._start)))
         _replay(self._rows, self._start[:, 0].copy(), inputs, np.empty_like(self._start), found)
         same = (found[:, self._left] == found[:, self._right]) == self._found
@@ -150,14 +150,14 @@ class Recipe:
 
 
 def _gone_on_with(known: np.ndarray, written: Sequence[Any]) -> np.ndarray:
-    """What was written as an array (entries, width), of which the first entries are known."""
+    """Return recorded rows as an array (entries, width), whose first entries are known."""
     new = np.array(written[len(known) :], dtype=known.dtype).reshape(-1, known.shape[1])
     return np.concatenate([known, new])
 
 
 @kernel
 def _replay(rows: Any, start: Any, inputs: Any, V: Any, out: Any) -> None:
-    """Carry the operations out for each row of inputs; V (R, 1): room."""
+    """Carry out the operations for each row of inputs; V (R, 1): scratch space."""
     for i in range(inputs.shape[0]):
         for r in range(start.shape[0]):
             V[r, 0] = start[r]

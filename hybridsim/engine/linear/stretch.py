@@ -1,4 +1,4 @@
-"""What the states do over a stretch of closed-form segments: extremes, integrals, time in holding modes."""
+"""Summary of the states over closed-form segments: extremes, integrals, time in holding modes."""
 
 from __future__ import annotations
 
@@ -10,33 +10,29 @@ import numpy as np
 from hybridsim.engine.linear.motion import moved
 from hybridsim.engine.native.kernels import inlined, kernel
 
-# Gauss's rule on pieces over which the fastest coordinate turns by so much takes its square to rounding: the error of
+# Gauss quadrature integrates the square of the fastest coordinate to rounding on pieces with this angle. The error of
 # n nodes is below (angle/2)**(2n) 2**(2n) (n!)**4/((2n + 1) (2n)!**3), 2e-16 here.
 _TURN, _NODES = 8.0, 16
-_MOST_PIECES = 4096  # a stretch with more is for others
-_GROWN = (
-    4.0  # times the coordinates, at most, from a node to the next: these are less than 0.8 of a rate apart
-)
-_UNSEEN = 1e-15  # of a state's size: a turn that does less is none
-_ITERATIONS = 60  # of a secant method that halves in the worst case
+_MOST_PIECES = 4096  # a longer interval is left to sampling
+_GROWN = 4.0  # largest growth of the coordinates between nodes, which are less than 0.8 of a rate apart
+_UNSEEN = 1e-15  # relative to a state's size: smaller extrema are ignored
+_ITERATIONS = 60  # most iterations of a secant method that bisects in the worst case
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(_NODES)
 
 
 class Stretch(NamedTuple):
-    """What is summed up: extremes (2, n), integrals of x and x**2 (2, n), states at begin and end (2, n); for each
-    component the time in its holding mode and the stretches of it (2, C), and whether it holds at begin and end (2, C).
-    """
+    """Accumulated measures of the states and the holding modes over several segments."""
 
-    extremes: np.ndarray
-    integrals: np.ndarray
-    ends: np.ndarray
-    held: np.ndarray
-    holding: np.ndarray
+    extremes: np.ndarray  # (2, n) smallest and largest value of each state
+    integrals: np.ndarray  # (2, n) of x and x**2
+    ends: np.ndarray  # (2, n) states at the beginning and the end
+    held: np.ndarray  # (2, C) time in the holding mode, and number of its intervals, by component
+    holding: np.ndarray  # (2, C) whether the component holds at the beginning and at the end
 
 
 @inlined
 def _state_and_slope(lin: Any, k: int, i: int, v: Any) -> tuple[float, float]:
-    """A state at modal coordinates v, and its rate along c' = B c."""
+    """Return a state at modal coordinates v, and its rate along c' = B c."""
     value = slope = 0.0
     for j in range(lin.counts[k]):
         b, change = lin.basis[k, i, j], lin.values[k, j] * v[j]
@@ -51,7 +47,7 @@ def _state_and_slope(lin: Any, k: int, i: int, v: Any) -> tuple[float, float]:
 def _turn(
     lin: Any, k: int, i: int, c: Any, low: float, high: float, at_low: float, at_high: float, v: Any
 ) -> float:
-    """The value of a state where its rate is zero, between two times at which it has different signs."""
+    """Return a state's value at the zero of its rate between two times at which the rate has different signs."""
     value, kept = 0.0, 0
     for _ in range(_ITERATIONS):
         s = low - at_low * (high - low) / (at_high - at_low)
@@ -59,12 +55,12 @@ def _turn(
             s = 0.5 * (low + high)
         moved(lin, k, c, s, v)
         value, slope = _state_and_slope(lin, k, i, v)
-        # the value errs by the square of the error in time: this is far below rounding of the latter's root
+        # the error of the value is quadratic in the error of the time, and is far below rounding
         if slope == 0.0 or high - low <= 1e-9 * high or abs(slope) <= 1e-9 * min(abs(at_low), abs(at_high)):
             return value
         if (slope > 0.0) == (at_high > 0.0):
             high, at_high = s, slope
-            at_low *= 0.5 if kept == 1 else 1.0  # the other end is kept a second time (Illinois)
+            at_low *= 0.5 if kept == 1 else 1.0  # the other end is used a second time (Illinois method)
             kept = 1
         else:
             low, at_low = s, slope
@@ -75,7 +71,7 @@ def _turn(
 
 @inlined
 def _bend(lin: Any, k: int, i: int, v: Any, is_shrinking: bool) -> tuple[float, float]:
-    """Bounds of a state and of its third derivative, from modal coordinates v on, at least up to the next node."""
+    """Return bounds of a state and its third derivative from modal coordinates v on, at least to the next node."""
     size = bend = 0.0
     for j in range(lin.counts[k]):
         b = abs(lin.basis[k, i, j])
@@ -94,7 +90,7 @@ def _bend(lin: Any, k: int, i: int, v: Any, is_shrinking: bool) -> tuple[float, 
 
 @inlined
 def _is_shrinking(lin: Any, k: int) -> bool:
-    """Whether no modal coordinate ever grows, so that bounds made of them hold from there on."""
+    """Return whether no modal coordinate ever grows, so that bounds made from them stay valid."""
     for j in range(lin.counts[k]):
         if lin.values[k, j].real > 0.0:
             return False
@@ -119,8 +115,8 @@ def _between(
 ) -> None:
     """Widen a state's extremes by those between two times at which its rates are known, however close they are.
 
-    The rate x' has two zeros in an interval of length h only where |x'| is at most max |x'''| h**2/2 at both of its
-    ends. Such an interval is halved until what could turn there is below rounding.
+    The rate x' has two zeros in an interval of length h only if |x'| is at most max |x'''| h**2/2 at both of
+    its ends. Such an interval is halved until a possible extremum in it is below rounding.
     """
     moved(lin, k, c, low, v)
     size, bend = _bend(lin, k, i, v, _is_shrinking(lin, k))
@@ -146,11 +142,11 @@ def _between(
 def sum_up(
     lin: Any, hold: Any, record: Any, first: int, last: int, begin: float, nodes: Any, weights: Any, room: Any, out: Any
 ) -> bool:  # fmt: skip
-    """Add segments first to last - 1 of a record to a `Stretch`, the first one from local time `begin` on.
+    """Add segments first to last - 1 of a record to a `Stretch`, starting at local time `begin` in the first segment.
 
-    record: ends, rows, modes, coordinates, jumps as `hybridsim.integrators.closed_form.segments` writes them; hold:
-    of each component. room: v (J,); slopes and bounds of third derivatives (3, n). False where a segment turns too
-    often.
+    record: ends, rows, modes, coordinates, jumps as written by `hybridsim.integrators.closed_form.segments`;
+    hold: holding mode of each component. room: v (J,); slopes and bounds of third derivatives (3, n). Return
+    False if a segment oscillates too often.
     """
     ends, rows, modes, coordinates, jumps = record
     v, slopes = room

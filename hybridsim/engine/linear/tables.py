@@ -18,73 +18,65 @@ from hybridsim.engine.series.bounded import ORDER
 from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
 
-_LARGEST = 1e150  # the square of it has a value yet
+_LARGEST = 1e150  # its square is still finite
 _MOST_GROWTH = 300.0  # exponent within a segment: doubles go from exp(-745) to exp(709)
 _PARTING = 2.0  # exponent by which coordinates of one block may grow apart
-# In units of the fastest rate: so near to its start a state that grows from zero is what modal coordinates cancel to,
-# and the first terms of its series are all of it.
+# In units of the fastest rate: within this time of its start, a state that grows from zero is lost to cancellation in
+# modal coordinates, and the first terms of its series suffice.
 _NEAR, _SLOWEST = 0.125, 1e-300
-_KEPT = 64  # tables of a structure, one for each set of parameter values
-_MOST_BYTES = 1 << 28  # of all of these, but for the last ones
+_KEPT = 64  # most tables per structure, one for each set of parameter values
+_MOST_BYTES = 1 << 28  # most bytes of all these tables except the last
 
 
 _lock = SharedLock()
 
 
 class LinearTables(NamedTuple):
-    """One row for each vector of modes, in the order of the shelf; y = (states, monomials) has n + M entries.
+    """Arrays with one row per mode vector, in the order of registration; y = (states, monomials) has n + M entries.
 
-    kinds, rates, offsets (A,), term_start (A + 1,), sources, weights: the atoms. factors (M, D): the monomials, each a
-    product of 2*atom + part, and of ones: 2*A. phases (2,): the sources in p that are angles known to rounding only.
-    Rows over y have zeros behind states and monomials, and panels are what `hybridsim.engine.native.simd_products`
-    makes of them. series (K, G, 4, .): Taylor coefficients of the guards, by rows over y; roundings likewise: bounds
-    of their rounding errors for y of size 1; largest (K, G, 4): of those of a coefficient. counts (K,), values (K,
-    J), upper (K, J, J), ends (K, J): the flow in modal coordinates c, J even; basis (K, n, J); inverse (K, J / 2, .,
-    4): panels that lead from y to c, a complex number being two; states (K, ., 2 J, 4): from c to the states, spreads
-    (K, ., J, 4): from its sizes to what these are summed from; slopes (K, ., ., 4): from y to their rates. terms (K,
-    G, J, 2, BOUND_TERMS): Taylor coefficients of the guards in modal coordinates, factors of their real and imaginary
-    parts; sizes, rests (K, G, J): bounds of the guard and of the first coefficient left out; farthest, grown (K, G):
-    how far ahead the latter holds, but for a factor; turning (K, G): the fastest of the speeds and rates of growth
-    that a guard sees, which make the more of a rounding the longer they go on. waves (K, G): the modal coordinate
-    that turns without damping, where a guard sees one such and else constants; -1 otherwise. lasting (K,): how long
-    the motion may be followed from one point: of exp(2*(t - 400)) nothing is left at t = 0 that could grow to one.
-    flows (K, n + M, n + M): from y to its rate; near (K,): up to when a state is summed from these.
+    Shapes: K mode vectors, A atoms, M monomials, G guards, J modal coordinates (even). Rows over y are padded
+    with zeros behind states and monomials. Panels are made by `hybridsim.engine.native.simd_products`.
+
+    The motion is followed from one point only for a limited time (`lasting`). For example, exp(2*(t - 400))
+    underflows at t = 0 and could not grow to one from there.
     """
 
-    kinds: np.ndarray
-    rates: np.ndarray
-    offsets: np.ndarray
-    term_start: np.ndarray
-    sources: np.ndarray
-    weights: np.ndarray
-    factors: np.ndarray
-    phases: np.ndarray
-    series: np.ndarray
-    roundings: np.ndarray
-    largest: np.ndarray
-    counts: np.ndarray
-    values: np.ndarray
-    upper: np.ndarray
-    ends: np.ndarray
-    basis: np.ndarray
-    inverse: np.ndarray
-    states: np.ndarray
-    spreads: np.ndarray
-    slopes: np.ndarray
-    terms: np.ndarray
-    sizes: np.ndarray
-    rests: np.ndarray
-    farthest: np.ndarray
-    grown: np.ndarray
-    turning: np.ndarray
-    waves: np.ndarray
-    lasting: np.ndarray
-    flows: np.ndarray
-    near: np.ndarray
+    kinds: np.ndarray  # (A,) kinds of the atoms
+    rates: np.ndarray  # (A,) rates of the atoms
+    offsets: np.ndarray  # (A,) offsets of the atoms
+    term_start: np.ndarray  # (A + 1,) first term of each atom in sources and weights
+    sources: np.ndarray  # places in p of the atoms' terms
+    weights: np.ndarray  # weights of the atoms' terms
+    factors: np.ndarray  # (M, D) factors of the monomials: 2*atom + part, or 2*A for a one
+    phases: np.ndarray  # (2,) range of the places in p that hold rounded angles
+    series: np.ndarray  # (K, G, 4, .) Taylor coefficients of the guards as rows over y
+    roundings: np.ndarray  # (K, G, 4, .) bounds of the rounding errors of series for y of size 1
+    largest: np.ndarray  # (K, G, 4) largest rounding of each coefficient
+    counts: np.ndarray  # (K,) number of modal coordinates
+    values: np.ndarray  # (K, J) diagonal of B in c' = B c
+    upper: np.ndarray  # (K, J, J) strictly upper part of B
+    ends: np.ndarray  # (K, J) end of the block of each coordinate
+    basis: np.ndarray  # (K, n, J) from c to the states
+    inverse: np.ndarray  # (K, J / 2, ., 4) panels from y to c, with two numbers per complex coordinate
+    states: np.ndarray  # (K, ., 2 J, 4) panels from c to the states
+    spreads: np.ndarray  # (K, ., J, 4) panels from the sizes of c to the sizes of the states' terms
+    slopes: np.ndarray  # (K, ., ., 4) panels from y to the rates of the states
+    terms: np.ndarray  # (K, G, J, 2, BOUND_TERMS) Taylor coefficients of the guards for Re c and Im c
+    sizes: np.ndarray  # (K, G, J) bounds of the guard
+    rests: np.ndarray  # (K, G, J) bounds of the first omitted coefficient
+    farthest: np.ndarray  # (K, G) how far ahead rests holds, up to the factor grown
+    grown: np.ndarray  # (K, G) factor on rests within farthest
+    turning: (
+        np.ndarray
+    )  # (K, G) fastest speed or growth rate in the guard, which amplifies roundings with time
+    waves: np.ndarray  # (K, G) coordinate of a guard that is a constant plus one undamped wave, else -1
+    lasting: np.ndarray  # (K,) how long the motion may be followed from one point
+    flows: np.ndarray  # (K, n + M, n + M) from y to its rate
+    near: np.ndarray  # (K,) time up to which a state is summed from the series of flows
 
 
 def no_tables() -> LinearTables:
-    """Tables of a loop whose modes are not linear: empty."""
+    """Return the empty tables of a loop whose modes are not linear."""
     i, c = np.int64, np.complex128
     tables: LinearTables = packed(LinearTables(
         np.zeros(0, i), np.zeros(0), np.zeros(0), np.zeros(1, i), np.zeros(0, i), np.zeros(0), np.zeros((0, 0), i),
@@ -99,9 +91,9 @@ def no_tables() -> LinearTables:
 
 
 class _Rows:
-    """The fields that have a row for each vector of modes, with room for more: those of a run grow many times.
+    """The fields that have a row per mode vector, with spare rows, because the tables of a run grow many times.
 
-    Rows that are there do not change, so that tables made earlier are views of the same memory.
+    Existing rows do not change, so that earlier tables are views of the same memory.
     """
 
     def __init__(self, fields: dict[str, np.ndarray]) -> None:
@@ -109,15 +101,15 @@ class _Rows:
 
     @property
     def size(self) -> int:
-        """In bytes."""
+        """Return the size in bytes."""
         return sum(field.nbytes for field in self._fields.values())
 
     def first(self, count: int) -> dict[str, np.ndarray]:
-        """The first rows of each."""
+        """Return the first rows of each field."""
         return {name: field[:count] for name, field in self._fields.items()}
 
     def gone_on_with(self, first: int, new: dict[str, np.ndarray]) -> _Rows:
-        """These up to `first`, and new ones: in the room behind them, if nobody else has taken it."""
+        """Return the rows up to `first` followed by new ones, in the spare rows if these are still free."""
         count = first + len(new["counts"])
         with _lock:
             rows = self
@@ -138,7 +130,7 @@ def _with_room(field: np.ndarray, count: int) -> np.ndarray:
 
 
 class Made(NamedTuple):
-    """Tables of some vectors of modes at one set of values, and the matrices (K, m, m), (K, G, m) they are made of."""
+    """Tables of some mode vectors at one set of values, and the matrices (K, m, m), (K, G, m) that define them."""
 
     tables: LinearTables
     flows: np.ndarray
@@ -149,10 +141,10 @@ class Made(NamedTuple):
 def linear_tables(
     system: System, met: np.ndarray, p: np.ndarray, horizon: float, begun: Made | None = None
 ) -> Made | None:
-    """Tables of the vectors of modes met so far (K, components) at the parameters in p; horizon: of a segment.
+    """Return tables of the mode vectors entered so far (K, components) at the parameters in p; horizon: of a segment.
 
-    begun: those of the first of these, which are taken up as far as they are the same. None where each mode has a rate
-    or a guard with a coefficient that is no finite number, or one beyond all that squares.
+    begun: tables of the first of these vectors, which are reused as far as they agree. Return None if each
+    mode has a rate or a guard with a coefficient that is not finite, or is too large to be squared.
     """
     plan, registers = plan_of(system, met, p)
     A, guards = plan.matrices(registers)
@@ -170,7 +162,7 @@ def linear_tables(
 def _gone_on_with(
     begun: Made, A: np.ndarray, guards: np.ndarray, is_finite: np.ndarray, n: int, horizon: float
 ) -> _Rows | None:
-    """The rows of those begun with those of further matrices behind them; None where the first ones are others."""
+    """Extend existing rows by the rows of further matrices; return None if the first matrices differ."""
     first, widest = len(begun.flows), begun.tables.values.shape[1]
     if not (np.array_equal(begun.flows, A[:first]) and np.array_equal(begun.guards, guards[:first])):
         return None
@@ -179,10 +171,10 @@ def _gone_on_with(
 
 
 def leave_out(A: np.ndarray, guards: np.ndarray, n: int) -> np.ndarray:
-    """Which modes (..., K) have coefficients with squares; the others are changed to such as no guard admits.
+    """Return which modes (..., K) have usable coefficients; make the others modes that no guard admits.
 
-    A (..., K, m, m), guards (..., K, G, m). Two surfaces that cannot be held together make modes without finite
-    numbers; runs have them as neighbours only. One that is in such a mode all the same is stopped by `unknown`.
+    A (..., K, m, m), guards (..., K, G, m). Two surfaces that cannot be held together give modes with
+    non-finite numbers, which runs have only as neighbours. `unknown` stops a run that is in such a mode.
     """
     is_finite = np.logical_and(*((np.abs(part) < _LARGEST).all(axis=(-2, -1)) for part in (A, guards)))
     A[~is_finite, :n] = 0.0
@@ -192,24 +184,26 @@ def leave_out(A: np.ndarray, guards: np.ndarray, n: int) -> np.ndarray:
 
 
 def unknown(fields: dict[str, np.ndarray], is_finite: np.ndarray) -> dict[str, np.ndarray]:
-    """The fields of `of_matrices` with no numbers for the motion in modes that are left out: a leap stops there, and
-    nothing is taken to rest there."""
+    """Set the motion of omitted modes to NaN in the fields of `of_matrices`.
+
+    A compiled loop then stops there, and no state counts as resting there.
+    """
     for name in ("inverse", "slopes", "flows"):
         fields[name][~is_finite] = np.nan
     return fields
 
 
 def angles_of(system: System) -> np.ndarray:
-    """Where in p the angles are that are known to rounding only: the first, and the one after the last."""
+    """Return the range of p with angles that are rounded: the first place, and the one after the last."""
     return np.array([system.layout.phases_at, system.layout.signals_at], dtype=np.int64)
 
 
 def of_matrices(
     A: np.ndarray, rows: np.ndarray, n: int, horizon: float, least: int = 0
 ) -> dict[str, np.ndarray]:
-    """The fields of the tables that have a row for each vector of modes, by name: of A (K, m, m), rows (K, G, m).
+    """Return the fields of the tables that have a row per mode vector, by name, from A (K, m, m) and rows (K, G, m).
 
-    least: of J.
+    least: smallest J.
     """
     count, guards, size = rows.shape
     flows = modals(A, horizon, BOUND_TERMS, multiple=LANES // 2, least=least)
@@ -264,10 +258,10 @@ def of_matrices(
 
 
 def _lasting(rates: np.ndarray, ends: np.ndarray, count: int) -> float:
-    """The time to grow by as much as leaves both ends within doubles, and no part of a block to its rounding.
+    """Return how long a motion can be followed before numbers overflow or parts of a block are lost to rounding.
 
-    Coordinates of one block are known to rounding of the largest of them. One that grows faster than others, as a load
-    does that is nothing yet, would make of that rounding what it makes of itself.
+    Coordinates of one block have errors relative to the largest of them. If one grows faster than the others,
+    such as a load that is still very small, the rounding error grows as fast.
     """
     lasting, j = np.inf, 0
     while j < count:
@@ -282,17 +276,18 @@ def _lasting(rates: np.ndarray, ends: np.ndarray, count: int) -> float:
 
 
 def horizon_class(horizon: float) -> float:
-    """The order of magnitude that tables are made for."""
+    """Return the order of magnitude for which tables are made."""
     return 16.0 ** math.ceil(math.log(horizon, 16.0)) if horizon > 0.0 else math.inf
 
 
 def tables_of(
     system: System, modes: np.ndarray, p: np.ndarray, horizon: float
 ) -> tuple[LinearTables, deque[Any]] | None:
-    """Tables of these vectors of modes (K, components), and scratch arrays for them to be handed on.
+    """Return tables of these mode vectors (K, components), and reusable scratch arrays for them.
 
-    The tables are made once for each set of parameter values and each order of magnitude of the horizon: how long a
-    segment may be at most. The scratch arrays serve all tables of one form. None where there are no tables.
+    The tables are made once for each set of parameter values and each order of magnitude of the horizon, the
+    longest possible segment. The scratch arrays serve all tables of one shape. Return None if there are no
+    tables.
     """
     horizon = horizon_class(horizon)
     last = system.tables.get(horizon)
@@ -305,7 +300,7 @@ def tables_of(
 
 
 def _scratch(system: System, tables: LinearTables) -> deque[Any]:
-    """Where scratch arrays for tables of this form wait."""
+    """Return the pool of scratch arrays for tables of this shape."""
     form = len(tables.kinds), len(tables.factors), tables.values.shape
     spare: deque[Any] = system.code.shared(f"scratch for linear modes of form {form}", deque)
     return spare

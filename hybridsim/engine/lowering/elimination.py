@@ -20,8 +20,8 @@ def eliminated(
 ) -> list[Item]:
     """Return the items of a Gaussian elimination without pivoting, for matrices with non-zero leading minors.
 
-    The effects of forces on accelerations are definite, and the effects of relays that hold their surfaces have positive
-    principal minors.
+    The effects of forces on accelerations are definite, and the effects of relays that hold their surfaces
+    have positive principal minors.
     """
     items: list[Item] = []
 

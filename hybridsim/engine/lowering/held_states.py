@@ -25,15 +25,17 @@ class HeldStates:
 
     Parameters
     ----------
-    surfaces : functions of states, t and parameters that holding modes keep at zero; only those that a mode can hold.
+    surfaces : functions of states, t and parameters that holding modes keep at zero; only those that a mode
+        can hold.
 
     Attributes
     ----------
-    pins : maps a constraint to the index of the one state that is evaluated from it, if the constraint is linear in that
-        state with a coefficient free of states. The evaluation is then exact. Two constraints that never hold at the same
-        time, such as two stops of one body, may share a state.
+    pins : maps a constraint to the index of the one state that is evaluated from it, if the constraint is
+        linear in that state with a coefficient free of states. The evaluation is then exact. Two constraints
+        that never hold at the same time, such as two stops of one body, may share a state.
     projected : maps any other constraint to the indices of its states. They are moved along the gradients of
-        the held constraints by Newton's method. Constraints that share a state with one of these are projected, too.
+        the held constraints by Newton's method. Constraints that share a state with one of these are
+        projected, too.
     """
 
     def __init__(self, lowering: Lowering, surfaces: dict[Held, Any]) -> None:
@@ -266,10 +268,11 @@ class HeldStates:
         return items
 
     def turned(self, derivatives: list[str]) -> tuple[list[Item], list[str]]:
-        """Return the rates of the states as integrated, from the rates on the surfaces, whose normals turn with the motion.
+        """Return the rates of the states as integrated, from the rates on the surfaces, whose normals turn.
 
-        The projection of x + sum of l_c grad s_c(x) is x. The integrated point is off the surface by its errors and
-        moves by x' + sum of l_c d(grad s_c)/dt with constant l_c. Its projection then moves by x' to first order.
+        The projection of x + sum of l_c grad s_c(x) is x. The integrated point is off the surface by its
+        errors and moves by x' + sum of l_c d(grad s_c)/dt with constant l_c. Its projection then moves by x'
+        to first order.
         """
         sp, states = self.lowering.sp, self.states
         items: list[Item] = []

@@ -1,8 +1,8 @@
 """Functions of a generated module for impacts: effects of impulses, derivatives of gaps, and restitutions.
 
-For m surfaces in the order of the module and n states the output contains, one after the other: d(u_k)/dx (m, n) with
-u_k the rate of a gap or a relative velocity; d(rates)/d(unknown_k) (m, n); and the growth of friction force k per unit
-of load d at the onset of slip, forward and backward, (m, m) each.
+For m surfaces in the order of the module and n states the output contains, one after the other: d(u_k)/dx (m,
+n) with u_k the rate of a gap or a relative velocity; d(rates)/d(unknown_k) (m, n); and the growth of friction
+force k per unit of load d at the onset of slip, forward and backward, (m, m) each.
 """
 
 from __future__ import annotations

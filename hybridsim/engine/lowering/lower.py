@@ -399,7 +399,8 @@ class Lowering:
     def in_modes(self, c: int, name: str, in_hold: Any, otherwise: Any = None, without: Any = None) -> Switch:
         """Return a switch that sets a name to one value in the holding mode and to another value in the other modes.
 
-        otherwise : value by mode; without it, the unknown's declared value. without : values substituted in declared values.
+        otherwise : value by mode; without it, the unknown's declared value. without : values substituted in
+            declared values.
         """
         component = self.components[c]
         surface = component.surface

@@ -1,10 +1,10 @@
 """Products of unknowns in the rate of a surface, which is linear if all unknowns but one have known values.
 
-An unknown is known beforehand, also in sliding, if no other unknown acts on its surface. If at most one of the other
-factors holds its surface, the others have the values that their modes declare, and the rate is linear in that one.
-With g for these values (0 for a holding factor) every product is replaced by its tangent: u*w by g_w u + g_u w - g_u g_w.
-This is the product itself as long as one of the two does not hold. If both hold, the rates on the sides do not
-determine the motion, and such modes are not admitted.
+An unknown is known beforehand, also in sliding, if no other unknown acts on its surface. If at most one of
+the other factors holds its surface, the others have the values that their modes declare, and the rate is
+linear in that one. With g for these values (0 for a holding factor) every product is replaced by its tangent:
+u*w by g_w u + g_u w - g_u g_w. This is the product itself as long as one of the two does not hold. If both
+hold, the rates on the sides do not determine the motion, and such modes are not admitted.
 """
 
 from __future__ import annotations
@@ -28,9 +28,10 @@ class Products:
         self.known: set[tuple[int, int]] = set()  # (surface, unknown with a known value in its rate)
 
     def linear(self, c: int, totals: dict[int, Any], row: dict[int, Any]) -> tuple[dict[int, Any], Any]:
-        """Return the effects of all unknowns on the rate of surface c and its remainder, linear for the declared values.
+        """Return the effects of all unknowns on the rate of surface c, and its remainder, at the declared values.
 
-        totals : the rates of all surfaces as functions of the unknowns. row : the derivatives of this rate by the unknowns.
+        totals : the rates of all surfaces as functions of the unknowns. row : the derivatives of this rate by
+            the unknowns.
         """
         multiplied: set[int] = set()
         for d, slope in row.items():

@@ -1,10 +1,10 @@
 """Relays that act on the second derivative of their function, which are held if it and its rate are zero.
 
-If du/dt = k w for the functions u and w of two relays and a number k, a motion that stays at u = 0 also stays at
-w = 0. There dw/dt = a + b U + c W with both relays anywhere between -1 and 1. Filippov's rates hold both at
-zero as long as |a| <= |b| + |c|. This is sliding of second order, as in a twisting controller (A. Levant, Int. J.
-Control 58 (1993) 1247, doi:10.1080/00207179308923053). The condition determines only the sum of both relays. Here
-both take the same fraction of their largest effect.
+If du/dt = k w for the functions u and w of two relays and a number k, a motion that stays at u = 0 also stays
+at w = 0. There dw/dt = a + b U + c W with both relays anywhere between -1 and 1. Filippov's rates hold both
+at zero as long as |a| <= |b| + |c|. This is sliding of second order, as in a twisting controller (A. Levant,
+Int. J. Control 58 (1993) 1247, doi:10.1080/00207179308923053). The condition determines only the sum of both
+relays. Here both take the same fraction of their largest effect.
 """
 
 from __future__ import annotations
@@ -44,9 +44,10 @@ class Partner:
 def partners(
     lowering: Lowering, surfaces: dict[int, Any], rate: dict[int, Any], effect: dict[tuple[int, int], Any]
 ) -> dict[int, Partner]:
-    """Return the partners of the relays that do not act on the rate of their own function; without one they never hold.
+    """Return the partners of the relays that do not act on the rate of their own function.
 
-    rate : rate of each surface's function without any relay. effect : effect of each relay (second) on each rate (first).
+    A relay without action and without a partner can never be held. rate : rate of each surface's function
+    without any relay. effect : effect of each relay (second) on each such rate (first).
     """
     found = {}
     for c in sorted(lowering.never_held):

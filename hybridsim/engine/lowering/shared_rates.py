@@ -1,8 +1,9 @@
 """Rates that follow from the surface along which a relay slides, instead of from the forces that hold it.
 
-While s(x) = 0 is held, the one rate on which the relay acts follows from the others, f_k = -(ds/dt + sum of g_i f_i over
-i != k)/g_k with g the gradient of s. A sum of forces would carry their rounding errors: a decaying speed
-along x + v = 0 would become noise of either sign in the end, and friction would detect endless reversals.
+While s(x) = 0 is held, the one rate on which the relay acts follows from the others, f_k = -(ds/dt + sum of
+g_i f_i over i != k)/g_k with g the gradient of s. A sum of forces would carry their rounding errors: a
+decaying speed along x + v = 0 would become noise of either sign in the end, and friction would detect endless
+reversals.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
 def kept_rates(lowering: Lowering, i: int, der: list[Any], held: HeldStates) -> Iterator[tuple[int, Any]]:
     """Yield the relays that determine the rate of a state while they slide, each with the rate.
 
-    The relay's held state must be evaluated from its surface and must be another state. Of the rates in ds/dt the relay
-    must act only on this one, and the derivative of s by this state must not depend on states.
+    The relay's held state must be evaluated from its surface and must be another state. Of the rates in ds/dt
+    the relay must act only on this one, and the derivative of s by this state must not depend on states.
     """
     sp, x = lowering.sp, lowering.states[i]
     for c, unknown in lowering.unknown.items():

@@ -1,8 +1,9 @@
 """The function of a generated module for time stepping with impacts: rates, effects and loads of contacts.
 
-For m surfaces in the order of the module and n states the output contains, one after the other: u_k (m,), the rate of
-a gap or a relative velocity; d(u_k)/dx (m, n); d(rates)/d(unknown_k) (m, n); and the growth of friction force k per
-unit of normal force d. The last are (m, m) each for slip above, slip below, and the upper and lower limit of stick.
+For m surfaces in the order of the module and n states the output contains, one after the other: u_k (m,), the
+rate of a gap or a relative velocity; d(u_k)/dx (m, n); d(rates)/d(unknown_k) (m, n); and the growth of
+friction force k per unit of normal force d. The last are (m, m) each for slip above, slip below, and the
+upper and lower limit of stick.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """Friction along a gap: a contact whose relative velocity is proportional to the rate of a gap.
 
-An example is a sliding block that meets a stop. Both contacts would then hold one velocity. If both velocities are zero
-together (the rate of the gap is a*v), the share of the friction in a push is not determined. Here the stop takes the
-whole push while both hold, and a pull acts against the friction: the gap opens if the pull exceeds the limit of stick.
-The motion is the same for any other share. If the velocities differ (a stop beside a belt), the two never hold together.
+An example is a sliding block that meets a stop. Both contacts would then hold one velocity. If both
+velocities are zero together (the rate of the gap is a*v), the share of the friction in a push is not
+determined. Here the stop takes the whole push while both hold, and a pull acts against the friction: the gap
+opens if the pull exceeds the limit of stick. The motion is the same for any other share. If the velocities
+differ (a stop beside a belt), the two never hold together.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """A pool of large memory blocks, which are reused after their last array is gone.
 
-The operating system maps a fresh block of this size page by page, when it is first written. In a compiled loop
-this can cost a sixth of the time of a run of thousands of steps.
+The operating system maps a fresh block of this size page by page, when it is first written. In a compiled
+loop this can cost a sixth of the time of a run of thousands of steps.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ _KEPT = 4  # most free blocks in a pool
 class Lender:
     """A pool of blocks of one size in bytes.
 
-    Each block is lent as a buffer object over its memory. Every array over the buffer, and every view of such an
-    array, keeps the buffer alive. The memory returns to the pool when the buffer is deleted.
+    Each block is lent as a buffer object over its memory. Every array over the buffer, and every view of such
+    an array, keeps the buffer alive. The memory returns to the pool when the buffer is deleted.
     """
 
     def __init__(self, size: int) -> None:

@@ -1,7 +1,8 @@
 """The cache on disk has one folder for generated model modules and one for the engine's compiled kernels.
 
 Files in the cache are executed. The folder must therefore be private to this user (see
-`hybridsim.engine.native.private_folder`). Without such a folder nothing is cached, and each process compiles again.
+`hybridsim.engine.native.private_folder`). Without such a folder nothing is cached, and each process compiles
+again.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Cache of compiled kernels on disk with the safety rules of the rest of the cache.
 
-A cached kernel is private to this user and checked against its digest; a damaged file is compiled again. numba's own
-cache loads any pickle under a predictable name and ends with a traceback if a file is truncated. Two of its processes
-may exchange their numbered files, and it fails in a read-only folder.
+A cached kernel is private to this user and checked against its digest; a damaged file is compiled again.
+numba's own cache loads any pickle under a predictable name and ends with a traceback if a file is truncated.
+Two of its processes may exchange their numbered files, and it fails in a read-only folder.
 
 This module uses only the cache interface of numba. Without it each process would compile all kernels.
 """

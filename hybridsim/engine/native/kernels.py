@@ -1,8 +1,8 @@
 """The only interface to numba: it compiles kernels and calls model functions through their addresses.
 
 A model function has one signature, ``f(t, x, p, z, out) -> status``. With the compiler on it is a C function
-reached through its address, so that a kernel is compiled once and never per model; with ``HYBRIDSIM_JIT=0`` the
-"address" is the Python function itself and every kernel runs as plain Python.
+reached through its address, so that a kernel is compiled once and never per model; with ``HYBRIDSIM_JIT=0``
+the "address" is the Python function itself and every kernel runs as plain Python.
 """
 
 from __future__ import annotations
@@ -122,9 +122,9 @@ if ENABLED:
     def _ours() -> tuple[Any, Any]:
         """Return the settings for kernels.
 
-        At level 2 the engine compiles in seven eighths of the time of numba's default, level 3, and runs as fast.
-        For some machines (AMD's Zen 4 and 5) LLVM unrolls loops of unknown length a dozen times. Our loops have two
-        or three turns, and `exact` takes a fifth longer with such unrolling.
+        At level 2 the engine compiles in seven eighths of the time of numba's default, level 3, and runs as
+        fast. For some machines (AMD's Zen 4 and 5) LLVM unrolls loops of unknown length a dozen times. Our
+        loops have two or three turns, and `exact` takes a fifth longer with such unrolling.
         """
         return min(numba.config.OPT, type(numba.config.OPT)(_LEVEL)), _plain_machine()
 
@@ -148,8 +148,8 @@ if ENABLED:
     def _compiled(function: Callable[..., Any], **options: Any) -> Any:
         """Compile a kernel with our options of numba; literal arguments make specialised versions, up to twice as fast.
 
-        Without the option `_nrt`, each read of an array from a pack would include two calls that count references, and
-        no value would stay in a register across them.
+        Without the option `_nrt`, each read of an array from a pack would include two calls that count
+        references, and no value would stay in a register across them.
         """
         made = numba.njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)
         keep_on_disk(made, function)
@@ -429,9 +429,10 @@ _addresses: dict[tuple[Any, ...], int] = {}  # of kernels, by the types of what 
 def kernel_address(function: Callable[..., int], *given: Any) -> int:
     """Return the address of a kernel that returns an integer, for arguments of the given types; see `call_kernel`.
 
-    The kernel is compiled if necessary. A kernel that calls others directly is compiled together with them, again for
-    each caller; large kernels are compiled once because they are called by address. Only the elements of an array are
-    passed: see `array_at`. Without a compiler the address is a number that identifies the function.
+    The kernel is compiled if necessary. A kernel that calls others directly is compiled together with them,
+    again for each caller; large kernels are compiled once because they are called by address. Only the
+    elements of an array are passed: see `array_at`. Without a compiler the address is a number that
+    identifies the function.
     """
     key = tuple(map(_type_by_address, given))
     if (function, key) not in _addresses:

@@ -1,7 +1,7 @@
 """Generated functions as machine code: their text, a small part of Python, translated to LLVM and compiled at once.
 
-A general compiler of Python finds out the types of what it is given first. Here all numbers are doubles but the modes,
-and a function of some dozen lines is ready in milliseconds.
+A general compiler of Python finds out the types of what it is given first. Here all numbers are doubles but
+the modes, and a function of some dozen lines is ready in milliseconds.
 """
 
 from __future__ import annotations
@@ -261,8 +261,8 @@ def compile_text(text: str, name: str, kept: Path | None) -> tuple[int, Any]:
 def ready(kept: Path | None, names: Sequence[str], written: Callable[[], str]) -> tuple[list[int], Any]:
     """Return the addresses of functions of an LLVM module and the object that keeps them alive.
 
-    kept: path of the cached machine code, if any. If the file does not exist, the text that `written` returns is
-    compiled and stored.
+    kept: path of the cached machine code, if any. If the file does not exist, the text that `written` returns
+    is compiled and stored.
     """
     code = load_whole(kept)
     if code is None:

@@ -1,7 +1,7 @@
 """Products of small matrices and vectors in compiled code, four numbers at a time.
 
-A matrix is stored in panels of four rows, or row by row for single rows. Vectors are padded with zeros up to the
-next multiple of four, and so are the columns that they multiply.
+A matrix is stored in panels of four rows, or row by row for single rows. Vectors are padded with zeros up to
+the next multiple of four, and so are the columns that they multiply.
 """
 
 from __future__ import annotations
@@ -80,8 +80,9 @@ if ENABLED:
     ) -> Any:
         """Emit a loop over a vector that accumulates sums, four entries at a time.
 
-        row: address of the matrix elements that belong to the start of the vector. wide: matrix elements per entry.
-        body(entries, row, sums) returns the next sums. Return the sums and the row address for the next vector.
+        row: address of the matrix elements that belong to the start of the vector. wide: matrix elements per
+        entry. body(entries, row, sums) returns the next sums. Return the sums and the row address for the
+        next vector.
         """
         array = context.make_array(kind)(context, builder, value)
         (count,) = cgutils.unpack_tuple(builder, array.shape, 1)

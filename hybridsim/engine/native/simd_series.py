@@ -1,6 +1,7 @@
 """Powers of a step and sums of series over them as machine code, four terms at a time.
 
-The results equal those of `tabulate` and `sum_sizes` of `hybridsim.engine.series.interpreter` to the last bit.
+The results equal those of `tabulate` and `sum_sizes` of `hybridsim.engine.series.interpreter` to the last
+bit.
 """
 
 from __future__ import annotations
@@ -11,7 +12,8 @@ from hybridsim.engine.native.llvm_text import ONE, Lines, number
 class Powers:
     """The powers a**k for k = 0..order as in `tabulate` of `engine.series.interpreter`, and sums of series with them.
 
-    Powers and terms are computed four at a time from the highest order down; the lowest order % 4 ones are scalar.
+    Powers and terms are computed four at a time from the highest order down; the lowest order % 4 ones are
+    scalar.
     """
 
     def __init__(self, code: Lines, a: str, order: int) -> None:

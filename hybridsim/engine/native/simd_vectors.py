@@ -1,8 +1,8 @@
 """A vector type of eight doubles for kernels, because LLVM does not vectorise such short loops well.
 
-LLVM turns a loop over a few lanes into vectors of sixteen and a scalar rest. Here all operations are on vectors, and
-arrays are padded to whole vectors. Processors with shorter vectors use two or four of theirs. A product
-and a sum may be fused. Without the compiler a vector is an array.
+LLVM turns a loop over a few lanes into vectors of sixteen and a scalar rest. Here all operations are on
+vectors, and arrays are padded to whole vectors. Processors with shorter vectors use two or four of theirs. A
+product and a sum may be fused. Without the compiler a vector is an array.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """Named tuples of many arrays that are passed to kernels by one pointer.
 
-A kernel that is given a tuple of arrays receives seven words per array, copied at every call, and counts references
-to each. With a hundred arrays that costs more than the kernel's own work and most of its compile time. A packed tuple
-is the address of a table of the arrays' addresses and shapes. Kernels read its fields like those of the tuple.
-The caller must keep the arrays alive during the call.
+A kernel that is given a tuple of arrays receives seven words per array, copied at every call, and counts
+references to each. With a hundred arrays that costs more than the kernel's own work and most of its compile
+time. A packed tuple is the address of a table of the arrays' addresses and shapes. Kernels read its fields
+like those of the tuple. The caller must keep the arrays alive during the call.
 """
 
 from __future__ import annotations
@@ -167,8 +167,9 @@ def _whole_numbers(numbers: tuple[int, ...]) -> np.ndarray:
 class Sheet:
     """A layout of arrays of rows that lie one behind the other in a few blocks of memory.
 
-    Offsets are computed once; a new block is a single allocation, and packing all arrays takes a few additions. A block
-    is freed with the last array in it, so arrays with different lifetimes belong in different blocks.
+    Offsets are computed once; a new block is a single allocation, and packing all arrays takes a few
+    additions. A block is freed with the last array in it, so arrays with different lifetimes belong in
+    different blocks.
 
     Parameters
     ----------

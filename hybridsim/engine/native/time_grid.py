@@ -14,9 +14,9 @@ _COARSE = 2.0**-42
 def on_the_grid(s: float, h: float) -> float:
     """Return the step length from s to the double next to s + h, or 0 if there is none.
 
-    A step that is tried with one length and accepted with a length an ulp of time different is another step if a state
-    moves far in an ulp. A length of few ulps is never rounded up, because a rejected step must be followed by a
-    shorter one.
+    A step that is tried with one length and accepted with a length an ulp of time different is another step
+    if a state moves far in an ulp. A length of few ulps is never rounded up, because a rejected step must be
+    followed by a shorter one.
     """
     end = s + h
     if abs(h) < _COARSE * abs(end) and abs(end - s) > abs(h):

@@ -1,4 +1,4 @@
-"""The Taylor polynomial of a guard, with a bound of what it leaves out: where it is positive for certain, and its zero.
+"""Taylor polynomials of a guard with a bound of the remainder: where the guard is certainly positive, and its zero.
 
 Coefficients and bounds are those of `hybridsim.engine.linear.motion.guard_terms`.
 """
@@ -17,11 +17,11 @@ from hybridsim.engine.series.bounded import UNIT
 
 _ITERATIONS = 100
 _NEAR = 1e-9  # relative change by Newton's method that leaves an error below rounding
-_POLISH = 6  # iterations of it from nearby
-_SAFE = 0.95  # to end on the safe side
+_POLISH = 6  # iterations of Newton's method from a near start
+_SAFE = 0.95  # safety factor
 _HALVINGS = 5
 _SQUARES = BOUND_TERMS.bit_length() - 1  # BOUND_TERMS is a power of two
-# a parabola stays positive up to 4; iterations towards the lowest point; times its error that it stays above there
+# range for a dip (a parabola stays positive up to 4); iterations to its minimum; clearance there in errors
 _DIPS, _TURNS, _CLEAR = 6.0, 3, 4.0
 # c (x - v)**2 + e has positive coefficients in Bernstein form of degree 15 up to v + 7.5 e/(c v)
 _PAST = 3.0
@@ -36,7 +36,7 @@ _BERNSTEIN = np.array(
 
 @polynomial_kernel
 def value_and_slope(backward: Any, count: int, d: float, start: float) -> tuple[float, float]:
-    """A polynomial, `start` and then its coefficients, highest first, and its derivative: even and odd powers apart."""
+    """Evaluate a polynomial, `start` plus coefficients from the highest down, and its derivative."""
     square = d * d
     even, odd = (start, 0.0) if count % 2 == 0 else (0.0, start)
     even_rate = odd_rate = 0.0
@@ -52,11 +52,11 @@ def value_and_slope(backward: Any, count: int, d: float, start: float) -> tuple[
 
 @inlined
 def safe_step(terms: Any, first: int, rest: float, longest: float, error: float, lower: Any) -> float:
-    """A step over which sum terms[first + i] d**i - rest d**m stays positive; terms[first] > 0, m the number of terms.
+    """Return a step over which sum terms[first + i] d**i - rest d**m stays positive, where terms[first] > 0.
 
-    Positive terms after the first negative one are left out, so that the bound has one zero (Descartes' rule), and is
-    positive before every point at which it is. lower: room for its terms. error: of a guard that begins away from zero,
-    above which it stays if it is there.
+    m is the number of terms. Positive terms after the first negative one are omitted. The bound then has one
+    zero (Descartes' rule) and is positive before it. lower: scratch space for the terms. error: error of a
+    guard that begins away from zero; the guard stays above it.
     """
     m = BOUND_TERMS - first
     is_down = False
@@ -83,7 +83,7 @@ def safe_step(terms: Any, first: int, rest: float, longest: float, error: float,
 
 @inlined
 def _to_the_terms(d: float) -> float:
-    """d**BOUND_TERMS, by squares."""
+    """Return d**BOUND_TERMS by repeated squaring."""
     for _ in range(_SQUARES):
         d *= d
     return d
@@ -91,7 +91,7 @@ def _to_the_terms(d: float) -> float:
 
 @inlined
 def zero_of_terms(terms: Any, rest: float, size: float, backward: Any) -> float:
-    """The zero just ahead of a guard that falls, by its Taylor polynomial; NaN where that is not good to rounding."""
+    """Return the next zero of a falling guard from its Taylor polynomial; NaN if it is not accurate to rounding."""
     if not terms[1] < 0.0:
         return math.nan
     d = -terms[0] / terms[1]
@@ -114,7 +114,7 @@ def zero_of_terms(terms: Any, rest: float, size: float, backward: Any) -> float:
     for i in range(2, BOUND_TERMS):
         power *= abs(d)
         rising += i * power * (max(terms[i], 0.0) if d > 0.0 else abs(terms[i]))
-    # a guard that falls all the way has one zero there; else Newton's method may have passed over the first
+    # a monotonic guard has one zero there; otherwise Newton's method may have skipped the first one
     return d if rest * _to_the_terms(d) <= 0.25 * UNIT * size and rising < 0.0 else math.nan
 
 
@@ -125,19 +125,19 @@ def _term(terms: Any, i: int, power: float) -> float:
 
 @inlined
 def stays_positive(terms: Any, first: int, rest: float, d: float, error: float) -> bool:
-    """Whether sum terms[first + i] x**i - rest x**m is certainly positive on (0, d], m the number of terms.
+    """Return whether sum terms[first + i] x**i - rest x**m is certainly positive on (0, d], with m the number of terms.
 
-    By its coefficients in Bernstein form there, which are two vectors. error: of the guard itself, which times
-    x**first this is; it counts as at the end.
+    The test uses the coefficients in Bernstein form, which are two vectors. error: error of the guard itself,
+    which is this sum times x**first; its value at the end of the interval is used.
     """
     low, also_low, high, also_high = splat(0.0), splat(0.0), splat(0.0), splat(0.0)
     power, square, total, at = 1.0, d * d, 0.0, 0
-    for i in range(0, BOUND_TERMS, 2):  # two beside each other, which do not wait for each other
+    for i in range(0, BOUND_TERMS, 2):  # two independent sums
         u, v = _term(terms, first + i, power), _term(terms, first + i + 1, power * d)
         power *= square
         total += abs(u) + abs(v)
         x, y = splat(u), splat(v)
-        if i < WIDTH:  # of the later ones the first half has no part
+        if i < WIDTH:  # the later terms do not contribute to the first half
             low, also_low = low + load(_BERNSTEIN, at) * x, also_low + load(_BERNSTEIN, at + BOUND_TERMS) * y
         high = high + load(_BERNSTEIN, at + WIDTH) * x
         also_high = also_high + load(_BERNSTEIN, at + BOUND_TERMS + WIDTH) * y
@@ -156,7 +156,7 @@ def stays_positive(terms: Any, first: int, rest: float, d: float, error: float) 
 
 @inlined
 def past_dip(terms: Any, first: int, longest: float, error: float, backward: Any) -> float:
-    """Just past the lowest point of a guard that falls and rises again; 0 if it does not, or comes near its error."""
+    """Return a point just past the minimum of a guard that falls and rises again; 0 if none or too near its error."""
     a, b, c = terms[first], terms[first + 1], terms[first + 2]
     if not (b < 0.0 < c and b * b < _DIPS * a * c):
         return 0.0
@@ -174,7 +174,7 @@ def past_dip(terms: Any, first: int, longest: float, error: float, backward: Any
 
 @inlined
 def falls_over(terms: Any, rest: float, longest: float) -> float:
-    """How far on either side a guard falls at least half as fast as here, by its Taylor polynomial; 0 if not at all."""
+    """Return how far on both sides a guard falls at least half as fast as here, by its Taylor polynomial, or 0."""
     steepness = -terms[1]
     if not steepness > 0.0:
         return 0.0

@@ -1,7 +1,8 @@
-"""What is ahead of Taylor series, at a distance d: the state there, its rates, and whether the series still hold.
+"""The end of a Taylor step of length d: the state there, its rates, and whether the series are still accurate.
 
-It is one array: the powers d**k, k = 0..order; of n states their values there, their rates, the slopes of their series
-times d, and sum_k |c_k| d**k, k > 0; of the watched functions their values there, and those of their series.
+The results are in one array: the powers d**k, k = 0..order; for n states their values, their rates, the
+slopes of their series times d, and sum_k |c_k| d**k, k > 0; for the watched functions their values and those
+of their series.
 """
 
 from __future__ import annotations
@@ -13,27 +14,27 @@ from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.series.interpreter import advance, tabulate
 
 _DEFECT = 100.0  # as in the taylor integrator
-# Shares of a step, by the golden ratio: where a state that seems to go straight on is looked at before the end.
+# Shares of a step, by the golden ratio: test points for a state that seems to follow a straight line.
 BETWEEN = (0.618, 0.236, 0.854, 0.472, 0.09, 0.708, 0.326, 0.944)
 
 
 def room_ahead(order: int, n: int, guards: int) -> int:
-    """How many numbers these are."""
+    """Return the length of this array."""
     return order + 1 + 4 * n + 2 * guards
 
 
 @inlined
 def parts_of(ahead: Any, order: int, n: int, count: int) -> tuple[Any, Any, Any, Any]:
-    """Of the array: states, their rates, values of the functions, values of their series."""
+    """Return the parts of the array: states, their rates, values of the functions, values of their series."""
     x, f = order + 1, order + 1 + 4 * n
     return ahead[x : x + n], ahead[x + n : x + 2 * n], ahead[f : f + count], ahead[f + count : f + 2 * count]
 
 
 @inlined
 def sum_at(U: Any, r: int, order: int, powers: Any) -> float:
-    """Value of the series in a row of U, for the powers of a distance.
+    """Evaluate the series in a row of U from the powers of a distance.
 
-    As `sum_sizes` of `hybridsim.engine.series.interpreter`.
+    The order of summation is that of `sum_sizes` in `hybridsim.engine.series.interpreter`.
     """
     a, b, c, d = 0.0, 0.0, 0.0, 0.0
     for k in range(order - 3, 0, -4):
@@ -49,7 +50,7 @@ def sum_at(U: Any, r: int, order: int, powers: Any) -> float:
 def values_at(
     code: int, rows: Any, places: Any, s: float, x: Any, watched: Any, W: Any, values: Any, rates: Any
 ) -> None:
-    """Rates of the states and values of the watched functions at (s, x), by code at an address, if there is some."""
+    """Compute rates of the states and values of the watched functions at (s, x), by compiled code if available."""
     if code != 0:
         call_series(code, s, 0.0, x, values, W, rates)
     else:
@@ -60,7 +61,7 @@ def values_at(
 def _interpreted_values(
     rows: Any, places: Any, s: float, x: Any, watched: Any, W: Any, values: Any, rates: Any
 ) -> None:
-    """As `values_at`, by the interpreter of tapes."""
+    """Compute the same as `values_at` with the interpreter of tapes."""
     time, states, derivatives = places
     if time >= 0:
         W[time, 0] = s
@@ -75,7 +76,7 @@ def _interpreted_values(
 
 @inlined
 def _together(four: tuple[float, float, float, float]) -> float:
-    """The sum of four, as of a vector whose halves are added first."""
+    """Return the sum of four numbers, added like the halves of a vector."""
     return (four[0] + four[2]) + (four[1] + four[3])
 
 
@@ -93,9 +94,10 @@ def look_ahead(
     W: Any,
     ahead: Any,
 ) -> None:
-    """Fill the array for series (n, order + 1) of states and U of the watched functions from local time s.
+    """Fill the array from series (n, order + 1) of states and U of the watched functions from local time s.
 
-    code: address of a function that does the same; 0 for none. W: the tape with its constants.
+    code: address of a function that does the same; 0 for none. W: the registers of the tape with its
+    constants.
     """
     if code != 0:
         call_series(code, s, d, series, U, W, ahead)
@@ -105,7 +107,7 @@ def look_ahead(
     x, rates, values, sums = parts_of(ahead, order, n, count)
     for i in range(n):
         values_of_four, slopes, sizes = (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0)
-        for k in range(order - 3, 0, -4):  # four sums side by side, from the last terms on
+        for k in range(order - 3, 0, -4):  # four interleaved sums, from the last terms on
             one, two = series[i, k] * ahead[k], series[i, k + 1] * ahead[k + 1]
             three, four = series[i, k + 2] * ahead[k + 2], series[i, k + 3] * ahead[k + 3]
             a, b, c, e = values_of_four
@@ -130,7 +132,7 @@ def look_ahead(
 
 @inlined
 def flow_holds(ahead: Any, order: int, n: int, d: float, x0: Any, rtol: float, atol: Any) -> bool:
-    """Whether the series of states from x0 still meet their equation."""
+    """Return whether the series of the states from x0 still satisfy their differential equation."""
     x = order + 1
     for i in range(x, x + n):
         rate, slope, change = ahead[i + n], ahead[i + 2 * n], ahead[i + 3 * n]
@@ -142,10 +144,10 @@ def flow_holds(ahead: Any, order: int, n: int, d: float, x0: Any, rtol: float, a
 
 @inlined
 def seems_straight(computed: Any, series: Any, order: int, powers: Any, rtol: float, atol: Any) -> bool:
-    """Whether by its series the rate of a state hardly changes, which may be different later.
+    """Return whether the rate of a state hardly changes according to its series, though it may change later.
 
-    computed (n,): see `hybridsim.engine.system.programs.mode_tables`. Of a rate such as 1 + sin(t)**20 all terms but
-    the first vanish where it begins: they tell nothing of the step, at whose end they may vanish again.
+    computed (n,): see `hybridsim.engine.system.programs.mode_tables`. For a rate such as 1 + sin(t)**20 all
+    terms but the first vanish at the start. They do not limit the step, at whose end they may vanish again.
     """
     for i in range(series.shape[0]):
         scale, k = atol[i] + rtol * abs(series[i, 0]), 2
@@ -158,7 +160,7 @@ def seems_straight(computed: Any, series: Any, order: int, powers: Any, rtol: fl
 
 @kernel
 def keeps_up(U: Any, watched: Any, order: int, powers: Any, rtol: float, values: Any, sums: Any) -> bool:
-    """Whether the series of functions, in the watched rows of U, still give their values, by their sums."""
+    """Return whether the series of the watched functions still agree with their values."""
     share = _DEFECT * rtol + 64.0 * UNIT
     for j in range(watched.shape[0]):
         r = watched[j]

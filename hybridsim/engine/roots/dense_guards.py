@@ -1,4 +1,4 @@
-"""Guards along a polynomial dense output: each gets its own series, stretch by stretch, and its first exit."""
+"""Guards along a polynomial dense output: each gets its own series piece by piece, and its first exit."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from hybridsim.engine.series.interpreter import advance, reach, sum_sizes, tabul
 
 _SHORTER = 0.25
 _LONGER = 4.0
-_ROUNDING = 16.0 * UNIT  # of a Bernstein coefficient, relative to all that is summed for it
-_SHORTEST = 2.0**-40  # of a step: a stretch on which a guard's series says nothing
+_ROUNDING = 16.0 * UNIT  # of a Bernstein coefficient, relative to the sum of the sizes of its terms
+_SHORTEST = 2.0**-40  # of a step: shortest piece, on which a guard's series is useless
 _MOST_STRETCHES = (
-    4096  # of a step: near a point without a value they get so short that there is no end of them
+    4096  # most pieces of a step; they become very short near a point at which the guard is undefined
 )
 
 
 @inlined
 def shifted(coefficients: Any, q: float, out: Any) -> None:
-    """Polynomials (n, m) about a point q of theirs; zeros above."""
+    """Compute polynomials (n, m) about a shifted origin q; higher coefficients of out are zero."""
     n, m = coefficients.shape
     for i in range(n):
         for j in range(m):
@@ -41,10 +41,10 @@ def shifted(coefficients: Any, q: float, out: Any) -> None:
 def series_along(
     code: int, rows: Any, inputs: Any, s: float, x: Any, watched: Any, V: Any, W: Any, out: Any
 ) -> None:
-    """Coefficients of the watched functions, a row each, from local time s on along states with the coefficients x.
+    """Compute the series of the watched functions, a row each, from local time s along states with coefficients x.
 
-    rows: what the functions need of the tape. V, W: with its constants in their registers. code: address of a function
-    that does the same (`along` of `hybridsim.engine.series.emit_series`); 0 for none.
+    rows: tape rows that the functions need. V, W: registers that hold the tape's constants. code: address of
+    a function that does the same (`along` of `hybridsim.engine.series.emit_series`); 0 for none.
     """
     if code != 0:
         call_series(code, s, 0.0, x, out, W, out)
@@ -66,9 +66,9 @@ def series_along(
 def guards_at(
     code: int, rows: Any, inputs: Any, s: float, x: Any, watched: Any, W: Any, rates: Any, out: Any
 ) -> None:
-    """Values of the watched functions at (s, x); code.
+    """Compute the values of the watched functions at (s, x), by compiled code if available.
 
-    As `values` of `hybridsim.engine.series.emit_series`, writes rates.
+    The code also writes rates, as `values` of `hybridsim.engine.series.emit_series` does.
     """
     if code != 0:
         call_series(code, s, 0.0, x, out, W, rates)
@@ -85,17 +85,18 @@ def guards_at(
 
 @inlined
 def begin_positive(sides: Any, orders: Any, floors: Any) -> None:
-    """Every guard is positive where the next step or stretch begins."""
+    """Return whether every guard is positive at the start of the next step or piece."""
     for g in range(sides.shape[0]):
         sides[g], orders[g], floors[g] = 1, 0, 0.0
 
 
 @kernel
 def stays_positive(left: Any, right: Any, order: int, floor: float, d: float, weights: Any) -> bool:
-    """Whether a polynomial of degree 2 K - 1 is certainly positive on (0, d]: its Bernstein coefficients are.
+    """Return whether a polynomial of degree 2 K - 1 has positive Bernstein coefficients on (0, d], so stays positive.
 
-    left, right (K,): its Taylor coefficients at both ends, the first `order` of which are zero by decree on the left,
-    where it is known to the floor. weights (K, K): from these to the K Bernstein coefficients next to an end.
+    left, right (K,): its Taylor coefficients at both ends. The first `order` of them are set to zero on the
+    left, with an uncertainty `floor`. weights (K, K): from these to the K Bernstein coefficients next to an
+    end.
     """
     size, power = 0.0, 1.0
     for k in range(left.shape[0]):
@@ -118,10 +119,10 @@ def stays_positive(left: Any, right: Any, order: int, floor: float, d: float, we
 def first_linear_guard(
     tapes: Any, k: int, count: int, d: float, hermite: Any, room: Any
 ) -> tuple[int, int, float]:
-    """As `first_guard` for guards that are linear in states and time: along a step they are polynomials themselves.
+    """Do the same as `first_guard` for guards that are linear in states and time, which are polynomials along a step.
 
-    room: the numbers of the watched guards, `guards_left` and `guards_right` (G, K), their Taylor coefficients at the
-    ends of the step, and their sides, orders and floors.
+    room: the indices of the watched guards, their Taylor coefficients at the ends of the step, `guards_left`
+    and `guards_right` (G, K), and their sides, orders and floors.
     """
     left, right, numbers = room.guards_left, room.guards_right, room.numbers
     sides, orders, floors = room.sides, room.orders, room.floors
@@ -143,7 +144,7 @@ def first_linear_guard(
         for i in range(count):
             for j in range(degree + 1):
                 V[watched[i], j] = polynomials[i, j]
-            for j in range(degree + 1, degree + 3):  # nothing is left out: so much for the error of a series
+            for j in range(degree + 1, degree + 3):  # nothing is omitted: the error of a series is zero
                 V[watched[i], j] = 0.0
         tabulate(d, degree + 2, room.powers)
         watched = watched[:count]
@@ -168,7 +169,7 @@ def first_linear_guard(
 
 @kernel
 def likely_reach(V: Any, watched: Any, order: int, rtol: float) -> float:
-    """A length beyond that over which the series of some functions hold, to look for that from."""
+    """Return a length beyond the range of the functions' series, from which to search for that range."""
     longest = math.inf
     for j in range(watched.shape[0]):
         r = watched[j]
@@ -194,12 +195,13 @@ def first_guard(
     watched: Any,
     room: Any,
 ) -> tuple[int, int, float]:
-    """The guard of mode row k that first goes negative on a step: (FOUND, guard, time from s), (NEVER, -1, d), OPEN.
+    """Find the guard of mode row k that first becomes negative on a step: (FOUND, guard, time), (NEVER, -1, d), OPEN.
 
-    rows: what the guards need of the tape; codes: `EndsCodes`. room: `polynomial` (n, m), the states in powers of the
-    time from s; V and W with the constants of the tape in their registers; sides, orders, floors of the guards just
-    after s, as in `earliest_exit`, moved on. The series of a guard serves as far as its last terms stay below rtol of
-    its largest and it meets the guard at its end; there the next stretch begins.
+    The time counts from s. rows: tape rows that the guards need; codes: `EndsCodes`. room: `polynomial` (n,
+    m), the states in powers of the time from s; V and W with the constants of the tape in their registers;
+    sides, orders and floors of the guards just after s, as in `earliest_exit`, which are updated. The series
+    of a guard is used as long as its last terms stay below rtol of its largest one and it agrees with the
+    guard at its end. There the next piece begins.
     """
     along, values_code = codes.along[k], codes.values[k]
     x, U, values, y, rates = room.states, room.guard_series, room.values, room.ahead, room.rates

@@ -12,7 +12,7 @@ from hybridsim.engine.series.bounded import UNIT
 
 @inlined
 def parts_for_exit(room: Any) -> Any:
-    """What `earliest_exit` needs of a room: sides, orders and floors of all guards, and scratch arrays."""
+    """Return the arrays of a room that `earliest_exit` needs: sides, orders and floors of guards, and scratch."""
     return (room.sides, room.orders, room.floors), (room.a, room.b, room.stack)
 
 
@@ -20,10 +20,10 @@ def parts_for_exit(room: Any) -> Any:
 def earliest_exit(
     tapes: Any, k: int, order: int, h: float, U: Any, watched: Any, powers: Any, totals: Any, parts: Any, bernstein: Any
 ) -> tuple[int, int, float]:  # fmt: skip
-    """(NEVER, -1, h), or the guard of the mode that first goes negative in a step of length h: (FOUND, guard, time).
+    """Find the guard of the mode that first becomes negative in a step h: (FOUND, guard, time) or (NEVER, -1, h).
 
-    watched: rows of U with the series of the mode's guards. powers (order + 1,): h**k. totals: see `reach`. parts: see
-    `parts_for_exit`. bernstein: see `first_exit`, by the number of leading zeros.
+    watched: rows of U with the series of the mode's guards. powers (order + 1,): h**k. totals: see `reach`.
+    parts: see `parts_for_exit`. bernstein: functions for `first_exit`, by the number of leading zeros.
     """
     (sides, orders, floors), (a, b, stack) = parts
     found, best, begin = -1, 1.0, tapes.active_start[k]
@@ -34,15 +34,15 @@ def earliest_exit(
         if not total < math.inf:
             return OPEN, g, 0.0
         if total == 0.0 and sides[g] >= 0:
-            continue  # zero all along: neither a side nor a change of it
+            continue  # identically zero: no side and no change of side
         if sides[g] <= 0:
             return OPEN, g, 0.0
         last = abs(U[r, order]) * powers[order] + abs(U[r, order - 1]) * powers[order - 1]
         error, floor = 2.0 * last + 8.0 * UNIT * total, floors[g]
-        if not error + floor < math.inf:  # nothing is below what is not a number, and halving would not end
+        if not error + floor < math.inf:  # comparisons with NaN are false, and halving would not end
             return OPEN, g, 0.0
         if orders[g] == 0 and first - (total - abs(first)) > error + floor + 64.0 * UNIT * total:
-            continue  # the first term outweighs all others
+            continue  # the first term is larger than the sum of the others
         for j in range(order + 1):
             a[j] = U[r, j] * powers[j]
         code = bernstein[orders[g]] if orders[g] < bernstein.shape[0] else 0

@@ -1,8 +1,8 @@
-"""The first time at which a polynomial goes negative, isolated in Bernstein form with a bound of its error.
+"""The first time at which a polynomial becomes negative, isolated in Bernstein form with an error bound.
 
-In Bernstein form on [0, 1] the coefficients of a power series are sums of its own with weights in [0, 1], so that the
-change of basis loses nothing; no root lies where they share a sign (R. T. Farouki, Computer Aided Geometric Design 29
-(2012) 379, doi:10.1016/j.cagd.2012.03.001).
+In Bernstein form on [0, 1] the coefficients of a power series are sums of its own with weights in [0, 1], so
+that the change of basis loses no accuracy. There is no root if the coefficients share a sign (R. T. Farouki,
+Computer Aided Geometric Design 29 (2012) 379, doi:10.1016/j.cagd.2012.03.001).
 """
 
 from __future__ import annotations
@@ -12,30 +12,30 @@ from typing import Any
 
 from hybridsim.engine.native.kernels import call_series, inlined, kernel, polynomial_kernel
 
-NEVER, FOUND, OPEN = 0, 1, 2  # outcomes: stays positive, a root, a question of rounding
-POSITIVE, NEGATIVE, WITHIN, ONCE, MIXED = range(5)  # what is known of the signs of a piece
+NEVER, FOUND, OPEN = 0, 1, 2  # outcomes: stays positive, a root, undecided because of rounding
+POSITIVE, NEGATIVE, WITHIN, ONCE, MIXED = range(5)  # signs of a piece
 _DEEPEST = 40  # halvings; a piece that narrow and still open is a touch
 _POLISH = 100  # iterations: bisection alone needs 53
-_NEAR = 1e-6  # relative change by Halley's method, of third order, from which on what is left of the error is told
+_NEAR = 1e-6  # relative change in Halley's third-order method below which the remaining error is known
 
 
 @kernel
 def to_bernstein(a: Any, b: Any) -> None:
-    """Bernstein coefficients b_j = sum_{k<=j} C(j, k)/C(n, k) a_k of sum_k a_k theta**k, n the degree."""
+    """Compute the Bernstein coefficients b_j = sum_{k<=j} C(j, k)/C(n, k) a_k of sum_k a_k theta**k of degree n."""
     n = a.shape[0] - 1
     b[0] = a[0]
-    share = 1.0  # of one in C(n, k)
+    share = 1.0  # 1/C(n, k)
     for k in range(1, n + 1):
         share *= k / (n - k + 1.0)
         b[k] = a[k] * share
-    for k in range(1, n + 1):  # from differences to values: sums over Pascal's triangle
-        for j in range(n, k - 1, -1):  # backward, so that no sum waits for another
+    for k in range(1, n + 1):  # differences to values, by sums over Pascal's triangle
+        for j in range(n, k - 1, -1):  # backward, so that the sums are independent
             b[j] += b[j - 1]
 
 
 @inlined
 def halve(stack: Any, top: int, m: int, b: Any) -> None:
-    """The piece in a row of the stack in its two halves, the left one above the right one; b (m,): room."""
+    """Split the piece in a row of the stack into two halves, the left half on top; b (m,): scratch space."""
     left, width = stack[top, m], 0.5 * stack[top, m + 1]
     for i in range(m):
         b[i] = stack[top, i]
@@ -52,14 +52,16 @@ def halve(stack: Any, top: int, m: int, b: Any) -> None:
 def first_exit(
     a: Any, error: float, floor: float, order: int, b: Any, stack: Any, code: int
 ) -> tuple[int, float]:
-    """Where p(theta) = sum_k a_k theta**k first goes negative on (0, 1].
+    """Find where p(theta) = sum_k a_k theta**k first becomes negative on (0, 1].
 
-    The first `order` coefficients are zero by decree and the next is positive; error bounds the distance of p from the
-    function that it stands for, and floor by how much it is not zero where it begins. All of p is shifted by so much,
-    and q = p/theta**order, whose zeros are searched, by floor/theta**order. (NEVER, 1) where p stays above the bounds;
-    (FOUND, theta); (OPEN, theta) where it comes within them without a certain change of sign up to the next certain
-    one, or at the end. b (m,), stack (64, m + 2): room for m coefficients, and for pieces with their left ends and
-    widths. code: address of a function that does `to_bernstein` for that many coefficients
+    The first `order` coefficients are set to zero and the next is positive. error bounds the distance of p
+    from the function that it approximates, and floor bounds its deviation from zero at the start. p is
+    shifted by the error, and q = p/theta**order, whose zeros are searched, by floor/theta**order.
+
+    The result is (NEVER, 1) if p stays above the bounds and (FOUND, theta) for a certain zero. It is (OPEN,
+    theta) if p comes within the bounds without a certain change of sign before the next certain one, or at
+    the end. b (m,), stack (64, m + 2): scratch space for m coefficients, and for pieces with their left ends
+    and widths. code: address of a function that does `to_bernstein` for that many coefficients
     (`hybridsim.engine.series.emit_bernstein`), 0 for none.
     """
     m = a.shape[0] - order
@@ -71,7 +73,7 @@ def first_exit(
     if b[0] - rest > error + 2.0**order * floor:
         return NEVER, 1.0
     if order > 0:
-        b[0] = max(b[0], 2.0 * (error + floor))  # positive by decree, whatever rounding made of it
+        b[0] = max(b[0], 2.0 * (error + floor))  # positive by definition, regardless of rounding
     if code != 0:
         call_series(code, 0.0, 0.0, b, b, b, stack)
     else:
@@ -87,7 +89,7 @@ def first_exit(
                 shift /= left
         kind = signs_of(stack[top, :m], error + shift)
         if kind == POSITIVE and left == 0.0 and order > 0 and width > 2.0**-_DEEPEST and dips(stack[top, :m]):
-            kind = MIXED  # nearer to its begin than its end it is known less well
+            kind = MIXED  # the first half is less accurate than the second
         if kind == POSITIVE:
             if touched >= 0.0:
                 return OPEN, touched
@@ -110,10 +112,11 @@ def first_exit(
 
 @kernel
 def signs_of(b: Any, error: float) -> int:
-    """What the Bernstein coefficients of a piece tell of its signs.
+    """Classify the signs of a piece from its Bernstein coefficients.
 
-    POSITIVE, NEGATIVE: all of them are, beyond the error; WITHIN: none is beyond it. ONCE: it certainly begins
-    positive, ends negative and has one zero, since they change their sign once.
+    POSITIVE, NEGATIVE: all coefficients are, beyond the error. WITHIN: none is beyond the error. ONCE: the
+    piece certainly begins positive, ends negative and has one zero, since the coefficients change their sign
+    once.
     """
     m = b.shape[0]
     above = 0
@@ -137,7 +140,7 @@ def signs_of(b: Any, error: float) -> int:
 
 @kernel
 def dips(b: Any) -> bool:
-    """Whether Bernstein coefficients fall below half the first one and rise again."""
+    """Return whether Bernstein coefficients fall below half the first one and rise again."""
     lowest = b[0]
     for i in range(1, b.shape[0]):
         if b[i] > lowest and lowest < 0.5 * b[0]:
@@ -148,7 +151,7 @@ def dips(b: Any) -> bool:
 
 @kernel
 def change_of_sign(b: Any) -> float:
-    """Where on [0, 1] the polygon of the Bernstein coefficients, which begins positive, changes its sign first."""
+    """Return where on [0, 1] the polygon of the Bernstein coefficients first becomes negative."""
     i = 1
     while b[i] >= 0.0:
         i += 1
@@ -157,13 +160,13 @@ def change_of_sign(b: Any) -> float:
 
 @polynomial_kernel
 def _expanded(a: Any, order: int, theta: float) -> tuple[float, float, float]:
-    """The polynomial without its first `order` coefficients, its slope, and half its second derivative.
+    """Evaluate the polynomial without its first `order` coefficients, its slope, and half its second derivative.
 
-    As E(q) + theta O(q), q = theta**2: even and odd powers are summed side by side, and need not wait for each other.
+    With q = theta**2 they are E(q) + theta O(q): the even and odd powers are independent sums.
     """
     q, last = theta * theta, a.shape[0] - 1
     even = even_slope = even_bend = odd = odd_slope = odd_bend = 0.0
-    if (last - order) % 2 == 0:  # one even power more than odd ones
+    if (last - order) % 2 == 0:  # one more even power than odd powers
         even = a[last]
         last -= 1
     for k in range(last, order, -2):
@@ -180,10 +183,10 @@ def _expanded(a: Any, order: int, theta: float) -> tuple[float, float, float]:
 
 @kernel
 def polished(a: Any, order: int, left: float, right: float, start: float) -> float:
-    """The zero of the deflated polynomial between a point where it is positive and one where it is negative.
+    """Compute the zero of the deflated polynomial between a point where it is positive and one where it is negative.
 
-    By Halley's method (W. Gander, American Mathematical Monthly 92 (1985) 131) from a guess between them, and by
-    bisection where it leads out.
+    Halley's method (W. Gander, American Mathematical Monthly 92 (1985) 131) starts from a guess between them;
+    bisection replaces a step that leaves the interval.
     """
     theta = start
     for _ in range(_POLISH):
@@ -195,7 +198,7 @@ def polished(a: Any, order: int, left: float, right: float, start: float) -> flo
         else:
             return theta
         change = value / slope if slope != 0.0 else math.nan
-        bend = change * curvature / slope  # the error that is left is about its square times the change
+        bend = change * curvature / slope  # the remaining error is about its square times the change
         if bend < 0.5:
             change /= 1.0 - bend
         moved = theta - change

@@ -5,8 +5,8 @@ point is the representation; its largest misfit at the other points, doubled, is
 bound is not small are halved, so a long step over a fast guard costs samples, never a root. A polynomial in
 Bernstein form has no root where its coefficients share a sign (R. T. Farouki, Computer Aided Geometric Design
 29 (2012) 379, doi:10.1016/j.cagd.2012.03.001); halving isolates every root, and a dip that comes within the
-bound is reported as a near-grazing, not lost. Coefficients that are zero by decree at the left end are divided
-out (deflation), so a guard that has just fired cannot fire again from the same zero.
+bound is reported as a near-grazing, not lost. Coefficients that are zero by decree at the left end are
+divided out (deflation), so a guard that has just fired cannot fire again from the same zero.
 """
 
 from __future__ import annotations
@@ -25,26 +25,26 @@ from hybridsim.engine.system.failures import StepFailure
 DEGREE = 8
 SAMPLES = 2 * DEGREE + 1
 # A piece is accepted when its error bound is below this share of the guard's largest value on it: about the
-# square root of the unit roundoff, so that a dip must be deeper than rounding to count and halving stays short.
+# square root of the unit roundoff, so that only dips deeper than rounding count and few halvings are needed.
 _ACCEPT = 2.0**-30
 # Halvings of a step: theta itself is rounded to 2**-53, so a function of it cannot be resolved to 2**-30 of its size on
 # a piece narrower than 2**-23. A few halvings later a piece is accepted with whatever bound it has.
 _DEEPEST = 26
-_ROUNDING_DEPTH = 4  # halvings after which a piece that is not resolved may owe its misfit to rounding alone
-_MOST_PIECES = 200_000  # a guard that needs more oscillates some 20 000 times within one step
-_CLOSEST = 40  # halvings toward the start of a step in search of a value that rounding has not made
-# of the largest value on a step: a dip to below that is held against the rounding of the values
+_ROUNDING_DEPTH = 4  # halvings after which the misfit of an unresolved piece may be rounding alone
+_MOST_PIECES = 200_000  # a guard that needs more oscillates about 20 000 times within one step
+_CLOSEST = 40  # halvings toward the start of a step in the search for a value larger than rounding
+# of the largest value on a step: a lower dip is compared with the rounding of the values
 _TOUCHING = 2.0**-40
-_ROUNDINGS_BEFORE = 8.0  # times the rounding of one step: what those before it may have left
+_ROUNDINGS_BEFORE = 8.0  # in roundings of one step: error that may remain from earlier steps
 _TINY = 1e-290  # size of values below which rounding is no longer relative
-_NARROWEST = 2.0**-26  # width (of a piece) at which a sign that stays open is settled by the signs around it
+_NARROWEST = 2.0**-26  # width of a piece below which neighbouring signs decide an undecided sign
 
 # Chebyshev points of the second kind on [0, 1]
 POINTS = 0.5 - 0.5 * np.cos(np.pi * np.arange(SAMPLES) / (SAMPLES - 1))
 
 
 def _transforms() -> tuple[np.ndarray, np.ndarray]:
-    """Matrices from the values at every second point to Bernstein coefficients and to the points between."""
+    """Return matrices from the values at every second point to Bernstein coefficients and to the other points."""
     nodes = POINTS[::2]
     basis = np.array(
         [[comb(DEGREE, i) * x**i * (1 - x) ** (DEGREE - i) for i in range(DEGREE + 1)] for x in POINTS]
@@ -56,7 +56,9 @@ def _transforms() -> tuple[np.ndarray, np.ndarray]:
 
 
 _TO_BERNSTEIN, _BETWEEN = _transforms()
-_GROWTH = float(np.abs(_TO_BERNSTEIN).sum(axis=1).max())  # how rounding of samples grows in the coefficients
+_GROWTH = float(
+    np.abs(_TO_BERNSTEIN).sum(axis=1).max()
+)  # amplification of the samples' rounding in the coefficients
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,7 @@ class Grazing:
 
 @allocating_kernel
 def _halve(b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The two halves of a polynomial in Bernstein form (de Casteljau)."""
+    """Return the two halves of a polynomial in Bernstein form (de Casteljau)."""
     n = b.shape[0]
     left, right, work = np.empty(n), np.empty(n), b.copy()
     for k in range(n):
@@ -91,7 +93,7 @@ def _halve(b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @kernel
 def _sign(b: np.ndarray, bound: np.ndarray) -> int:
-    """+1 or -1 where all coefficients are beyond their bounds on one side, 0 where the sign is open."""
+    """Return +1 or -1 if all coefficients are beyond their bounds on one side, 0 if the sign is undecided."""
     positive, negative = True, True
     for i in range(b.shape[0]):
         positive = positive and b[i] > bound[i]
@@ -103,7 +105,7 @@ def _sign(b: np.ndarray, bound: np.ndarray) -> int:
 
 @kernel
 def _within(b: np.ndarray, bound: np.ndarray) -> bool:
-    """Whether the whole piece lies inside its bounds: halving would tell no more."""
+    """Return whether the whole piece lies inside its bounds, so that halving gives no more information."""
     for i in range(b.shape[0]):
         if abs(b[i]) > bound[i]:
             return False
@@ -112,7 +114,7 @@ def _within(b: np.ndarray, bound: np.ndarray) -> bool:
 
 @allocating_kernel
 def sign_pattern(b: np.ndarray, bound: np.ndarray) -> tuple[np.ndarray, int]:
-    """Intervals of certain and of open sign: rows (left, right, sign), adjacent ones of one sign merged."""
+    """Return intervals of certain and undecided sign: rows (left, right, sign), neighbours of one sign merged."""
     n = b.shape[0]
     rows = np.empty((1024, 3))
     count = 0
@@ -145,7 +147,7 @@ def sign_pattern(b: np.ndarray, bound: np.ndarray) -> tuple[np.ndarray, int]:
 
 @kernel
 def _represent(samples: np.ndarray, coefficients: np.ndarray) -> tuple[float, float]:
-    """Fill the Bernstein coefficients of the piece sampled at `POINTS`; return its error bound and largest value."""
+    """Compute the Bernstein coefficients of the piece sampled at `POINTS`; return its error bound and largest value."""
     misfit, largest = 0.0, 0.0
     for i in range(DEGREE + 1):
         coefficients[i] = 0.0
@@ -164,9 +166,10 @@ def _represent(samples: np.ndarray, coefficients: np.ndarray) -> tuple[float, fl
 
 @kernel
 def _deflated(coefficients: np.ndarray, bounds: np.ndarray, order: int, side: int) -> int:
-    """Divide out theta**order in place: the first `order` coefficients are zero by decree. Returns how many are left.
+    """Divide out theta**order in place; return how many coefficients are left.
 
-    The sign of what then leads is known by decree too, whatever rounding made of it.
+    The first `order` coefficients are zero. The sign of the new leading coefficient is set too, regardless of
+    its rounding error.
     """
     n = coefficients.shape[0]
     for _ in range(order):
@@ -184,7 +187,7 @@ def _deflated(coefficients: np.ndarray, bounds: np.ndarray, order: int, side: in
 def quiet(
     values: np.ndarray, numbers: np.ndarray, sides: np.ndarray, orders: np.ndarray, floors: np.ndarray
 ) -> np.ndarray:
-    """Which of the functions certainly keep their side over a whole step, from their samples (17, functions)."""
+    """Return which functions certainly keep their side over a whole step, from their samples (17, functions)."""
     result = np.zeros(numbers.shape[0], dtype=np.bool_)
     coefficients, bounds = np.empty(DEGREE + 1), np.empty(DEGREE + 1)
     samples = np.empty(SAMPLES)
@@ -207,10 +210,10 @@ def quiet(
 def _before(
     sample: Callable[[np.ndarray], np.ndarray], theta: float, side: int, rounding: Callable[[], float]
 ) -> float:
-    """A point up to theta at which a function that starts from zero is still on its side, theta itself if need be.
+    """Return a point up to theta at which a function that starts from zero is still on its side, or theta itself.
 
-    The leading coefficient is known by decree; where it is within the bound of the representation a zero close to the
-    start has been made nothing of, and what is known of the function are its values.
+    The sign of the leading coefficient is known. If the coefficient is within the error bound of the
+    polynomial, a zero close to the start is lost, and only the function's values give information.
     """
     if side * sample(np.array([theta]))[0] > 0.0:
         return theta
@@ -222,11 +225,11 @@ def _before(
 def _with_touches(
     coefficients: np.ndarray, bounds: np.ndarray, rows: np.ndarray, is_first: bool, is_last: bool
 ) -> np.ndarray:
-    """The pattern of a piece with open stretches where its values come to within what rounding may have made of them.
+    """Return the pattern of a piece with undecided intervals where its values come within their rounding errors.
 
-    A misfit tells of roundings that differ from sample to sample; one that is common to them, such as that of the steps
-    before, shifts the dip unseen. At the ends of a step rounding has its own rules, and where the sign changes the
-    pattern tells already.
+    The misfit only shows roundings that differ from sample to sample. A common one, such as that of the steps
+    before, shifts the dip and stays hidden. The ends of a step have their own rules for rounding. Where the
+    sign changes, the pattern is already known.
     """
     found, count = sign_pattern(coefficients, bounds)
     signs = [None, *found[:count, 2].tolist(), None]
@@ -260,33 +263,36 @@ def find_roots(
     floor: float = 0.0,
     begins: bool = False,
 ) -> tuple[list[Crossing], list[Grazing], int, float]:
-    """All changes of side of one guard over a step, theta in (0, 1].
+    """Find all changes of side of one guard over a step, theta in (0, 1].
 
     Parameters
     ----------
     sample : callable, thetas (k,) -> values (k,)
     first : values at `POINTS` over the whole step
-    order, side : the guard's leading order that is not zero at theta = 0, and its sign just after (0: not known)
-    rounding : bound of the rounding error of one value; asked for only where nothing else tells
-    before : bound of what errors at the start of the step make of a value at theta; likewise
-    floor : what the location of the last event leaves uncertain, where the function starts from zero; values below it
-        are not looked into
-    begins : whether a segment begins here: what is within rounding of zero leaves it then and does not touch it
-    stop_at_first : direction after whose first crossing the search may end (0: find all)
+    order, side : order of the guard's first non-zero coefficient at theta = 0, and its sign just after (0:
+        unknown)
+    rounding : function that returns a bound of the rounding error of one value; called only if needed
+    before : function that returns the effect of errors at the start of the step on a value at theta; called
+        only if needed
+    floor : uncertainty from the location of the last event, for a function that starts from zero; smaller
+        values are ignored
+    begins : whether a segment begins here; a value within rounding of zero then leaves zero and is not a
+        touch
+    stop_at_first : direction of the first crossing after which the search may end (0: find all)
 
-    Returns the crossings and grazings in order, the sign at the end of the step (0 where it is within the bound), and
-    the first theta at which the function is not a number (infinity: it is one throughout). No change of side is
-    reported across a stretch where it is none.
+    Returns the crossings and grazings in order, the sign at the end of the step (0 if it is within the
+    bound), and the first theta at which the function is not a number (infinity if there is none). No change
+    of side is reported across an interval in which it is not a number.
     """
     crossings: list[Crossing] = []
     grazings: list[Grazing] = []
-    last, open_from = side, -1.0  # last certain sign; where the open stretch after it began
+    last, open_from = side, -1.0  # last certain sign, and start of the undecided interval after it
     low, pieces, undefined = math.inf, 0, math.inf
     waiting: list[tuple[float, float, np.ndarray | None, int]] = [(0.0, 1.0, first, 0)]
     touching = _TOUCHING * np.abs(first[np.isfinite(first)]).max(initial=0.0)
 
     def has_left(theta: float) -> bool:
-        """Whether what starts from zero was beyond rounding before theta: else it is that very zero still."""
+        """Return whether a function that starts from zero exceeded rounding before theta, so that it left this zero."""
         bound = max(floor, _ROUNDINGS_BEFORE * rounding(), before(theta))
         return bool((side * sample(theta * POINTS) > bound).any())
 

@@ -1,11 +1,12 @@
-"""Where a Taylor step has to end for an exponential or a root whose series shows nothing of what comes.
+"""The places where a Taylor step has to end because of an exponential or a root that its series does not show.
 
-Of a rate such as exp(-((t - 1)/w)**2) or 1 + exp(-(v/w)**2) no term is seen far away: they are below rounding where a
-step begins, and may be at its end, with all of the pulse between. The argument u is seen all the way. A step ends where
-|u| becomes small, beyond which the series show what comes, and where exp(u) is largest inside of a step, at which the
-look at the end of the step shows it. The same holds for hyperbolic functions, which differ from their limits by
-exponentials, and for roots: v/sqrt(v**2 + w**2) is 1 or -1 far away, and its series shows no change of sign. A power
-of an exponential fades as much sooner: u is looked at times the power.
+For a rate such as exp(-((t - 1)/w)**2) or 1 + exp(-(v/w)**2) all terms are below rounding far away. This may
+be so at the start and at the end of a step that contains the whole pulse. The series of the argument u has no
+such gap. A step ends where |u| becomes small, beyond which the series show the pulse. It also ends where
+exp(u) is largest inside a step, so that the test at the end of the step detects it. The same holds for
+hyperbolic functions, which differ from their limits by exponentials, and for roots: v/sqrt(v**2 + w**2) is 1
+or -1 far away, and its series shows no change of sign. A power of an exponential fades earlier: u is
+multiplied by the power.
 """
 
 from __future__ import annotations
@@ -16,21 +17,24 @@ from hybridsim.engine.native.kernels import call_apart, call_series, inlined, ke
 from hybridsim.engine.roots.first_exit import halve, to_bernstein
 from hybridsim.engine.series.vanishing_kinds import EXPONENTIAL, ROOT
 
-# Where exp(u) changes by a factor of exp(8) or less within a step its series shows it.
+# If exp(u) changes by a factor of exp(8) or less within a step, its series shows it.
 _SEEN = 8.0
-# |u| from which on exp(u) is faint, and where in between the step ends that comes from there; from farther away it ends
-# at such shares of |u|: near a multiple zero of u rounding is all that its series shows
+# |u| above which exp(u) is negligible, and |u| at the end of a step that starts there. A step from farther away ends
+# at these shares of |u|, because near a multiple zero of u its series shows only rounding
 _FAINT, _NEAR = 7.0, 4.0
 _FAR_SHARE, _NEAR_SHARE = 0.01, 0.005
-_NOTHING = 745.0  # exp(-745) is the last double
-_ERROR, _SHARE = 0.1, 1e-6  # what the last terms of u may be; or of how far exp(u) is from being a double
-# share of a step to which they may shorten it: u may have a pole that the rates do not
+_NOTHING = 745.0  # exp(-745) is the smallest double
+_ERROR, _SHARE = (
+    0.1,
+    1e-6,
+)  # largest last terms of u, absolute or as a share of the distance of exp(u) to underflow
+# smallest share to which they may shorten a step: u may have a pole that the rates do not have
 _SHORTEST = 1.0 / 64.0
-# halvings of a step, and pieces that are looked at: u has as many extrema as its order has, at most
+# halvings of a step, and most pieces: the number of extrema of u is at most its order
 _DEEPEST, _MOST_PIECES = 40, 400
-PIECES = _DEEPEST + 2  # that wait at once, at most
-_POLISHED, _CLOSE = 60, 1e-8  # steps towards an extremum, and when it is near enough
-_HALVED = 40  # times, at most, between two parts
+PIECES = _DEEPEST + 2  # most pieces on the stack
+_POLISHED, _CLOSE = 60, 1e-8  # most steps to an extremum, and its accuracy
+_HALVED = 40  # most bisections between two places
 
 
 @inlined
@@ -51,7 +55,7 @@ def _slope(u: Any, order: int, d: float) -> float:
 
 @inlined
 def _sizes(u: Any, order: int, h: float) -> tuple[float, float, float]:
-    """Bounds of |u(d) - u(0)|, and of |h (u'(d) - u'(0))|, for d in a step h; the size of the last two terms."""
+    """Return bounds of |u(d) - u(0)| and |h (u'(d) - u'(0))| for d in a step h, and the size of the last two terms."""
     size, power = abs(u[1] * h), h
     change, turn, before = size, 0.0, 0.0
     for k in range(2, order + 1):
@@ -64,16 +68,16 @@ def _sizes(u: Any, order: int, h: float) -> tuple[float, float, float]:
 
 @inlined
 def may_end(u: Any, kind: int, size: float) -> bool:
-    """Whether a step h may have to end for a function of u; size: sum_k |u_k| h**k. Cheaper than to find where."""
+    """Return whether a step h may have to end for a function of u, by a cheap test; size: sum_k |u_k| h**k."""
     return kind == ROOT or size - abs(u[0]) > _SEEN
 
 
 @kernel
 def where_it_ends(u: Any, kind: int, order: int, h: float, a: Any, stack: Any, code: int) -> float:
-    """How far a step of length h may go for a function of u, by its kind; u (order + 1,): the series.
+    """Return how far a step of length h may go for a function of u of this kind; u (order + 1,): its series.
 
-    h may be negative; order >= 2. a (order,) or longer, stack (PIECES, order + 2) or larger: room. code: address of a
-    function that does `to_bernstein` for as many coefficients as the order
+    h may be negative; order >= 2. a (order,) or longer, stack (PIECES, order + 2) or larger: scratch space.
+    code: address of a function that does `to_bernstein` for as many coefficients as the order
     (`hybridsim.engine.series.emit_bernstein`), 0 for none.
     """
     if kind == ROOT:
@@ -90,7 +94,7 @@ def where_it_ends(u: Any, kind: int, order: int, h: float, a: Any, stack: Any, c
     comes_near = start > _FAINT and start - change < low
     if not change > _SEEN or start - change > _NOTHING or (turn < abs(u[1] * h) and not comes_near):
         return h
-    if turn < abs(u[1] * h):  # it rises or falls all along
+    if turn < abs(u[1] * h):  # monotonic
         sign = 1.0 if u[0] > 0.0 else -1.0
         if sign * _value(u, order, h) < low:
             return call_apart(_becomes_near, (u, order, sign, high, low, 0.0, h))
@@ -100,7 +104,7 @@ def where_it_ends(u: Any, kind: int, order: int, h: float, a: Any, stack: Any, c
 
 @kernel
 def where_a_root_ends(u: Any, order: int, h: float, a: Any, stack: Any, code: int) -> float:
-    """The same for sqrt(u): before u falls to less than a hundredth, if it rises again within the step."""
+    """Return the same for sqrt(u): before u falls below a hundredth, if it rises again within the step."""
     change, _, _ = _sizes(u, order, h)
     high, low = _FAR_SHARE * u[0], _NEAR_SHARE * u[0]
     if not (u[0] > 0.0 and u[0] - change < low):
@@ -112,9 +116,10 @@ def where_a_root_ends(u: Any, order: int, h: float, a: Any, stack: Any, code: in
 def _first_place(
     u: Any, order: int, h: float, kind: int, high: float, low: float, a: Any, stack: Any, code: int
 ) -> float:
-    """The first place in a step h at which it has to end, or h: from piece to piece on which u rises or falls.
+    """Return the first place at which a step h has to end, or h, from pieces on which u rises or falls.
 
-    The slope is isolated in Bernstein form: where its coefficients change their sign at most once, so does it.
+    The slope is isolated in Bernstein form: if its coefficients change their sign at most once, so does the
+    slope.
     """
     start, sign = abs(u[0]), 1.0 if u[0] > 0.0 else -1.0
     is_far = start > _FAINT and kind != ROOT
@@ -140,7 +145,9 @@ def _first_place(
             continue
         near, far = left * h, (left + width) * h
         begins_low = (u[0] if left == 0.0 else _value(u, order, near)) < 0.0
-        may_matter = rises if begins_low else not rises or kind == EXPONENTIAL  # else |u| is largest there
+        may_matter = (
+            rises if begins_low else not rises or kind == EXPONENTIAL
+        )  # otherwise |u| is largest there
         if changes > 0 and may_matter:
             d = _extremum(u, order, near, far, rises)
             value = _value(u, order, d)
@@ -153,12 +160,12 @@ def _first_place(
             near = d
         if is_far and sign * _value(u, order, far) < low:
             return _becomes_near(u, order, sign, high, low, near, far)
-    return max(stack[top, order], _SHORTEST) * h  # where rounding makes too many pieces
+    return max(stack[top, order], _SHORTEST) * h  # rounding causes too many pieces
 
 
 @inlined
 def _changes(b: Any) -> tuple[int, bool]:
-    """How often Bernstein coefficients change their sign, zeros left out; whether they begin positive."""
+    """Return how often Bernstein coefficients change their sign, without zeros, and whether they begin positive."""
     changes, last, first = 0, 0.0, 0.0
     for i in range(b.shape[0]):
         if b[i] != 0.0:
@@ -171,7 +178,7 @@ def _changes(b: Any) -> tuple[int, bool]:
 
 @inlined
 def _extremum(u: Any, order: int, near: float, far: float, rises: bool) -> float:
-    """Where the slope of u changes its sign between two places: by Newton's method, by bisection where it leads out."""
+    """Find where the slope of u changes its sign between two places, by Newton's method with bisection."""
     d = 0.5 * (near + far)
     for _ in range(_POLISHED):
         slope, bend = 0.0, 0.0
@@ -195,7 +202,7 @@ def _extremum(u: Any, order: int, near: float, far: float, rises: bool) -> float
 
 @kernel
 def _becomes_near(u: Any, order: int, sign: float, high: float, low: float, far: float, near: float) -> float:
-    """Where |u| is between high and low, between a place where it is larger and one where it is less."""
+    """Find where |u| is between high and low, between a place with a larger and one with a smaller |u|."""
     d = near
     for _ in range(_HALVED):
         d = 0.5 * (far + near)

@@ -1,8 +1,8 @@
 """Taylor coefficients of states and guards along a flow, each with a running bound of its rounding error.
 
-The recurrences are those of automatic differentiation (A. Jorba and M. Zou, Experimental Mathematics 14 (2005) 99,
-doi:10.1080/10586458.2005.10128904); each error bound follows its recurrence to first order in the unit
-roundoff (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., 2002, section 3.3).
+The recurrences are those of automatic differentiation (A. Jorba and M. Zou, Experimental Mathematics 14
+(2005) 99, doi:10.1080/10586458.2005.10128904); each error bound follows its recurrence to first order in the
+unit roundoff (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., 2002, section 3.3).
 """
 
 from __future__ import annotations
@@ -346,8 +346,8 @@ def _advance(row: Any, V: Any, E: Any, k: int) -> None:
 def run_tape(rows: Any, order: int, states: Any, derivatives: Any, V: Any, E: Any) -> None:
     """Compute the Taylor coefficients V[register, k] and error bounds E for k = 0..order along the flow.
 
-    `rows` (m, 5) int64. The caller sets the registers of constants, time and parameters and order 0 of the states.
-    states[i] is the register of x_i, derivatives[i] that of dx_i/dt.
+    `rows` (m, 5) int64. The caller sets the registers of constants, time and parameters and order 0 of the
+    states. states[i] is the register of x_i, derivatives[i] that of dx_i/dt.
     """
     for k in range(order + 1):
         for r in range(rows.shape[0]):

@@ -1,7 +1,7 @@
 """Dual numbers, for the functions of a model that run as plain Python: resets, projections and rates.
 
-Each number carries a row of derivatives. A generated function is run on dual numbers with mathematical functions that
-accept them.
+Each number carries a row of derivatives. A generated function is run on dual numbers with mathematical
+functions that accept them.
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Straight-line code that converts power series to Bernstein form, for the few degrees of series of one order.
 
-The sums equal those of `to_bernstein` in `hybridsim.engine.roots.first_exit` to the last bit, without the loops.
+The sums equal those of `to_bernstein` in `hybridsim.engine.roots.first_exit` to the last bit, without the
+loops.
 """
 
 from __future__ import annotations
@@ -19,8 +20,8 @@ LEADING = 4  # number of cases for the count of leading coefficients set to zero
 def bernstein_code(order: int) -> tuple[list[int], Any]:
     """Return the addresses of conversion functions for series of one order, and the object that keeps them alive.
 
-    There is one function per count of omitted leading coefficients. The functions are void f(., ., a, ., ., b), as for
-    series: a are the power coefficients, b the Bernstein coefficients.
+    There is one function per count of omitted leading coefficients. The functions are void f(., ., a, ., .,
+    b), as for series: a are the power coefficients, b the Bernstein coefficients.
     """
     names = [f"bernstein_{size}" for size in range(order + 1, order + 1 - LEADING, -1)]
     folder = model_folder()

@@ -1,10 +1,11 @@
 """Straight-line code for the short series of the guards of one vector of modes, with bounds of their rounding errors.
 
-Each operation is that of `hybridsim.engine.series.bounded`, in the same order, so that both give the same to the last
-bit if values are finite. Exact values carry no bound and add nothing to other bounds.
+Each operation is that of `hybridsim.engine.series.bounded`, in the same order, so that both give the same to
+the last bit if values are finite. Exact values carry no bound and add nothing to other bounds.
 
-The functions are void f(s, s_error, x, x_error, p, out): local time and state with the bounds of their errors, the
-run-time vector, and the output with the coefficients of the guards (guards, ORDER + 1) followed by their bounds.
+The functions are void f(s, s_error, x, x_error, p, out): local time and state with the bounds of their
+errors, the run-time vector, and the output with the coefficients of the guards (guards, ORDER + 1) followed
+by their bounds.
 """
 
 from __future__ import annotations

@@ -5,11 +5,11 @@ of its own, equal values are computed once, and unused values are omitted. Each 
 `hybridsim.engine.series.interpreter`, so that both give the same to the last bit and either may replace the
 other.
 
-The step functions are void f(s, known, x, guards, constants, out). s is the local time, known says whether order 0 is
-known, x are the states. guards receives the coefficients of the active guards, constants holds the tape's constants in
-their registers, and out receives the coefficients of the states. Order 0 of sines, exponentials and similar operations
-stays in its registers among the constants: a step begins where the step before it was evaluated last, so that these
-values can be reused.
+The step functions are void f(s, known, x, guards, constants, out). s is the local time, known says whether
+order 0 is known, x are the states. guards receives the coefficients of the active guards, constants holds the
+tape's constants in their registers, and out receives the coefficients of the states. Order 0 of sines,
+exponentials and similar operations stays in its registers among the constants: a step begins where the step
+before it was evaluated last, so that these values can be reused.
 
 The other functions have the same type. `ahead` is void f(s, d, series, guards, constants, out), see
 `hybridsim.engine.roots.defect_check`. `sizes` is void f(h, ., ., guards, ., out), see `measure` in
@@ -78,8 +78,8 @@ def _results(op: int) -> int:
 class ModeTape:
     """The parts of a mode vector's lean tape that the code needs.
 
-    These are its rows, the rows of high orders, the registers of time, states, rates, active guards and arguments of
-    fading functions, and the conditions that stay constant as time passes.
+    These are its rows, the rows of high orders, the registers of time, states, rates, active guards and
+    arguments of fading functions, and the conditions that stay constant as time passes.
     """
 
     rows: tuple[tuple[int, ...], ...]
@@ -398,8 +398,8 @@ def _kept_order(code: _Expansion) -> _Expansion:
 def ends_text(tape: ModeTape, terms: int, first: int, order: int) -> str:
     """Return a module with the functions ends_0, first_0, along_0 and values_0.
 
-    ends_0 has the given number of terms. first_0 expands the states up to the order `first`; see `short_function`.
-    along_0 expands the guards up to the last order; see `along_function`.
+    ends_0 has the given number of terms. first_0 expands the states up to the order `first`; see
+    `short_function`. along_0 expands the guards up to the last order; see `along_function`.
     """
     stride = order + 1
     parts = (

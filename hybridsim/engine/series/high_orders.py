@@ -1,9 +1,10 @@
 """Rows for the high orders of a lean tape, in which the rates follow from shorter chains of operations.
 
-A coefficient depends on the one before it through every operation between a state and its rate. With a compiled tape
-this latency is most of a step's time. Successive constants become one factor, a sum adds its latest term last, and the
-last factor of a rate includes the division by the order. The rounding differs from that of the lean tape's rows.
-Therefore the orders by which events are decided keep those rows, and so do guards at any order.
+A coefficient depends on the one before it through every operation between a state and its rate. With a
+compiled tape this latency is most of a step's time. Successive constants become one factor, a sum adds its
+latest term last, and the last factor of a rate includes the division by the order. The rounding differs from
+that of the lean tape's rows. Therefore the orders by which events are decided keep those rows, and so do
+guards at any order.
 """
 
 from __future__ import annotations

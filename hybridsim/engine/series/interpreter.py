@@ -1,14 +1,14 @@
 """Taylor coefficients of any order along a flow, and the step size for which they are accurate.
 
-The recurrences are those of automatic differentiation (A. Jorba and M. Zou, Experimental Mathematics 14 (2005) 99,
-doi:10.1080/10586458.2005.10128904). They use the lean tape, without the error bounds of
+The recurrences are those of automatic differentiation (A. Jorba and M. Zou, Experimental Mathematics 14
+(2005) 99, doi:10.1080/10586458.2005.10128904). They use the lean tape, without the error bounds of
 `hybridsim.engine.series.bounded`.
 
-Sums run from the middle of a convolution outward. The newest coefficients, at both ends, are added last, so that few
-operations depend on them. Divisions by an order, or at higher orders by a fixed number, are multiplications by the
-reciprocal. The generated code of `hybridsim.engine.series.emit_series` does the same operations, to the last bit. So
-does `hybridsim.engine.series.bounded` up to the order by which events are decided; beyond it products and sums are
-fused.
+Sums run from the middle of a convolution outward. The newest coefficients, at both ends, are added last, so
+that few operations depend on them. Divisions by an order, or at higher orders by a fixed number, are
+multiplications by the reciprocal. The generated code of `hybridsim.engine.series.emit_series` does the same
+operations, to the last bit. So does `hybridsim.engine.series.bounded` up to the order by which events are
+decided; beyond it products and sums are fused.
 """
 
 from __future__ import annotations
@@ -303,9 +303,9 @@ def advance(rows: Any, V: Any, k: int) -> None:
 def expand(rows: Any, high: Any, places: Any, order: int, s: float, x: Any, V: Any) -> None:
     """Compute the coefficients 0..order along the flow from x at local time s, of all registers or of those in `high`.
 
-    high: rows for the orders beyond `EXACTLY` (`hybridsim.engine.series.high_orders`); if empty, all orders use the
-    same rows. places: registers of time (-1: none), of the states and of their derivatives. The caller sets the
-    constants.
+    high: rows for the orders beyond `EXACTLY` (`hybridsim.engine.series.high_orders`); if empty, all orders
+    use the same rows. places: registers of time (-1: none), of the states and of their derivatives. The
+    caller sets the constants.
     """
     time, states, derivatives = places
     if time >= 0:
@@ -350,8 +350,8 @@ def sum_sizes(U: Any, r: int, order: int, powers: Any) -> float:
 def measure(code: int, U: Any, watched: Any, order: int, h: float, powers: Any, totals: Any) -> None:
     """Compute the powers of h and, for the series in the watched rows of U, the sums of `sum_sizes`.
 
-    code: address of a function that does so for all rows, with the totals after the powers in memory (`sizes` of
-    `hybridsim.engine.series.emit_series`); 0 for none.
+    code: address of a function that does so for all rows, with the totals after the powers in memory (`sizes`
+    of `hybridsim.engine.series.emit_series`); 0 for none.
     """
     if code != 0:
         call_series(code, h, 0.0, U, U, U, powers)
@@ -390,9 +390,9 @@ def rough_inverse_root(x: float, n: int) -> float:
 def shorter_reach(U: Any, r: int, order: int, rtol: float, h: float, is_before: bool) -> float:
     """Return a step below h over which the last term of a series is below rtol of one of its first four, or h/2.
 
-    is_before: use the last term but one, which is larger. Over a useful step one of the first four terms is the
-    largest, or not much smaller; for exp(w t) with rtol = 1e-12 and order 24 it is the fourth. These terms give the
-    step directly.
+    is_before: use the last term but one, which is larger. Over a useful step one of the first four terms is
+    the largest, or not much smaller; for exp(w t) with rtol = 1e-12 and order 24 it is the fourth. These
+    terms give the step directly.
     """
     last = order - 1 if is_before else order
     found = 0.0
@@ -420,11 +420,12 @@ def reach(
 ) -> float:
     """Return the step h, at most `longest`, up to which the series meet the tolerance.
 
-    On return powers (order + 1,) are h**k and totals are those of `sum_sizes` for the functions; code: see `measure`.
+    On return powers (order + 1,) are h**k and totals are those of `sum_sizes` for the functions; code: see
+    `measure`.
 
-    states: rows of V with the series of the states, watched: rows of U with those of functions. The last two terms of
-    each state are below atol + rtol |x|, and those of each function below rtol of its largest term, times the slack.
-    The result is NaN if a coefficient is not finite.
+    states: rows of V with the series of the states, watched: rows of U with those of functions. The last two
+    terms of each state are below atol + rtol |x|, and those of each function below rtol of its largest term,
+    times the slack. The result is NaN if a coefficient is not finite.
     """
     h, first, last = longest, 0.0, 0.0  # the last two terms over the tolerance, without the powers of h
     for i in range(states.shape[0]):

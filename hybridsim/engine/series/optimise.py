@@ -1,8 +1,8 @@
 """The lean tape of one vector of modes, without copies and with its constants in time computed once.
 
-The rows of a tape (see `hybridsim.engine.series.tape`) are sorted by their operands. A row over constants has one
-coefficient and runs once. A product with a constant, and the sine of an angle that grows linearly, cost one
-multiplication per order instead of a convolution.
+The rows of a tape (see `hybridsim.engine.series.tape`) are sorted by their operands. A row over constants has
+one coefficient and runs once. A product with a constant, and the sine of an angle that grows linearly, cost
+one multiplication per order instead of a convolution.
 """
 
 from __future__ import annotations
@@ -77,8 +77,8 @@ class LeanTape:
 def twins_of(tape: dict[str, Any]) -> dict[int, int]:
     """Map each register that is constant in some modes only to the register that it uses in those modes.
 
-    A compiled loop keeps its registers from mode to mode and writes only the leading coefficient of a constant.
-    Without separate registers, the higher coefficients of another mode would remain.
+    A compiled loop keeps its registers from mode to mode and writes only the leading coefficient of a
+    constant. Without separate registers, the higher coefficients of another mode would remain.
     """
     kinds = [dict.fromkeys(tape["states"], SERIES) | {tape["time"]: LINEAR} for _ in range(2)]
     least, most = kinds

@@ -15,8 +15,8 @@ from hybridsim.expr import own_roundoff
 class Inputs(NamedTuple):
     """Registers of a tape's inputs, as index arrays.
 
-    These are constants with values and error bounds (m, 2), parameters and their places in p, phases, time (1,) (-1:
-    none) and states.
+    These are constants with values and error bounds (m, 2), parameters and their places in p, phases, time
+    (1,) (-1: none) and states.
     """
 
     constants: np.ndarray

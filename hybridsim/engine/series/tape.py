@@ -1,7 +1,8 @@
 """A tape stores expressions as rows (operation, a, b, c, out) over numbered registers for a pre-compiled interpreter.
 
 The tape is data. It is built once from SymPy expressions when a model is first lowered, stored beside the
-generated source, and run by `hybridsim.engine.series.bounded` to compute Taylor coefficients with error bounds.
+generated source, and run by `hybridsim.engine.series.bounded` to compute Taylor coefficients with error
+bounds.
 """
 
 from __future__ import annotations
