@@ -1,6 +1,6 @@
-"""The integrators: each family is one folder, and all are reached through one registry.
+"""This package contains the integrators: one folder per family of methods, and one registry for all.
 
-`contract` says what an integrator has to offer. A new method is a new folder and a line in `registry`.
+`contract` defines the interface of an integrator. A new method is a new folder and a line in `registry`.
 """
 
 from hybridsim.integrators.registry import integrator_class, list_integrators, make_integrator

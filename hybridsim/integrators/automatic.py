@@ -1,4 +1,4 @@
-"""Which integrator "auto" takes, and why."""
+"""Selection of the integrator for integrator="auto", with the reason."""
 
 from __future__ import annotations
 
@@ -18,29 +18,29 @@ from hybridsim.integrators.rosenbrock.step import linearise
 if TYPE_CHECKING:
     from hybridsim.integrators.contract import Integrator
 
-_SMALL = 24  # states and guards up to which tables of closed forms are small
-_TIGHT = 1e-10  # rtol below which series of high order cost least
-_STABLE = 3.0  # |h lambda| at which explicit methods of high order are about to lose stability
-_MANY = 1e6  # steps held down by stability alone: a minute where a stiff method takes less than a second
-_DECAYING = 0.25  # share of an eigenvalue that is its decay, so that rodas5p damps it out
-_MANY_IN_PYTHON = 1e4  # the same where no compiled loop takes them
-_APART = (
-    10.0  # times as fast as all that moves beside it is a decay that is over before anything else happens
-)
+_SMALL = 24  # largest number of states and guards with small tables of closed forms
+_TIGHT = 1e-10  # rtol below which series of high order are fastest
+_STABLE = 3.0  # |h lambda| at the stability limit of explicit methods of high order
+_MANY = 1e6  # steps limited by stability: a minute, for which a stiff method takes less than a second
+_DECAYING = 0.25  # smallest share of decay in an eigenvalue, so that rodas5p damps it
+_MANY_IN_PYTHON = 1e4  # the same limit without a compiled loop
+_APART = 10.0  # ratio to all other rates above which a decay is over before anything else happens
 
 
 class Choice(NamedTuple):
-    """An integrator by name, and the reason in words."""
+    """The name of an integrator and the reason for its choice."""
 
     name: str
     reason: str
 
 
 def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float], rtol: float) -> Choice:
-    """The closed form where it goes from event to event, a stiff method where stability would rule, an explicit one.
+    """Choose an integrator for a model, a start and a tolerance.
 
-    Stiffness is seen where it shows at the start, in the eigenvalues of the Jacobian; what begins later is met on the
-    way, see `successor_of`.
+    The closed form is chosen for linear modes if it runs in compiled code, a stiff method if stability would
+    limit the step of an explicit one, and an explicit method otherwise. Stiffness is detected at the start,
+    from the eigenvalues of the Jacobian. Stiffness that begins later is detected during the run, see
+    `successor_of`.
     """
     if not system.has_tape:
         return _for_functions(system, x0, z0, span)
@@ -67,7 +67,7 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
 
 
 def _for_functions(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float]) -> Choice:
-    """For rates that are a Python function: there is no tape for closed forms and series."""
+    """Choose for rates that are a Python function, for which closed forms and series have no tape."""
     steps = _steps_for_stability(system, x0, z0, span)
     stiff = f"stability would hold an explicit method to {steps:.0e} steps" if steps > _MANY else ""
     if isinstance(system.code, PythonCode) and system.code.refused:
@@ -78,35 +78,35 @@ def _for_functions(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[f
 
 
 def _steps_for_stability(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float]) -> float:
-    """Steps to which stability alone would hold an explicit method."""
+    """Return the number of steps that an explicit method needs for stability alone."""
     per_rate = abs(span[1] - span[0]) / _STABLE
     steps = per_rate * _fastest_decay(system, x0, np.maximum(z0, 0), span[0])
-    if steps > _MANY and (z0 < 0).any():  # a law may be steep on the side on which the motion is not
+    if steps > _MANY and (z0 < 0).any():  # a law may be steep on the side that the motion does not take
         steps = per_rate * _fastest_decay(system, x0, _modes_at_start(system, x0, z0, span), span[0])
     return steps
 
 
 def _modes_at_start(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float]) -> np.ndarray:
-    """The modes in which the run begins; the first of each component that cannot be decided."""
+    """Return the modes in which the run begins; an undecided component gets its first mode."""
     p = system.vector(Instant(span[0]), system.discrete_start)
     at = Situation(0.0, x0.copy(), p, z0.copy(), np.zeros(system.n), 0.0)
     return np.maximum(Settling(system, at, z0.copy(), span[1] >= span[0]).run((), ()).z, 0)
 
 
 def successor_of(name: str, system: System) -> Integrator | None:
-    """The method that goes on where one that was chosen meets stiffness on the way; None where it does not look."""
+    """Return the method that replaces a chosen one on stiffness during the run; None if it is not monitored."""
     from hybridsim.integrators.rosenbrock.rodas5p import Rodas5P
 
     return Rodas5P() if name == "dop853" and system.has_tape else None
 
 
 def _fastest_decay(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> float:
-    """The largest rate -Re(lambda) at which anything decays at the start."""
+    """Return the largest decay rate -Re(lambda) at the start."""
     return max(0.0, float(-_eigenvalues(system, x, z, t0).real.min(initial=0.0)))
 
 
 def _is_apart(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> bool:
-    """Whether decays are far faster than all that they do not belong to, so that they alone hold the steps down."""
+    """Return whether decays are much faster than all other motions, so that they alone limit the step."""
     values = _eigenvalues(system, x, np.maximum(z, 0), t0)
     sizes = np.abs(values)
     stiff = values.real < -_DECAYING * sizes
@@ -116,7 +116,7 @@ def _is_apart(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> bool:
 
 
 def _eigenvalues(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> np.ndarray:
-    """Those of the Jacobian at the start; none where it is not finite."""
+    """Return the eigenvalues of the Jacobian at the start, or none if it is not finite."""
     none = np.zeros(0, dtype=complex)
     if not system.n:
         return none
@@ -126,7 +126,7 @@ def _eigenvalues(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> np.
 
 
 def _jacobian(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """d(dx/dt)/dx from the tape."""
+    """Return d(dx/dt)/dx from the tape."""
     n, inputs, lean = system.n, system.registers.inputs, system.lean_tape(z)
     V = np.zeros((system.registers.count, 2))
     V[inputs.constants, 0] = inputs.values[:, 0]

@@ -1,4 +1,4 @@
-"""The earlier path of the contract of integrators: deprecated, see `hybridsim.integrators.contract`."""
+"""The deprecated path of the integrator interface; use `hybridsim.integrators.contract`."""
 
 from __future__ import annotations
 

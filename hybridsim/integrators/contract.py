@@ -1,4 +1,4 @@
-"""The contract of an integrator, for those who write one: `Integrator`, and what it gets and gives."""
+"""The interface of an integrator, for authors of methods: `Integrator`, its arguments and its results."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ __all__ = [
     "Watch",
 ]
 
-NEEDS_TAPE = "it needs rates that are declared as expressions"  # reason to lack "functions"
+NEEDS_TAPE = "it needs rates that are declared as expressions"  # reason for lacks["functions"]
 CAPABILITIES = {
     "contacts": "contacts with dry friction that stick",
     "located": "events of contacts are located, with their right number and order",
@@ -55,7 +55,7 @@ CAPABILITIES = {
 
 
 class _IntegratorType(ABCMeta):
-    """The type of integrators, which prints an integrator with its name and its order."""
+    """The metaclass of integrators, whose repr shows the name and the order."""
 
     def __repr__(cls) -> str:
         name, title, order = (getattr(cls, key, "") for key in ("name", "title", "order"))
@@ -63,30 +63,28 @@ class _IntegratorType(ABCMeta):
 
 
 class Integrator(metaclass=_IntegratorType):
-    """How a piecewise-smooth system is integrated.
+    """Base class of all methods that integrate a piecewise-smooth system.
 
-    The contract, in the order in which it matters:
+    The contract, most important rules first:
 
-    1. An integrator is a frozen dataclass; its fields are its options, with defaults and types. It keeps no state
-       between runs: whatever a run needs lives in the stepper.
-    2. Give ``start`` to step through smooth segments and have events located, decided and settled by the engine; or
-       give ``run`` to drive a whole run, as a fixed-step method that makes its own decisions does.
-    3. ``start(flow, x0, s_bound, tolerances, first_step, watch)`` begins a segment at local time 0 in the state x0.
-       Its field ``flow.rhs(s, x)`` is smooth: no sign, no switch. Everything is fresh: no history of an earlier
-       segment may be used.
-    4. ``stepper.step()`` returns the next accepted `Step`, the last one ending at ``s_bound`` bit for bit, or raises
-       `StepFailure`. A trial in which a number is not finite is a rejected step, never an accepted one. s_bound is
-       negative when time runs backward.
-    5. ``step.dense(times)`` takes local times (k,) inside the step to states (k, n) and meets x0 and x1 at its ends.
-       Say in ``dense_is_accurate`` whether it is as accurate as the method; if not, give ``stepper.restep(step, s)``,
-       the same step up to s exactly, and event times get the accuracy of the method. Where its error up to s is
-       above the tolerance, return a shorter step, from whose end ``step()`` goes on: it is searched anew.
-    6. A method that finds zeros by itself returns them in ``step.roots`` and ends its step at them; ``watch`` says
-       what to look for and which leading coefficients are zero at the start, by decree.
-    7. What a method cannot do stands in ``lacks``: capability (a key of `CAPABILITIES`) to the reason. A model that
-       needs it is refused with that reason.
-    8. Evaluate only through ``flow``: it counts. Count rejected steps in ``flow.counters.rejected``.
-    9. `hybridsim.testing` holds every integrator to the event contract; run it on yours.
+    1. An integrator is a frozen dataclass; its fields are its options, with defaults and types. It keeps no
+    state between runs: all data of a run belong to the stepper. 2. Implement ``start`` to step through smooth
+    segments; the engine then locates, decides and resolves events. Or implement ``run`` for a whole run, as
+    in a fixed-step method that makes its own decisions. 3. ``start(flow, x0, s_bound, tolerances, first_step,
+    watch)`` begins a segment at local time 0 in the state x0. The function ``flow.rhs(s, x)`` is smooth: no
+    sign, no switch. No history of an earlier segment may be used. 4. ``stepper.step()`` returns the next
+    accepted `Step`, the last one ending exactly at ``s_bound``, or raises `StepFailure`. A trial in which a
+    number is not finite is a rejected step, never an accepted one. s_bound is negative if time runs backward.
+    5. ``step.dense(times)`` maps local times (k,) inside the step to states (k, n) and equals x0 and x1 at
+    its ends. Set ``dense_is_accurate`` to whether it is as accurate as the method. If not, implement
+    ``stepper.restep(step, s)``, the same step up to s exactly, which gives event times the accuracy of the
+    method. If its error up to s is above the tolerance, return a shorter step, from whose end ``step()``
+    continues; it is searched again. 6. A method that finds zeros itself returns them in ``step.roots`` and
+    ends its step at them; ``watch`` contains the functions to monitor and their leading coefficients that are
+    set to zero at the start. 7. ``lacks`` lists missing capabilities: it maps a key of `CAPABILITIES` to the
+    reason. A model that needs the capability is refused with that reason. 8. Evaluate only through ``flow``,
+    which counts evaluations. Count rejected steps in ``flow.counters.rejected``. 9. `hybridsim.testing` tests
+    any integrator against the event contract; run it on yours.
     """
 
     name: ClassVar[str]
@@ -96,20 +94,20 @@ class Integrator(metaclass=_IntegratorType):
     when: ClassVar[str]
     lacks: ClassVar[Mapping[str, str]] = MappingProxyType({})
     dense_is_accurate: ClassVar[bool] = False
-    leaps: ClassVar[bool] = False  # whether it has a compiled loop, which leaper() gives
+    leaps: ClassVar[bool] = False  # whether leaper() returns a compiled loop
 
     @property
     def stable_to(self) -> float:
-        """Of an explicit method, how far along the negative axis of h*lambda its steps are stable; else 0."""
+        """Return how far along the negative axis of h*lambda an explicit method is stable; 0 for others."""
         return 0.0
 
     @property
     def rounding(self) -> float:
-        """What steps round away at most, in units of rounding of the way that the states went."""
+        """Return the largest rounding error of steps, in roundings of the change of the states."""
         return 100.0
 
     def prepare(self, system: System) -> None:
-        """Compile what a run of this method needs beyond the model's functions; it counts as compile time."""
+        """Compile everything that a run needs beyond the model's functions; it counts as compile time."""
         return
 
     def start(
@@ -125,7 +123,7 @@ class Integrator(metaclass=_IntegratorType):
         raise NotImplementedError(f"{self.name} has no start(): it drives its runs itself")
 
     def leaper(self, system: System, tolerances: Tolerances, longest: float) -> Leaps | None:
-        """The compiled loop of this method for one run; None where the model rules it out."""
+        """Return the compiled loop of this method for one run, or None if the model rules it out."""
         return None
 
     def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:

@@ -1,4 +1,4 @@
-"""The first steps of a multistep method from a guard that grows late: by a method of high order, then handed over."""
+"""First steps of a multistep method from a guard that grows late, taken by a method of high order."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from hybridsim.engine.run.stepping import Flow, Step, Stepper, Watch
 from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.integrators.runge_kutta.dop853 import Dop853
 
-# The order of growth from which a guard is late: a gap that opens with its rate and acceleration zero. The first step
-# of order one has an error of its square, which hides whatever grows later than that.
+# A guard that grows with this order or later is late, such as a gap that opens with zero rate and acceleration. The
+# first step of order one has a quadratic error, which hides later growth.
 _LATE = 3
-# In tolerances of the states: errors over the first steps of a multistep method are some tens of these.
+# In tolerances of the states: errors of the first steps of a multistep method are tens of tolerances.
 _CLEAR = 100.0
 _MOST = (
-    100  # first steps; explicit ones in a stiff mode may be short, and the guard is left to the method then
+    100  # most first steps; in a stiff mode explicit steps may be too short, and the method then takes over
 )
 
 
@@ -28,16 +28,16 @@ def with_first_steps(
     watch: Watch,
     make: Callable[[float, np.ndarray], Stepper],
 ) -> Stepper:
-    """A multistep method, which `make` begins at a local time and state: after first steps if a guard grows late."""
+    """Start a multistep method by `make`, after first steps of high order if a guard grows late."""
     late = [int(g) for g in watch.guards if watch.sides[g] > 0 and watch.orders[g] >= _LATE]
     return FirstSteps(flow, x0, bound, tolerances, watch, late, make) if late else make(0.0, x0)
 
 
 class FirstSteps:
-    """Steps of DOP853 until the guards that begin at zero are clear of the errors of the states; then the method's own.
+    """Steps of DOP853 until the guards that begin at zero exceed the errors of the states; then the method's own steps.
 
-    A multistep method begins at order one, and its errors are those of its tolerance, while a gap that opens grows with
-    the cube of time: what has opened would seem to close again.
+    A multistep method begins at order one with errors of the size of its tolerance, while a gap that opens
+    grows with the cube of time. Without these steps a gap that has opened would seem to close again.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class FirstSteps:
         self.count, self.is_over = 0, False
 
     def step(self) -> Step:
-        """The next step of the one or the other."""
+        """Return the next step, by DOP853 or by the method."""
         step = self.stepper.step()
         if not self.is_over:
             self.count += 1
@@ -66,13 +66,13 @@ class FirstSteps:
         return step
 
     def restep(self, step: Step, s: float) -> Step:
-        """By the method that took the step."""
+        """Repeat a step up to s with the method that took it."""
         if self.is_over and step is self.last:
             self.stepper, self.is_over = self.early, False
         return self.stepper.restep(step, s)
 
     def _first(self, x0: np.ndarray, watch: Watch) -> float:
-        """The step after which the leading terms of the late guards are clear; the method shortens it if it must."""
+        """Return the first step, after which the late guards' leading terms are significant; it may be shortened."""
         series = self.flow.system.series(0.0, x0, self.flow.p, self.flow.z, np.zeros(self.flow.n), 0.0)
         orders = watch.orders[self.late]
         leading = np.abs(series.guards[self.late, orders])
@@ -82,13 +82,13 @@ class FirstSteps:
         return 2.0 * float(max(steps, default=np.inf))
 
     def _errors(self, s: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The late guards, and what errors of the states within their tolerances make of them."""
+        """Return the late guards, and their changes by errors of the states within the tolerances."""
         sizes = self.tolerances.atol + self.tolerances.rtol * np.abs(x)
         states = np.vstack([x, x + np.diag(sizes)])
         values = self.flow.guards(np.full(len(states), s), states)[:, self.late]
         return values[0], np.abs(values[1:] - values[0]).sum(axis=0)
 
     def _is_clear(self, s: float, x: np.ndarray) -> bool:
-        """Whether the late guards are beyond what errors of the states may make of them."""
+        """Return whether the late guards exceed their errors."""
         values, errors = self._errors(s, x)
         return bool((values > _CLEAR * errors).all())

@@ -1,4 +1,4 @@
-"""Steps of one-step methods with an error estimate: their control, the first one, and steps repeated up to an event."""
+"""Step control for one-step methods with an error estimate, including first steps and steps up to an event."""
 
 from __future__ import annotations
 
@@ -19,32 +19,32 @@ from hybridsim.engine.system.failures import Collapsed, StepFailure
 from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.integrators.runge_kutta.step import SMALLEST, STRETCH, next_length
 
-_MOST_PARTS = 64  # of a step that is repeated up to an event
+_MOST_PARTS = 64  # most parts of a step that is repeated up to an event
 _SHORTER = 0.5  # factor on a step whose error up to an event is above the tolerance
 
 
 class Point:
-    """A state on the way; what else is known there is worked out when it is first asked for."""
+    """A state along the run; further quantities are computed at first use."""
 
     def __init__(self, flow: Flow, s: float, x: np.ndarray) -> None:
         self.flow, self.s, self.x = flow, s, x
 
     @cached_property
     def dx(self) -> np.ndarray:
-        """The slope."""
+        """Return the slope."""
         self.flow.counters.rhs_evaluations += 1
         return self.flow.rhs(self.s, self.x)
 
     @cached_property
     def series(self) -> np.ndarray:
-        """Taylor coefficients of the flow to third order (n, 4)."""
+        """Return Taylor coefficients of the flow to third order (n, 4)."""
         flow, zero = self.flow, np.zeros(self.flow.n)
         return flow.system.series(self.s, self.x, flow.p, flow.z, zero, 0.0).states
 
 
 @dataclass(frozen=True)
 class Trial:
-    """The end of a trial step, its error in units of the tolerance, and what the method keeps for its dense output."""
+    """The end of a trial step, its error in units of the tolerance, and the method's data for dense output."""
 
     x: np.ndarray
     error: float
@@ -52,12 +52,12 @@ class Trial:
 
 
 class OneStepStepper(ABC):
-    """Steps a one-step method through one segment.
+    """Advance a one-step method through one segment.
 
     Parameters
     ----------
-    order : of the method.
-    error_order : power of the step with which the estimated error of a step falls.
+    order : order of the method.
+    error_order : exponent of the step size in the error estimate.
     """
 
     def __init__(
@@ -73,7 +73,7 @@ class OneStepStepper(ABC):
         self.flow, self.bound, self.tolerances = flow, bound, tolerances
         self.order, self.error_order = order, error_order
         self.control = (tolerances.rtol, tolerances.atol)
-        self._memory = np.zeros(3)  # of the step control
+        self._memory = np.zeros(3)  # state of the step control
         self.here = self._point(0.0, x0)
         if not np.isfinite(self.here.dx).all():
             names = [n for n, d in zip(flow.system.names, self.here.dx, strict=True) if not np.isfinite(d)]
@@ -85,22 +85,22 @@ class OneStepStepper(ABC):
 
     @abstractmethod
     def _attempt(self, start: Point, h: float) -> Trial:
-        """One step of length h, negative where time runs backward."""
+        """Try one step of length h, which is negative if time runs backward."""
 
     @abstractmethod
     def _dense(self, start: Point, end: Point, trial: Trial) -> Dense:
-        """Dense output of an accepted step."""
+        """Return the dense output of an accepted step."""
 
     def _holds(self, start: Point, end: Point, trial: Trial) -> bool:
-        """Whether the dense output of a step that is right at its end is so on the way."""
+        """Return whether the dense output is accurate inside a step that is accurate at its end."""
         return True
 
     def step(self) -> Step:
-        """The next accepted step."""
+        """Return the next accepted step."""
         direction, start = math.copysign(1.0, self.bound), self.here
         while True:
             h = min(self.h, self.tolerances.max_step)
-            # what would be left is too short for a step of its own
+            # the rest would be too short for another step
             last = h * STRETCH >= abs(self.bound - start.s) - SMALLEST * math.ulp(self.bound)
             h = abs(self.bound - start.s) if last else abs(on_the_grid(start.s, direction * h))
             if not h > 0.0:
@@ -118,10 +118,11 @@ class OneStepStepper(ABC):
         return Step(start.s, s, start.x, end.x, self._dense(start, end, trial))
 
     def restep(self, step: Step, s: float) -> Step:
-        """The step up to s in one step of exactly that length, or a shorter one where its error asks for it.
+        """Return one step from the start to exactly s, or a shorter one if its error is too large.
 
-        A law may be steep where an event is and flat on either side of it, which the stages of the longer step missed.
-        What moves by less than the tolerance is taken in equal parts: a law without a slope is not followed further.
+        A law may be steep at an event and flat on both sides, which the stages of the longer step missed. If
+        the change of the state is below the tolerance, equal parts are used, because a law with a jump cannot
+        be resolved further.
         """
         start, length = self._point(step.s0, step.x0), s - step.s0
         trial = self._attempt(start, length)
@@ -137,7 +138,7 @@ class OneStepStepper(ABC):
         return self._in_parts(start, s)
 
     def _in_parts(self, start: Point, s: float) -> Step:
-        """A step up to s in equal parts, as many as its error asks for and no more than there may be."""
+        """Return a step up to s in equal parts, as many as its error requires within a limit."""
         count = 2
         while True:
             knots = np.linspace(start.s, s, count + 1)
@@ -155,17 +156,17 @@ class OneStepStepper(ABC):
         return Step(start.s, s, start.x, points[-1].x, Pieces(knots, parts))
 
     def _first_step(self) -> float:
-        """Starting step of Hairer, Norsett and Wanner 1993, section II.4."""
+        """Return the starting step of Hairer, Norsett and Wanner 1993, section II.4."""
         x, dx = self.here.x, self.here.dx
         scale = self.tolerances.atol + self.tolerances.rtol * np.abs(x)
         scale = np.where(scale > 0.0, scale, 1.0)
 
         def size(x: np.ndarray) -> float:
-            with np.errstate(over="ignore"):  # infinity makes the smallest step
+            with np.errstate(over="ignore"):  # an infinite norm gives the smallest step
                 return float(np.sqrt(np.mean((x / scale) ** 2)))
 
         d0, d1 = size(x), size(dx)
-        # a state that has just come to zero makes the estimate as small as its rounding; error control mends the rest
+        # a state that has just reached zero makes the estimate as small as its rounding; error control corrects it
         smallest = 1e-9 * abs(self.bound)
         h0 = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
         if not h0 > 0.0:

@@ -1,4 +1,4 @@
-"""The options of an integrator: the fields of its dataclass, their kinds in words, what its docstring says of them."""
+"""The options of an integrator: the fields of its dataclass, their kinds in words, and their descriptions."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from numbers import Integral, Real
 from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
-LARGEST = 10**6  # of a count, such as of iterations
-# A line of a docstring's section "Parameters": one or several names, a colon, text that goes on in indented lines.
+LARGEST = 10**6  # largest count, for example of iterations
+# An entry of a docstring's section "Parameters": names, a colon, and text that continues in indented lines.
 _ENTRY = re.compile(r"^(\w+(?:, \w+)*) : (.*(?:\n[ \t]+.*)*)", re.MULTILINE)
 
 
@@ -21,9 +21,9 @@ class Option:
 
     Parameters
     ----------
-    kind : what may be given, in words.
-    default : its default; None where the integrator finds a value itself, or where there is none.
-    text : what it does, from the docstring of the class that has it.
+    kind : description of the allowed values.
+    default : the default; None if the integrator computes a value, or if there is no default.
+    text : description, from the docstring of the class that declares the option.
     """
 
     name: str
@@ -33,7 +33,7 @@ class Option:
 
 
 def options_of(cls: type[Any]) -> tuple[Option, ...]:
-    """All options of an integrator class."""
+    """Return all options of an integrator class."""
     kinds, texts = get_type_hints(cls), _texts(cls)
     return tuple(
         Option(
@@ -47,7 +47,7 @@ def options_of(cls: type[Any]) -> tuple[Option, ...]:
 
 
 def _texts(cls: type[Any]) -> dict[str, str]:
-    """What the docstrings of a class and its bases say of parameters, the nearest one first."""
+    """Return the descriptions of parameters in the docstrings of a class and its bases, nearest first."""
     found: dict[str, str] = {}
     for base in reversed(cls.__mro__):
         document = inspect.cleandoc(base.__doc__ or "") if "__doc__" in vars(base) else ""
@@ -58,7 +58,7 @@ def _texts(cls: type[Any]) -> dict[str, str]:
 
 
 def fits(value: object, kind: Any) -> bool:
-    """Whether a value may stand where the annotation of an option says `kind`; a whole number is a number too."""
+    """Return whether a value matches the annotation `kind` of an option; an integer counts as a number."""
     if get_origin(kind) is Literal:
         return value in get_args(kind)
     if get_origin(kind) in (Union, UnionType):
@@ -70,7 +70,7 @@ def fits(value: object, kind: Any) -> bool:
 
 
 def _is_small(value: Any, most: float) -> bool:
-    """Whether a number is one of the doubles, and no larger than `most`; what is not a number is left to others."""
+    """Return whether a number is a finite double not above `most`; other values are not judged here."""
     try:
         return not abs(float(value)) > most
     except OverflowError:
@@ -78,7 +78,7 @@ def _is_small(value: Any, most: float) -> bool:
 
 
 def in_words(kind: Any) -> str:
-    """An annotation for people."""
+    """Return an annotation in words."""
     if get_origin(kind) is Literal:
         return "one of " + ", ".join(map(str, get_args(kind)))
     if get_origin(kind) in (Union, UnionType):

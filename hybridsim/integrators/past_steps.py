@@ -1,9 +1,10 @@
-"""Interpolation through the ends of the last steps: dense output where derivatives tell nothing.
+"""Dense output for stiff modes: interpolation through the ends of the last steps.
 
-On a stiff stretch a state is off its slow motion by a rounding or a tolerance, and its derivatives are that times
-powers of a rate far above one over the step. The values themselves are good. So the dense output is the polynomial
-through the last few of them, as the formulas of a multistep method have it themselves (C. W. Gear, Numerical Initial
-Value Problems in Ordinary Differential Equations, Prentice-Hall 1971, chapter 9).
+In a stiff mode a state deviates from its slow motion by a rounding error or a tolerance. Its derivatives are
+this deviation times powers of a rate far above one over the step, and are useless. The values themselves are
+accurate. So the dense output is the polynomial through the last few of them, as in the formulas of a
+multistep method (C. W. Gear, Numerical Initial Value Problems in Ordinary Differential Equations,
+Prentice-Hall 1971, chapter 9).
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import numpy as np
 from hybridsim.engine.native.kernels import kernel
 from hybridsim.engine.record.segments import Dense
 
-MOST = 6  # points: the highest order of backward differentiation formulas is five
+MOST = 6  # most points, since the highest order of backward differentiation formulas is five
 # Taylor series to third order that miss the other end of their step by more than this share of their largest term
 # do not converge on the step.
 _CONVERGES = 0.1
@@ -23,7 +24,7 @@ _CONVERGES = 0.1
 
 @kernel
 def converges(series: Any, h: float, x1: Any) -> bool:
-    """Whether Taylor coefficients (n, k) of the states at one end of a step of length h lead to its other end."""
+    """Return whether Taylor coefficients (n, k) of the states at one end of a step h reproduce its other end."""
     for i in range(series.shape[0]):
         power, largest, total = 1.0, 0.0, 0.0
         for k in range(series.shape[1]):
@@ -38,13 +39,13 @@ def converges(series: Any, h: float, x1: Any) -> bool:
 
 
 def through(s: np.ndarray, x: np.ndarray) -> Dense:
-    """The polynomial for the last step through as many points as make it smooth; s (m,), x (m, n), m >= 2.
+    """Return the polynomial for the last step through a suitable number of points; s (m,), x (m, n), m >= 2.
 
-    Of the polynomials through the last 2, 3, ... points that one is taken at which the next point changes the middle of
-    the step least.
+    Of the polynomials through the last 2, 3, ... points it is the one for which the next point changes the
+    middle of the step least.
     """
     order = slice(None, -MOST - 1, -1)
-    s, x = s[order], x[order]  # the last first
+    s, x = s[order], x[order]  # latest point first
     differences = x.copy()
     for k in range(1, len(s)):
         differences[k:] = (differences[k:] - differences[k - 1 : -1]) / (s[k:] - s[:-k])[:, None]

@@ -1,4 +1,4 @@
-"""The one list of integrators: ours, and those that third parties add through the entry point."""
+"""The registry of integrators: built-in ones, and those that third parties add through the entry point."""
 
 from __future__ import annotations
 
@@ -59,12 +59,12 @@ def _registered() -> dict[str, type[Integrator]]:
 
 
 def list_integrators() -> tuple[type[Integrator], ...]:
-    """List all integrators that can be named, ours first.
+    """List all integrators that can be named, built-in ones first.
 
     Returns
     -------
     tuple of type
-        Of each its ``name`` and what it says of itself.
+        The integrator classes, with attributes such as ``name``, ``title``, ``order`` and ``lacks``.
 
     Examples
     --------
@@ -76,7 +76,7 @@ def list_integrators() -> tuple[type[Integrator], ...]:
 
 
 def integrator_class(name: str) -> type[Integrator]:
-    """The integrator of a name."""
+    """Return the integrator class with this name."""
     found = _registered()
     if name not in found:
         remedy = nearest(name, found, kind="integrators")
@@ -89,7 +89,7 @@ def integrator_class(name: str) -> type[Integrator]:
 
 @contextmanager
 def registered(method: str | type[Integrator]) -> Iterator[str]:
-    """The name of an integrator; a class that nobody has registered can be named while the context lasts."""
+    """Yield the name of an integrator; an unregistered class can be used by name inside the context."""
     if isinstance(method, str):
         yield integrator_class(method).name
         return
@@ -110,7 +110,7 @@ def registered(method: str | type[Integrator]) -> Iterator[str]:
 
 @cache
 def option_names(cls: type[Any]) -> tuple[str, ...]:
-    """The options of an integrator: the fields of its dataclass."""
+    """Return the options of an integrator: the fields of its dataclass."""
     return tuple(f.name for f in fields(cls))
 
 
@@ -118,7 +118,7 @@ _START = "pass the start as x0=..., by name ({'x': 1.0}) or one number per state
 _PARAMETERS = "pass values of parameters as params={...}"
 _SPAN = "pass both ends of the run as t_span=(t0, t1)"
 _STEP = "use max_step=... to limit the step, or step=... with integrator='moreau' or 'rk4-dichotomy'"
-# What users of SciPy's solve_ivp and of other tools ask for, and where it is here.
+# Keywords of SciPy's solve_ivp and of other tools, with their counterparts here.
 _ELSEWHERE = {
     "y0": _START,
     "u0": _START,
@@ -140,12 +140,12 @@ _ELSEWHERE = {
 
 
 def keyword_elsewhere(keyword: str) -> str | None:
-    """The remedy for a keyword of another tool that has a counterpart in `simulate`."""
+    """Return the remedy for a keyword of another tool that has a counterpart in `simulate`."""
     return _ELSEWHERE.get(keyword)
 
 
 def make_integrator(name: str, options: dict[str, Any], keywords: Iterable[str] = ()) -> Integrator:
-    """The integrator of a name with its options set; keywords: what else the user may have meant by an option."""
+    """Return the integrator of a name with its options; keywords: other names that the user may have meant."""
     cls = integrator_class(name)
     known = option_names(cls)
     for option in options:

@@ -76,11 +76,7 @@ class _Block(NamedTuple):
 
 
 class Modals(NamedTuple):
-    """Block diagonal forms of many matrices: the fields of `Modal` with a leading axis K, padded with zeros.
-
-    counts (K,): the coordinates of each. powers (K, J): |B**exponent| of the block, for the exponent that was
-    asked.
-    """
+    """Block diagonal forms of many matrices: the fields of `Modal` with a leading axis K, padded with zeros."""
 
     counts: np.ndarray  # (K,) number of coordinates of each matrix
     values: np.ndarray

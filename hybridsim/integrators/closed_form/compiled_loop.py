@@ -1,4 +1,4 @@
-"""Leaps over segments of linear modes, as the general mode loop sees them."""
+"""The compiled loop over segments of linear modes, for the general mode loop."""
 
 from __future__ import annotations
 
@@ -26,36 +26,36 @@ from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.integrators.closed_form.segments import Record, leap_at_address, reach_leap, room_for
 
-_SEGMENTS = 1024  # room for one call
+_SEGMENTS = 1024  # most segments of one call
 _NONE = np.zeros(0, dtype=np.int64)
 
 _leap = Door(leap_at_address)
 
 
 class ExactLeaper:
-    """Leaps of one run."""
+    """The compiled loop of one run."""
 
     def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
         self.system, self.longest = system, longest
-        self.horizon = 0.0  # the farthest that a segment might have gone so far
+        self.horizon = 0.0  # longest segment that was possible so far
         # as in the room of a leap, where the last one left them
         self.hints = np.zeros((0, system.guard_count))
         self.shelf, self.automata = shelf_of(system), automata_of(system)
-        self.tables: LinearTables | None = None  # those that the sheet is for
+        self.tables: LinearTables | None = None  # tables for which the sheet was made
         self.sheet: Sheet
-        self.leapt: Leapt | None = None  # a call that was made ahead, for the next leap to begin with
+        self.leapt: Leapt | None = None  # a call made in advance, whose results the next leap takes first
 
     def anew(self) -> ExactLeaper:
-        """The same for another run."""
+        """Return the same loop for another run."""
         other: ExactLeaper = object.__new__(type(self))
         vars(other).update(vars(self))
         return other
 
     @property
     def place(self) -> tuple[np.ndarray, ...]:
-        """How far ahead the tables reach, and when guards were zero last: the last digits of a zero depend on it.
+        """The horizon of the tables and the last zeros of guards, which affect the last digits of later zeros.
 
-        The hints come with their vectors of modes: another process has these in other rows.
+        The hints are stored with their mode vectors, because another process has these in other rows.
         """
         count = len(self.hints)
         modes = self.shelf.tapes.modes[:count]
@@ -85,7 +85,7 @@ class ExactLeaper:
         self.hints[rows] = hints[is_known]
 
     def go(self, origin: Instant, laid: Laid, target: Instant) -> Leapt | None:
-        """Call the kernel; None where there are no tables."""
+        """Call the kernel; return None without tables."""
         system, shelf = self.system, self.shelf
         shelf.surround(laid.part("z"))
         tapes, inputs = shelf.tapes, system.registers.inputs
@@ -124,7 +124,7 @@ class ExactLeaper:
     def leap(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
     ) -> Landing:
-        """As far as ordinary events and the room for them go."""
+        """Advance through ordinary events as far as the buffers last."""
         leapt, self.leapt = self.leapt or self.go(origin, laid_out(outcome, p), target), None
         if leapt is None:
             return Landing(origin, outcome.copy, BEFORE_SOMETHING, np.zeros((0, 2)), _NONE)
@@ -137,16 +137,16 @@ class ExactLeaper:
         return Landing(Instant(*leapt.clock), leapt.after, end, leapt.instants, leapt.owners)
 
     def count(self, leapt: Leapt, counters: Counters) -> None:
-        """Add what a call has cost."""
+        """Add the cost of a call to the counters."""
         leapt.count_in(counters)
 
     def forget_segments(self, leapt: Leapt) -> bool:
-        """Let go of all segments but the end of the last one."""
+        """Release all segments except the end of the last one."""
         leapt.forget_segments()
         return True
 
     def _sheet(self, tables: LinearTables) -> Sheet:
-        """What the kernel writes to; the trajectory keeps it, events longer than segments."""
+        """Return the layout of the kernel's output; the trajectory keeps it, events longer than segments."""
         widest, system = tables.values.shape[1], self.system
 
         def made() -> Sheet:
@@ -154,7 +154,7 @@ class ExactLeaper:
                 Record,
                 (
                     (float, (_SEGMENTS,), 0),
-                    # one row more: where each begins and where the last one ends
+                    # one more row: all starts, and the end of the last segment
                     (float, (_SEGMENTS + 1, 2), 1),
                     (np.int64, (_SEGMENTS,), 0),
                     (np.int64, (_SEGMENTS + 1, len(system.automata)), 1),
@@ -169,7 +169,7 @@ class ExactLeaper:
         return sheet
 
     def segments_of(self, leapt: Leapt) -> ClosedFormBlock:
-        """The segments of a call that has some, and has let go of none."""
+        """Return the segments of a call that has some and has released none."""
         ends, origins, numbers, modes, vectors, coordinates, _, jumps = leapt.rows
         begun, tables = slice(0, leapt.count), leapt.beside[0]
         return ClosedFormBlock(
@@ -185,7 +185,7 @@ class ExactLeaper:
         )
 
     def _commit(self, leapt: Leapt, record: Trajectory) -> None:
-        """Leave the segments to the trajectory, and the events."""
+        """Transfer the segments and the events to the trajectory."""
         if record.segments.is_end_alone:
             record.segments.keep_only(leapt.last_end)
         else:

@@ -1,4 +1,4 @@
-"""Linear modes in closed form."""
+"""The integrator `exact`, which computes linear modes in closed form."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from hybridsim.integrators.closed_form.compiled_loop import ExactLeaper
 from hybridsim.integrators.contract import NEEDS_TAPE, Integrator
 from hybridsim.integrators.taylor.method import TaylorStepper
 
-_TIGHTEST = 1e-15  # what a series in doubles is asked for
+_TIGHTEST = 1e-15  # rtol for series in doubles
 
 
 @dataclass(frozen=True)
 class Exact(Integrator):
-    """Each linear mode in closed form, x(t) = Re(T exp(B t) c), its guards' zeros isolated with a bound.
+    """Closed-form motion of each linear mode, x(t) = Re(T exp(B t) c), with zeros of guards isolated by an error bound.
 
-    For modes that are linear in the states with constant, polynomial, exponential or sinusoidal forcing, and guards
-    that are linear in states and forcing: whether a model is of this kind is read off its declaration, and one that is
-    not is refused with what is in the way. B is block diagonal (see `hybridsim.engine.linear.modal`), so that
-    defective, oscillatory and stiff modes are taken alike. A guard that is one undamped wave has its zeros in closed
-    form. Each other is followed by lower bounds made of its Taylor polynomial and the largest remainder, so that no
-    zero is jumped over, and its zeros are good to rounding. There is no step and no truncation: rtol and atol do not
-    enter. A segment that holds something unusual (a monitor, an input, a question of rounding, time running backward)
-    is taken by its Taylor series, which converges everywhere, to rounding of the states' nominal sizes: there atol
-    enters.
+    It applies to modes that are linear in the states with constant, polynomial, exponential or sinusoidal
+    forcing, and to guards that are linear in states and forcing. The model's declaration decides this, and
+    the error for another model names the obstacle. B is block diagonal (see `hybridsim.engine.linear.modal`),
+    so that defective, oscillatory and stiff modes are treated alike. A guard that is one undamped wave has
+    its zeros in closed form. Every other guard is followed by lower bounds made of its Taylor polynomial and
+    the largest remainder, so that no zero is passed over, and its zeros are accurate to rounding. There is no
+    step and no truncation error: rtol and atol are not used. A segment with something unusual (a monitor, an
+    input, a case decided by rounding, time running backward) is computed from its Taylor series, which
+    converges everywhere, to rounding of the states' nominal sizes. There atol is used.
 
     When to choose it: whenever it applies. It is the fastest and the most accurate.
     """
@@ -50,12 +50,12 @@ class Exact(Integrator):
     leaps: ClassVar[bool] = True
 
     def prepare(self, system: System) -> None:
-        """The compiled mode loop; a model that is not piecewise linear is refused here."""
+        """Compile the mode loop; refuse a model that is not piecewise linear."""
         refuse_nonlinear(system)
         compile_leaps(system, ExactLeaper)
 
     def leaper(self, system: System, tolerances: Tolerances, longest: float) -> ExactLeaper | None:
-        """The compiled mode loop, which knows no steps: where these are bounded there is none."""
+        """Return the compiled mode loop, or None if max_step is set, because the loop has no steps."""
         return ExactLeaper(system, tolerances, longest) if math.isinf(tolerances.max_step) else None
 
     def start(
@@ -67,6 +67,6 @@ class Exact(Integrator):
         first_step: float | None,
         watch: Watch,
     ) -> Stepper:
-        """Begin a smooth segment that holds something unusual."""
+        """Begin a smooth segment that contains something unusual."""
         tight = Tolerances(_TIGHTEST, 1e-3 * tolerances.atol, tolerances.max_step)
         return TaylorStepper(flow, x0, s_bound, tight, first_step)

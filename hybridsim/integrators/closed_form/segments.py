@@ -1,6 +1,6 @@
-"""The compiled mode loop of linear modes: each segment in closed form, from event to event, no Python between.
+"""The compiled mode loop of linear modes, which goes from event to event in closed form without Python calls.
 
-As `hybridsim.engine.run.leap`, with one closed form for a segment where that has steps.
+It corresponds to `hybridsim.engine.run.leap`, with one closed form per segment instead of steps.
 """
 
 from __future__ import annotations
@@ -51,61 +51,52 @@ from hybridsim.engine.run.leap import AT_TARGET, FULL, STOPPED, holding, set_ori
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.programs.modes_index import find_modes
 
-_NONE, _OPEN = -1, -2  # no guard goes negative; a question of rounding
-_DONE = -1.0  # in place of a guard's size: its first zero is known
+_NONE, _OPEN = -1, -2  # no guard becomes negative; undecided because of rounding
+_DONE = -1.0  # replaces a guard's size if its first zero is known
 
 
 class Room(NamedTuple):
-    """What a leap is to do, and scratch arrays.
+    """Task and scratch arrays of the compiled loop."""
 
-    rates (R,) of angles, where in p the origin and the phases are (2,), the longest segment (1,), times (4,): the
-    target, and the clock, which is moved on; how many segments were committed (1,), from how many points guards were
-    followed (1,). Modal coordinates (J,), their sizes, terms of a guard (2, BOUND_TERMS), those at the start (G,
-    BOUND_TERMS + 2), a state; hints (K, G): how long after these modes were entered a guard was zero when they were
-    met last in this run, 0 where it was not; former (G,): a row of it before the segment under way; terms near a
-    start (2, n + M).
-    """
-
-    rates: np.ndarray
-    places: np.ndarray
-    longest: np.ndarray
-    times: np.ndarray
-    committed: np.ndarray
-    points: np.ndarray
-    c: np.ndarray
-    v: np.ndarray
-    sizes: np.ndarray
-    terms: np.ndarray
-    starts: np.ndarray
-    hints: np.ndarray
-    former: np.ndarray
-    series: np.ndarray
+    rates: np.ndarray  # (R,) rates of the angles
+    places: np.ndarray  # (2,) places in p of the origin and of the phases
+    longest: np.ndarray  # (1,) longest segment
+    times: np.ndarray  # (4,) target, and clock, which is advanced
+    committed: np.ndarray  # (1,) number of committed segments
+    points: np.ndarray  # (1,) number of points from which guards were followed
+    c: np.ndarray  # (J,) modal coordinates
+    v: np.ndarray  # (J,) modal coordinates
+    sizes: np.ndarray  # (J,) sizes of modal coordinates
+    terms: np.ndarray  # (2, BOUND_TERMS) terms of a guard
+    starts: np.ndarray  # (G, BOUND_TERMS + 2) terms of the guards at the start, with bounds
+    hints: np.ndarray  # (K, G) time from entry to the last zero of a guard in this run, or 0
+    former: np.ndarray  # (G,) a row of hints before the current segment
+    series: np.ndarray  # (2, n + M) terms near a start
     scale: np.ndarray
     pace: np.ndarray
 
 
 class Record(NamedTuple):
-    """What is committed of each segment: its end in local time, origin (2,), row of the tables, modes, run-time vector,
-    modal coordinates at its start, the guard that fired (-1: none), states at start and both sides of its end (3, n).
-    """
+    """The committed segments, one row each."""
 
-    ends: np.ndarray
-    clocks: np.ndarray
-    rows: np.ndarray
-    modes: np.ndarray
-    vectors: np.ndarray
-    coordinates: np.ndarray
-    fires: np.ndarray
-    jumps: np.ndarray
+    ends: np.ndarray  # end in local time
+    clocks: np.ndarray  # (., 2) time origin
+    rows: np.ndarray  # row of the tables
+    modes: np.ndarray  # mode vector
+    vectors: np.ndarray  # run-time vector
+    coordinates: np.ndarray  # modal coordinates at the start
+    fires: np.ndarray  # guard that fired (-1: none)
+    jumps: np.ndarray  # (., 3, n) state at the start, and before and after the end
 
 
 @merged
 def first_exit_of(lin: Any, tapes: Any, k: int, bound: float, state: Any, room: Any) -> tuple[int, float]:
-    """The guard of the modes in row k that first goes negative, and when; (_NONE, bound), or (_OPEN, time).
+    """Find the guard of the modes in row k that first becomes negative, and when; (_NONE, bound), or (_OPEN, time).
 
-    Waves have their zeros in closed form. Of the others the one that was zero soonest when these modes were met last
-    goes first, or else the one that falls fastest: the rest need to be followed no farther than it lasts. All are
-    followed up to one horizon, and then to one four times as far: most stay positive for long.
+    Waves have their zeros in closed form. Of the other guards the one with the earliest zero in the last
+    visit of these modes comes first, or else the one that falls fastest. The rest need to be followed no
+    farther than its zero. All are followed up to one horizon, and then up to four times as far, since most
+    stay positive for long.
     """
     c, starts, hints, sides, orders = room.c, room.starts, room.hints, state.sides, state.orders
     first, last = tapes.active_start[k], tapes.active_start[k + 1]
@@ -151,7 +142,7 @@ def first_exit_of(lin: Any, tapes: Any, k: int, bound: float, state: Any, room: 
 
 
 def room_for(system: Any, tables: Any) -> Room:
-    """Room for leaps of a system by tables like these, as kernels take it."""
+    """Return scratch arrays for the compiled loop of a system with tables of this shape, packed for kernels."""
     n, widest, layout = system.n, tables.values.shape[1], system.layout
     room: Room = packed(
         Room(
@@ -178,7 +169,7 @@ def room_for(system: Any, tables: Any) -> Room:
 
 @inlined
 def stopped(hints: Any, k: int, former: Any) -> int:
-    """The segment under way is left to others, or to a leap that begins with it: its zeros have not been met."""
+    """Restore the hints of the current segment, because its zeros are not committed."""
     put(former, hints[k])
     return STOPPED
 
@@ -186,10 +177,10 @@ def stopped(hints: Any, k: int, former: Any) -> int:
 def exact_leap(
     automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any, room: Any, record: Any
 ) -> int:
-    """Go from event to event; returns why it ended: FULL too where guards were followed for a second, or after growth.
+    """Go from event to event and return why it ended; FULL also means a second of following guards, or growth.
 
-    It is reached by its address, so that it is compiled once for all that go by it. automata, tapes, inputs, state,
-    work as for `leap`; lin: tables of linear modes. record: what the segments and events are written to.
+    The kernel is called by address, so that it is compiled once for all callers. automata, tapes, inputs,
+    state and work are as for `leap`; lin: tables of linear modes; record: output for segments and events.
     """
     place, rates = (room.places[0], room.places[1]), room.rates
     longest, target, clock, functions = room.longest[0], room.times[:2], room.times[2:], called_by(work)
@@ -252,7 +243,7 @@ def exact_leap(
             for i in range(n):
                 x_error[i] = 4.0 * UNIT * scale[i] + x_error[i]
             committed[0] = n_segments + 1
-            if until < bound:  # the next leap begins there, with functions of time from there
+            if until < bound:  # the next call begins there, with new functions of time
                 clock[0], clock[1] = moved_on(clock[0], clock[1], s)
                 for g in range(state.sides.shape[0]):
                     state.sides[g], state.orders[g], state.floors[g] = 1, 0, 0.0
@@ -261,7 +252,7 @@ def exact_leap(
             return AT_TARGET
         if is_crowded(s, clock, pace):
             return stopped(hints, k, former)
-        # the event is settled at the origin of the segment that follows, whose functions of time these are
+        # the event is resolved at the origin of the next segment, to which these functions of time belong
         high, low = clock[0], clock[1]
         clock[0], clock[1] = moved_on(high, low, s)
         set_origin(place, rates, clock[0], clock[1], p)
@@ -280,7 +271,7 @@ def exact_leap(
             set_origin(place, rates, high, low, p)
             return stopped(hints, k, former)
         k = work.whole[ROW] if work.whole[ROW] != k else find_modes(tapes, z)
-        is_known = automata.hold[automata.owner[fired]] >= 0  # others may have changed what is in p
+        is_known = automata.hold[automata.owner[fired]] >= 0  # another event may have changed p
         put(y1, jumps[n_segments, 2])
         n_segments += 1
         committed[0] = n_segments
@@ -290,13 +281,13 @@ def exact_leap(
 def leap_at_address(
     automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any, room: Any, record: Any
 ) -> int:
-    """Call `exact_leap`."""
+    """Call `exact_leap` by its address."""
     return call_kernel(work.reached[LEAP], (automata, tapes, inputs, lin, state, work, room, record))
 
 
 def reach_leap(
     automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any, room: Any, record: Any
 ) -> None:
-    """Compile what a leap needs, if need be, and put the addresses where kernels find them."""
+    """Compile the kernels that a call needs, if necessary, and store their addresses for other kernels."""
     reach_settling(automata, tapes, inputs, lin, state, work)
     work.reached[LEAP] = kernel_address(exact_leap, automata, tapes, inputs, lin, state, work, room, record)

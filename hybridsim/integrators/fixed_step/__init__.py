@@ -1,1 +1,1 @@
-"""Methods with a fixed step make their own decisions: the published ones and Moreau-Jean time stepping."""
+"""Methods with a fixed step, which decide events themselves: the published ones and Moreau-Jean time stepping."""

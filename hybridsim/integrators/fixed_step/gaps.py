@@ -1,4 +1,4 @@
-"""Gaps of unilateral contacts between the steps of a method: how wide they are, as far as rounding tells."""
+"""Gaps of unilateral contacts at the steps of a method: their signs, as far as rounding determines them."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from hybridsim.engine.system.system import System
 
 
 def gaps(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> dict[int, tuple[int, bool]]:
-    """For each unilateral component the sign of its gap, and whether its rate is not zero, at local time 0.
+    """Return the sign of each unilateral component's gap, and whether its rate is not zero, at local time 0.
 
-    p : with its pin off, so that the states count as they are.
+    p : run-time vector with its pin off, so that the states are used unchanged.
     """
     series: Any = system.series(0.0, x, p, z, 4.0 * UNIT * np.abs(x), 0.0)
     values, bounds = series.surfaces, series.surface_bounds

@@ -1,4 +1,4 @@
-"""What the kernels of all fixed-step methods share: why a stretch of steps ends, and what a step has passed."""
+"""Kernels that all fixed-step methods share: the reasons to return to Python, and sign changes in a step."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import numpy as np
 
 from hybridsim.engine.native.kernels import call, inlined
 
-# why a stretch of steps ended
+# reasons why a sequence of steps ended
 BOUND, FULL, GUARD, MONITOR, NOT_FINITE, RESTITUTION, RESTED = 0, 1, 2, 3, 4, 5, 6
 GOES_ON = -1
 
 
 @inlined
 def leaves_side(before: float, after: float) -> bool:
-    """Whether a monitor goes from one side to zero or beyond."""
+    """Return whether a monitor changes from one side to zero or to the other side."""
     return (before > 0.0 and after <= 0.0) or (before < 0.0 and after >= 0.0)
 
 
@@ -23,10 +23,10 @@ def leaves_side(before: float, after: float) -> bool:
 def brought_to_zero(
     address: Any, s: float, x: Any, p: Any, z: Any, fresh: Any, is_first: bool, before: Any, after: Any
 ) -> bool:
-    """Whether the modes that a step begins with have brought a monitor to zero from where the step before left it.
+    """Return whether the modes at the start of a step brought a monitor to zero from its value after the last step.
 
-    address: of the monitors, whose values are written to before; after: their values at the end of the step before.
-    Those that it holds for are marked in fresh.
+    address: the monitors' function, whose values are written to before; after: their values at the end of the
+    last step. Monitors for which this holds are marked in fresh.
     """
     found = False
     if fresh.shape[0] > 0:
@@ -53,11 +53,11 @@ def passed(
     after: Any,
     counts: Any,
 ) -> int:
-    """What ends the stretch at a step to (s1, x1), or GOES_ON.
+    """Return the reason to end the loop after a step to (s1, x1), or GOES_ON.
 
-    functions: addresses of guards and monitors. watched: guards that must not be negative. fresh: monitors that have
-    just fired: the rest of such a zero is no new zero on the first step. before: their values where the step begins.
-    guards, after: room.
+    functions: addresses of guards and monitors. watched: guards that must not be negative. fresh: monitors
+    that have just fired, whose remaining zero on the first step is not a new one. before: monitor values at
+    the start of the step. guards, after: scratch space.
     """
     for i in range(x1.shape[0]):
         if not np.isfinite(x1[i]):

@@ -1,4 +1,4 @@
-"""Moreau-Jean time stepping: no event is located, the forces of a step solve the laws at its end."""
+"""Moreau-Jean time stepping, which locates no events and solves the force laws at the end of each step."""
 
 from __future__ import annotations
 
@@ -20,43 +20,50 @@ from hybridsim.integrators.fixed_step.run import FixedStepRun, surface_table
 from hybridsim.integrators.fixed_step.step_length import fixed_step_length, refuse_longer
 from hybridsim.model.parts.impact import ROUNDING
 
-_HALVINGS = 16  # of a step in which a declared guard or monitor crosses zero
+_HALVINGS = 16  # halvings of a step in which a declared guard or monitor crosses zero
 
 
 @dataclass(frozen=True)
 class Moreau(Integrator):
-    """Moreau-Jean time stepping: a fixed step, implicit in the forces of contacts, that knows no events.
+    """Moreau-Jean time stepping: a fixed step, implicit in the forces of contacts, without located events.
 
-        X = x + h (theta a(t + h, X) + (1 - theta) a(t, x)) + h sum_k B_k f_k,   f_k in the law of contact k at v_k(X)
+            X = x + h (theta a(t + h, X) + (1 - theta) a(t, x)) + h sum_k B_k f_k,   f_k in the law of contact
+            k at v_k(X)
 
-    a are the rates without the forces f, which enter linearly. Each force is what stops its contact over the step, as
-    far as the limit of stick goes, else that of slip at the new velocity; together they are found by projected
-    Gauss-Seidel sweeps, inside Newton's iteration for X. A step may hold any number of stops, slips and reversals: none
-    is missed, each is late by up to a step. A contact that sticks has its velocity exactly zero.
+    a are the rates without the forces f, which enter linearly. Each force stops its contact over the step if
+    the limit of stick allows it; otherwise it is the slip force at the new velocity. Projected Gauss-Seidel
+    sweeps find all forces together, inside Newton's iteration for X. A step may contain any number of stops,
+    slips and reversals. None is missed, and each is late by up to a step. A contact that sticks has a
+    velocity of exactly zero.
 
-    Of a gap g with the rate u and the restitution e (`hybridsim.Impact`) the force p is an impulse over the step,
+    For a gap g with the rate u and the restitution e (`hybridsim.Impact`) the force p is an impulse over the
+    step,
 
-        0 <= p,   u(X) >= e max(-u(x), 0),   one of the two with equality,   where g is closed or g + u h/2 <= 0 at x
+            0 <= p,   u(X) >= e max(-u(x), 0),   one of the two with equality,   if g is closed or g + u h/2
+            <= 0 at x
 
-    and friction that it loads has limits that grow with it. A gap is `closed`, it and its rate exactly zero, where it
-    is pushed and does not rebound; bounces end there once one is over within a step. Until then a gap may be negative
-    by up to a step's way, and bounces, which leave the mode as it is, are no events.
+    and limits of friction that it loads grow with it. A gap is `closed`, with gap and rate exactly zero, if
+    it is pushed and does not rebound; bounces end there once one bounce is over within a step. Until then a
+    gap may be negative by up to the distance travelled in a step. Bounces leave the mode unchanged and are
+    not events.
 
     Parameters
     ----------
-    steps_per_period : steps in one period of the forcing (1200).
-    period : that period T, if not the forcing's own.
-    step : the step itself, instead of T/steps_per_period.
-    theta : 1/2 keeps the energy of a free vibration, 1 damps it.
-    tolerance : of the forces and of the new state, relative; steps that do not get there are counted in a warning.
-    iterations : of Newton's method in a step at most.
+    steps_per_period : number of steps in one period of the forcing (1200).
+    period : the period T, if it is not the forcing's period.
+    step : step size, instead of T/steps_per_period.
+    theta : 1/2 conserves the energy of a free vibration, 1 damps it.
+    tolerance : relative tolerance of the forces and of the new state; steps that miss it are counted in a
+        warning.
+    iterations : largest number of Newton iterations in a step.
 
-    When to choose it: many contacts, accumulations of events, and as a route to the answer that shares no decision with
-    those that locate events. Error of first order in the step: in the states, and where velocities jump in their mean
-    over time (L1). General automata, resets and monitors as in other fixed-step methods. Friction and rebound together
-    may gain energy by Newton's law (Kane's paradox), which methods that locate impacts reduce and this one does not.
-    Source: M. Jean, Comput. Methods Appl. Mech. Engrg. 177 (1999) 235, doi:10.1016/S0045-7825(98)00383-1; V. Acary and
-    B. Brogliato, Numerical Methods for Nonsmooth Dynamical Systems, 2008, doi:10.1007/978-3-540-75392-6.
+    When to choose it: many contacts, accumulations of events, and as an independent check of methods that
+    locate events, since it shares no decision with them. The error is of first order in the step: in the
+    states, and for velocities that jump in their mean over time (L1). General automata, resets and monitors
+    work as in other fixed-step methods. Friction and rebound together may gain energy by Newton's law (Kane's
+    paradox). Methods that locate impacts reduce this gain, and this one does not. Source: M. Jean, Comput.
+    Methods Appl. Mech. Engrg. 177 (1999) 235, doi:10.1016/S0045-7825(98)00383-1; V. Acary and B. Brogliato,
+    Numerical Methods for Nonsmooth Dynamical Systems, 2008, doi:10.1007/978-3-540-75392-6.
     """
 
     name: ClassVar[str] = "moreau"
@@ -146,7 +153,7 @@ class MoreauMarch:
         fresh: np.ndarray,
         rows: tuple[np.ndarray, np.ndarray, np.ndarray],
     ) -> tuple[int, int]:
-        """Steps up to the bound, or to what needs the caller."""
+        """Step up to the bound, or until Python has to act."""
         x, z = start
         count, why = moreau_steps(
             self._functions, self._settings, self.step, self._table, watched, bound, p, x.copy(), z.copy(), fresh,
@@ -155,7 +162,7 @@ class MoreauMarch:
         return count, why
 
     def trial(self, s: float, tau: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """The state after one step of length tau."""
+        """Return the state after one step of length tau."""
         out = np.empty(len(x))
         moreau_step(
             self._functions, self._settings, self._table, s, tau, x, p, z.copy(), out, self._room, self.counts
@@ -163,7 +170,7 @@ class MoreauMarch:
         return out
 
     def refused(self) -> str:
-        """The gap of a step whose restitution is beyond [0, 1], with its value."""
+        """Return a message about the gap whose restitution is outside [0, 1], with its value."""
         room, system = self._room, self.system
         for k in np.flatnonzero(room.active):
             e = float(room.restitution[k])
@@ -173,7 +180,7 @@ class MoreauMarch:
         return ""
 
     def warnings(self) -> list[str]:
-        """Steps whose forces or states did not settle."""
+        """Return a warning that counts the steps whose forces or states did not converge."""
         failed = int(self.counts[2])
         if not failed:
             return []

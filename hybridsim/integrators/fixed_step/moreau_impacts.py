@@ -1,4 +1,4 @@
-"""Kernels of time stepping with impacts: which gaps close in a step, how they rebound, what loads friction."""
+"""Kernels of time stepping with impacts: closing gaps, rebounds, and loads on friction."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from hybridsim.engine.native.kernels import call, kernel
 from hybridsim.engine.native.loop_hints import put
 from hybridsim.model.parts.impact import ROUNDING
 
-UNILATERAL = 7  # column of the table that says whether a surface is a gap
-# what a normal force lets grow: friction of slip above, below, limits of stick
+UNILATERAL = 7  # column of the table: whether a surface is a gap
+# bounds that grow with a normal force: slip forces above and below, limits of stick
 UP, DOWN, MOST, LEAST = range(4)
-_STEPPED = 6  # number of that function among those of a step
+_STEPPED = 6  # index of the function ``stepped`` among the functions of a step
 
 
 @kernel
 def add_impacts(functions: Any, table: Any, s: float, x: Any, p: Any, room: Any) -> None:
-    """Rates u of the surfaces with their slopes at (s, x), what a unit of each force does, and loads of friction.
+    """Compute rates u of the surfaces with their gradients at (s, x), effects of unit forces, and loads of friction.
 
-    The loads are taken where the forces are, see `take_apart`: `room.sides` are the modes that x is in, with all gaps
-    open, and `room.y1` the surfaces.
+    The loads are evaluated at the same point as the forces, see `take_apart`: `room.sides` are the modes at x
+    with all gaps open, and `room.y1` are the surface functions.
     """
     n, m, sides, trial = x.shape[0], table.shape[0], room.sides, room.trial
     stepped = functions[_STEPPED]
@@ -55,10 +55,10 @@ def _keep_loads(room: Any, n: int, m: int, k: int, bound: int) -> None:
 
 @kernel
 def approach(restitutions: Any, table: Any, s: float, h: float, x: Any, p: Any, z: Any, room: Any) -> bool:
-    """Which gaps may push in a step from (s, x, z), and how fast they separate at least; False: a restitution is amiss.
+    """Find the gaps that may push in a step from (s, x, z) and their least rates of separation; False: bad restitution.
 
-    A gap takes part that is closed, or that would be so by the middle of the step at its present rate. What is closed
-    does not approach: rounding must not make it rebound.
+    A gap takes part if it is closed, or would be closed by the middle of the step at its present rate. A
+    closed gap has no approach speed, because rounding must not make it rebound.
     """
     n = x.shape[0]
     for i in range(n):
@@ -82,9 +82,9 @@ def approach(restitutions: Any, table: Any, s: float, h: float, x: Any, p: Any, 
 
 @kernel
 def gap_rates(table: Any, X: Any, free: Any, room: Any) -> None:
-    """Rates of the surfaces without forces, `room.y`, and what a unit of each force does to them, `room.G`.
+    """Compute the rates of the surfaces without forces, `room.y`, and their changes by unit forces, `room.G`.
 
-    Linear about X, the last iterate: where the iteration ends they are exact.
+    The rates are linearised about X, the last iterate, and are exact when the iteration ends.
     """
     for k in range(table.shape[0]):
         total = room.u[k]

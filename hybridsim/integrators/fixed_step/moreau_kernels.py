@@ -1,4 +1,4 @@
-"""Kernels of time stepping: forces taken apart from a flow, one implicit step, and the forces that belong to it."""
+"""Kernels of time stepping: separation of forces from a flow, one implicit step, and its forces."""
 
 from __future__ import annotations
 
@@ -32,65 +32,55 @@ from hybridsim.integrators.fixed_step.moreau_impacts import (
 )
 from hybridsim.integrators.rosenbrock.step import factor, solve
 
-_NUDGE = 2.0**-26  # a difference quotient's step, relative: half of the digits
+_NUDGE = 2.0**-26  # relative step of a difference quotient: half of the digits
 _RENEWED = 4  # iterations after which Newton's method gets a new matrix
-# Sweeps after which what slips comes to rest by kinetic friction alone: contacts whose static friction is larger might
-# take turns for ever.
+# Sweeps after which only kinetic friction can stop a slipping contact, because contacts with larger static friction
+# might alternate indefinitely.
 _PATIENCE = 50
-_SWEEPS = 10_000  # of the projected Gauss-Seidel iteration; a lone contact needs one
-_HOLD, _ABOVE, _BELOW = 0, 1, 2  # what a force means
+_SWEEPS = 10_000  # most projected Gauss-Seidel sweeps; a single contact needs one
+_HOLD, _ABOVE, _BELOW = 0, 1, 2  # meanings of a force
 _CONVERGED, _UNSETTLED, _AMISS = range(3)  # how a step ended
 
 
 class Room(NamedTuple):
-    """Scratch arrays for n states, m surfaces, C components, Q quantities, G guards.
-
-    a, a_old (n,): rates without the forces. B, w (m, n): what a unit of each force does to the rates, to the end of a
-    step. up, down, most, least (m,): force of slip above, below (negative), limits of the holding force. G (m, m): what
-    a unit of force does to the surfaces at the end; y (m,): these without forces. force, meaning (m,): what was found.
-
-    With impacts: u (m,), S (m, n): rates of gaps and relative velocities, and their slopes, from `rows`, the results of
-    the function ``stepped``. loads (4, m, m): what normal forces let grow. active, rebound (m,): gaps that may push,
-    and their least speed of separation, from `approach` (n + m,) and `restitution`. evaluated (m, n): states that a
-    closed gap evaluates.
-    """
+    """Scratch arrays for n states, m surfaces, C components, Q quantities, G guards."""
 
     sides: np.ndarray
     trial: np.ndarray
-    a: np.ndarray
-    a_old: np.ndarray
+    a: np.ndarray  # (n,) rates without the forces, at the end of the step
+    a_old: np.ndarray  # (n,) rates without the forces, at the start of the step
     on: np.ndarray
     rates: np.ndarray
     nudged: np.ndarray
-    B: np.ndarray
-    w: np.ndarray
+    B: np.ndarray  # (m, n) effect of unit forces on the rates
+    w: np.ndarray  # (m, n) effect of unit forces on the state at the end of the step
     quantities: np.ndarray
     guards: np.ndarray
-    up: np.ndarray
-    down: np.ndarray
-    most: np.ndarray
-    least: np.ndarray
+    up: np.ndarray  # (m,) slip force above
+    down: np.ndarray  # (m,) slip force below (negative)
+    most: np.ndarray  # (m,) upper limit of the holding force
+    least: np.ndarray  # (m,) lower limit of the holding force
     M: np.ndarray
     pivots: np.ndarray
     X: np.ndarray
     free: np.ndarray
-    y: np.ndarray
+    y: np.ndarray  # (m,) surface functions at the end of the step, without forces
     y1: np.ndarray
-    G: np.ndarray
-    force: np.ndarray
-    meaning: np.ndarray
+    G: np.ndarray  # (m, m) effect of unit forces on the surface functions at the end of the step
+    force: np.ndarray  # (m,) solution
+    meaning: np.ndarray  # (m,) hold, above or below
     sizes: np.ndarray
     monitors: np.ndarray
     monitors_after: np.ndarray
-    u: np.ndarray
-    S: np.ndarray
-    rows: np.ndarray
-    loads: np.ndarray
-    active: np.ndarray
-    rebound: np.ndarray
-    approach: np.ndarray
+    u: np.ndarray  # (m,) rates of gaps and relative velocities
+    S: np.ndarray  # (m, n) gradients of u
+    rows: np.ndarray  # results of the function ``stepped``
+    loads: np.ndarray  # (4, m, m) growth of the bounds with normal forces
+    active: np.ndarray  # (m,) gaps that may push
+    rebound: np.ndarray  # (m,) least rate of separation
+    approach: np.ndarray  # (n + m,) arguments of the restitutions: states and approach speeds
     restitution: np.ndarray
-    evaluated: np.ndarray
+    evaluated: np.ndarray  # (m, n) states that a closed gap evaluates
 
 
 def room_for(
@@ -103,11 +93,12 @@ def room_for(
     sizes: Any,
     evaluated: Any,
 ) -> Any:
-    """Room for one run; sizes (n,): of the states, for difference quotients and for the end of iterations.
+    """Allocate the scratch arrays of one run.
 
-    evaluated (m, n): see `Room`.
+    sizes (n,): sizes of the states, for difference quotients and convergence tests. evaluated (m, n): see
+    `Room`.
     """
-    none = max(surfaces, 1)  # a compiled function writes at least there
+    none = max(surfaces, 1)  # compiled functions write at least one element
     of_components = {name: np.zeros(components, dtype=np.int64) for name in ("sides", "trial")}
     of_states = {name: np.zeros(n) for name in ("a", "a_old", "on", "rates", "nudged", "X", "free")}
     names = ("up", "down", "most", "least", "y", "y1", "force", "u", "rebound", "restitution")
@@ -129,12 +120,13 @@ def room_for(
 def take_apart(
     functions: Any, table: Any, s: float, x: Any, p: Any, z: Any, room: Any, counts: Any, has_impacts: bool
 ) -> None:
-    """Rates without the forces, what a unit of each force adds, and the bounds of each force, at (s, x).
+    """Compute rates without the forces, the effect of each unit force, and the bounds of each force, at (s, x).
 
-    The rates are linear in the forces: at a surface those above it less those below it are the force's share, times the
-    difference of the two forces. A force of slip is taken where the surface is on its side, else on the surface: a law
-    need not mean anything beyond. functions: see `moreau_step`. table: as of `surface_table`, the quantity, and whether
-    it is a gap. `room.sides` gets the modes that x is in, all gaps open: normal forces are among those taken apart.
+    The rates are linear in the forces: the difference of the rates above and below a surface is the effect of
+    its force times the difference of the two forces. A slip force is evaluated at x if the surface is on its
+    side, else on the surface, because a law may be undefined beyond it. functions: see `moreau_step`. table:
+    as in `surface_table`, plus the quantity and whether it is a gap. `room.sides` receives the modes at x
+    with all gaps open: normal forces are separated, too.
     """
     sides, trial, a, on, rates, q = room.sides, room.trial, room.a, room.on, room.rates, room.quantities
     put(z, sides)
@@ -187,7 +179,7 @@ def take_apart(
 def implicit_matrix(
     flow: Any, theta: float, h: float, s: float, x: Any, p: Any, room: Any, counts: Any
 ) -> bool:
-    """LU factors of I - h theta da/dx, by differences; `room.a` and `room.sides` are at (s, x)."""
+    """Factorise I - h theta da/dx from difference quotients; `room.a` and `room.sides` are at (s, x)."""
     n = x.shape[0]
     put(x, room.nudged)
     call(flow, s, x, p, room.sides, room.rates)
@@ -195,7 +187,7 @@ def implicit_matrix(
         room.free[i] = room.rates[i]
     for j in range(n):
         nudge = _NUDGE * max(abs(x[j]), room.sizes[j])
-        for way in (1.0, -1.0):  # a law need not have a value on the other side of rest
+        for way in (1.0, -1.0):  # a law may be undefined on the other side of rest
             room.nudged[j] = x[j] + way * nudge
             step = room.nudged[j] - x[j]
             call(flow, s, room.nudged, p, room.sides, room.rates)
@@ -211,10 +203,10 @@ def implicit_matrix(
 
 @inlined
 def forces(table: Any, room: Any, m: int, tolerance: float, has_impacts: bool) -> bool:
-    """Forces at the end of a step by projected Gauss-Seidel sweeps; whether they settled.
+    """Compute the forces at the end of a step by projected Gauss-Seidel sweeps; return whether they converged.
 
-    Each force is what holds its surface at zero, as far as its limits allow; else that of slip. That of a gap is the
-    least that makes it rebound.
+    Each force holds its surface at zero if its limits allow; otherwise it is the slip force. The force of a
+    gap is the smallest one with the required rebound.
     """
     for sweep in range(_SWEEPS):
         change = scale = 0.0
@@ -269,13 +261,14 @@ def moreau_step(
     room: Any,
     counts: Any,
 ) -> int:
-    """One step of the theta scheme, implicit in the forces; the modes that they mean go to z. How it ended.
+    """Take one step of the theta scheme, implicit in the forces; write the resulting modes to z; return how it ended.
 
-        X = x + h (theta a(s + h, X) + (1 - theta) a(s, x)) + h sum_k B_k f_k,   f_k in the law of k at y_k(X)
+            X = x + h (theta a(s + h, X) + (1 - theta) a(s, x)) + h sum_k B_k f_k,   f_k in the law of k at
+            y_k(X)
 
-    and for gaps f_k >= 0, y_k(X) >= rebound_k, one of the two with equality. functions: flow, guards, quantities,
-    surfaces, project, monitors; with impacts stepped and restitutions. settings: theta, tolerance, iterations, whether
-    there are impacts. counts: rates, guards.
+    and for gaps f_k >= 0, y_k(X) >= rebound_k, one of the two with equality. functions: flow, guards,
+    quantities, surfaces, project, monitors; with impacts stepped and restitutions. settings: theta,
+    tolerance, iterations, whether there are impacts. counts: rates, guards.
     """
     theta, tolerance, iterations, has_impacts = settings
     n, m, X, free = x.shape[0], table.shape[0], room.X, room.free
@@ -322,7 +315,7 @@ def moreau_step(
             change = max(change, abs(moved - X[i]) / max(abs(moved), room.sizes[i]))
             X[i] = moved
             is_number = is_number and math.isfinite(moved)
-        if not is_number:  # what holds is set exactly below, and would hide it
+        if not is_number:  # held states are set exactly below, which would hide it
             put(X, out)
             return _UNSETTLED
         if iteration > 0 and change <= tolerance and settled:
@@ -338,7 +331,7 @@ def moreau_step(
         put(X, out)
         return _CONVERGED if is_done else _UNSETTLED
     call(functions[4], s + h, X, p, z, out)
-    # rates that no force enters, with held states as they are: what should not move does not move by a bit
+    # rates without forces, at unchanged held states, so that states at rest stay exactly constant
     call(functions[0], s + h, out, p, z, room.rates)
     for i in range(n):
         is_free = True
@@ -347,7 +340,7 @@ def moreau_step(
             is_free = is_free and not (room.meaning[k] == _HOLD and room.evaluated[k, i] != 0)
         if is_free:
             out[i] = x[i] + h * (theta * room.rates[i] + (1.0 - theta) * room.a_old[i])
-    if is_closed:  # the gap may depend on what has just been set
+    if is_closed:  # the gap may depend on states that have just been set
         put(out, X)
         call(functions[4], s + h, X, p, z, out)
     return _CONVERGED if is_done else _UNSETTLED
@@ -372,12 +365,12 @@ def moreau_steps(
     out: Any,
     counts: Any,
 ) -> tuple[int, int]:
-    """Steps from local time 0 in (x, z) up to the bound; see `hybridsim.integrators.fixed_step.run.March`.
+    """Step from local time 0 in (x, z) up to the bound; see `hybridsim.integrators.fixed_step.run.March`.
 
-    counts: rates, guards, steps that did not converge. out (n,): room.
+    counts: rates, guards, steps that did not converge. out (n,): scratch space.
     """
     n, s, planned, row = x.shape[0], 0.0, step, 0
-    for k in range(table.shape[0]):  # a run that goes on from here has no others to begin with
+    for k in range(table.shape[0]):  # a run that continues from here has no other values to begin with
         room.force[k], room.meaning[k] = 0.0, _HOLD
     while True:
         times[row] = s

@@ -1,4 +1,4 @@
-"""Whether the limits of a friction force depend on another friction force, which time stepping does not solve for."""
+"""Detection of friction limits that depend on another friction force, which time stepping does not support."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 def refuse_loads_of_friction(model: Model, integrator: str) -> None:
     """Refuse a contact whose load, or law, uses the friction force of another one.
 
-    The sweeps take each limit as given, except for normal forces. A limit that follows another friction force would be
-    taken as where that one slips.
+    The sweeps treat each limit as given, except for normal forces. A limit that depends on another friction
+    force would be evaluated at the slip force of that contact.
     """
     components = model.all_components()
     frictions = {c.surface.unknown: c.name for c in components if c.surface and not c.surface.is_unilateral}

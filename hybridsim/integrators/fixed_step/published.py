@@ -1,4 +1,4 @@
-"""The published fixed-step methods: RK4 with a dichotomy to the zero-velocity interval, and RK4 with a bare sign."""
+"""The published fixed-step methods: RK4 with bisection to the zero-velocity interval, and RK4 with a sign function."""
 
 from __future__ import annotations
 
@@ -30,26 +30,28 @@ _FIXED = {
 
 @dataclass(frozen=True)
 class Rk4Dichotomy(Integrator):
-    """The published method: classic RK4 with step T/h0; a step in which the velocity changes sign is halved.
+    """The published method: classic RK4 with step T/h0; a step in which the velocity changes sign is bisected.
 
-    The friction force follows Eq. 4 of the paper: beyond the zero-velocity interval it is the slip force; inside it
-    the force that holds the body, as far as the limit allows. Halving ends when |v| <= eps_v or after 16 halvings, and
-    the run goes on from there. What the paper leaves open are options; the defaults are its literal reading.
+    The friction force follows Eq. 4 of the paper: outside the zero-velocity interval it is the slip force;
+    inside it the force that holds the body, up to its limit. Bisection ends when |v| <= eps_v or after 16
+    halvings, and the run continues from there. Details that the paper leaves open are options; the defaults
+    are its literal reading.
 
     Parameters
     ----------
-    steps_per_period : steps in one period of the forcing, h0 in the paper (1200 there).
-    period : that period T, if not the forcing's own.
-    step : the step itself, instead of T/h0.
+    steps_per_period : number of steps in one period of the forcing, h0 in the paper (1200 there).
+    period : the period T, if it is not the forcing's period.
+    step : step size, instead of T/h0.
     eps_v : half width of the zero-velocity interval (8e-4 m/s), in the unit of the relative velocity.
-    max_bisections : halvings at most (16).
-    stick_velocity : "kept" as Eq. 4 reads, then the body creeps with up to eps_v while it sticks; or "zero".
-    release : "step": taken at the next step; "located": halved to the limit.
+    max_bisections : largest number of halvings (16).
+    stick_velocity : "kept" follows Eq. 4, so that a sticking body creeps at up to eps_v; "zero" sets its
+        velocity to zero.
+    release : "step": release at the next step; "located": release located by bisection.
     friction : "step": the force is chosen at the start of a step; "stage": at every stage.
     after_event : "full-step" from the located time on; "rest-of-step" first, back to the grid.
 
-    When to choose it: to compare with the published figures. Its event times are as good as eps_v, whatever the step.
-    Source: He, Pan, Zhang, Mei, Zhang, Symmetry 18 (2026) 57, doi:10.3390/sym18010057.
+    When to choose it: to compare with the published figures. The accuracy of its event times is eps_v, for
+    any step. Source: He, Pan, Zhang, Mei, Zhang, Symmetry 18 (2026) 57, doi:10.3390/sym18010057.
     """
 
     name: ClassVar[str] = "rk4-dichotomy"
@@ -109,12 +111,12 @@ class Rk4Sign(Integrator):
 
     Parameters
     ----------
-    steps_per_period : steps in one period of the forcing, h0 in the paper (1200 there).
-    period : that period T, if not the forcing's own.
-    step : the step itself, instead of T/h0.
-    friction : "stage": the sign is taken at every stage; "step": at the start of each step.
+    steps_per_period : number of steps in one period of the forcing, h0 in the paper (1200 there).
+    period : the period T, if it is not the forcing's period.
+    step : step size, instead of T/h0.
+    friction : "stage": the sign is evaluated at every stage; "step": at the start of each step.
 
-    When to choose it: never for an answer; to see what chatter through a stick costs. Its modes are that chatter.
+    When to choose it: only to show the cost of chattering through a stick. Its modes show the chattering.
     Source: He, Pan, Zhang, Mei, Zhang, Symmetry 18 (2026) 57, doi:10.3390/sym18010057, Eq. 2.
     """
 

@@ -1,4 +1,4 @@
-"""Kernels of the fixed-step methods: the classic Runge-Kutta step, the force law by zone, the dichotomy."""
+"""Kernels of the published methods: the classic Runge-Kutta step, the force law by zone, the bisection."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ZONE, SIGN = 0, 1
 
 @inlined
 def _any_held(table: Any, z: Any) -> bool:
-    """Whether a surface component is in its holding mode."""
+    """Return whether a surface component is in its holding mode."""
     for k in range(table.shape[0]):
         if z[table[k, 0]] == table[k, 3]:
             return True
@@ -35,11 +35,11 @@ def choose_modes(
     surfaces: Any,
     guards: Any,
 ) -> None:
-    """Modes of the surface components from the state, in place.
+    """Set the modes of the surface components from the state, in place.
 
-    ZONE is Eq. 4 of the paper: beyond eps the mode of that side; inside it the holding mode while the unknown stays
-    within its limits, else the side that it pushes to. SIGN: the side alone, and the holding mode as a mark of an
-    exact zero. table rows: component, above, below, hold, upper guard, lower guard.
+    ZONE is Eq. 4 of the paper: outside eps the mode of that side; inside it the holding mode while the
+    unknown stays within its limits, else the side to which it pushes. SIGN: the side alone, and the holding
+    mode to mark an exact zero. table rows: component, above, below, hold, upper guard, lower guard.
     """
     call(addresses[1], s, x, p, z, surfaces)
     for k in range(table.shape[0]):
@@ -71,7 +71,7 @@ def choose_modes(
 def _mean_of_sides(
     flow: Any, table: Any, s: float, x: Any, p: Any, z: Any, sides: Any, out: Any, other: Any
 ) -> None:
-    """dx/dt where velocities are exactly zero: the mean of both sides, which is sgn(0) = 0 for a symmetric law."""
+    """Compute dx/dt at exactly zero velocity as the mean of both sides, i.e. sgn(0) = 0 for a symmetric law."""
     for i in range(z.shape[0]):
         sides[i] = z[i]
     for k in range(table.shape[0]):
@@ -90,7 +90,7 @@ def _mean_of_sides(
 def _slope(
     flow: Any, rule: int, table: Any, s: float, x: Any, p: Any, z: Any, sides: Any, out: Any, other: Any
 ) -> None:
-    """dx/dt in the modes z."""
+    """Compute dx/dt in the modes z."""
     if rule == SIGN and _any_held(table, z):
         _mean_of_sides(flow, table, s, x, p, z, sides, out, other)
     else:
@@ -101,7 +101,7 @@ def _slope(
 def _step(
     addresses: Any, law: Any, table: Any, s: float, h: float, x: Any, p: Any, z: Any, out: Any, work: Any
 ) -> None:
-    """See `rk4_step`: this is it, made part of its callers."""
+    """Do the work of `rk4_step`, inlined into its callers."""
     rule, every_stage, eps = law
     k, stage, other, modes, sides, surfaces, guards = work[:7]
     n = x.shape[0]
@@ -123,7 +123,7 @@ def _step(
 def rk4_step(
     addresses: Any, law: Any, table: Any, s: float, h: float, x: Any, p: Any, z: Any, out: Any, work: Any
 ) -> None:
-    """One classic Runge-Kutta step of length h from (s, x) in z; the modes held over it, or chosen at every stage.
+    """Take one classic Runge-Kutta step of length h from (s, x) in z, with modes fixed or chosen at every stage.
 
     law: rule, every stage, eps. work: see `workspace`.
     """
@@ -131,10 +131,11 @@ def rk4_step(
 
 
 def workspace(n: int, components: int, surfaces: int, guards: int, monitors: int) -> tuple[np.ndarray, ...]:
-    """Arrays that the kernels work in.
+    """Allocate the arrays of the kernels.
 
-    For a step: slopes (4, n), a stage, another slope, modes, modes of one side, surface values, guard values. For the
-    march: surface values at both ends of a step, guard values, monitor values at both ends, a trial state, a held one.
+    For a step: slopes (4, n), a stage, another slope, modes, modes of one side, surface values, guard values.
+    For the march: surface values at both ends of a step, guard values, monitor values at both ends, a trial
+    state, a held one.
     """
     surfaces, guards, monitors = max(surfaces, 1), max(guards, 1), max(monitors, 1)
     modes = (np.empty(components, dtype=np.int64), np.empty(components, dtype=np.int64))
@@ -145,7 +146,7 @@ def workspace(n: int, components: int, surfaces: int, guards: int, monitors: int
 
 @inlined
 def _reversed_surface(before: Any, after: Any, table: Any, z: Any) -> int:
-    """Row of the first slipping surface component whose sign changed over the step, -1 if none."""
+    """Return the row of the first slipping surface component whose sign changed over the step, or -1."""
     for k in range(table.shape[0]):
         if z[table[k, 0]] != table[k, 3] and before[k] * after[k] < 0.0:
             return k
@@ -154,7 +155,7 @@ def _reversed_surface(before: Any, after: Any, table: Any, z: Any) -> int:
 
 @inlined
 def _released(values: Any, table: Any, z: Any) -> bool:
-    """Whether a held component is beyond its limit."""
+    """Return whether a held component is beyond its limit."""
     for k in range(table.shape[0]):
         if z[table[k, 0]] == table[k, 3] and (values[table[k, 4]] < 0.0 or values[table[k, 5]] < 0.0):
             return True
@@ -180,9 +181,9 @@ def _halve_step(
     work: Any,
     counters: Any,
 ) -> float:
-    """The dichotomy: halve the step of length h until surface `row` is within eps; row < 0: until a limit is passed.
+    """Bisect a step of length h until surface `row` is within eps or, for row < 0, until a limit is passed.
 
-    Leaves the state there in `out` and returns the length of the step to it.
+    Write the state to `out` and return the length of the step to it.
     """
     low, high, tau = 0.0, h, h
     for _ in range(halvings):
@@ -204,7 +205,7 @@ def _halve_step(
             low = tau
     if row >= 0:
         return tau
-    # the end of the bracket where the limit is passed, so that the release is seen
+    # the end of the bracket beyond the limit, so that the release is detected
     rk4_step(addresses, law, table, s, high, x, p, z, out, work)
     counters[0] += 4
     return high
@@ -229,13 +230,13 @@ def run_steps(
     work: Any,
     counters: Any,
 ) -> tuple[int, int]:
-    """Fixed steps from local time 0 in (x, z) towards the bound, until something needs the caller.
+    """Take fixed steps from local time 0 in (x, z) towards the bound, until Python has to act.
 
-    addresses: flow, surfaces, guards, monitors, project. settings: step, halvings. law, work: as for `rk4_step`.
-    flags: dichotomy, zeroed, located release, rest of step. counters: rhs, guards, halvings.
-    fresh: monitors that have just fired; what is left of their zero is no new one on the first step.
-    Row k of times, states, modes holds the start of step k and the modes it was taken in; the last row the end.
-    Returns (number of rows, why it ended).
+    addresses: flow, surfaces, guards, monitors, project. settings: step, halvings. law, work: as for
+    `rk4_step`. flags: bisection, zeroed, located release, rest of step. counters: rhs, guards, halvings.
+    fresh: monitors that have just fired, whose remaining zero on the first step is not a new one. Row k of
+    times, states, modes holds the start of step k and the modes during it; the last row is the end. Return
+    (number of rows, reason).
     """
     step, halvings = settings
     rule, _, eps = law

@@ -13,7 +13,7 @@ from hybridsim.integrators.fixed_step.run import surface_table
 
 @dataclass(frozen=True)
 class FixedStep:
-    """What both methods hand to the kernel."""
+    """Settings that both methods pass to the kernel."""
 
     step: float
     rule: int
@@ -27,7 +27,7 @@ class FixedStep:
 
 
 class Rk4March:
-    """See `hybridsim.integrators.fixed_step.run.March`."""
+    """The kernels of one run; see `hybridsim.integrators.fixed_step.run.March`."""
 
     def __init__(self, system: System, settings: FixedStep) -> None:
         self.step, self.halvings, self.pinned = settings.step, settings.halvings, settings.zeroed
@@ -50,7 +50,7 @@ class Rk4March:
         fresh: np.ndarray,
         rows: tuple[np.ndarray, np.ndarray, np.ndarray],
     ) -> tuple[int, int]:
-        """Steps up to the bound, or to what needs the caller."""
+        """Step up to the bound, or until Python has to act."""
         count, why = run_steps(
             self._addresses, (self.step, self.halvings), self._law, self._flags, self._table, watched, bound, p, *start,
             fresh, *rows, self._work, self.counts,
@@ -58,16 +58,16 @@ class Rk4March:
         return count, why
 
     def trial(self, s: float, tau: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """The state after one step of length tau."""
+        """Return the state after one step of length tau."""
         out = np.empty(len(x))
         rk4_step(self._addresses, self._law, self._table, s, tau, x, p, z, out, self._work)
         self.counts[0] += 4
         return out
 
     def refused(self) -> str:
-        """Nothing: these methods run no impacts."""
+        """Return an empty message, because these methods do not support impacts."""
         return ""
 
     def warnings(self) -> list[str]:
-        """None: what these methods do wrong shows in their results."""
+        """Return no warnings: the results show the errors of these methods."""
         return []

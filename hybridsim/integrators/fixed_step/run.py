@@ -1,4 +1,4 @@
-"""The march of a fixed-step method: steps by the kernel, declared events, and decisions at the zones it finds."""
+"""The run of a fixed-step method: steps by the kernel, declared events, and resolution of what the kernel finds."""
 
 from __future__ import annotations
 
@@ -28,16 +28,16 @@ from hybridsim.integrators.fixed_step.gaps import gaps
 from hybridsim.integrators.fixed_step.kernels import BOUND, FULL, MONITOR, NOT_FINITE, RESTED, RESTITUTION
 from hybridsim.integrators.fixed_step.step_length import refuse_endless
 
-_STATE = ("x", "z", "discrete", "scale", "fresh", "turned")  # what a run needs to go on
-_ROWS = 8192  # steps of one call of the kernel; each call starts a new time origin, so no digits are lost
+_STATE = ("x", "z", "discrete", "scale", "fresh", "turned")  # attributes from which a run can continue
+_ROWS = 8192  # most steps per kernel call; each call has a new time origin, so that no digits are lost
 
 
 class March(Protocol):
     """The kernels of one method for one run.
 
-    step, halvings: length of a step, and how often it is halved to find what a guard or monitor does in it. pinned:
-    whether held states are evaluated from their constraints. has_sides_only: whether there is no third mode, and the
-    holding one marks an exact zero. counts: evaluations of rates and of guards.
+    step, halvings: length of a step, and how often it is halved to locate the zero of a guard or monitor.
+    pinned: whether held states are evaluated from their constraints. has_sides_only: whether there is no
+    third mode and the holding mode marks an exact zero. counts: evaluations of rates and of guards.
     """
 
     step: float
@@ -55,36 +55,36 @@ class March(Protocol):
         fresh: np.ndarray,
         rows: tuple[np.ndarray, np.ndarray, np.ndarray],
     ) -> tuple[int, int]:
-        """Steps from local time 0 in start = (x, z) up to the bound, or to what needs the caller.
+        """Step from local time 0 in start = (x, z) up to the bound, or until Python has to act.
 
-        watched: guards of components without a surface. fresh: monitors that have just fired. Row k of rows = (times,
-        states, modes) holds the start of step k and the modes it was taken in; the last row is the end. Returns (number
-        of rows, why it ended).
+        watched: guards of components without a surface. fresh: monitors that have just fired. Row k of rows =
+        (times, states, modes) holds the start of step k and the modes during it; the last row is the end.
+        Return (number of rows, reason).
         """
         ...
 
     def trial(self, s: float, tau: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """The state after one step of length tau."""
+        """Return the state after one step of length tau."""
         ...
 
     def refused(self) -> str:
-        """What ended the last call with RESTITUTION."""
+        """Return the message for a last call that ended with RESTITUTION."""
         ...
 
     def warnings(self) -> list[str]:
-        """What a user should know of the run."""
+        """Return warnings about the run for the user."""
         ...
 
 
 def _left(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """See `hybridsim.integrators.fixed_step.kernels.leaves_side`; of all monitors."""
+    """Apply `hybridsim.integrators.fixed_step.kernels.leaves_side` to all monitors."""
     return ((before > 0.0) & (after <= 0.0)) | ((before < 0.0) & (after >= 0.0))
 
 
 def surface_table(system: System) -> np.ndarray:
-    """A row for each component with a surface: its number, above, below, hold, upper and lower guard of the latter.
+    """Return a row per component with a surface: its number, modes above, below, hold, and guards of the hold mode.
 
-    -1 stands for what a gap does not have.
+    The entries of a gap that do not exist are -1.
     """
     return np.array(
         [
@@ -97,7 +97,7 @@ def surface_table(system: System) -> np.ndarray:
 
 
 class FixedStepRun:
-    """One run with fixed steps: surface components by the rule of the kernel, everything else settled here."""
+    """One run with fixed steps: the kernel treats surface components, this class everything else."""
 
     def __init__(
         self, system: System, task: Task, march: March, progress: Callable[[float], None] | None
@@ -111,14 +111,14 @@ class FixedStepRun:
         self.x, self.z, self.discrete = task.x0.copy(), np.maximum(task.z0, 0), task.discrete.copy()
         self._holds = np.array([a.hold for a in system.automata], dtype=np.int64)
         self.declared = [c for c, a in enumerate(system.automata) if not a.has_surface]
-        self.located = located = march.step * 2.0**-march.halvings  # how well an event is located
+        self.located = located = march.step * 2.0**-march.halvings  # accuracy of event times
         self.accumulation = Accumulation(located, 4.0 * located)
-        self.scale = np.abs(self.x)  # of the states on the last stretch: what rounding is relative to
+        self.scale = np.abs(self.x)  # sizes of the states in the last kernel call, for relative rounding
         self.fresh = np.zeros(len(system.monitor_names), dtype=np.bool_)  # monitors that have just fired
         self.turned = False  # an input may just have jumped
 
     def run(self) -> Trajectory:
-        """Step to the end; what was computed is kept in any case."""
+        """Step to the end; results up to a failure are kept."""
         record = self.record
         try:
             self._run()
@@ -177,7 +177,7 @@ class FixedStepRun:
         return p
 
     def _stretch(self, appointment: Appointment | None, target: Instant) -> bool:
-        """One call of the kernel and what ends it; True where the run stops."""
+        """Call the kernel once and resolve its end; return True if the run stops."""
         system = self.system
         p, bound = self._vector(), target.minus(self.origin)
         times, states = np.empty(_ROWS), np.empty((_ROWS, system.n))
@@ -191,11 +191,11 @@ class FixedStepRun:
             return True
         z = self._sides_taken() if self.turned else self.z
         self.turned = False
-        here = self.x.copy(), z  # moved on as it goes; events hold what was there
+        here = self.x.copy(), z  # the arrays change later; events store copies
         count, why = self.march.run(numbers, bound, p, here, self.fresh, rows)
         rested = np.flatnonzero(self.fresh) if why == RESTED else None
         self.fresh[:] = False
-        if count < _ROWS:  # a short stretch does not hold on to room for a long one
+        if count < _ROWS:  # do not keep large buffers for few rows
             times, states, modes = times[:count].copy(), states[:count].copy(), modes[:count].copy()
         self.scale = np.abs(states).max(axis=0)
         self._keep(p, times, states, modes, start_z)
@@ -231,7 +231,7 @@ class FixedStepRun:
         return self._declared_event(s, p, why)
 
     def _sides_taken(self) -> np.ndarray:
-        """The modes, but for what an input's jump has carried off its surface: the kernel sees that as it is held."""
+        """Return the modes, without holding modes that a jump of an input has moved off their surface."""
         z, p = self.z.copy(), self._vector()
         p[self.system.layout.pin_at] = 0.0
         values = self.system.rows(
@@ -247,7 +247,7 @@ class FixedStepRun:
         return z
 
     def _gaps(self) -> dict[int, tuple[int, bool]]:
-        """See `gaps`; of the present states."""
+        """Return `gaps` of the present states."""
         if not self.system.is_unilateral.any():
             return {}
         p = self._vector()
@@ -255,7 +255,7 @@ class FixedStepRun:
         return gaps(self.system, self.x, p, self.z)
 
     def _overlaps(self, of: Iterable[int]) -> bool:
-        """Whether a gap of these components is negative where it cannot be, which ends the run."""
+        """Return whether a gap of these components has an invalid negative value, which ends the run."""
         below = [c for c, (gap, _) in self._gaps().items() if gap < 0 and c in of]
         if below:
             names = ", ".join(self.system.automata[c].name for c in below)
@@ -266,7 +266,7 @@ class FixedStepRun:
     # -- events of guards and monitors beside the surfaces --------------------------------------------------
 
     def _declared_event(self, s: float, p: np.ndarray, why: int) -> bool:
-        """Halve the step in which a guard or monitor changed its sign, then settle what fired."""
+        """Locate a sign change of a guard or monitor by bisection of the step, then resolve it."""
         x, z = self.x, self.z
         watched = self._watched()
         before = self._monitors(s, x, p)
@@ -303,7 +303,7 @@ class FixedStepRun:
         return self._settle(instant, tuple(fired), (), best)
 
     def _watched(self) -> list[int]:
-        """Guards of the components without a surface, in their present modes."""
+        """Return the guards of the components without a surface, in their present modes."""
         if not self.declared:
             return []
         return [int(g) for g in self.system.guards_of(self.z)[self.declared].ravel() if g >= 0]
@@ -315,16 +315,16 @@ class FixedStepRun:
         return self.march.trial(s, tau, self.x, p, self.z)
 
     def _monitors(self, s: float, x: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Their values at states as they are, not as the modes would hold them."""
+        """Return the monitors at the unchanged states, not at held states evaluated from constraints."""
         free = p.copy()
         free[self.system.layout.pin_at] = 0.0
         names = self.system.monitor_names
         return self.system.rows("monitors", len(names), np.array([s]), x[None, :], free, self.z)[0]
 
     def _turning_back(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-        """Which of the monitors are zero here to the last bit, and go back to the side on which they were."""
+        """Return which monitors are exactly zero here and return to their previous side."""
         back = np.zeros(len(after), dtype=np.bool_)
-        if (after == 0.0).any():  # inputs as they are from here on
+        if (after == 0.0).any():  # use the inputs after this instant
             series = self.system.series(0.0, self.x, self._vector(), self.z, np.zeros(len(self.x)), 0.0)
             for k in np.flatnonzero(after == 0.0):
                 back[k] = side_after(series.monitors[k], series.monitor_bounds[k], 1)[0] == np.sign(before[k])
@@ -345,7 +345,7 @@ class FixedStepRun:
                 self.record.status = "terminated"
                 self.record.message = f"ended by {monitor.name} at t = {float(instant)!r}"
                 stop = True
-        if resetting:  # all of one instant, so that they read one state
+        if resetting:  # all resets of one instant read the same state
             return self._settle(instant, (), (), x, monitors=tuple(resetting), seen=seen) or stop
         self._record_monitors(instant, seen, x, x)
         return stop
@@ -367,22 +367,23 @@ class FixedStepRun:
         seen: Sequence[tuple[str, int]] = (),
         starting: bool = False,
     ) -> bool:
-        """Transitions and resets by the event contract, for all components but those with a surface.
+        """Resolve transitions and resets by the event contract, for all components without a surface.
 
-        monitors: numbers of those that reset; seen: names and directions of all that crossed, to be recorded first.
+        monitors: indices of those that reset; seen: names and directions of all that crossed, to be recorded
+        first.
         """
         system, record = self.system, self.record
         self.origin = instant
         p = self._vector()
         before = np.where(starting, self.task.z0, self.z)
         x, sides = self.x, np.sign(self._monitors(0.0, self.x, p))
-        # what was located lies within the last halving of a step
+        # the located event lies within the last halving of a step
         s_error = self.located if fired or monitors else 0.0
         x_error = 4.0 * UNIT * np.maximum(np.abs(self.x), self.scale)
         if s_error:
             x_error += s_error * np.abs(system.flow(0.0, self.x, p, self.z))
         at = Situation(0.0, self.x.copy(), p, self.z.copy(), x_error, s_error, bool(starting))
-        if starting:  # resets read contacts on the sides on which they are
+        if starting:  # resets read contacts on their present sides
             at.z[system.has_surface] = self.task.z0[system.has_surface]
             at.z = as_given(system, at).z
         resets: list[tuple[object, ...]] = [("schedule", k) for k in schedules]
@@ -426,7 +427,7 @@ class FixedStepRun:
         left[list(monitors)] = False
         if left.any():
             series = system.series(0.0, x, p, before, x_error, s_error)
-            # a little beyond its zero a monitor is on the side that it had before
+            # just past its zero a monitor is still on its previous side
             for k in map(int, np.flatnonzero(left)):
                 value, bound = series.monitors[k], series.monitor_bounds[k]
                 sides[k] = side_before(value, bound, 1)[0] if abs(value[0]) <= bound[0] else sides[k]
@@ -444,7 +445,7 @@ class FixedStepRun:
     # -- the record -----------------------------------------------------------------------------------------
 
     def _keep(self, p: np.ndarray, s: np.ndarray, x: np.ndarray, z: np.ndarray, before: np.ndarray) -> None:
-        """The rows of one stretch as segments of constant modes, and the mode changes between them."""
+        """Store the rows of one kernel call as segments of constant modes with the mode changes between them."""
         record = self.record
         record.counters.steps += len(s) - 1
         if self.march.has_sides_only:
@@ -458,7 +459,7 @@ class FixedStepRun:
         record.occurrences.add(StepOccurrences(self.system, self.origin, rows, components, changes, s, x))
 
     def _side_of_zeros(self, z: np.ndarray) -> None:
-        """A row whose velocity was exactly zero gets the side it went to: that method knows no third mode."""
+        """Set the mode of a row with exactly zero velocity to the next side, without a third mode."""
         for c, _, _, hold, *_ in surface_table(self.system):
             for k in np.flatnonzero(z[:-1, c] == hold)[::-1]:
                 z[k, c] = z[k + 1, c]

@@ -1,4 +1,4 @@
-"""How long a fixed step is: as given, or a share of the forcing's period."""
+"""The length of a fixed step: a given value, or a fraction of the forcing's period."""
 
 from __future__ import annotations
 
@@ -8,15 +8,13 @@ from hybridsim.engine.system.period import system_period
 from hybridsim.engine.system.system import System
 from hybridsim.errors import UsageError
 
-_MOST_STEPS = (
-    1e18  # thirty years at a nanosecond each; below it a run to a far end may still be ended by a monitor
-)
+_MOST_STEPS = 1e18  # thirty years at a nanosecond each; with fewer steps a monitor may still end the run
 
 
 def fixed_step_length(
     system: System, step: float | None, period: float | None, steps_per_period: float, name: str
 ) -> float:
-    """Length of the fixed step: as given, or the forcing's period over the number of steps per period."""
+    """Return the fixed step: the given value, or the forcing's period over the number of steps per period."""
     for label, value in (("step", step), ("period", period), ("steps_per_period", steps_per_period)):
         if value is not None and not (math.isfinite(value) and value > 0.0):
             raise UsageError(f"{name}: {label} is {value!r}", remedy="use a positive number")
@@ -33,7 +31,7 @@ def fixed_step_length(
 
 
 def refuse_longer(step: float, max_step: float, name: str) -> None:
-    """A fixed step is not shortened behind the user's back."""
+    """Refuse a fixed step longer than max_step instead of shortening it silently."""
     if step > max_step:
         raise UsageError(
             f"max_step is {max_step:g}, but the fixed step of {name} is {step:g}",
@@ -42,7 +40,7 @@ def refuse_longer(step: float, max_step: float, name: str) -> None:
 
 
 def refuse_endless(step: float, span: tuple[float, float], name: str) -> None:
-    """Steps so short that nobody sees the end of a run: a slip of the keyboard."""
+    """Refuse steps so short that the run would not end, which is probably a typing error."""
     count = abs(span[1] - span[0]) / step
     if count > _MOST_STEPS:
         raise UsageError(

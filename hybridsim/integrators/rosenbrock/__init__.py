@@ -1,1 +1,1 @@
-"""Rosenbrock methods, for stiff modes, share this folder: a method is a tableau and a name."""
+"""This package contains Rosenbrock methods for stiff modes, each of which is a tableau and a name."""

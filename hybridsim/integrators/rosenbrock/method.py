@@ -1,4 +1,4 @@
-"""Rosenbrock methods from their tableau: stiff modes without iterations, with the exact Jacobian."""
+"""Rosenbrock methods defined by a tableau: stiff modes without iterations, with the exact Jacobian."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.integrators.one_step import OneStepStepper, Point, Trial
 from hybridsim.integrators.rosenbrock.step import RosenbrockTableau, linearise, rosenbrock_attempt, solve
 
-_DEFECT = 100.0  # times the tolerance, as for Runge-Kutta methods: by how much a step may miss the flow in its middle
+_DEFECT = 100.0  # largest defect in the middle of a step, in tolerances, as for Runge-Kutta methods
 
 
 @dataclass(frozen=True)
 class StageDense:
-    """Dense output from the stages of one step: a polynomial in theta = (s - s0)/(s1 - s0), see `RosenbrockTableau`.
+    """Dense output from the stages of one step, a polynomial in theta = (s - s0)/(s1 - s0); see `RosenbrockTableau`.
 
-    K (order - 1, n) are the combinations of stages; the ends are met bit for bit.
+    K (order - 1, n) are the combinations of stages. The values at both ends are exact.
     """
 
     s0: float
@@ -31,33 +31,33 @@ class StageDense:
     K: np.ndarray
 
     def __call__(self, s: np.ndarray) -> np.ndarray:
-        """States (k, n) at local times (k,)."""
+        """Return states (k, n) at local times (k,)."""
         return self._at((np.asarray(s, dtype=float) - self.s0) / (self.s1 - self.s0))
 
     def _at(self, theta: np.ndarray) -> np.ndarray:
-        """States (k, n) at these shares of the step (k,)."""
+        """Return states (k, n) at these fractions of the step (k,)."""
         theta = theta[:, None]
         inner = np.zeros((len(theta), len(self.x0)))
         for row in self.K[::-1]:
             inner = inner * theta + row
-        # written from x0 on, so that what does not move stays where it is to the last bit
+        # starting from x0, so that states at rest stay exactly constant
         out = self.x0 + theta * ((self.x1 - self.x0) + (1.0 - theta) * inner)
         out[theta[:, 0] == 1.0] = self.x1
         return out
 
     def middle(self) -> np.ndarray:
-        """State (n,) at theta = 1/2, which may be between two doubles of time."""
+        """Return the state (n,) at theta = 1/2, which may lie between two doubles of time."""
         return self._at(np.array([0.5]))[0]
 
     def middle_slope(self) -> np.ndarray:
-        """Rate of change (n,) at theta = 1/2."""
+        """Return the rate of change (n,) at theta = 1/2."""
         orders = np.arange(len(self.K))
         inner = (orders * 0.5 ** (orders - 1.0)) @ self.K
         return ((self.x1 - self.x0) + 0.25 * inner) / (self.s1 - self.s0)
 
 
 class RosenbrockStepper(OneStepStepper):
-    """Steps a Rosenbrock method through one segment; event times are refined by repeating the step."""
+    """Advance a Rosenbrock method through one segment; event times are refined by repeating the step."""
 
     def __init__(
         self,
@@ -112,10 +112,10 @@ class RosenbrockStepper(OneStepStepper):
         return Trial(out, error, stages)
 
     def _holds(self, start: Point, end: Point, trial: Trial) -> bool:
-        """Whether in the middle the dense output meets the flow as well as the tolerances ask for.
+        """Return whether the dense output satisfies the flow at the middle of the step within the tolerances.
 
-        What it misses by is weighed as an error of the step is, h (1 - gamma h J)^-1 (f(x) - x'): of a stiff component
-        that the flow brings back at once little is left.
+        The defect is weighted like an error of the step, h (1 - gamma h J)^-1 (f(x) - x'). The weight is
+        small for a stiff component that the flow damps immediately.
         """
         flow, tableau = self.flow, self.tableau
         dense = self._dense(start, end, trial)
@@ -133,7 +133,7 @@ class RosenbrockStepper(OneStepStepper):
 
 
 class RosenbrockPoint(Point):
-    """A point with the flow's linearisation there: Jacobian (n, n) and derivative with respect to time (n,)."""
+    """A point with the flow's linearisation: Jacobian (n, n) and derivative with respect to time (n,)."""
 
     def __init__(
         self,
@@ -147,5 +147,5 @@ class RosenbrockPoint(Point):
 
     @cached_property
     def linear(self) -> tuple[np.ndarray, np.ndarray]:
-        """Worked out when it is first asked for: a repeated step starts from a point of its own."""
+        """Return the linearisation, computed at first use; a repeated step has a start point of its own."""
         return self._linearised(self.s, self.x)

@@ -1,4 +1,4 @@
-"""Steinebach's Rosenbrock method Rodas5P: stiff modes on the compiled engine."""
+"""Steinebach's Rosenbrock method Rodas5P, for stiff modes, on the compiled engine."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ TABLEAU = RosenbrockTableau(
 
 @dataclass(frozen=True)
 class Rodas5P(Integrator):
-    """Steinebach's Rosenbrock method of order 5(4), L-stable, its stages in one compiled kernel.
+    """Steinebach's Rosenbrock method of order 5(4), L-stable, with its stages in one compiled kernel.
 
-    A step is eight linear systems with one matrix, no iteration and no history: after an event it starts at full
-    speed, where a multistep method begins at order one. The Jacobian and the derivative with respect to time are
-    those of the model's expressions, exact. The dense output has order 4; a step in which an event falls is repeated
-    up to it.
+    A step solves eight linear systems with one matrix, without iteration and history. After an event it
+    restarts with full order, while a multistep method begins at order one. The Jacobian and the derivative
+    with respect to time are exact, from the model's expressions. The dense output has order 4; a step that
+    contains an event is repeated up to it.
 
-    When to choose it: stiff modes, regularised friction laws among them, at tolerances of 1e-3 to 1e-8; below that
-    `scipy-radau` or `cvode-bdf` take fewer steps.
+    When to choose it: stiff modes, including regularised friction laws, at tolerances of 1e-3 to 1e-8; below
+    that `scipy-radau` or `cvode-bdf` take fewer steps.
     """
 
     name: ClassVar[str] = "rodas5p"
@@ -41,7 +41,7 @@ class Rodas5P(Integrator):
 
     @property
     def rounding(self) -> float:
-        """Three times the root of the squares that the roundings of the stages, whose c are large, add up to."""
+        """Return three times the root sum of squares of the stages' roundings, whose coefficients c are large."""
         return 2500.0
 
     def start(

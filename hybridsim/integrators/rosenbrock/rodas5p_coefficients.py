@@ -1,9 +1,9 @@
 """Coefficients of the Rosenbrock method Rodas5P with its embedded method and its dense output.
 
-Published in G. Steinebach, BIT Numerical Mathematics 63 (2023) 27, doi:10.1007/s10543-023-00967-x, here in the
-variables in which no product with the Jacobian is needed (E. Hairer, G. Wanner, Solving Ordinary Differential
-Equations II, 2nd ed., 1996, section IV.7, doi:10.1007/978-3-642-05221-7). The last three stages go on from one
-another, and the last one is the error estimate.
+Published in G. Steinebach, BIT Numerical Mathematics 63 (2023) 27, doi:10.1007/s10543-023-00967-x, here in
+the variables in which no product with the Jacobian is needed (E. Hairer, G. Wanner, Solving Ordinary
+Differential Equations II, 2nd ed., 1996, section IV.7, doi:10.1007/978-3-642-05221-7). The last three stages
+go on from one another, and the last one is the error estimate.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ STAGES = 8
 
 
 def _lower(*rows: tuple[float, ...]) -> np.ndarray:
-    """A strictly lower triangular matrix from the rows below the first."""
+    """Return a strictly lower triangular matrix from its rows below the first."""
     out = np.zeros((STAGES, STAGES))
     for i, row in enumerate(rows, 1):
         out[i, : len(row)] = row

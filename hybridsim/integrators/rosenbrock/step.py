@@ -1,4 +1,4 @@
-"""One trial step of a Rosenbrock method: stages that are linear systems with one matrix, and its error."""
+"""One trial step of a Rosenbrock method: stages as linear systems with one matrix, and the error estimate."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from hybridsim.engine.series.interpreter import advance
 
 @dataclass(frozen=True)
 class RosenbrockTableau:
-    """A method with s stages U_i, in the variables in which the Jacobian J multiplies nothing.
+    """A method with s stages U_i, in the variables in which nothing is multiplied by the Jacobian J.
 
-        (1/(gamma h) - J) U_i = f(t + nodes_i h, x + sum_j a_ij U_j) + sum_j c_ij U_j/h + d_i h df/dt
-        x1 = x + sum_i m_i U_i, error = sum_i e_i U_i
-        x(theta) = (1 - theta) x0 + theta (x1 + (1 - theta)(K_0 + theta (K_1 + ...))), K = dense @ U
+            (1/(gamma h) - J) U_i = f(t + nodes_i h, x + sum_j a_ij U_j) + sum_j c_ij U_j/h + d_i h df/dt
+            x1 = x + sum_i m_i U_i, error = sum_i e_i U_i
+            x(theta) = (1 - theta) x0 + theta (x1 + (1 - theta)(K_0 + theta (K_1 + ...))), K = dense @ U
 
     E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd ed., 1996, section IV.7,
     doi:10.1007/978-3-642-05221-7.
@@ -37,13 +37,13 @@ class RosenbrockTableau:
 
     @property
     def arrays(self) -> tuple[Any, ...]:
-        """What `rosenbrock_attempt` takes."""
+        """Return the arrays for `rosenbrock_attempt`."""
         return self.gamma, self.a, self.c, self.m, self.e, self.nodes, self.d
 
 
 @kernel
 def linearise(rows: Any, places: Any, s: float, x: Any, V: Any, jacobian: Any, rate: Any) -> None:
-    """Jacobian (n, n) and derivative with respect to time (n,) of the flow at (s, x).
+    """Compute the Jacobian (n, n) and the derivative with respect to time (n,) of the flow at (s, x).
 
     Both come from the tape at first order, one direction at a time; V (registers, 2) holds its constants.
     """
@@ -69,7 +69,7 @@ def linearise(rows: Any, places: Any, s: float, x: Any, V: Any, jacobian: Any, r
 
 @kernel
 def factor(a: Any, pivots: Any) -> bool:
-    """LU factors in place, with partial pivoting; False where the matrix is singular or not finite."""
+    """Compute LU factors in place with partial pivoting; return False if the matrix is singular or not finite."""
     n = a.shape[0]
     for k in range(n):
         p = k
@@ -90,7 +90,7 @@ def factor(a: Any, pivots: Any) -> bool:
 
 @kernel
 def solve(a: Any, pivots: Any, b: Any) -> None:
-    """Solve in place with what `factor` left in a and pivots."""
+    """Solve in place with the factors and pivots from `factor`."""
     n = a.shape[0]
     for k in range(n):
         p = pivots[k]
@@ -121,9 +121,10 @@ def rosenbrock_attempt(
     stages: Any,
     out: Any,
 ) -> float:
-    """One step of length h from (s, x); its end in `out`, its error in units of the tolerance.
+    """Try one step of length h from (s, x); write its end to `out`, return its error in units of the tolerance.
 
-    tableau: see `RosenbrockTableau`. tolerances: rtol, atol. matrix, pivots, slope: room. stages (s, n) are kept.
+    tableau: see `RosenbrockTableau`. tolerances: rtol, atol. matrix, pivots, slope: scratch space. stages (s,
+    n): output.
     """
     gamma, a, c, m, e, nodes, d = tableau
     rtol, atol = tolerances

@@ -1,4 +1,4 @@
-"""Leaps of a Runge-Kutta method: its compiled mode loop as the general one sees it."""
+"""The compiled mode loop of a Runge-Kutta method, for the general mode loop."""
 
 from __future__ import annotations
 
@@ -74,14 +74,14 @@ _leap = Door(rk_leap)
 
 
 class RungeKuttaLeaper(Leaper):
-    """Leaps of an explicit Runge-Kutta method."""
+    """The compiled loop of an explicit Runge-Kutta method."""
 
-    is_looked_at: ClassVar[bool] = True  # for stiffness
+    is_looked_at: ClassVar[bool] = True  # whether stiffness is monitored
 
     def __init__(self, system: System, tolerances: Tolerances, longest: float, tableau: Tableau) -> None:
         rtol = tolerances.rtol
         self.tableau, leading = tableau, tableau.leading_terms
-        first = leading[0] + 1  # order of the states where a segment begins
+        first = leading[0] + 1  # order of the states at the start of a segment
         self.order = max(short_order(rtol), 2 * TERMS + 1, first)
         super().__init__(system, 2 * TERMS, f"{len(tableau.c)} stages, order {self.order}")
         self.parts: GuardParts = system.code.shared("guard parts", GuardParts)
@@ -99,7 +99,7 @@ class RungeKuttaLeaper(Leaper):
         )
 
     def anew(self) -> RungeKuttaLeaper:
-        """The same for another run, which takes its own first step."""
+        """Return the same loop for another run, which determines its own first step."""
         other = cast("RungeKuttaLeaper", super().anew())
         *rest, given = self.control
         other.control = (*rest, given.copy())
@@ -153,7 +153,7 @@ class RungeKuttaLeaper(Leaper):
         rows: Any,
     ) -> tuple[int, int, int]:
         room.counts[:] = 0
-        tapes = self.shelf.tapes  # one and the same for both: another thread may put more on the shelf
+        tapes = self.shelf.tapes  # the same tapes for both, since another thread may extend the shelf
         codes = self.codes.of(tapes)
         code, steps, count = _leap(
             self.functions, self.automata, tapes, self.parts.of(tapes), self.inputs, NOT_LINEAR, codes,
@@ -169,7 +169,7 @@ class RungeKuttaLeaper(Leaper):
     def _count(self, counters: Counters, steps: int, cost: tuple[int, int]) -> None:
         tries, rejected = cost
         counters.rejected += rejected
-        # the slope comes with the series; one more in the middle
+        # the series include the slope; one more in the middle
         counters.rhs_evaluations += tries * (len(self.tableau.c) - 1) + 2 * steps
 
     def _block(self, *arrays: np.ndarray) -> HermiteBlock:

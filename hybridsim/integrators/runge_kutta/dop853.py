@@ -11,10 +11,10 @@ from hybridsim.integrators.runge_kutta.method import RungeKuttaIntegrator, Table
 
 @dataclass(frozen=True)
 class Dop853(RungeKuttaIntegrator):
-    """Dormand and Prince's method of order 8(5,3) in a compiled mode loop, on our event location.
+    """Dormand and Prince's method of order 8(5,3) in a compiled mode loop, with event location by hybridsim.
 
-    The same method as `scipy-dop853` at about a hundredth of the cost; the dense output is the two-point Hermite
-    polynomial of degree 7 on Taylor coefficients, and a step in which an event falls is repeated up to it.
+    It is the method of `scipy-dop853` at about a hundredth of the cost. The dense output is the two-point
+    Hermite polynomial of degree 7 on Taylor coefficients; a step that contains an event is repeated up to it.
 
     When to choose it: smooth modes that are not stiff, from 1e-4 to 1e-13.
     """

@@ -1,4 +1,4 @@
-"""Explicit embedded Runge-Kutta methods from their tableau: a new method is a tableau and a name."""
+"""Explicit embedded Runge-Kutta methods defined by a tableau: a new method is a tableau and a name."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["RungeKuttaIntegrator", "RungeKuttaStepper", "Tableau"]
 
 
 class RungeKuttaStepper(OneStepStepper):
-    """Steps a method through one segment, with local extrapolation and dense output of degree 7.
+    """Advance a method through one segment, with local extrapolation and dense output of degree 7.
 
     The dense output is the Hermite polynomial on the Taylor coefficients of the flow at both ends, with an
     error of h**8 x^(8)/(256 8!); event times are refined by repeating the step.
@@ -62,7 +62,7 @@ class RungeKuttaStepper(OneStepStepper):
 
     def _holds(self, start: Point, end: Point, trial: Trial) -> bool:
         flow, (x, dx) = self.flow, np.empty((2, self.flow.n))
-        if not flow.system.has_tape:  # its derivatives are differences, and less than the tolerances ask for
+        if not flow.system.has_tape:  # its derivatives are differences, too inaccurate for the tolerances
             return True
         flow.counters.rhs_evaluations += 1
         weights, ends = middle_weights(start.series.shape[1]), (start.series, end.series)
@@ -83,10 +83,10 @@ class RungeKuttaStepper(OneStepStepper):
 
 @dataclass(frozen=True)
 class RungeKuttaIntegrator(Integrator):
-    """An explicit embedded method in compiled code; its class variables are a tableau and what describes it.
+    """An explicit embedded method in compiled code; class variables hold the tableau and the description.
 
-    Segments and ordinary events go through the compiled mode loop where nothing in the model speaks against it:
-    what jumps inside a mode and Python functions do, since it looks at guards through their series.
+    Segments and ordinary events go through the compiled mode loop if the model permits it. Jumps inside a
+    mode and Python functions do not, since the loop follows guards by their series.
     """
 
     tableau: ClassVar[Tableau]
@@ -95,12 +95,12 @@ class RungeKuttaIntegrator(Integrator):
 
     @property
     def stable_to(self) -> float:
-        """The border of the stability region of the tableau, on the negative axis."""
+        """Return the stability limit of the tableau on the negative axis."""
         return self.tableau.real_stability
 
     @property
     def rounding(self) -> float:
-        """Of the sums of stages, and of the sums within them, which cancel in part."""
+        """Return the rounding of the sums of stages and of the sums within them, which cancel in part."""
         return self.tableau.rounding
 
     @classmethod
@@ -108,12 +108,12 @@ class RungeKuttaIntegrator(Integrator):
         return RungeKuttaLeaper(system, tolerances, longest, cls.tableau)
 
     def prepare(self, system: System) -> None:
-        """The compiled mode loop."""
+        """Compile the mode loop."""
         if system.has_tape and not system.has_corners:
             compile_leaps(system, self._leaper)
 
     def leaper(self, system: System, tolerances: Tolerances, longest: float) -> RungeKuttaLeaper | None:
-        """The compiled mode loop; None for a model with corners, or one of Python functions."""
+        """Return the compiled mode loop; None for a model with corners or Python functions."""
         leaps = system.has_tape and not system.has_corners
         return self._leaper(system, tolerances, longest) if leaps else None
 

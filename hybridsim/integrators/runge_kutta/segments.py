@@ -1,8 +1,8 @@
-"""The compiled mode loop of explicit Runge-Kutta methods: steps from event to event, no Python between.
+"""The compiled mode loop of explicit Runge-Kutta methods, which steps from event to event without Python calls.
 
-As in `hybridsim.engine.run.leap`, segments are committed one by one up to the target, or up to the first that holds
-something which is not ordinary. The dense output of a step is the two-point Hermite polynomial on the Taylor
-coefficients of the flow at its ends; a step in which a guard leaves is repeated up to the event.
+As in `hybridsim.engine.run.leap`, segments are committed one by one up to the target, or up to the first that
+contains something unusual. The dense output of a step is the two-point Hermite polynomial on the Taylor
+coefficients of the flow at its ends; a step in which a guard becomes negative is repeated up to the event.
 """
 
 from __future__ import annotations
@@ -43,17 +43,17 @@ from hybridsim.integrators.runge_kutta.step import SAFETY, SMALLEST, STRETCH, at
 
 LANDED, UNSURE, REJECTED, LOST = 0, 1, 2, 3
 _NEIGHBOURHOOD = 0.125  # share of a step within which an event time is corrected
-_CORRECTIONS = 5  # of an event time; they converge quadratically from the accuracy of the dense output
+_CORRECTIONS = 5  # most corrections of an event time; they converge quadratically
 _HALF = 0.5
-_PASSES = 3  # of the tolerance at a step's end, which the first step's length is made for
+_PASSES = 3  # error of a first step in tolerances that still passes; its length aims at one
 
 
 @kernel
 def first_length(leading: Any, x: Any, tolerances: Any, series: Any, longest: float) -> float:
-    """The length at which the error estimate of a step from the origin of the series (n, q + 2) meets the tolerance.
+    """Return the length at which the error estimate of a step from the series' origin (n, q + 2) meets the tolerance.
 
-    leading: q, the coefficients of the main estimate at h**q x^(q)/q! and h**(q + 1) x^(q + 1)/(q + 1)!, then q and
-    one such coefficient of the low estimate, q = 0 where there is none; see `leading_terms`.
+    leading: q, the coefficients of the main estimate at h**q x^(q)/q! and h**(q + 1) x^(q + 1)/(q + 1)!, then
+    q and one such coefficient of the low estimate, with q = 0 if there is none; see `leading_terms`.
     """
     q, c, c_next, q_low, c_low = leading
     rtol, atol = tolerances
@@ -84,7 +84,7 @@ def first_length(leading: Any, x: Any, tolerances: Any, series: Any, longest: fl
 
 @inlined
 def gather(registers: Any, W: Any, out: Any) -> None:
-    """Coefficients of some registers, a row each."""
+    """Copy the coefficients of some registers, a row each."""
     for i in range(registers.shape[0]):
         for j in range(out.shape[1]):
             out[i, j] = W[registers[i], j]
@@ -92,7 +92,7 @@ def gather(registers: Any, W: Any, out: Any) -> None:
 
 @inlined
 def is_finite(series: Any) -> bool:
-    """Whether all coefficients are numbers."""
+    """Return whether all coefficients are finite."""
     total = 0.0
     for i in range(series.shape[0]):
         for k in range(series.shape[1]):
@@ -102,9 +102,9 @@ def is_finite(series: Any) -> bool:
 
 @kernel
 def expand_ends(rows: Any, guard_rows: Any, places: Any, s: float, x: Any, W: Any, out: Any) -> None:
-    """Coefficients of the states (n, K) along the flow from (s, x), and in W of all registers.
+    """Compute coefficients of the states (n, K) along the flow from (s, x), and in W those of all registers.
 
-    rows: what the flow needs of the tape, and what else is wanted; guard_rows: those of them that guards need.
+    rows: tape rows of the flow and of further wanted functions; guard_rows: those of them that guards need.
     """
     time, states, derivatives = places
     n, last = out.shape
@@ -134,9 +134,9 @@ def series_of(
     out: Any,
     guards: Any,
 ) -> bool:
-    """Coefficients of the states (n, K) along the flow from (s, x) and of the watched functions, a row each.
+    """Compute coefficients of the states (n, K) along the flow from (s, x) and of the watched functions, a row each.
 
-    code: address of a function that does so; 0 for none. Returns whether those of the states are numbers.
+    code: address of a function that does so; 0 for none. Return whether those of the states are finite.
     """
     if code != 0:
         call_series(code, s, 0.0, x, guards, W, out)
@@ -148,7 +148,7 @@ def series_of(
 
 @inlined
 def is_still(stages: Any) -> bool:
-    """Whether nothing moves at any stage of a step."""
+    """Return whether the rates at all stages of a step are zero."""
     for i in range(stages.shape[0]):
         for m in range(stages.shape[1]):
             if stages[i, m] != 0.0:
@@ -177,12 +177,11 @@ def land(
     room: Any,
     work: Any,
 ) -> tuple[int, float]:
-    """Repeat the step of length h up to where a watched function, by its place, is zero, at d by the dense output.
+    """Repeat the step of length h up to the zero of a watched function, which the dense output places at d.
 
-    The step starts from work.y; its end is in work.x_after, the series there in room.right and room.guards_right.
-    code: see `series_of`.
-    Newton's method corrects the time until it is good to rounding; a correction within reach of the series at the end
-    needs no new step.
+    place: index of the function. The step starts from work.y; its end is in work.x_after, the series there
+    are in room.right and room.guards_right. code: see `series_of`. Newton's method corrects the time until it
+    is accurate to rounding; a correction within the range of the series at the end needs no new step.
     """
     W, right, y, y1, last = room.W, room.right, work.y, work.x_after, room.right.shape[1] - 1
     rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
@@ -210,7 +209,7 @@ def land(
         if abs(move) <= 2.0 * 2.0**-52 * (s + d):
             return LANDED, d
         moved = min(max(d + move, low), high)
-        moved = (s + moved) - s  # the event is where the step to it ends
+        moved = (s + moved) - s  # the event is at the end of the step to it
         if moved == d or not moved > 0.0:
             return UNSURE, d
         move, d = moved - d, moved
@@ -241,7 +240,7 @@ def is_zero(
     state: Any,
     work: Any,
 ) -> bool:
-    """Whether a guard is zero, at the state in the work space, within twice the rounding of it and of the instant."""
+    """Return whether a guard at the work space's state is zero within twice its rounding and that of the instant."""
     s_error, y = 8.0 * 2.0**-52 * s, work.y
     call(functions.flow, s, y, state.p, state.z, work.slopes)
     state_errors(automata, s_error, y, scale, state.x_error, state.z, work.slopes, work.y_error)
@@ -270,12 +269,12 @@ def rk_leap(
     room: Any,
     record: Any,
 ) -> tuple[int, int, int]:
-    """Go from event to event; returns why it ended and how many steps and segments were committed.
+    """Go from event to event; return why it ended and how many steps and segments were committed.
 
-    parts: `Parts` of the tapes; codes: `EndsCodes` of them. method: tableau, leading terms of its estimates, error
-    order, matrices of the Hermite polynomial. control: rtol, atol, order of the guards' series, max_step, longest
-    segment, and in an array the length of the first step of all (0: to be found), which is used up. The others are as
-    for `leap`.
+    parts: `Parts` of the tapes; codes: `EndsCodes` of them. method: tableau, leading terms of its estimates,
+    error order, matrices of the Hermite polynomial. control: rtol, atol, order of the guards' series,
+    max_step, longest segment, and an array with the length of the first step (0: unknown), which is cleared
+    after use. The others are as for `leap`.
     """
     rates, origin_at, phases_at = places
     tableau, leading, error_order, hermite = method
@@ -331,7 +330,7 @@ def rk_leap(
             gather(states, W, room.first)
             gather(watched, W, room.guards_left)
         h = first_length(leading, y, tolerances, room.first, min(bound, max_step))
-        tried = math.inf  # the length that was rejected last from here
+        tried = math.inf  # last rejected length from this point
         if first[0] > 0.0:
             h, first[0] = first[0], 0.0
         for i in range(n):
@@ -343,9 +342,9 @@ def rk_leap(
             if n_steps >= steps.shape[0]:
                 if n_segments > 0 or n_steps < LEAST:
                     return FULL, first_step, n_segments
-                first[0] = h  # the leap that follows goes on with it
+                first[0] = h  # the next call continues with it
                 break
-            # what would be left is too short for a step of its own
+            # the rest would be too short for another step
             is_last = h * STRETCH >= bound - s - SMALLEST * 2.0**-52 * bound
             d = bound - s if is_last else on_the_grid(s, h)
             if s > longest or not 0.0 < d < tried:
@@ -453,7 +452,7 @@ def rk_leap(
             put(y, x)
             for i in range(n):
                 x_error[i] = 4.0 * UNIT * scale[i] + x_error[i]
-            if s < bound:  # a segment that is too long for the room is cut in two
+            if s < bound:  # a segment that is too long for the buffers is divided
                 move_on(s, clock, sides, orders, floors)
                 return FULL, n_steps, n_segments + 1
             clock[0], clock[1] = target[0], target[1]

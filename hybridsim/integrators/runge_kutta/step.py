@@ -14,16 +14,16 @@ from hybridsim.engine.native.struct_pack import packed
 
 # Step control of Hairer, Norsett and Wanner 1993, section II.4: safety factor and bounds of the change of a step.
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
-_LEAST = 1e-2  # an error below this share of the tolerance says nothing of how errors grow
-_NOTHING = 1e-9  # a coefficient that order conditions make zero, but for rounding
-SMALLEST = 10.0  # a rest of fewer ulps of the local time is no step of its own
-# Nor is a rest of less than this share of the step: some thousand steps of one length add up to their span but for
-# roundings of that size, and a step that is longer by it has the same error but for a part in 10**8.
+_LEAST = 1e-2  # smaller errors, as shares of the tolerance, are not used for extrapolation
+_NOTHING = 1e-9  # rounding of a coefficient that order conditions make zero
+SMALLEST = 10.0  # a rest of fewer ulps of the local time is merged into the last step
+# So is a rest of less than this share of the step: thousands of equal steps add up to their span up to
+# roundings of that size, and a step that is longer by it has the same error up to a part in 10**8.
 STRETCH = 1.0 + 2.0**-30
 
 
 class Coefficients(NamedTuple):
-    """The arrays of a tableau: nodes, matrix, and in rows the weights, those of the error, those of the low error."""
+    """The arrays of a tableau: nodes, matrix, and rows of weights, error weights and low error weights."""
 
     c: np.ndarray
     a: np.ndarray
@@ -34,8 +34,8 @@ class Coefficients(NamedTuple):
 class Tableau:
     """An explicit method with s stages: nodes c (s,), a (s, s) strictly lower triangular, weights b (s,).
 
-    e (s,) is b minus the weights of the embedded method; the error estimate of a step then falls like
-    h**error_order. e_low, where given, is a second estimate of lower order that keeps the first one honest, as in
+    e (s,) is b minus the weights of the embedded method; the error estimate of a step is of order
+    h**error_order. e_low, if given, is a second estimate of lower order that safeguards the first, as in
     DOP853: the error used is e**2/sqrt(e**2 + 0.01 e_low**2).
     """
 
@@ -49,17 +49,18 @@ class Tableau:
 
     @cached_property
     def packed(self) -> Any:
-        """What `attempt` takes."""
+        """Return the arrays for `attempt`."""
         rows = [self.b, self.e, self.e_low] if self.e_low.size else [self.b, self.e]
         arrays = (np.ascontiguousarray(part, dtype=float) for part in (self.c, self.a, rows))
         return packed(Coefficients(*arrays))
 
     @cached_property
     def leading_terms(self) -> tuple[int, float, float, int, float]:
-        """First terms of the error estimates of a step on a linear problem, by coefficients x_k = x^(k)/k! of the flow.
+        """Return the first terms of the error estimates on a linear problem, for coefficients x_k = x^(k)/k!.
 
-        There a combination e of the stages comes to sum_k (e . A**(k - 1) 1) k! h**k x_k. The order q of the main
-        estimate, its coefficients at q and q + 1, then order and coefficient of the low one, (0, 0) without.
+        On a linear problem a combination e of the stages is sum_k (e . A**(k - 1) 1) k! h**k x_k. Return the
+        order q of the main estimate, its coefficients at q and q + 1, then order and coefficient of the low
+        estimate, (0, 0) without one.
         """
         q, terms = self._leading(self.e)
         q_low, terms_low = self._leading(self.e_low) if self.e_low.size else (0, np.zeros(2))
@@ -67,12 +68,12 @@ class Tableau:
 
     @cached_property
     def rounding(self) -> float:
-        """What a step rounds away, in units of rounding of h*f: sum |b_i| (1 + sum |a_ij|)."""
+        """Return the rounding error of a step, in roundings of h*f: sum |b_i| (1 + sum |a_ij|)."""
         return float(np.abs(self.b) @ (1.0 + np.abs(self.a).sum(axis=1)))
 
     @cached_property
     def real_stability(self) -> float:
-        """Up to which z all |R(-z)| <= 1, for R(z) = 1 + b.1 z + b.A 1 z**2 + ..., to 1e-3 or so."""
+        """Return the largest z with |R(-z)| <= 1 up to it, R(z) = 1 + b.1 z + b.A 1 z**2 + ..., to about 1e-3."""
         power, terms = np.ones(len(self.c)), [1.0]
         for _ in self.c:
             terms.append(float(self.b @ power))
@@ -107,7 +108,7 @@ def attempt(
     k: Any,
     out: Any,
 ) -> float:
-    """One step of length h from (s, x) with slope dx there; its end in `out`, its error in units of the tolerance.
+    """Try one step of length h from (s, x) with slope dx; write its end to `out`, return its error in tolerances.
 
     tableau: `Coefficients`. tolerances: rtol, atol.
     """
@@ -144,16 +145,17 @@ def attempt(
 
 @kernel
 def forget(memory: Any) -> None:
-    """Begin step control anew; memory (3,): length and error of the last accepted step, 1 after a rejected one."""
+    """Reset step control; memory (3,): length and error of the last accepted step, 1 after a rejected one."""
     memory[0], memory[1], memory[2] = 0.0, 0.0, 0.0
 
 
 @kernel
 def next_length(h: float, error: float, error_order: int, memory: Any) -> float:
-    """The length to try after a step of length h with this error in units of the tolerance.
+    """Return the length to try after a step of length h with this error in units of the tolerance.
 
-    Where errors have been growing from step to step they are taken to go on so (K. Gustafsson, ACM Transactions on
-    Mathematical Software 20 (1994) 496, doi:10.1145/198429.198437); after a rejected step none is longer.
+    If errors have been growing from step to step, the growth is extrapolated (K. Gustafsson, ACM Transactions
+    on Mathematical Software 20 (1994) 496, doi:10.1145/198429.198437). After a rejected step the length does
+    not increase.
     """
     if not error <= 1.0:
         memory[2] = 1.0

@@ -40,13 +40,14 @@ _E = np.array(
 
 @dataclass(frozen=True)
 class Tsit5(RungeKuttaIntegrator):
-    """Tsitouras' pair of order 5(4) in a compiled mode loop, on our event location.
+    """Tsitouras' pair of order 5(4) in a compiled mode loop, with event location by hybridsim.
 
-    Seven stages, the last one at the end of the step, whose weights are those of order 5; the dense output is the
-    two-point Hermite polynomial of degree 7 on Taylor coefficients, and a step in which an event falls is repeated
-    up to it.
+    It has seven stages. The last one is at the end of the step, with the weights of order 5. The dense output
+    is the two-point Hermite polynomial of degree 7 on Taylor coefficients; a step that contains an event is
+    repeated up to it.
 
-    When to choose it: tolerances of 1e-3 to 1e-6, smooth modes that are not stiff; below 1e-6 `dop853` costs less.
+    When to choose it: tolerances of 1e-3 to 1e-6, smooth modes that are not stiff; below 1e-6 `dop853` is
+    faster.
     """
 
     name: ClassVar[str] = "tsit5"

@@ -1,4 +1,4 @@
-"""SciPy's own event finding: `solve_ivp` with terminal events, called anew after each of them."""
+"""SciPy's own event location: `solve_ivp` with terminal events, called again after each of them."""
 
 from __future__ import annotations
 
@@ -13,25 +13,24 @@ from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.period import system_period
 from hybridsim.engine.system.tolerances import Tolerances
 
-# While a mode holds all states still, nothing but the event functions feels the forcing, and a step may grow over
-# whole periods of it. Who has met that bounds the step; we do it for him.
+# While a mode holds all states, only the event functions depend on the forcing, and a step may grow over
+# whole periods of it. Experienced users limit the step; this class does so, too.
 _STEPS_PER_PERIOD = 10
 _DIRECTIONS = {"up": 1.0, "down": -1.0, "both": 0.0}
 
 
 class NativeStepper:
-    """One call of `solve_ivp` for a whole segment, handed out step by step.
+    """One call of `solve_ivp` for a whole segment, returned step by step.
 
-    What it does and does not see is `solve_ivp`'s own:
+    Its limitations are those of `solve_ivp`:
 
-    - the sign of an event function is tested at both ends of a step and nowhere between: of two zeros in one step
-      neither is seen;
-    - the test is closed at both ends: a function that is zero where the segment starts and falls fires there, also
-      where only its rounding falls;
-    - a zero is found on the dense output, which may be less accurate than the method.
+    - the sign of an event function is tested only at both ends of a step, so that two zeros in one step are
+    missed; - the test includes both ends: a function that is zero at the start of a segment and falls fires
+    there, even if only its rounding error falls; - a zero is found on the dense output, which may be less
+    accurate than the method.
 
-    The guards of the mode are terminal events with direction -1, monitors that only record are not terminal. Without
-    ``max_step`` a step is at most a tenth of the forcing's period.
+    The guards of the mode are terminal events with direction -1; monitors that only record are not terminal.
+    Without ``max_step`` a step is at most a tenth of the forcing's period.
     """
 
     def __init__(
@@ -49,7 +48,7 @@ class NativeStepper:
 
         self.flow = flow
         system = flow.system
-        # the argument of a corner may stay at zero, which the test of signs takes for an event at every step
+        # the argument of a corner may stay at zero, which the sign test treats as an event at every step
         still = system.is_corner[system.owner[watch.guards]] & (watch.sides[watch.guards] == 0)
         guards = [int(g) for g in watch.guards[~still]]
         monitors = list(range(len(watch.monitor_sides)))
@@ -72,7 +71,7 @@ class NativeStepper:
                     first_step=first_step,
                     **({"jac": flow.jacobian} if implicit else {}),
                 )
-            # of its root finder, or of a matrix that is no number
+            # from its root finder, or from a matrix that is not finite
             except (
                 RuntimeError,
                 ValueError,
@@ -91,7 +90,7 @@ class NativeStepper:
         def event(s: float, x: np.ndarray) -> float:
             return float(self.flow.guards(np.array([s]), x[None, :])[0, number])
 
-        # SciPy reads these off the function itself; a function has no such attributes by its type
+        # SciPy reads these attributes of the function; its type does not declare them
         event.terminal, event.direction = True, -1.0  # type: ignore[attr-defined]  # SciPy reads them off the function
         return event
 
@@ -101,13 +100,13 @@ class NativeStepper:
         def event(s: float, x: np.ndarray) -> float:
             return float(self.flow.monitors(np.array([s]), x[None, :])[0, number])
 
-        # as for guards: attributes that a function does not have by its type
+        # as for guards: attributes that the type does not declare
         event.terminal = monitor.action != "record"  # type: ignore[attr-defined]  # SciPy reads them off the function
         event.direction = _DIRECTIONS[monitor.direction]  # type: ignore[attr-defined]  # SciPy reads them off the function
         return event
 
     def _cut(self, result: Any, guards: list[int], monitors: list[int]) -> list[Step]:
-        """The steps of the call, cut where events were found in them."""
+        """Yield the steps of the call, divided at the events found in them."""
         found: dict[float, list[Root]] = {}
         for g, times in zip(guards, result.t_events, strict=False):
             for s in times:
@@ -136,7 +135,7 @@ class NativeStepper:
         return steps
 
     def _direction(self, monitor: int, result: Any, s: float) -> int:
-        """Whether a monitor rises or falls at a zero: by its values at the ends of the step that holds it."""
+        """Return whether a monitor rises or falls at a zero, from its values at the ends of the step."""
         ends = np.abs(result.t)
         right = int(np.clip(np.searchsorted(ends, abs(s), side="left"), 1, len(ends) - 1))
         pair = result.t[[right - 1, right]]
@@ -144,14 +143,14 @@ class NativeStepper:
         return 1 if after > before else -1
 
     def step(self) -> Step:
-        """The next step of the call."""
+        """Return the next step of the call."""
         step = next(self.steps, None)
         if step is None:
             raise StepFailure(f"solve_ivp: {self.failure}")
         return step
 
     def restep(self, step: Step, s: float) -> Step:
-        """Not needed: the step ends at the event."""
+        """Raise an error: the step already ends at the event."""
         raise NotImplementedError("solve_ivp already ends at its event")
 
 

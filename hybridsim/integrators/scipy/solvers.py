@@ -33,20 +33,21 @@ class ScipyIntegrator(Integrator):
     Parameters
     ----------
     events : "located": the engine finds all zeros along each step and repeats the step up to the first one.
-        "native": each smooth stretch is one call of `solve_ivp` with terminal events, as a careful user writes it;
-        see `NativeStepper` for what that misses. What follows an event is decided by the engine either way.
+        "native": each smooth segment is one call of `solve_ivp` with terminal events, as a careful user
+        writes it; see `NativeStepper` for its limitations. The engine decides what follows an event in both
+        cases.
     """
 
     events: Literal["located", "native"] = "located"
 
     solver: ClassVar[str]
     implicit: ClassVar[bool] = False
-    is_multistep: ClassVar[bool] = False  # it begins at order one
-    starts_blind: ClassVar[bool] = False  # a first step that is far too long makes it give up
+    is_multistep: ClassVar[bool] = False  # whether it begins at order one
+    starts_blind: ClassVar[bool] = False  # whether it gives up after a first step that is far too long
 
     @property
     def stable_to(self) -> float:
-        """Of the explicit ones."""
+        """Return the stability limit of the explicit solvers."""
         return _STABLE.get(self.solver, 0.0)
 
     def start(
@@ -87,7 +88,7 @@ class ScipyIntegrator(Integrator):
         return SolverStepper(solver, self.implicit, flow, x0, s_bound, tolerances, first_step)
 
     def _first(self, first_step: float | None, left: float) -> float | None:
-        """A first step that is no longer than what is left of the segment."""
+        """Return a first step no longer than the rest of the segment."""
         return None if first_step is None else min(first_step, abs(left))
 
 
@@ -95,7 +96,7 @@ class ScipyIntegrator(Integrator):
 class ScipyRK23(ScipyIntegrator):
     """Bogacki and Shampine's pair of order 3(2); its dense output, a cubic, is as accurate as the method.
 
-    When to choose it: never for accuracy; it shows what a low order costs.
+    When to choose it: only to show the cost of a low order.
     """
 
     name: ClassVar[str] = "scipy-rk23"
@@ -111,7 +112,7 @@ class ScipyRK23(ScipyIntegrator):
 class ScipyRK45(ScipyIntegrator):
     """Dormand and Prince's pair of order 5(4), SciPy's default.
 
-    When to choose it: loose tolerances (1e-3 to 1e-6) and few states; else `scipy-dop853` is cheaper.
+    When to choose it: loose tolerances (1e-3 to 1e-6) and few states; otherwise `scipy-dop853` is faster.
     """
 
     name: ClassVar[str] = "scipy-rk45"
@@ -143,7 +144,8 @@ class ScipyDOP853(ScipyIntegrator):
 class ScipyRadau(ScipyIntegrator):
     """Implicit Runge-Kutta method of order 5 (Radau IIA), Newton iteration with the model's own Jacobian.
 
-    When to choose it: stiff modes at 1e-4 to 1e-8. Its dense output is a cubic: steps are repeated to event times.
+    When to choose it: stiff modes at 1e-4 to 1e-8. Its dense output is a cubic: steps are repeated to event
+    times.
     """
 
     name: ClassVar[str] = "scipy-radau"
@@ -157,9 +159,9 @@ class ScipyRadau(ScipyIntegrator):
 
 @dataclass(frozen=True)
 class ScipyBDF(ScipyIntegrator):
-    """Backward differentiation formulas of orders 1 to 5 in quasi-constant steps, the model's own Jacobian.
+    """Backward differentiation formulas of orders 1 to 5 in quasi-constant steps, with the model's own Jacobian.
 
-    When to choose it: stiff modes with few events, loose tolerances; it begins anew at order 1 after each event.
+    When to choose it: stiff modes with few events, loose tolerances; it restarts at order 1 after each event.
     """
 
     name: ClassVar[str] = "scipy-bdf"
@@ -179,10 +181,10 @@ class ScipyBDF(ScipyIntegrator):
 
 @dataclass(frozen=True)
 class ScipyLSODA(ScipyIntegrator):
-    """ODEPACK's LSODA: Adams formulas while the motion is not stiff, BDF where it is, by its own choice.
+    """ODEPACK's LSODA, which switches automatically between Adams formulas (not stiff) and BDF (stiff).
 
-    When to choose it: modes of which nobody knows whether they are stiff. It gives up where its first step is far too
-    long, so it is given one from the Taylor series of the states.
+    When to choose it: modes that may or may not be stiff. It gives up after a first step that is far too
+    long, so hybridsim computes its first step from the Taylor series of the states.
     """
 
     name: ClassVar[str] = "scipy-lsoda"

@@ -1,4 +1,4 @@
-"""SciPy's solvers stepped one step at a time, for events that the engine locates on their dense output."""
+"""SciPy's solvers advanced one step at a time, with events located by the engine on their dense output."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from hybridsim.engine.run.stepping import Flow, Step
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.tolerances import Tolerances
 
-_SHARE_OF_A_TURN = 0.1  # of the fastest forcing, in radians: what a first step may span
-_RETRIES, _SHORTER = 25, 0.25  # where a solver gives up on a trial that is no number
-_SMALLEST = 1e-12  # a first step shorter than this share of the segment is of no use
+_SHARE_OF_A_TURN = 0.1  # longest first step, in radians of the fastest forcing
+_RETRIES, _SHORTER = 25, 0.25  # retries, and step factor, if a solver gives up on a trial with NaN
+_SMALLEST = 1e-12  # shortest useful first step, as a share of the segment
 
 
 def _dense(interpolant: Any) -> Dense:
@@ -21,7 +21,7 @@ def _dense(interpolant: Any) -> Dense:
 
 
 class SolverStepper:
-    """Steps an instance of `scipy.integrate.OdeSolver` through one segment."""
+    """Advance an instance of `scipy.integrate.OdeSolver` through one segment."""
 
     def __init__(
         self,
@@ -43,7 +43,7 @@ class SolverStepper:
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
             solver = self._made(s0, x0, bound, first_step)
         if not np.isfinite(getattr(solver, "h_abs", 0.0)):
-            # SciPy's guess of a first step met a value that is no number; it would halve that guess for ever
+            # SciPy's guess of a first step gave a NaN, and SciPy would halve the guess indefinitely
             solver.h_abs = 1e-9 * abs(bound - s0)
         return solver
 
@@ -51,7 +51,7 @@ class SolverStepper:
         return self.solver_class(
             self._rhs,
             s0,
-            x0.copy(),  # LSODA writes into the array that it is given
+            x0.copy(),  # LSODA overwrites its argument
             bound,
             first_step=first_step,
             max_step=self.tolerances.max_step,
@@ -67,19 +67,19 @@ class SolverStepper:
         return rate
 
     def _jacobian(self, s: float, x: np.ndarray) -> np.ndarray:
-        """Zero where it is no number: no step from there succeeds, and SciPy then tries a shorter one."""
+        """Return the Jacobian, or zero if it is not finite; the step then fails, and SciPy tries a shorter one."""
         jacobian = self.flow.jacobian(s, x)
         return jacobian if np.isfinite(jacobian).all() else np.zeros_like(jacobian)
 
     def step(self) -> Step:
-        """One accepted step."""
+        """Return one accepted step."""
         for _ in range(_RETRIES):
             try:
                 return self._advance(self.solver)
             except StepFailure:
                 if not self.met_no_number:
                     raise
-            # LSODA gives up where a trial is no number; sent off anew with a shorter step it comes closer
+            # LSODA gives up if a trial is NaN; restarted with a shorter step it gets closer
             shorter = _SHORTER * abs(self.last_step or self.bound)
             s0, x0 = self.reached
             self.solver = self._solver(s0, x0, self.bound, min(shorter, abs(self.bound - s0)))
@@ -88,7 +88,7 @@ class SolverStepper:
         return self._advance(self.solver)
 
     def restep(self, step: Step, s: float) -> Step:
-        """From the start of a step to s in one step of exactly that length, or the shorter one taken instead."""
+        """Return one step from the start to exactly s, or the shorter step that the solver accepted."""
         solver = self._solver(step.s0, step.x0, s, abs(s - step.s0))
         part = self._advance(solver)
         if solver.status != "running":
@@ -102,7 +102,7 @@ class SolverStepper:
         before = solver.nfev
         s0, x0 = solver.t, solver.y
         with np.errstate(invalid="ignore", over="ignore", divide="ignore"):
-            message = solver.step()  # a trial that is no number is rejected, not worth a warning
+            message = solver.step()  # a trial with NaN is rejected and needs no warning
         if solver.status == "failed" or not np.isfinite(solver.y).all():
             raise StepFailure(f"{solver.__class__.__name__}: {message or 'the state is not a finite number'}")
         if solver is self.solver:
@@ -114,7 +114,7 @@ class SolverStepper:
 
 
 def series_step(flow: Flow, x0: np.ndarray, bound: float, tolerances: Tolerances) -> float:
-    """A first step after which the terms of second and third order of the states are below the tolerance."""
+    """Return a first step over which second- and third-order terms of the states are below the tolerance."""
     series = flow.system.series(0.0, x0, flow.p, flow.z, np.zeros(flow.n), 0.0).states
     scale = tolerances.atol + tolerances.rtol * np.abs(x0)
     step = min(abs(bound), _SHARE_OF_A_TURN / max(map(abs, flow.system.rates), default=1e-300))

@@ -1,1 +1,1 @@
-"""CVODE of SUNDIALS runs here with its own root finding, and starts anew after every event."""
+"""This package runs CVODE of SUNDIALS, restarted after every event."""

@@ -1,4 +1,4 @@
-"""CVODE of SUNDIALS through scikit-sundae, restarted at every event, which the engine locates on its steps."""
+"""CVODE of SUNDIALS through scikit-sundae, restarted at every event; the engine locates events on its steps."""
 
 from __future__ import annotations
 
@@ -23,28 +23,29 @@ from hybridsim.integrators.past_steps import MOST, converges, through
 _NOISE = {
     "accumulation": "it does not resolve events closer than its tolerances, since each restart is at order one"
 }
-# More steps than any one output should take; CVODE's default of 500 ends long smooth stretches.
+# More steps than one output should need; CVODE's default of 500 would end long smooth segments.
 _MAX_STEPS = 10_000_000
-_SMALLEST = 2e-14  # rtol with which it still takes steps: below, it finds that too much accuracy is asked for
+_SMALLEST = 2e-14  # smallest rtol that CVODE accepts
 
 
 @cache
 def _leave_stdout_alone() -> None:
-    """Have SUNDIALS write its warnings to standard error, unless somebody has chosen a place for them.
+    """Make SUNDIALS write its warnings to standard error, unless the user has chosen another place.
 
-    It writes to the standard output of C otherwise, among the data of whoever runs it. It reads these variables when a
-    solver is made; to redirect the descriptor around its calls would take away what other threads write meanwhile.
+    Otherwise they go to C's standard output, among the caller's data. SUNDIALS reads these variables when a
+    solver is created. Redirecting the file descriptor around its calls would also redirect the output of
+    other threads.
     """
     for level in ("WARNING", "INFO", "DEBUG"):
         os.environ.setdefault(f"SUNLOGGER_{level}_FILENAME", "stderr")
 
 
 class CvodeStepper:
-    """Steps CVODE through one segment.
+    """Advance CVODE through one segment.
 
-    CVODE's step control sees the states alone. While a mode holds them still, a step would grow over many periods of
-    a forcing that only the guards feel. So the sine of every angle
-    that grows in time is integrated along: the error control then resolves the forcing in every mode.
+    CVODE's step control depends only on the states. While a mode holds them, a step would grow over many
+    periods of a forcing that only the guards contain. Therefore the sine of every angle that grows in time is
+    integrated, too. The error control then resolves the forcing in every mode.
     """
 
     def __init__(
@@ -64,11 +65,11 @@ class CvodeStepper:
         at = flow.system.layout.phases_at
         self.rates = np.asarray(flow.system.rates)
         self.phases = flow.p[at : at + len(self.rates)]
-        # its norm is the root of a mean, within which one of n errors may be sqrt(n) times the tolerance
+        # CVODE uses a root-mean-square norm, in which one of n errors may be sqrt(n) times the tolerance
         share = 1.0 / np.sqrt(flow.n + len(self.rates))
         rtol = max(share * tolerances.rtol, min(tolerances.rtol, _SMALLEST))
         atol = share * np.concatenate([tolerances.atol, np.full(len(self.rates), tolerances.rtol)])
-        # a fresh start is of order 1: it cannot take up the step of before an event, only one that a user asks for
+        # a restart has order 1 and cannot reuse the step size from before an event, only one that a user sets
         first = first_step if first_step == tolerances.first_step else None
         self.solver = CVODE(
             self._rhs(),
@@ -84,7 +85,7 @@ class CvodeStepper:
         angles = np.sin(self.phases + self.rates * self.s)
         self.solver.init_step(self.s, np.concatenate([self.x, angles]))
         self.past_times, self.past_states = [self.s], [self.x]
-        # the series at the end of the last step whose dense output was asked for
+        # the series at the end of the last step with computed dense output
         self.last_series = math.nan, np.zeros((0, 0))
 
     def _rhs(self) -> Callable[[float, np.ndarray, np.ndarray], None]:
@@ -98,7 +99,7 @@ class CvodeStepper:
         return rhs
 
     def _jacobian(self) -> Callable[[float, np.ndarray, np.ndarray, np.ndarray], None]:
-        """The model's own; the differences that CVODE takes otherwise miss corners narrower than their increments."""
+        """Return the model's Jacobian; CVODE's differences would miss corners narrower than their increments."""
         flow, n = self.flow, self.flow.n
 
         def jacobian(s: float, x: np.ndarray, dx: np.ndarray, out: np.ndarray) -> None:
@@ -110,7 +111,7 @@ class CvodeStepper:
         return jacobian
 
     def _dense(self, s0: float, s1: float, x0: np.ndarray, x1: np.ndarray) -> Dense:
-        """Interpolation made when it is first asked for."""
+        """Return dense output that is computed at first use."""
         made: list[Dense] = []
         self.past_times, self.past_states = [*self.past_times, s1][-MOST:], [*self.past_states, x1][-MOST:]
         times, states = np.array(self.past_times), np.array(self.past_states)
@@ -131,7 +132,7 @@ class CvodeStepper:
         return self.flow.system.series(s, x, self.flow.p, self.flow.z, zero, 0.0).states
 
     def step(self) -> Step:
-        """One internal step of CVODE, cut at the bound."""
+        """Return one internal step of CVODE, cut at the bound."""
         result = self.solver.step(self.bound, method="onestep", tstop=self.bound)
         if not result.success:
             raise StepFailure(f"CVODE: {result.message}")
@@ -143,7 +144,7 @@ class CvodeStepper:
         return Step(s0, s1, x0, x1, self._dense(s0, s1, x0, x1))
 
     def restep(self, step: Step, s: float) -> Step:
-        """Not needed: the dense output is as accurate as the method."""
+        """Raise an error: the dense output is as accurate as the method."""
         raise NotImplementedError("events of CVODE are located on its dense output")
 
 
@@ -151,8 +152,9 @@ class CvodeStepper:
 class CvodeBDF(Integrator):
     """Backward differentiation formulas of orders 1 to 5, variable step, Newton iteration.
 
-    When to choose it: stiff modes, such as regularised laws and laws with fast internal states. At events: a fresh
-    start of order 1. Dense output, on which events are located, is the two-point Hermite polynomial of degree 7.
+    When to choose it: stiff modes, such as regularised laws and laws with fast internal states. It restarts
+    at order 1 after each event. Events are located on its dense output, the two-point Hermite polynomial of
+    degree 7.
     """
 
     name: ClassVar[str] = "cvode-bdf"
@@ -187,7 +189,8 @@ class CvodeBDF(Integrator):
 class CvodeAdams(Integrator):
     """Adams-Moulton formulas of orders 1 to 12, variable step.
 
-    When to choose it: long smooth stretches between events at tight tolerances. At events as `cvode-bdf`.
+    When to choose it: long smooth segments between events at tight tolerances. Events are handled as by
+    `cvode-bdf`.
     """
 
     name: ClassVar[str] = "cvode-adams"

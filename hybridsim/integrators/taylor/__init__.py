@@ -1,1 +1,1 @@
-"""The integrator `taylor` follows the flow by Taylor series, of an order that the tolerance asks for."""
+"""This package contains the integrator `taylor`: Taylor series with an order that depends on the tolerance."""

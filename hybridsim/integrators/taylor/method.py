@@ -1,4 +1,4 @@
-"""Taylor series of the flow, of an order that the tolerance asks for; its dense output is the series itself."""
+"""Taylor series of the flow, with an order that depends on the tolerance; they are also the dense output."""
 
 from __future__ import annotations
 
@@ -23,20 +23,18 @@ from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.integrators.contract import NEEDS_TAPE, Integrator
 
-_SMALLEST = 10.0  # a rest of fewer ulps of the local time is no step of its own
+_SMALLEST = 10.0  # a rest of fewer ulps of the local time is merged into the last step
 _SHORTER = 0.25  # factor on a step at whose end the series does not satisfy the equation
-_DEFECT = (
-    100.0  # of a step, in units of the tolerance: in the slope the last term of order p is p times as large
-)
-_WORTH_ITS_OWN = 0.9  # a first step that covers more than this share of what there is leaves no rest behind
+_DEFECT = 100.0  # largest defect of a step, in tolerances: in the slope the last term of order p is p times as large
+_WORTH_ITS_OWN = 0.9  # a first step that covers more than this share of the segment covers all of it
 _RETRIES = 30
-# So many steps in a row, each shortened so often, lead nowhere: the solution ends at the edge of where its rate has a
-# value, the root of a level that falls to zero, and each series goes back and forth over it within the tolerance.
+# This many consecutive steps, each shortened this often, make no progress: the solution ends at the edge of the domain
+# of its rate, such as sqrt of a level that falls to zero, and each series crosses it within the tolerance.
 _CREEPING, _OFTEN = 1000, 4
 
 
 class TaylorStepper:
-    """Steps the series through one segment."""
+    """Advance the series through one segment."""
 
     def __init__(
         self,
@@ -53,11 +51,11 @@ class TaylorStepper:
         self.pieces = np.empty(self.series.order), np.empty((PIECES, self.series.order + 2))
         self.s, self.x = 0.0, x0
         self.longest = first_step or math.inf
-        # steps in a row that were shortened often and do not shrink further, where they begin, and the first of them
+        # consecutive steps that were shortened often and do not shrink further: count, start, and first length
         self.creeping, self.since, self.shortest = 0, 0.0, 0.0
 
     def step(self) -> Step:
-        """The next step, as long as the series reaches."""
+        """Return the next step, as long as the series is accurate."""
         direction = math.copysign(1.0, self.bound)
         left = abs(self.bound - self.s)
         longest = min(left, self.tolerances.max_step)
@@ -74,7 +72,7 @@ class TaylorStepper:
         smallest = _SMALLEST * math.ulp(abs(self.bound))
         before = self.flow.counters.rejected
         for _ in range(_RETRIES):
-            last = h >= left - smallest  # what would be left is too short for a step of its own
+            last = h >= left - smallest  # the rest would be too short for another step
             h = left if last else h if math.isnan(h) else abs(on_the_grid(self.s, direction * h))
             x1 = coefficients @ (direction * h) ** np.arange(coefficients.shape[1])
             if math.isnan(h) or (
@@ -109,7 +107,7 @@ class TaylorStepper:
         return Step(s0, self.s, x0, x1, dense, holds=holds)
 
     def _holds_between(self, coefficients: np.ndarray, h: float) -> bool:
-        """The same as `_holds` on the way, where the rate of a state seems to stay as it is."""
+        """Do the test of `_holds` inside the step, if the rate of a state seems constant."""
         moves = np.abs(coefficients[:, 2:]) @ np.abs(h) ** np.arange(2, coefficients.shape[1])
         still = moves <= self.tolerances.atol + self.series.rtol * np.abs(self.x)
         if not (still & self.computed).any():
@@ -122,16 +120,14 @@ class TaylorStepper:
         )
 
     def _holds(self, coefficients: np.ndarray, x0: np.ndarray, x1: np.ndarray, s0: float, d: float) -> bool:
-        """Whether the series from s0 still satisfies the equation at a distance d, where the state is x1.
+        """Return whether the series from s0 still satisfies the equation at a distance d, where the state is x1.
 
-        The terms of a series tell nothing of what is beyond rounding where it starts: a saturated tanh, the other
-        branch of a root, a friction that is larger near rest alone.
+        The terms of a series do not show effects below rounding at its origin: a saturated tanh, the other
+        branch of a root, or a friction that is larger only near rest.
         """
         powers = np.arange(1, coefficients.shape[1])
         slope = coefficients[:, 1:] @ (powers * d ** (powers - 1))
-        with np.errstate(
-            invalid="ignore"
-        ):  # infinite rates less infinite slopes: that is no defect below a bound
+        with np.errstate(invalid="ignore"):  # infinite rates less infinite slopes are not a small defect
             defect = abs(d) * np.abs(slope - self.flow.rhs(s0 + d, x1))
         self.flow.counters.rhs_evaluations += 1
         scale = self.tolerances.atol + self.series.rtol * np.maximum(np.abs(x0), np.abs(x1))
@@ -139,7 +135,7 @@ class TaylorStepper:
         return bool((defect <= _DEFECT * (scale + self.series.rtol * change)).all())
 
     def restep(self, step: Step, s: float) -> Step:
-        """A shorter step, where the series does not hold at s: where it holds it is as accurate as at its end."""
+        """Return a shorter step if the series is inaccurate at s; otherwise it needs no repetition."""
         self.flow.counters.rejected += 1
         self.s, self.x, self.longest = step.s0, step.x0, _SHORTER * abs(s - step.s0)
         return self.step()
@@ -156,13 +152,14 @@ def _dense(s0: float, coefficients: np.ndarray) -> Dense:
 
 @dataclass(frozen=True)
 class Taylor(Integrator):
-    """Taylor series by recurrences over the operations of the model, order and step chosen by the tolerance.
+    """Taylor series by recurrences over the operations of the model, with order and step chosen by the tolerance.
 
-    The order is 1.5 (1 - ln(rtol)/2), of linear modes with 1.6; the step is the one at which the
-    last two terms reach the tolerance: near the least work for an accuracy. Guards have series of their own, and the
-    step ends where these stop to be accurate.
+    The order is 1.5 (1 - ln(rtol)/2), for linear modes with 1.6 instead of 1.5. The step is the one at which
+    the last two terms reach the tolerance, which is close to the least work for an accuracy. Guards have
+    their own series, and the step ends where these stop being accurate.
 
-    When to choose it: tight tolerances, 1e-9 and below, and whenever events matter more than anything.
+    When to choose it: tight tolerances, 1e-9 and below, and whenever events are more important than anything
+    else.
     """
 
     name: ClassVar[str] = "taylor"
@@ -179,11 +176,11 @@ class Taylor(Integrator):
     leaps: ClassVar[bool] = True
 
     def prepare(self, system: System) -> None:
-        """The compiled mode loop."""
+        """Compile the mode loop."""
         compile_leaps(system, TaylorLeaper)
 
     def leaper(self, system: System, tolerances: Tolerances, longest: float) -> TaylorLeaper:
-        """The compiled mode loop."""
+        """Return the compiled mode loop."""
         return TaylorLeaper(system, tolerances, longest)
 
     def start(
