@@ -68,23 +68,27 @@ class Integrator(metaclass=_IntegratorType):
     The contract, most important rules first:
 
     1. An integrator is a frozen dataclass; its fields are its options, with defaults and types. It keeps no
-    state between runs: all data of a run belong to the stepper. 2. Implement ``start`` to step through smooth
-    segments; the engine then locates, decides and resolves events. Or implement ``run`` for a whole run, as
-    in a fixed-step method that makes its own decisions. 3. ``start(flow, x0, s_bound, tolerances, first_step,
-    watch)`` begins a segment at local time 0 in the state x0. The function ``flow.rhs(s, x)`` is smooth: no
-    sign, no switch. No history of an earlier segment may be used. 4. ``stepper.step()`` returns the next
-    accepted `Step`, the last one ending exactly at ``s_bound``, or raises `StepFailure`. A trial in which a
-    number is not finite is a rejected step, never an accepted one. s_bound is negative if time runs backward.
+       state between runs: all data of a run belong to the stepper.
+    2. Implement ``start`` to step through smooth segments; the engine then locates, decides and resolves
+       events. Or implement ``run`` for a whole run, as in a fixed-step method that makes its own decisions.
+    3. ``start(flow, x0, s_bound, tolerances, first_step, watch)`` begins a segment at local time 0 in the
+       state x0. The function ``flow.rhs(s, x)`` is smooth: no sign, no switch. No history of an earlier
+       segment may be used.
+    4. ``stepper.step()`` returns the next accepted `Step`, the last one ending exactly at ``s_bound``, or
+       raises `StepFailure`. A trial in which a number is not finite is a rejected step, never an accepted
+       one. s_bound is negative if time runs backward.
     5. ``step.dense(times)`` maps local times (k,) inside the step to states (k, n) and equals x0 and x1 at
-    its ends. Set ``dense_is_accurate`` to whether it is as accurate as the method. If not, implement
-    ``stepper.restep(step, s)``, the same step up to s exactly, which gives event times the accuracy of the
-    method. If its error up to s is above the tolerance, return a shorter step, from whose end ``step()``
-    continues; it is searched again. 6. A method that finds zeros itself returns them in ``step.roots`` and
-    ends its step at them; ``watch`` contains the functions to monitor and their leading coefficients that are
-    set to zero at the start. 7. ``lacks`` lists missing capabilities: it maps a key of `CAPABILITIES` to the
-    reason. A model that needs the capability is refused with that reason. 8. Evaluate only through ``flow``,
-    which counts evaluations. Count rejected steps in ``flow.counters.rejected``. 9. `hybridsim.testing` tests
-    any integrator against the event contract; run it on yours.
+       its ends. Set ``dense_is_accurate`` to whether it is as accurate as the method. If not, implement
+       ``stepper.restep(step, s)``, the same step up to s exactly, which gives event times the accuracy of the
+       method. If its error up to s is above the tolerance, return a shorter step, from whose end ``step()``
+       continues; it is searched again.
+    6. A method that finds zeros itself returns them in ``step.roots`` and ends its step at them; ``watch``
+       contains the functions to monitor and their leading coefficients that are set to zero at the start.
+    7. ``lacks`` lists missing capabilities: it maps a key of `CAPABILITIES` to the reason. A model that
+       needs the capability is refused with that reason.
+    8. Evaluate only through ``flow``, which counts evaluations. Count rejected steps in
+       ``flow.counters.rejected``.
+    9. `hybridsim.testing` tests any integrator against the event contract; run it on yours.
     """
 
     name: ClassVar[str]

@@ -356,7 +356,7 @@ def first_zero_of_wave(lin: Any, k: int, g: int, c: Any, bound: float) -> tuple[
     if level > radius + error:
         return NEVER, bound
     steepness = (radius - level) * (radius + level)  # the square of its slope at the zero, over omega**2
-    # beyond the zero the guard has to go below what its error could hide
+    # beyond the zero the guard has to fall below its error
     if not (level + real > error and steepness > 0.0 and 8.0 * error * abs(level) <= steepness):
         return OPEN, 0.0
     angle = math.acos(-level / radius) - math.atan2(imaginary, real)
@@ -433,7 +433,7 @@ def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, room:
         error = margin * size + floor
         order, floor = 0, 0.0
         d = zero_of_terms(terms, grown * rest, size, lower)
-        # beyond the zero the guard has to go below what its error could hide
+        # beyond the zero the guard has to fall below its error
         if d == d and 16.0 * error * abs(terms[2]) <= terms[1] * terms[1]:
             return (FOUND, s + d) if s + d <= bound else (NEVER, bound)
         if not terms[0] > error:

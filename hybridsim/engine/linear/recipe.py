@@ -112,7 +112,7 @@ class Traced(float):
 
     __hash__ = float.__hash__
     # decisions that are not recorded are forbidden
-    __bool__ = __lt__ = __le__ = __gt__ = __ge__ = None  # type: ignore[assignment]  # None makes these operators raise TypeError
+    __bool__ = __lt__ = __le__ = __gt__ = __ge__ = None  # type: ignore[assignment]  # they raise TypeError
 
 
 # registers, rows, and comparisons (both registers and the result)

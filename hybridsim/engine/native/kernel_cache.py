@@ -106,14 +106,12 @@ class KernelCache(FunctionCache):
         """Return a compiled version, or None if it has to be compiled."""
         try:
             return super().load_overload(sig, target_context)
-        except (
-            Exception
-        ):  # of another build of numba, such as it may be: compiling tells what is wrong, if anything
+        except Exception:  # from another build of numba; a real fault will show when the kernel is compiled
             return None
 
 
 def _digest_of(source: Path) -> str:
     try:
         return hashlib.sha256(source.read_bytes()).hexdigest()
-    except OSError:  # typed in, or of an archive: the bytes of the code, which are in the key, tell it
+    except OSError:  # entered interactively or from an archive: the key contains the bytes of the code
         return ""

@@ -186,7 +186,7 @@ if ENABLED:
         return compile_text(module.__loader__.get_source(module.__name__), name, kept)
 
     def texts_to_compile(module: Any) -> list[str]:
-        """Return the texts of the functions of a generated module whose machine code is not cached."""
+        """Return the source of the functions of a generated module that have no cached machine code."""
         path, text = getattr(module, "__file__", None), module.__loader__.get_source(module.__name__)
         return [
             definition_in(text, name)
@@ -423,7 +423,7 @@ else:
         return function(t, x, p, z, out)
 
 
-_addresses: dict[tuple[Any, ...], int] = {}  # of kernels, by the types of what they are given
+_addresses: dict[tuple[Any, ...], int] = {}  # addresses of kernels, by their argument types
 
 
 def kernel_address(function: Callable[..., int], *given: Any) -> int:
@@ -460,7 +460,7 @@ class Door:
 @cache
 def announce_compilation() -> None:
     """Print once, on stderr, that the engine is being compiled, unless an earlier run has printed it."""
-    # the folder alone proves nothing: it is made as soon as a kernel is defined
+    # an existing folder is no proof, because it is created when a kernel is defined
     folder = kernel_folder() if ENABLED else None
     if ENABLED and (folder is None or not (folder / "announced").exists()):
         store(folder and folder / "announced", b"")

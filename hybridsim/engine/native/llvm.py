@@ -1,7 +1,7 @@
-"""Generated functions as machine code: their text, a small part of Python, translated to LLVM and compiled at once.
+"""Translation of generated functions, which use a small part of Python, to LLVM and then to machine code.
 
-A general compiler of Python finds out the types of what it is given first. Here all numbers are doubles but
-the modes, and a function of some dozen lines is ready in milliseconds.
+A general compiler of Python first infers types. Here all numbers are doubles except the modes, and a function
+of some dozen lines is compiled in milliseconds.
 """
 
 from __future__ import annotations

@@ -74,7 +74,7 @@ def make_private(path: Path) -> None:
 def _has_trusted_owner(found: os.stat_result) -> bool:
     if found.st_uid in (0, os.geteuid()):
         return True
-    # in a container the superuser of the machine outside is no user: all that is not mapped has this one number
+    # in a container the host's superuser is not mapped; all unmapped users have this one number
     return found.st_uid == _unmapped() and not found.st_mode & 0o022
 
 

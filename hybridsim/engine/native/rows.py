@@ -1,4 +1,4 @@
-"""Kernels that evaluate a model function at many points at once."""
+"""Kernels that evaluate a model function at many points in one call."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Taylor polynomials of a guard with a bound of the remainder: where the guard is certainly positive, and its zero.
+"""Taylor polynomials of a guard with a bound of the remainder, which give certain positive intervals and zeros.
 
 Coefficients and bounds are those of `hybridsim.engine.linear.motion.guard_terms`.
 """
@@ -52,7 +52,7 @@ def value_and_slope(backward: Any, count: int, d: float, start: float) -> tuple[
 
 @inlined
 def safe_step(terms: Any, first: int, rest: float, longest: float, error: float, lower: Any) -> float:
-    """Return a step over which sum terms[first + i] d**i - rest d**m stays positive, where terms[first] > 0.
+    """Return a step over which sum terms[first + i] d**i - rest d**m stays positive; terms[first] is positive.
 
     m is the number of terms. Positive terms after the first negative one are omitted. The bound then has one
     zero (Descartes' rule) and is positive before it. lower: scratch space for the terms. error: error of a

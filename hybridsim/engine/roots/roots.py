@@ -225,7 +225,7 @@ def _before(
 def _with_touches(
     coefficients: np.ndarray, bounds: np.ndarray, rows: np.ndarray, is_first: bool, is_last: bool
 ) -> np.ndarray:
-    """Return the pattern of a piece with undecided intervals where its values come within their rounding errors.
+    """Return the pattern of a piece, with undecided intervals at values within their rounding errors.
 
     The misfit only shows roundings that differ from sample to sample. A common one, such as that of the steps
     before, shifts the dip and stays hidden. The ends of a step have their own rules for rounding. Where the

@@ -178,7 +178,7 @@ def _changes(b: Any) -> tuple[int, bool]:
 
 @inlined
 def _extremum(u: Any, order: int, near: float, far: float, rises: bool) -> float:
-    """Find where the slope of u changes its sign between two places, by Newton's method with bisection."""
+    """Find the sign change of the slope of u between two places, by Newton's method with bisection."""
     d = 0.5 * (near + far)
     for _ in range(_POLISHED):
         slope, bend = 0.0, 0.0

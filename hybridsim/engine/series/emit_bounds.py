@@ -85,7 +85,7 @@ class _Bounded(Lines):
         exact, off = self.given.numbers.get(r, (0.0, 0.0))
         return number(exact), number(off) if off else ZERO
 
-    # -- arithmetic of bounds, which are not negative: what is zero falls away ---------------------------------
+    # -- arithmetic of non-negative bounds, without zero terms --------------------------------------------------
 
     def plus(self, *terms: str) -> str:
         """Add terms from left to right."""

@@ -38,7 +38,7 @@ class ExactLeaper:
     def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
         self.system, self.longest = system, longest
         self.horizon = 0.0  # longest segment that was possible so far
-        # as in the room of a leap, where the last one left them
+        # as in `Room.hints` after the last call
         self.hints = np.zeros((0, system.guard_count))
         self.shelf, self.automata = shelf_of(system), automata_of(system)
         self.tables: LinearTables | None = None  # tables for which the sheet was made

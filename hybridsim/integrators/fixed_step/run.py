@@ -1,4 +1,4 @@
-"""The run of a fixed-step method: steps by the kernel, declared events, and resolution of what the kernel finds."""
+"""The run of a fixed-step method: steps by the kernel, declared events, and mode changes."""
 
 from __future__ import annotations
 
@@ -231,7 +231,7 @@ class FixedStepRun:
         return self._declared_event(s, p, why)
 
     def _sides_taken(self) -> np.ndarray:
-        """Return the modes, without holding modes that a jump of an input has moved off their surface."""
+        """Return the modes, with held components on the side to which a jump of an input has moved them."""
         z, p = self.z.copy(), self._vector()
         p[self.system.layout.pin_at] = 0.0
         values = self.system.rows(
@@ -263,7 +263,7 @@ class FixedStepRun:
             self.record.message = f"at t = {float(self.origin)!r}: the gap of {names} is below zero"
         return bool(below)
 
-    # -- events of guards and monitors beside the surfaces --------------------------------------------------
+    # -- events of guards and monitors without surfaces -----------------------------------------------------
 
     def _declared_event(self, s: float, p: np.ndarray, why: int) -> bool:
         """Locate a sign change of a guard or monitor by bisection of the step, then resolve it."""
@@ -459,7 +459,7 @@ class FixedStepRun:
         record.occurrences.add(StepOccurrences(self.system, self.origin, rows, components, changes, s, x))
 
     def _side_of_zeros(self, z: np.ndarray) -> None:
-        """Set the mode of a row with exactly zero velocity to the next side, without a third mode."""
+        """Give rows with exactly zero velocity the mode of the next row, because sgn has no third mode."""
         for c, _, _, hold, *_ in surface_table(self.system):
             for k in np.flatnonzero(z[:-1, c] == hold)[::-1]:
                 z[k, c] = z[k + 1, c]

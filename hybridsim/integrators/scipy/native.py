@@ -25,9 +25,10 @@ class NativeStepper:
     Its limitations are those of `solve_ivp`:
 
     - the sign of an event function is tested only at both ends of a step, so that two zeros in one step are
-    missed; - the test includes both ends: a function that is zero at the start of a segment and falls fires
-    there, even if only its rounding error falls; - a zero is found on the dense output, which may be less
-    accurate than the method.
+      missed;
+    - the test includes both ends: a function that is zero at the start of a segment and falls fires there,
+      even if only its rounding error falls;
+    - a zero is found on the dense output, which may be less accurate than the method.
 
     The guards of the mode are terminal events with direction -1; monitors that only record are not terminal.
     Without ``max_step`` a step is at most a tenth of the forcing's period.

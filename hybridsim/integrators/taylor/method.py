@@ -135,7 +135,7 @@ class TaylorStepper:
         return bool((defect <= _DEFECT * (scale + self.series.rtol * change)).all())
 
     def restep(self, step: Step, s: float) -> Step:
-        """Return a shorter step if the series is inaccurate at s; otherwise it needs no repetition."""
+        """Repeat a step with a shorter length, because its series is inaccurate at s."""
         self.flow.counters.rejected += 1
         self.s, self.x, self.longest = step.s0, step.x0, _SHORTER * abs(s - step.s0)
         return self.step()
