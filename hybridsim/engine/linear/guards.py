@@ -79,7 +79,7 @@ def modal_guards(
                 for m in range(size):
                     total += rows[k, g, m] * basis[k, m, j]
                 gamma[j] = total
-            # an entry of the basis is known to rounding of the largest one of its row, if it is not zero for certain
+            # a basis entry has a rounding error relative to the largest entry of its row, unless it is exactly zero
             known = 0.0
             for m in range(size):
                 largest = 0.0

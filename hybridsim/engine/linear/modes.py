@@ -175,7 +175,7 @@ def _first_reason(system: System, p: Sequence[float] | None) -> str | None:
     place = next(to_blame, next(iter(reasons)))
     return (
         reasons[place] if " in mode " in reasons[place] else f"{place}{reasons[place]}"
-    )  # a guard's title has it
+    )  # a guard's title contains the mode
 
 
 def is_linear_beside_corners(system: System) -> bool:

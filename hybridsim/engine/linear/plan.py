@@ -135,7 +135,7 @@ def plan_of(system: System, met: np.ndarray, p: np.ndarray) -> tuple[LinearPlan,
             found = _with_values(LinearPlan(system, met, p, begun), inputs)
             if found is None:  # otherwise new entries would have the values of the earlier plan
                 found = _with_values(LinearPlan(system, met, p), inputs)
-                assert found is not None  # the comparisons are those of these inputs
+                assert found is not None  # its comparisons were recorded at these inputs
             if len(plans) >= _MOST:
                 plans.clear()
             plans.append(found[0])

@@ -318,7 +318,7 @@ def _made(
             return None
         with _lock:
             for other in [other for other, made in kept.items() if made is begun]:
-                del kept[other]  # the same for fewer modes
+                del kept[other]  # tables of fewer modes at the same values
             kept[key] = found
             while len(kept) > _KEPT or (
                 len(kept) > 1 and sum(made.rows.size for made in kept.values()) > _MOST_BYTES

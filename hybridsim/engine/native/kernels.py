@@ -97,7 +97,7 @@ if ENABLED:
             if of.depth == 0:
                 of.spent += time.perf_counter() - of.since
 
-    _LEVEL = 2  # of LLVM's passes
+    _LEVEL = 2  # optimisation level of LLVM
 
     def _settings() -> tuple[Any, Any]:
         """Return LLVM's optimisation level and target machine, or None if numba does not provide them."""
@@ -128,7 +128,7 @@ if ENABLED:
         """
         return min(numba.config.OPT, type(numba.config.OPT)(_LEVEL)), _plain_machine()
 
-    _COMPILING, _LOCKED = "numba:compile", "numba:compiler_lock"  # the first happens within the second
+    _COMPILING, _LOCKED = "numba:compile", "numba:compiler_lock"  # compilation happens while the lock is held
     _compiling = _Compiling()
     for _kind in (_COMPILING, _LOCKED):
         event.register(_kind, _compiling)
@@ -181,7 +181,7 @@ if ENABLED:
 
     def compile_model_function(module: Any, name: str) -> tuple[Any, Any]:
         """Compile one function of a generated module; return its address and the object that keeps it alive."""
-        path = getattr(module, "__file__", None)  # None for a module that is in memory alone
+        path = getattr(module, "__file__", None)  # None for a module that exists only in memory
         kept = None if path is None else _of_this_machine(Path(path).with_suffix(f".{name}"))
         return compile_text(module.__loader__.get_source(module.__name__), name, kept)
 
@@ -471,7 +471,7 @@ def _kept() -> str:
     return "not cached" if kernel_folder() is None else f"cached in {cache_root()}"
 
 
-_told: set[str] = set()  # in this process: one line is enough
+_told: set[str] = set()  # once per process
 
 
 def _tell(text: str) -> None:

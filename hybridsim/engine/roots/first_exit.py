@@ -14,7 +14,7 @@ from hybridsim.engine.native.kernels import call_series, inlined, kernel, polyno
 
 NEVER, FOUND, OPEN = 0, 1, 2  # outcomes: stays positive, a root, undecided because of rounding
 POSITIVE, NEGATIVE, WITHIN, ONCE, MIXED = range(5)  # signs of a piece
-_DEEPEST = 40  # halvings; a piece that narrow and still open is a touch
+_DEEPEST = 40  # most halvings; an undecided piece of this width is a touch
 _POLISH = 100  # iterations: bisection alone needs 53
 _NEAR = 1e-6  # relative change in Halley's third-order method below which the remaining error is known
 

@@ -28,7 +28,7 @@ SAMPLES = 2 * DEGREE + 1
 # square root of the unit roundoff, so that only dips deeper than rounding count and few halvings are needed.
 _ACCEPT = 2.0**-30
 # Halvings of a step: theta itself is rounded to 2**-53, so a function of it cannot be resolved to 2**-30 of its size on
-# a piece narrower than 2**-23. A few halvings later a piece is accepted with whatever bound it has.
+# a piece narrower than 2**-23. A few halvings later a piece is accepted with any bound.
 _DEEPEST = 26
 _ROUNDING_DEPTH = 4  # halvings after which the misfit of an unresolved piece may be rounding alone
 _MOST_PIECES = 200_000  # a guard that needs more oscillates about 20 000 times within one step

@@ -30,7 +30,7 @@ from hybridsim.engine.series.tape import ADD, DIV, NEG, SQRT, SUB
 # f is the product of the constants b and c, or of their reciprocals, and a sign.
 FACTOR, INTEGRATE = 64, 96
 # And out_k of a constant over b, with b_k = a_k c, a_k / c or a_k and a sign:
-# -(sum_{0<i<k} out_i b_{k-i} + out_0 b_k) / b_0, in which a_k waits for one product and one difference.
+# -(sum_{0<i<k} out_i b_{k-i} + out_0 b_k) / b_0, in which only one product and one difference depend on a_k.
 RECIPROCAL = 128
 HAS_B, OVER_B, HAS_C, OVER_C, NEGATIVE = 1, 2, 4, 8, 16
 

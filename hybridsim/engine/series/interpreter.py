@@ -70,7 +70,7 @@ from hybridsim.engine.series.tape import (
 
 # Step control: the last two coefficients of each state and each guard stay below the tolerance at the end of a step.
 _SHORTER = 0.5  # factor on a step that is too long for a guard's series, without a better estimate
-# Of a guard's terms over the tolerance: one that is a state is not to shorten that state's own step.
+# Factor on a guard's tolerance, so that a guard that equals a state does not shorten that state's own step.
 SLACK = 1.5
 _TRIALS = 60  # most halvings of a step
 _FIRST, _SURELY = 4, 0.9  # terms that determine a shorter step; safety factor on it

@@ -130,7 +130,7 @@ class MoreauMarch:
         self._settings = (*settings, has_impacts)
         columns = [forces, system.is_unilateral[table[:, 0]]]
         self._table = np.concatenate([table, np.array(columns, dtype=np.int64).T], axis=1)
-        last = ("stepped", "restitutions") if has_impacts else ("flow", "flow")  # these are not called
+        last = ("stepped", "restitutions") if has_impacts else ("flow", "flow")  # placeholders, never called
         names = ("flow", "guards", "quantities", "surfaces", "project", "monitors", *last)
         self._functions = tuple(system.address(n) for n in names)
         evaluated = np.zeros((len(table), system.n))

@@ -115,7 +115,7 @@ class FixedStepRun:
         self.accumulation = Accumulation(located, 4.0 * located)
         self.scale = np.abs(self.x)  # sizes of the states in the last kernel call, for relative rounding
         self.fresh = np.zeros(len(system.monitor_names), dtype=np.bool_)  # monitors that have just fired
-        self.turned = False  # an input may just have jumped
+        self.turned = False  # whether an input may just have jumped
 
     def run(self) -> Trajectory:
         """Step to the end; results up to a failure are kept."""
