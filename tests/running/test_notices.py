@@ -200,5 +200,5 @@ def test_a_load_that_is_negative_from_the_start(name: str, x: float) -> None:
 def test_auto_says_what_keeps_a_linear_model_from_the_closed_form() -> None:
     watched = replace(hs.load("dfcs"), monitors=(hs.Monitor("up", "v", direction="up"),))
     sol = hs.simulate(watched, (0, 0.01))
-    assert "they are linear, but with monitors exact cannot go" in sol.message
-    assert "linear, but" not in hs.simulate("belt", (0, 0.1)).message
+    assert "exact was not chosen because the model has monitors" in sol.message
+    assert "exact was not chosen" not in hs.simulate("belt", (0, 0.1)).message

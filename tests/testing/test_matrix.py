@@ -196,7 +196,7 @@ def test_a_reason_is_read_easily_and_a_stop_by_design_says_so() -> None:
     rows = (Row("unit/4800", 1.0, 1e-3, 1, 0.0), Row("unit/19200", 1.0, 1e-3, 1, 0.0))
     cell = Cell("DH-r2-f0.2", "moreau", "wrong mode sequence", said, rows, order=-0.02)
     line = verdicts([cell], (moreau,))[-1]
-    assert "t = 5.34544082, and is f:stick at t = 5.34478632 (by design: no event is located" in line
+    assert "t = 5.34544082, and is f:stick at t = 5.34478632 (by design: events are not located" in line
     assert "order" not in line and "order 0.9" in verdicts([replace(cell, order=0.9)], (moreau,))[-1]
     assert (
         "by design" not in verdicts([replace(cell, reason=said.replace("f:stick", "f:slip+"))], (moreau,))[-1]

@@ -127,7 +127,7 @@ class HeldStates:
         return ModelError(
             f"the {' and '.join(titles)} of "
             + ", ".join(lowering.components[c].name for c in components)
-            + " are linearly dependent: they cannot all be held at zero by separate states",
+            + " are not independent: they cannot all be held at zero by separate states",
             place=lowering.place(components[0]),
             remedy=remedy,
         )

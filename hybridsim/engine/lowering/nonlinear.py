@@ -32,7 +32,7 @@ def nonlinear(lowering: Lowering, c: int, d: int, others: set[Any]) -> ModelErro
     name, component = declared_name(unknown), lowering.components[c]
     if not component.surface.unique:
         return ModelError(
-            f"{name} must enter the rates linearly, and enters the motion of {component.name} nonlinearly",
+            f"{name} enters the motion of {component.name} nonlinearly, so that it cannot be solved for",
             place=lowering.place(c),
             remedy="write the derivative of the velocity so that it is linear in the force",
         )

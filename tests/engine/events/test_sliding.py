@@ -360,7 +360,7 @@ def test_a_contact_and_a_relay_in_one_cluster() -> None:
 
 @pytest.mark.parametrize("integrator", ["rk4-dichotomy", "rk4-sign"])
 def test_the_published_methods_refuse_surfaces_by_name(integrator: str) -> None:
-    with pytest.raises(hs.UsageError, match="its rule for the zone around zero velocity is one of friction"):
+    with pytest.raises(hs.UsageError, match="its rule near zero velocity applies to friction only"):
         run(FORCED, 1.0, integrator=integrator, step=0.01)
 
 
