@@ -75,7 +75,7 @@ class LeanTape:
 
 
 def twins_of(tape: dict[str, Any]) -> dict[int, int]:
-    """Map each register that is constant in some modes only to the register that it uses in those modes.
+    """Return separate registers for values that are constant in some modes and vary in others.
 
     A compiled loop keeps its registers from mode to mode and writes only the leading coefficient of a
     constant. Without separate registers, the higher coefficients of another mode would remain.
