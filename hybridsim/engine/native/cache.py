@@ -184,7 +184,7 @@ def load_whole(path: Path | None) -> bytes | None:
 
 
 def _made_by_us(root: Path) -> tuple[list[Path], list[Path]]:
-    """List the folders of compiled code that carry our mark, and those that only have such a name."""
+    """List the folders of compiled code that carry our mark, and those with such a name but no mark."""
     ours, others = [], []
     for entry in sorted(root.glob("engine-*")):
         is_folder = entry.is_dir() and not entry.is_symlink()

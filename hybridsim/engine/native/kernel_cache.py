@@ -58,7 +58,7 @@ class _Place:
 
 
 class _Form(CompileResultCacheImpl):
-    """The format of numba's compiled functions, with a folder of our cache whatever the settings of numba are."""
+    """The format of numba's compiled functions, stored in our cache folder regardless of numba's settings."""
 
     def __init__(self, function: Any, folder: Path) -> None:
         self._lineno = function.__code__.co_firstlineno

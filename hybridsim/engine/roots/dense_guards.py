@@ -169,7 +169,7 @@ def first_linear_guard(
 
 @kernel
 def likely_reach(V: Any, watched: Any, order: int, rtol: float) -> float:
-    """Return a length beyond the range of the functions' series, from which to search for that range."""
+    """Return a length somewhat beyond the range of the functions' series; the search for the range starts there."""
     longest = math.inf
     for j in range(watched.shape[0]):
         r = watched[j]

@@ -116,10 +116,10 @@ def where_a_root_ends(u: Any, order: int, h: float, a: Any, stack: Any, code: in
 def _first_place(
     u: Any, order: int, h: float, kind: int, high: float, low: float, a: Any, stack: Any, code: int
 ) -> float:
-    """Return the first place at which a step h has to end, or h, from pieces on which u rises or falls.
+    """Return the first place in a step h at which the step has to end, or h.
 
-    The slope is isolated in Bernstein form: if its coefficients change their sign at most once, so does the
-    slope.
+    The step is divided into pieces on which u rises or falls. The slope is isolated in Bernstein form: if its
+    coefficients change their sign at most once, so does the slope.
     """
     start, sign = abs(u[0]), 1.0 if u[0] > 0.0 else -1.0
     is_far = start > _FAINT and kind != ROOT

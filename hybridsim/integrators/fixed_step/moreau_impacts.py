@@ -82,7 +82,7 @@ def approach(restitutions: Any, table: Any, s: float, h: float, x: Any, p: Any, 
 
 @kernel
 def gap_rates(table: Any, X: Any, free: Any, room: Any) -> None:
-    """Compute the rates of the surfaces without forces, `room.y`, and their changes by unit forces, `room.G`.
+    """Compute the rates of the surfaces without forces, `room.y`, and the effects of unit forces, `room.G`.
 
     The rates are linearised about X, the last iterate, and are exact when the iteration ends.
     """
