@@ -1,7 +1,7 @@
 """hybridsim simulates piecewise-smooth (hybrid) systems and compares the integrators that can run them.
 
 The public names are the ones listed here and no others. Each is imported when it is first used, so that
-`import hybridsim` costs little and a program pays only for what it calls.
+`import hybridsim` is fast and loads only the parts that a program uses.
 """
 
 from __future__ import annotations

@@ -44,8 +44,8 @@ def to_ivp(
     model : str, path or Model
         A `Model`, the name of a packaged one, or the path of a ``.toml`` file.
     z : mapping of str to str, optional
-        Mode of each component by name; left out, a component is in its declared initial mode. A contact has
-        none: its mode must be given.
+        Mode of each component by name; the default is the declared initial mode. Contacts have no initial mode, so
+        their modes are required.
     params : mapping of str to str or float, optional
         Parameter values that replace the declared ones.
 
@@ -57,12 +57,12 @@ def to_ivp(
     Raises
     ------
     UsageError
-        For a component or a mode that the model does not have, or a contact without one.
+        For an unknown component or mode, or a contact without a mode.
 
     Notes
     -----
-    To bring a solver of your own. What follows an event is then yours to decide; `simulate` does both, and
-    takes a solver of your own as an integrator (`hybridsim.integrators.contract.Integrator`).
+    Use it with another solver, and decide yourself what follows an event. `simulate` does both, and you can add your
+    own solver as an integrator (`hybridsim.integrators.contract.Integrator`).
 
     Examples
     --------

@@ -27,7 +27,7 @@ class Endless(Exception):
 def bounded_work(seconds: float) -> Iterator[None]:
     """Raise Endless when a block exceeds its time limit (in the main thread, where timer signals exist).
 
-    The signals are those of this process: its processor time in all threads, and the clock on the wall as a backstop.
+    Timer signals of the process count the processor time of all threads. The elapsed time is limited too.
     """
     if not hasattr(signal, "SIGPROF") or threading.current_thread() is not threading.main_thread():
         yield
@@ -73,7 +73,7 @@ def _is_passed_over(frame: FrameType | None) -> bool:
 class ProcessorTime:
     """A `progress` function that ends the run with status "limit" after a given processor time.
 
-    The time is that of the thread that runs it, counted from its first step, so that compiling is none of it.
+    It counts the processor time of the running thread from its first step, so compiling is not included.
     """
 
     def __init__(self, seconds: float) -> None:

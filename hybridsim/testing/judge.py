@@ -27,9 +27,9 @@ class Measured:
 
     Parameters
     ----------
-    ending, sequence, checks : sentences on how the run ended, on its events and modes, and from the truth's checks.
-    time_error, state_error : relative, see `Scene`.
-    status, steps, seconds : how the run ended and what it cost.
+    ending, sequence, checks : errors, as sentences, of the end of the run, of its events and modes, and of the checks.
+    time_error, state_error : relative errors, see `Scene`.
+    status, steps, seconds : status of the run, number of steps, and run time.
     """
 
     ending: tuple[str, ...]

@@ -30,13 +30,13 @@ VOCABULARY = (
 TOLERANCES = (1e-6, 1e-9, 1e-12)
 
 TROUBLES = {
-    "events": "Events: when they are, how many, and in which order",
-    "stick": "Stick: when it begins, whether it holds, when it ends",
-    "sliding": "Sliding: along a surface, and off it again",
-    "accumulation": "Accumulation: infinitely many events in a finite time",
-    "stiffness": "Stiffness: rates that lie decades apart",
-    "stability": "Stability: steps and intervals beyond their limits, and long runs",
-    "sensitivity": "Sensitivity: where digits are lost",
+    "events": "Events: their times, their number and their order",
+    "stick": "Stick: its start, its duration and its end",
+    "sliding": "Sliding: motion along a switching surface, and its end",
+    "accumulation": "Accumulation: infinitely many events in finite time",
+    "stiffness": "Stiffness: rates of very different size",
+    "stability": "Stability: step sizes beyond the limit of stability, and long runs",
+    "sensitivity": "Sensitivity: motions that amplify errors",
 }
 
 END = math.inf  # as the time of a state: the end of the run
@@ -56,13 +56,13 @@ class Truth:
 
     Parameters
     ----------
-    events : (t, label) of every event, in order; labels as in `judge.label`. None: not compared.
-    states : (t, values in the order of the states), right-continuous; END for the time where the run ends,
-        None for a value not compared.
-    quantities : (function of the solution, its true value), counted among the states.
-    status, end : how and when the run ends; status None: the checks decide.
-    checks : functions of the solution that return sentences about what is wrong, each with the capability it is
-        about ("" for every integrator).
+    events : (t, label) of every event, in order, with the labels of `judge.label`; None skips the comparison.
+    states : (t, values in the order of the states), right-continuous. END is the time of the end of the run; a value
+        None is not compared.
+    quantities : (function of the solution, its true value); their errors count as errors of states.
+    status, end : expected status and end time; with the status None only the checks decide.
+    checks : functions of the solution that return its errors as sentences, each with the capability that it tests (""
+        for every integrator).
     """
 
     events: tuple[tuple[float, str], ...] | None = ()
@@ -79,26 +79,26 @@ class Scene:
 
     Parameters
     ----------
-    name : of the scene, unique among those that are run together.
-    file : a model file of the package's own scenes by its bare name, the name of a packaged model, or the path of a
+    name : unique name of the scene.
+    file : the bare name of a model file of the packaged scenes, the name of a packaged model, or the path of a
         ``.toml`` file.
     span : (t0, t1) of the run.
-    truth : what must come out.
-    needs : capabilities without which the scene cannot be run.
-    unit : a time that is long for this motion, such as its period: errors of time are relative to it, and a
-        fixed-step method divides it.
-    tol_t, tol_x : errors allowed at the tightest tolerance: of event times in units of `unit`, of states in
-        units of their largest true value.
-    floor : error below which no improvement is asked for (digits of the truth, conditioning of the scene).
-    count_scheduled : whether scheduled events are among the expected ones.
-    start_is_event : whether an event at t0 itself counts; with a contact the engine only finds its mode there.
-    end_margin : events this close to the end of the run are not counted (the motion ends on an event).
-    speed : a speed that is fast for this motion, for methods with a zero-velocity interval.
+    truth : the known answer.
+    needs : capabilities that an integrator needs to run the scene.
+    unit : typical time of the motion, such as its period. Errors of times are relative to it, and fixed steps are
+        fractions of it.
+    tol_t, tol_x : allowed errors at the tightest tolerance, of event times in units of `unit` and of states in units
+        of their largest true value.
+    floor : errors below it need not decrease (digits of the truth, conditioning of the scene).
+    count_scheduled : whether `truth.events` contains scheduled events.
+    start_is_event : whether an event at t0 counts; for a contact it is only the selection of the mode.
+    end_margin : events closer to the end than this do not count (the motion ends on an event).
+    speed : typical speed of the motion, for methods with a zero-velocity interval.
     tolerances : rtol from loose to tight.
-    effort : a run that took more steps than this is the last of its study.
+    effort : number of steps above which a run is the last one of its study.
     trouble : the class of trouble, one of `TROUBLES`.
-    title, cause, story : what it is and why methods fail, in a few words each, and a paragraph: what goes
-        wrong, why, and which method to use.
+    title, cause, story : a title, the reason why methods fail, and a paragraph about the failure, its reason and the
+        method to use.
 
     Raises ValueError for a capability that is not in the vocabulary.
     """

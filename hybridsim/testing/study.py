@@ -56,9 +56,9 @@ class Study:
 
     Parameters
     ----------
-    done : the settings that ran, with what was measured.
-    tolerances : of event times and of states, that the last one is held to.
-    failure : the setting that did not run to a solution and the error it ended with, or None.
+    done : the completed settings with their measurements.
+    tolerances : allowed errors of event times and states at the last setting.
+    failure : the setting that failed and its exception, or None.
     """
 
     done: tuple[tuple[Setting, judge.Measured], ...]

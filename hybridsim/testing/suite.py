@@ -33,9 +33,9 @@ class Outcome:
     Parameters
     ----------
     verdict : "right", "wrong answer", "wrong mode sequence", "hang (bounded)" or "refused", as in the atlas; or
-        "lacks", where the scene needs what the integrator says that it lacks.
-    reasons : what is not right, a sentence each, the first of them that of the verdict; or why it is lacking.
-    errors : setting, error of event times, error of states, for every setting that ran.
+        "lacks", if the scene needs a capability that the integrator states to lack.
+    reasons : errors as sentences, starting with the reason of the verdict; or the missing capability.
+    errors : setting, error of event times and error of states of every completed setting.
     """
 
     integrator: str
@@ -55,7 +55,7 @@ def outcome(method: str | type[Integrator], scene: Scene, **options: Any) -> Out
 
     Parameters
     ----------
-    method : the name of a registered integrator, or an `Integrator` class of your own, registered or not.
+    method : the name of a registered integrator, or an `Integrator` class.
     """
     with registered(method) as name:
         one = integrator(name)

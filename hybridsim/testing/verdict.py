@@ -19,13 +19,13 @@ ERROR = "error"
 NOT_RUN = "not run"
 LACKS = "lacks"  # only used by `outcome`, which skips scenes beyond an integrator's stated limits; the atlas runs them
 VERDICTS = {
-    RIGHT: "every event found and none invented, and at the tightest setting errors within the scene's tolerance",
-    WRONG_ANSWER: "the run ends as if all were well, and its numbers are wrong or do not become right",
-    WRONG_SEQUENCE: "an event missed, invented or out of order, or a mode that is not the motion's",
-    HANG: "no end within the time or the steps that a run may take",
-    REFUSED: "it says that it cannot, with the reason: before the run, or where it stops",
-    ERROR: "it ends in an exception that is no refusal: a fault of the program",
-    NOT_RUN: "nothing to run: no friction to regularise, or a long row and a method that steps in Python",
+    RIGHT: "the event sequence is correct, and at the tightest setting the errors are within the scene's tolerance",
+    WRONG_ANSWER: "the run ends without an error, but its numbers are wrong or do not converge",
+    WRONG_SEQUENCE: "an event is missed, invented or out of order, or a mode is wrong",
+    HANG: "the run exceeds its limit of time or steps",
+    REFUSED: "the method reports that it cannot run the scene, with the reason, before the run or when it stops",
+    ERROR: "the run ends in an unexpected exception",
+    NOT_RUN: "not applicable: no friction to regularise, or too many steps for a method that steps in Python",
 }
 WRONG = (WRONG_ANSWER, WRONG_SEQUENCE)
 

@@ -45,11 +45,10 @@ class Caution:
 def warnings_of(model: Model) -> tuple[Caution, ...]:
     """Return the warnings about a valid model; those about guards come first.
 
-    A guard or monitor that is a square, an absolute value or otherwise of one sign; one that is constant while its mode
-    lasts; one whose quantities have no units where all others have; a pulse in plain t; a jump inside a mode; a
-    fractional power of a contact's velocity; a load or a friction force of the wrong sign. Nothing is reported that the
-    form of an expression, or its value at the start, does not show. The guards of contacts and surfaces are made by
-    the program and not looked at.
+    Warnings concern guards and monitors that are of one sign, constant in their mode, or without units if all other
+    states have units; pulses in t; jumps that are not treated as switching surfaces; fractional powers of a contact's
+    velocity; and loads or friction forces of the wrong sign. They are based on the form of the expressions and their
+    values at the start. Guards of contacts and surfaces, which the program creates, are not checked.
     """
     return (
         *_of_signs(model),

@@ -229,8 +229,8 @@ def product_of_signs(meanings: Meanings, first: ast.expr, second: ast.expr) -> a
 def not_linear(trees: Iterable[tuple[str, ast.expr]], carried: Mapping[str, Set[str]]) -> set[str]:
     """Return the signs that enter nonlinearly for given values of all others.
 
-    trees: values of names, and rates, which have none. carried: signs and forces, by themselves, and what jumps with
-    them.
+    `trees` contains the expressions of names, and of rates without a name. `carried` maps signs, forces and variables
+    that jump with them to these signs.
     """
     carried, size, trees = dict(carried), -1, list(trees)
     while size < len(carried):

@@ -40,8 +40,8 @@ class Cell:
 
     Parameters
     ----------
-    reason : what is not right, in one sentence.
-    order : of a fixed-step method, that the errors of states show; None where it cannot be seen.
+    reason : the first error, in one sentence.
+    order : observed order of convergence of a fixed-step method, or None.
     """
 
     scene: str

@@ -41,11 +41,10 @@ class Configuration:
 
     Parameters
     ----------
-    name, title : what it is called in the matrix, and what it is.
+    name, title : name in the matrix, and description.
     integrator : the name of a registered integrator.
-    kind : "best", the integrator as well as it can be run; "published", with its defaults and three steps; "native",
-        with SciPy's own event handling; "cooldown"; or the form of `Model.regularized` that is run
-        instead of the model.
+    kind : "best" for the best settings of the integrator; "published" for its defaults with three step sizes; "native"
+        for SciPy's own event handling; "cooldown"; or the form of `Model.regularized` to run.
     """
 
     name: str
@@ -110,7 +109,7 @@ class Configuration:
         if self.form and not judge.load(scene).contacts:
             return "the model has no friction contact to regularise"
         if self.form and not scene.truth.states:
-            return "what is known of the motion are its modes, and a regularised contact has none"
+            return "only the modes of the motion are known, and a regularised contact has no modes"
         if self.form and not self.settings(scene):
             return "too long for its steps"
         return ""
@@ -124,13 +123,13 @@ def configurations() -> tuple[Configuration, ...]:
             found += [
                 Configuration(
                     "rk4-dichotomy",
-                    "the published method as published: 16 halvings, eps_v = 8e-4, the velocity kept in stick",
+                    "the method as published: 16 bisections, eps_v = 8e-4, velocity not reset in stick",
                     one.name,
                     "published",
                 ),
                 Configuration(
                     "rk4-dichotomy refined",
-                    "the same with located release, velocity zero in stick and eps_v that falls with the step",
+                    "the published method with located release, zero velocity in stick and decreasing eps_v",
                     one.name,
                 ),
             ]
@@ -152,7 +151,7 @@ def configurations() -> tuple[Configuration, ...]:
         found.append(
             Configuration(
                 f"rk4 {form}",
-                f"classic RK4 on the {form} form of friction, both step and width falling",
+                f"classic RK4 with {form} friction; step and width decrease together",
                 "rk4-sign",
                 form,
             )
@@ -163,7 +162,7 @@ def configurations() -> tuple[Configuration, ...]:
 def chosen(names: tuple[str, ...] | None) -> tuple[Configuration, ...]:
     """Return the methods with these names, or of these integrators; without names, all.
 
-    The regularised forms of a model belong to no integrator: they are asked for by their own names.
+    Regularised forms belong to no integrator and must be named themselves.
     """
     every = configurations()
     if names is None:

@@ -21,17 +21,17 @@ class CooldownRK45(ScipyRK45):
 
     Parameters
     ----------
-    cooldown : how long, in the unit of t. What becomes negative in that time is not seen, then or later.
+    cooldown : length of the cooldown, in the unit of t. Guards that become negative in this time are missed.
 
-    When to choose it: never; it shows what the usual remedy for events that fire twice costs.
-    Source: the terminal events of heyoka have such a time (F. Biscani, D. Izzo, MNRAS 504 (2021) 2614,
-    doi:10.1093/mnras/stab1032); its users may leave it to be deduced.
+    When to use it: never; it shows the errors of the usual remedy for events that fire twice.
+    Source: terminal events of heyoka have a cooldown (F. Biscani, D. Izzo, MNRAS 504 (2021) 2614,
+    doi:10.1093/mnras/stab1032), which heyoka can also choose automatically.
     """
 
     cooldown: float = 1e-3
 
     name: ClassVar[str] = "scipy-rk45-cooldown"
-    title: ClassVar[str] = "SciPy RK45, blind to guards for a while after each event"
+    title: ClassVar[str] = "SciPy RK45, which ignores guards for a while after each event"
 
     def start(
         self,

@@ -46,10 +46,10 @@ class Example:
 
     Parameters
     ----------
-    state, unit : name and unit of the state that is shown.
-    time : the unit of time, or nothing.
-    points : true values in the window, from the truth of the scene.
-    failing : None where no method fails.
+    state, unit : name and unit of the displayed state.
+    time : the unit of time, or an empty string.
+    points : true values in the window.
+    failing : the failing run, or None if no method fails.
     stopped : whether the failing run ended inside the window.
     """
 

@@ -32,8 +32,8 @@ class Atlas:
 
     Parameters
     ----------
-    cells : by scene and configuration name.
-    interrupted : whether Ctrl-C ended it; then the scenes are those that were done.
+    cells : cells by names of scene and method.
+    interrupted : whether Ctrl-C stopped the atlas, which then contains only the finished scenes.
     """
 
     scenes: tuple[Scene, ...]
@@ -108,16 +108,16 @@ def atlas(
 
     Parameters
     ----------
-    scenes : the package's own without it.
-    integrators : names of integrators or configurations, or an `Integrator` class of your own; all without it.
-    quick : the loosest setting of each study only, which shows gross failures.
-    workers : processes, of which each starts Python anew: with more than one, scenes and integrators have to be the
-        package's own or installed, and a script needs its ``if __name__ == "__main__"``.
-    progress : called with the finished fraction and the name of the scene; it may raise KeyboardInterrupt.
+    scenes : scenes to run; the default is the packaged scenes.
+    integrators : names of integrators or methods, or one `Integrator` class; the default is all.
+    quick : whether to run only the loosest setting of each study, which finds gross failures.
+    workers : number of processes. With more than one, scenes and integrators must be importable in a new process, and
+        a script needs ``if __name__ == "__main__"``.
+    progress : function of the finished fraction and the name of the scene; it may raise KeyboardInterrupt.
 
     Returns
     -------
-    The matrix. After Ctrl-C, that of the scenes that were done by then, with `interrupted`.
+    The matrix; after Ctrl-C it contains only the finished scenes, and `interrupted` is True.
 
     Raises
     ------

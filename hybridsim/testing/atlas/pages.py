@@ -17,46 +17,46 @@ _WIDTH = 118
 _INTRODUCTION = """\
 # The atlas: where methods fail
 
-Scenes whose answer is known and which break simulators, run with every integrator and with what else people use.
-The truth of each is a closed form, or 30 digits and more from a computation that shares no code with the package.
-`hybridsim atlas` makes these pages.
+The atlas runs benchmark scenes with known answers with every integrator and with other common methods. The known answer
+of each scene is a closed form, or at least 30 digits from a computation that shares no code with the package.
+`hybridsim atlas` creates these pages.
 
 ![scenes against integrators, a verdict for each pair](matrix.png)
 
-A method is *right* in a scene when every event is found, in the right mode and order, none is invented, what is held is
-exact at every setting, and the errors come down to the scene's tolerance from setting to setting:
+A method is *right* in a scene if it finds every event in the right mode and order, invents no event, keeps the held
+states exact at every setting, and converges to the scene's tolerance:
 
 | method | settings |
 | --- | --- |
-| with an error control | rtol 1e-6, 1e-9 and 1e-12; in a few scenes 1e-8, 1e-10 and 1e-12, or only 1e-9 and 1e-12; \
-1e-13 where nothing but the error at 1e-12 is above the scene's tolerance |
+| with error control | rtol 1e-6, 1e-9 and 1e-12; in a few scenes 1e-8, 1e-10 and 1e-12, or only 1e-9 and 1e-12; \
+1e-13 if only the error at 1e-12 exceeds the scene's tolerance |
 | `rk4-dichotomy`, `rk4-sign` | steps of unit/300, unit/1200 and unit/4800 |
-| `moreau`, which is of first order | steps of unit/4800, unit/19200 and unit/76800 |
+| `moreau` (first order) | steps of unit/4800, unit/19200 and unit/76800 |
 | `rk4 tanh`, `rk4 karnopp` | v0 of 1e-2, 1e-3 and 1e-4 of the scene's speed, with steps of unit/1200, unit/12000 \
-and unit/120000, as far as 2e6 steps are enough for the run |
-| `scipy-rk45 cooldown` | rtol 1e-9, blind for 1e-2, 1e-3 and 1e-4 units after each event |
+and unit/120000, if the run needs at most 2e6 steps |
+| `scipy-rk45 cooldown` | rtol 1e-9, guards ignored for 1e-2, 1e-3 and 1e-4 units after each event |
 
-The scene's tolerance is that of a method with an error control, 1e-5 at least for `rk4-dichotomy`, which halves its
-steps, and 4.2e-4 (two of the finest 4800 steps) for methods that take an event where a step ends. `scipy-rk23` has
-tolerances a hundred times looser in scenes of more than fifty units. The *unit* is the scene's own time: the period
-of its forcing, or about one swing of its motion. The figure behind a name is the larger of two errors at the last
-setting: of event times, in units, and of states, each relative to its largest true value in the scene. Behind it
-stands the order in the step that the last two settings show, where the error falls with the step at all. Everything
-is run, also where an integrator says what it lacks; what fails there fails for the reason that it gives.
+The *unit* of a scene is its typical time: the forcing period, or about one oscillation. The scene's tolerance applies
+to methods with error control. It is at least 1e-5 for `rk4-dichotomy`, which bisects its steps, and 4.2e-4 (two of
+the finest 4800 steps) for methods that place events at the ends of steps. In scenes of more than fifty units
+`scipy-rk23` has tolerances that are 100 times looser. The number after a name is the larger of two errors at the last
+setting: the error of event times in units, and the error of states relative to their largest true value. If the error
+decreases with the step, the observed order of convergence follows. Scenes beyond the stated limits of an integrator
+are run too; the integrator then fails for the stated reason.
 
-All methods share the location and the decisions of events, unless their name says otherwise: native events, cooldown,
-regularised forms, and the fixed-step methods. Where all are right, the text says what goes
-wrong in programs that decide otherwise.
+All methods share the location of events and the selection of modes, except methods with native events, with a cooldown
+or with regularised forms, and the fixed-step methods. In scenes in which all methods are right, the text
+describes what goes wrong in other programs.
 
-A scene's picture shows one state over a part of the run, around where a method first goes visibly wrong: solid what is
-right, dashed the failing method that the legend names, at the setting of which the table tells. The strip below has a
-tick for each event in that part, and at its right edge their number, in the colour of each run. Circles are values
-that are known; an error below 4 % of the motion has a panel of its own.
+The picture of a scene shows one state in a time window around the first visible error of a method. The solid line is a
+correct run. The dashed line is the failing method named in the legend, at the setting given in the table. The strip
+below shows the events of both runs in this window, and their numbers at its right edge. Circles are known values. An
+error below 4 % of the motion has its own panel.
 """
 _LEAST_ORDER = 0.5  # smallest order that counts as convergence
 _NUMBER = re.compile(r"(?<![\w.])\d+\.\d{9,}(?:e[+-]?\d+)?")
 _DIGITS = 9  # digits of numbers in reasons
-_RUBBING = "Friction at a hard stop: the scene `rubbing-stop`, and `hybridsim run thrown-block`."
+_RUBBING = "For friction at a hard stop see the scene `rubbing-stop` and `hybridsim run thrown-block`."
 
 
 def pages(result: Atlas, pictures: Collection[str] = ()) -> dict[str, str]:
@@ -70,9 +70,9 @@ def pages(result: Atlas, pictures: Collection[str] = ()) -> dict[str, str]:
 
 def index(result: Atlas, groups: Mapping[str, list[Scene]]) -> str:
     """Return the text of the index page."""
-    lines = [_INTRODUCTION, "| verdict | what it means |", "| --- | --- |"]
+    lines = [_INTRODUCTION, "| verdict | meaning |", "| --- | --- |"]
     lines += [f"| {verdict} | {meaning} |" for verdict, meaning in VERDICTS.items()]
-    lines += ["", "## Classes of trouble", "", "| class | scenes | what it is about |", "| --- | --- | --- |"]
+    lines += ["", "## Classes of scenes", "", "| class | scenes | topic |", "| --- | --- | --- |"]
     for trouble, scenes in groups.items():
         name = trouble or "scenes"
         lines.append(
@@ -85,8 +85,8 @@ def index(result: Atlas, groups: Mapping[str, list[Scene]]) -> str:
         lines += [*textwrap.wrap(f"**{name}**: {links}", _WIDTH, break_on_hyphens=False), ""]
     lines.append(_RUBBING)
     shown = [verdict for verdict in VERDICTS if verdict != RIGHT]
-    lines += ["", "## Integrators and what else people use", ""]
-    lines.append(f"| name | what it is | {RIGHT} | {' | '.join(shown)} |")
+    lines += ["", "## Integrators and other methods", ""]
+    lines.append(f"| name | method | {RIGHT} | {' | '.join(shown)} |")
     lines.append("| --- | --- | " + " | ".join(["---"] * (1 + len(shown))) + " |")
     for one in result.configurations:
         cells = result.column(one)
