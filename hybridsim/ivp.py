@@ -138,11 +138,11 @@ def _modes(system: Any, given: Mapping[str, str] | None) -> np.ndarray:
     names = [a.name for a in system.automata]
     z: object = {} if given is None else given
     if not isinstance(z, Mapping):
-        raise UsageError(f"z is {z!r}", remedy="give a mapping from names of components to names of modes")
+        raise UsageError(f"z is {z!r}", remedy="use a dict of component names and mode names")
     for name in z:
         if name not in names:
             raise UsageError(
-                f"z names {name!r}, which is no component of model {system.model.name}",
+                f"z contains {name!r}, which is not a component of model '{system.model.name}'",
                 remedy=nearest(str(name), names, kind="components"),
             )
     modes = []
@@ -150,12 +150,12 @@ def _modes(system: Any, given: Mapping[str, str] | None) -> np.ndarray:
         mode = z.get(automaton.name)
         if mode is None and automaton.initial < 0:
             raise UsageError(
-                f"z gives no mode of {automaton.name}, and it has no initial one",
-                remedy=f"give one of {', '.join(automaton.modes)}",
+                f"z needs a mode of {automaton.name}, which has no initial mode",
+                remedy=f"use one of {', '.join(automaton.modes)}",
             )
         if mode is not None and mode not in automaton.modes:
             raise UsageError(
-                f"z of {automaton.name} is {mode!r}, which is no mode of it",
+                f"z of {automaton.name} is {mode!r}, which is not a mode of {automaton.name}",
                 remedy=nearest(str(mode), automaton.modes, kind="modes"),
             )
         modes.append(automaton.initial if mode is None else automaton.modes.index(mode))
