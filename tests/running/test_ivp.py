@@ -85,8 +85,8 @@ def test_inputs_are_looked_up_at_any_time() -> None:
 @pytest.mark.parametrize(
     ("z", "words"),
     [
-        ({}, "no mode of f"),
-        ({"g": "stick"}, "no component"),
+        ({}, "z needs a mode of f"),
+        ({"g": "stick"}, "not a component"),
         ({"f": "sticks"}, "stick"),
     ],
 )
