@@ -15,7 +15,7 @@ __version__ = "0.1.0.dev0"
 
 # The module that defines each public name. `__init__.pyi` repeats them for type checkers; a test compares both.
 _HOME = {
-    # declaring
+    # model declarations
     "Choice": "hybridsim.model",
     "Component": "hybridsim.model",
     "Contact": "hybridsim.model",
@@ -44,7 +44,7 @@ _HOME = {
     "chain_on_belt": "hybridsim.mechanics.declaration.scenes",
     "three_coupled_blocks": "hybridsim.mechanics.declaration.scenes",
     "two_blocks_on_belt": "hybridsim.mechanics.declaration.scenes",
-    # running
+    # simulation
     "MechanicalSolution": "hybridsim.mechanics.series_loop.solution",
     "SteppedSolution": "hybridsim.mechanics.time_stepping.solution",
     "Event": "hybridsim.solution",
@@ -54,7 +54,7 @@ _HOME = {
     "load_solution": "hybridsim.solution",
     "simulate": "hybridsim.simulate",
     "to_ivp": "hybridsim.ivp",
-    # asking
+    # analysis
     "Branch": "hybridsim.analysis",
     "Advice": "hybridsim.analysis",
     "Comparison": "hybridsim.analysis",
@@ -75,7 +75,7 @@ _HOME = {
     "sensitivities": "hybridsim.analysis",
     "steady_state": "hybridsim.analysis",
     "sweep": "hybridsim.analysis",
-    # failing
+    # errors
     "ExpressionError": "hybridsim.errors",
     "HybridsimError": "hybridsim.errors",
     "ModelError": "hybridsim.errors",

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from hybridsim.engine.system.system import System
     from hybridsim.integrators.contract import Integrator
 
-# The smallest rtol that means anything: a hundred units in the last place, as SciPy has it.
+# The smallest useful rtol: 100 units in the last place, as in SciPy.
 SMALLEST_RTOL = 100 * 2.0**-52
 RTOL = 1e-9
 

@@ -116,7 +116,7 @@ def to_ivp(
             flow, s = at(t, state := _state(x))
             return float(flow.guards(np.array([s]), state[None, :])[0, number])
 
-        # a function has no such attributes by its type; solve_ivp reads the first two off it
+        # solve_ivp reads the attributes terminal and direction; component and guard are for the user
         value.terminal, value.direction = True, -1  # type: ignore[attr-defined]  # SciPy reads them off the function
         value.component, value.guard = component, guard  # type: ignore[attr-defined]  # for the caller to read
         return value
