@@ -112,17 +112,17 @@ def _component(component: Component, report: Report) -> Iterator[str]:
         beyond = (
             f"impact with restitution {_flat(surface.restitution)} when it reaches 0"
             if surface.restitution is not None
-            else f"{surface.below} where it is < 0"
+            else f"{surface.below} for {_flat(surface.function)} < 0"
         )
         yield (
-            f"{surface.above} where {_flat(surface.function)} > 0, {beyond}; "
-            f"{surface.hold} holds it at 0 with the force {surface.unknown}"
-            + (f"; {held} is then computed from the constraint" if held else "")
-            + (f"; {', '.join(projected)} are projected onto the surface" if projected else "")
+            f"{surface.above} for {_flat(surface.function)} > 0, {beyond}; "
+            f"in {surface.hold} the unknown {surface.unknown} keeps it at 0"
+            + (f" ({held} is computed from the constraint)" if held else "")
+            + (f" ({', '.join(projected)} projected onto the surface)" if projected else "")
             + (
                 ""
                 if held or projected
-                else f"; its rate does not depend on {surface.unknown}: the surface can only be crossed"
+                else f"; the surface can only be crossed, because its rate does not depend on {surface.unknown}"
             )
         )
     if limit := component.limit:
