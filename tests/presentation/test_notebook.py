@@ -174,7 +174,7 @@ def test_a_hundred_thousand_events_stay_small() -> None:
     page = Page(text)
     rectangles = page.all("rect")
     assert 300 < len(rectangles) <= 1000
-    assert "990 more warnings" in page.text() and "shares" in page.text()
+    assert "990 more warnings" in page.text() and "fraction of time in each mode" in page.text()
     areas = dict.fromkeys(("#0072B2", "#D55E00", "#009E73"), 0.0)
     for attributes, title in rectangles:
         areas[str(attributes["fill"])] += float(attributes["width"]) * float(attributes["height"])

@@ -57,7 +57,7 @@ def test_a_run_is_stopped_by_its_own_work_alone() -> None:
     time.sleep(0.2)
     clock(0.1)
     work(0.06)
-    with pytest.raises(LimitReached, match=r"and 0\.05 were allowed"):
+    with pytest.raises(LimitReached, match=r"0\.05 s allowed"):
         clock(0.2)
 
 

@@ -162,7 +162,7 @@ class Model(Declared):
     def _state(self, name: str, start: Any) -> State:
         if self.flow is None:
             remedy = "use hs.State(name, start, der) objects, or define all rates by a function flow(t, x, p)"
-            raise self._fault(f"state {name} has no rate", remedy)
+            raise self._fault(f"states: {name} has no rate", remedy)
         return State(name, start, parse(0))
 
     def _named(self, field: str, kind: Callable[[str, Any], Any]) -> None:

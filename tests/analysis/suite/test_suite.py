@@ -112,7 +112,7 @@ def test_verdicts() -> None:
     assert verdict(scene, [row(0.2, right)]) is Verdict.OFF
     assert verdict(scene, [row(0.2, wrong)]) is Verdict.WRONG
     assert verdict(grazing, [row(0.2, wrong)]) is Verdict.WRONG
-    assert verdict(grazing, [row(0.2, wrong, integrator="cvode-bdf")]) is Verdict.LACKS
+    assert verdict(grazing, [row(0.2, wrong, integrator="rk4-sign")]) is Verdict.LACKS
     assert (
         verdict(scene, [row(0.2, wrong, 1e-4), row(1e-9, right, 1e-9), row(1.0, wrong, 1e-12)])
         is Verdict.RIGHT
