@@ -117,7 +117,7 @@ def _component(component: Component, report: Report) -> Iterator[str]:
         yield (
             f"{surface.above} for {_flat(surface.function)} > 0, {beyond}; "
             f"in {surface.hold} the unknown {surface.unknown} keeps it at 0"
-            + (f" ({held} is computed from the constraint)" if held else "")
+            + (f" ({held} from the constraint)" if held else "")
             + (f" ({', '.join(projected)} projected onto the surface)" if projected else "")
             + (
                 ""
