@@ -202,7 +202,7 @@ def test_without_a_limit_the_run_ends_there() -> None:
     endless = hs.Component(component.name, component.modes, initial="flight")
     sol = hs.simulate(hs.Model("ball", states=model.states, components=[endless]), (0, 5))
     assert sol.status == "accumulation"
-    assert "of ball: declare the limit" in sol.message
+    assert "events of ball accumulate" in sol.message
     assert sol.t_end == pytest.approx(limit(0.5), abs=1e-6)
 
 

@@ -69,8 +69,8 @@ def test_chattering_is_named_with_its_time() -> None:
     for integrator in ("dop853", "exact", "scipy-dop853"):
         sol = hs.simulate(switched(1e-4), (0, 1.2), integrator=integrator)
         (warning,) = told(sol, "chattering")
-        assert "are of relay" in warning
-        since = float(warning.split("from t = ")[1].split()[0])
+        assert "belong to relay" in warning
+        since = float(warning.split("from t = ")[1].split(",")[0])
         assert since >= 1 / 1.1  # where x first comes to the edge
 
 

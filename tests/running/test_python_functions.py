@@ -29,7 +29,7 @@ def test_functions_that_cannot_be_compiled_run_with_scipy_and_say_so() -> None:
     model = oscillator(flow=Spring(9.0))
     sol = hs.simulate(model, (0, 2))
     assert sol.integrator == "scipy-dop853" and "numba cannot compile" in sol.message
-    assert any("called from Python" in w and "Spring" in w for w in sol.warnings)
+    assert any("called as Python" in w and "Spring" in w for w in sol.warnings)
     np.testing.assert_allclose(sol.y[0], np.cos(3 * sol.t), atol=1e-8)
     np.testing.assert_allclose(sol.event_times("zero"), math.pi / 6, atol=1e-8)
     for name in ("dop853", "cvode-adams"):
@@ -130,7 +130,7 @@ def test_functions_cannot_be_written_to_toml() -> None:
 def test_a_function_of_other_arguments_is_told_what_it_is_called_with() -> None:
     """A flow as SciPy has it, of time and state alone."""
     model = hs.Model("turn", states={"x": 1.0, "v": 0.0}, flow=lambda t, x: (x[1], -x[0]))
-    with pytest.raises(hs.ModelError, match=r"takes \(t, x\), and is called with \(t, x, p\)"):
+    with pytest.raises(hs.ModelError, match=r"takes \(t, x\), but is called with \(t, x, p\)"):
         hs.simulate(model, (0, 1))
 
 
@@ -147,7 +147,7 @@ def returning(t: float, x: Any, p: Any) -> Any:
     ("flow", "told"),
     [
         (raising, "the function raising raised ZeroDivisionError"),
-        (returning, "the function returning returned (-1, inf); look there for a division by zero"),
+        (returning, "the function returning returned (-1, inf); look for a division by zero there"),
     ],
 )
 def test_a_division_by_zero_in_a_flow_is_told_with_the_name_of_the_function(
@@ -273,7 +273,7 @@ def test_a_flow_with_a_default_is_called_from_python() -> None:
 
     sol = hs.simulate(hs.Model("swing", states={"x": 1.0, "v": 0.0}, flow=flow), (0, 5), rtol=1e-10)
     assert sol.y[0, -1] == pytest.approx(math.cos(10.0), abs=1e-7)
-    assert any("called from Python" in text for text in sol.warnings)
+    assert any("called as Python" in text for text in sol.warnings)
 
 
 def test_nothing_is_compiled_again_as_long_as_nothing_outside_has_changed() -> None:

@@ -15,12 +15,18 @@ from hybridsim.engine.system.system import System
 def held(system: System, z: np.ndarray) -> str:
     """Why a state that is held at a surface has no unique past; empty if none is held."""
     names = [a.name for a, m in zip(system.automata, z, strict=True) if a.has_surface and m == a.hold]
-    return f"{', '.join(names)} held: many motions come to rest in the same state" if names else ""
+    return (
+        f"{', '.join(names)} is in a holding mode, which several different motions can enter, so the past is not unique"
+        if names
+        else ""
+    )
 
 
 def said_of_direction(t0: float, t1: float) -> str:
     """What is to be known of a run backward that did not reach its end, for whom did not mean to run so."""
-    return f"; this run goes backward in time, from t = {t0!r} to {t1!r}: give t_span the other way round to go forward"
+    return (
+        f"; this run goes backward in time, from t = {t0!r} to {t1!r}: swap the ends of t_span to run forward"
+    )
 
 
 def entered_here(system: System, z: np.ndarray, fired: tuple[int, ...]) -> str:
@@ -29,7 +35,7 @@ def entered_here(system: System, z: np.ndarray, fired: tuple[int, ...]) -> str:
         automaton = system.automata[int(system.owner[g])]
         if not (automaton.has_surface or automaton.is_corner):
             mode = automaton.modes[z[system.owner[g]]]
-            return f"mode {mode} of {automaton.name} began here or came through a transition: its past is not unique"
+            return f"mode {mode} of {automaton.name} began here or was entered by a transition: its past is not unique"
     return ""
 
 
@@ -45,7 +51,7 @@ def has_no_past(
     resets = [model.schedules[k].name for k in schedules if model.schedules[k].reset]
     resets += [system.monitor_names[k] for k in stopping if model.monitors[k].reset]
     if resets:
-        return f"running backward, the reset of {', '.join(resets)} has no unique past"
+        return f"the reset of {', '.join(resets)} cannot be inverted, so the past before it is not unique"
     return entered_here(system, z, fired)
 
 
@@ -96,6 +102,6 @@ def cross_backward(system: System, at: Situation, fired: tuple[int, ...]) -> Out
         could_rest = forward.verdict(rest, [c]) != LEAVES
         if outcome.status or could_rest or outcome.z[c] != other:
             outcome.status = "backward-nonunique"
-            outcome.message = f"{automaton.name} reaches a surface from which more than one past leads away"
+            outcome.message = f"{automaton.name} reaches a surface that several motions can have reached"
             break
     return outcome

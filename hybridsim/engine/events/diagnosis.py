@@ -156,7 +156,7 @@ def power_without_value(system: System, names: list[str], t: float, x: np.ndarra
     for node, base, power in (found for rate in rates for found in roots_in(rate, meanings)):
         value = number_of(base, values, meanings.lookup)
         if value is not None and value < 0.0:  # None: it depends on what a mode sets
-            remedy = f"to go on beyond zero, write abs({write(base)})**{power}*sign({write(base)})"
+            remedy = f"to continue beyond zero, write abs({write(base)})**{power}*sign({write(base)})"
             return f": '{write(node)}' has no value for {write(base)} < 0; {remedy}, or end the run there by a monitor"
     return ""
 
@@ -184,8 +184,8 @@ def _power_without_series(system: System, x: np.ndarray, ahead: np.ndarray) -> s
                 text, place = write(base), state.der.place or state.place
                 return (
                     f"{place.prefix if place else ''}'{write(node)}' in the rate of {state.name} has no Taylor series "
-                    f"at {text} <= 0, as its exponent is {power:g} under a name; write the number itself, or choose an "
-                    "integrator without series, such as dop853"
+                    f"at {text} <= 0, as its exponent is {power:g} given by a name; write the number itself, or use an "
+                    "integrator without Taylor series, such as dop853"
                 )
     return ""
 

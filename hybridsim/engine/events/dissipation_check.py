@@ -25,19 +25,19 @@ def refuse_driving(system: System, t0: float, x: np.ndarray, discrete: np.ndarra
         if automaton.is_unilateral:
             if effect <= 0.0:
                 raise ModelError(
-                    f"impact {automaton.name}: the force {automaton.name} pulls its gap shut instead of pushing it "
-                    f"open (its effect on the second derivative is {effect:.6g}, and should be positive)",
+                    f"impact {automaton.name}: the force {automaton.name} closes its gap instead of opening it "
+                    f"(its effect on the second derivative of the gap is {effect:.6g} and must be positive)",
                     place=system.model.all_components()[c].place,
-                    remedy=f"turn the sign of {automaton.name} in the rates round, or that of the gap",
+                    remedy=f"reverse the sign of {automaton.name} in the rates, or the sign of the gap",
                 )
         elif effect >= 0.0 and not system.automata[c].is_unique:
             name = system.automata[c].name
             place = system.model.all_components()[c].place
             raise ModelError(
                 f"contact {name}: the force {name} acts along its relative velocity, not against it "
-                f"(its effect on the relative acceleration is {effect:.6g}, and should be negative)",
+                f"(its effect on the relative acceleration is {effect:.6g} and must be negative)",
                 place=place,
-                remedy=f"let {name} enter the derivative of the velocity as '- {name}', or turn the velocity round",
+                remedy=f"write '- {name}' in the derivative of the velocity, or reverse the sign of the velocity",
             )
     if len(system.opposed) < _MOST:
         system.opposed.add(start)

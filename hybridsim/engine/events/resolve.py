@@ -150,7 +150,7 @@ class Settling:
         )
         return (
             "cascade",
-            f"transitions follow each other over and over, {self.most_rounds} rounds without rest ({names}); "
+            f"transitions repeat without time advancing, {self.most_rounds} rounds without rest (modes {names}); "
             f"guards that fire: {guards}{words_on_cascade(self)}",
         )
 
@@ -336,7 +336,10 @@ class Settling:
         sizes = [len(automata[c].modes) for c in taking_part]
         if math.prod(sizes) > _MOST_CANDIDATES:
             names = ", ".join(automata[c].name for c in taking_part)
-            return "inconsistent", f"{len(sizes)} coupled components at their surfaces at once ({names})"
+            return (
+                "inconsistent",
+                f"{len(sizes)} coupled components reach their surfaces at once ({names}), too many to solve",
+            )
         candidates = together(self.system, taking_part, joint_candidates(sizes))
         at.x = self._pinned(taking_part)
         at.x_error = np.where(self.pinned_states(taking_part), UNIT * np.abs(at.x), at.x_error)

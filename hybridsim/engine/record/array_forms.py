@@ -29,23 +29,26 @@ def check_forms(
     known = dict(sizes)
     for name, (kind, lengths) in forms.items():
         if name not in arrays:
-            raise ValueError(f"{title} has no array '{name}'")
+            raise ValueError(f"{title} lacks the array '{name}'")
         array = arrays[name]
         if array.dtype != np.dtype(kind) or array.ndim != len(lengths):
-            raise ValueError(f"{title}: '{name}' holds {array.dtype} in {array.ndim} dimensions")
+            raise ValueError(
+                f"{title}: '{name}' has the type {array.dtype} and {array.ndim} dimensions, instead of {kind} and "
+                f"{len(lengths)}"
+            )
         for length, wanted in zip(array.shape, lengths, strict=True):
             if isinstance(wanted, str):
                 size, _, more = wanted.partition("+")
                 wanted = known.setdefault(size, length - int(more or 0)) + int(more or 0)
             if length != wanted:
-                raise ValueError(f"{title}: '{name}' has the shape {array.shape}")
+                raise ValueError(f"{title}: '{name}' has the wrong shape {array.shape}")
     return known
 
 
 def check_range(what: str, array: np.ndarray, low: float, high: float) -> None:
     """Refuse numbers outside of what they may be; NaN is outside of everything."""
     if array.size and not (array.min() >= low and array.max() <= high):
-        raise ValueError(f"{what} is not from {low} to {high}")
+        raise ValueError(f"{what} is not within {low} to {high}")
 
 
 def check_finite(what: str, *arrays: np.ndarray) -> None:
@@ -58,19 +61,19 @@ def check_ascending(what: str, array: np.ndarray, *, strictly: bool = False) -> 
     """Refuse numbers that fall, or stand still."""
     steps = np.diff(array)
     if not ((steps > 0).all() if strictly else (steps >= 0).all()):
-        raise ValueError(f"{what} does not ascend")
+        raise ValueError(f"{what} is not in ascending order")
 
 
 def check_modes(what: str, modes: np.ndarray, counts: Sequence[int], lowest: int = 0) -> None:
     """Refuse numbers (..., C) of modes that the components, with so many each, do not have."""
     if not ((modes >= lowest) & (modes < np.asarray(counts, dtype=np.int64))).all():
-        raise ValueError(f"{what} is a mode that its component does not have")
+        raise ValueError(f"{what} is not a mode of its component")
 
 
 def check_instant(what: str, instant: object) -> tuple[float, float]:
     """A time as the sum of two finite doubles; anything else is refused."""
     if not isinstance(instant, list | tuple) or len(instant) != 2:
-        raise ValueError(f"{what} is no time")
+        raise ValueError(f"{what} is not a time")
     return check_number(what, instant[0]), check_number(what, instant[1])
 
 

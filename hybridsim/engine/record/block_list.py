@@ -103,7 +103,7 @@ class Chain(Sequence[Item]):
         if (
             blocks and count and not isinstance(blocks[-1], list)
         ):  # a run goes on where a block in arrays ends
-            raise damaged("how much of the run stays")
+            raise damaged("the number of stored items")
         if blocks and isinstance(blocks[-1], list):
             last = self._loose()
             last.extend(blocks[-1][: len(blocks[-1]) - count])
@@ -139,7 +139,7 @@ class Chain(Sequence[Item]):
             if place < len(block):
                 return block[place]
             place -= len(block)
-        raise AssertionError("the blocks hold fewer items than they say")
+        raise AssertionError("the blocks hold fewer items than their lengths promise")
 
 
 class SegmentChain(Chain[Segment]):

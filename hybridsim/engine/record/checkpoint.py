@@ -55,5 +55,6 @@ class Checkpoint:
 def damaged(what: str) -> UsageError:
     """What is raised where a run cannot go on from a place that came from a file."""
     return UsageError(
-        f"the run cannot go on: its file is damaged, in {what}", remedy="start a new one, from sol.y[:, -1]"
+        f"the run cannot be resumed: its file is damaged in {what}",
+        remedy="start a new run from sol.y[:, -1]",
     )

@@ -45,12 +45,16 @@ class Gauge:
         """Raise LimitReached where a limit is passed."""
         limits, counters = self.limits, self.counters
         if counters.events - self._events >= limits.events:
-            raise LimitReached(f"{counters.events - self._events} events, and {limits.events:g} were allowed")
+            raise LimitReached(
+                f"{counters.events - self._events} events were reached, and {limits.events:g} were allowed"
+            )
         if counters.steps - self._steps >= limits.steps:
-            raise LimitReached(f"{counters.steps - self._steps} steps, and {limits.steps:g} were allowed")
+            raise LimitReached(
+                f"{counters.steps - self._steps} steps were taken, and {limits.steps:g} were allowed"
+            )
         seconds = perf_counter() - self._began
         if seconds >= limits.seconds:
-            raise LimitReached(f"{seconds:.3g} s, and {limits.seconds:g} were allowed")
+            raise LimitReached(f"{seconds:.3g} s have passed, and {limits.seconds:g} were allowed")
         if limits.megabytes < inf:
             if self._looks % _OFTEN == 0 and (grown := resident_megabytes() - self._size) >= limits.megabytes:
                 raise LimitReached(

@@ -182,10 +182,10 @@ class Leaper(ABC):
     @place.setter
     def place(self, place: np.ndarray) -> None:
         if not (place.shape == (3,) and ((place >= 0.0) & (place <= max(_ROOM, self.steps))).all()):
-            raise damaged("how far the rows of the run are written")
+            raise damaged("the row counts of the run")
         rows, segments, steps = (int(number) for number in place)
         if not (1 <= steps <= self.steps and rows <= steps and segments <= _SEGMENTS + 1):
-            raise damaged("how far the rows of the run are written")
+            raise damaged("the row counts of the run")
         if steps != self.steps:
             self.steps = steps
             self._renew()

@@ -30,15 +30,13 @@ _LAST, _TURNS = 400, 0.2  # steps that are looked at then, and how many of them 
 _SOONER = 1.0  # seconds to go by an explicit method from which on a stiff one, a Python step at a time, is sooner there
 
 _JUMP = (
-    'the motion crawls along a jump of its rates: declare the surface it crosses ([surfaces.NAME] expr = "what changes '
-    'its sign"), a dry friction as a contact ([contacts.NAME])'
+    "the rates jump, and the steps at the jump are very short: declare the surface of the jump ([surfaces.NAME] "
+    'expr = "..."), or a contact ([contacts.NAME]) for dry friction'
 )
-_EVENTS = (
-    "events follow each other too closely: declare a wider hysteresis, a switching surface, or a mode's limit"
-)
+_EVENTS = "events follow each other too closely: declare a wider hysteresis, a switching surface or the limit of a mode"
 _STEPS = (
-    "choose a stiff integrator (rodas5p) if the motion is slow and its steps are short, declare `nominal` sizes or "
-    "pass a larger atol or rtol if the tolerance asks for too much, or a shorter t_span"
+    "use a stiff integrator (rodas5p) if the motion is slow and the steps are short; if the tolerance is too tight, "
+    "declare `nominal` sizes or pass a larger atol or rtol; or pass a shorter t_span"
 )
 
 HEADWAY_SIZE, HEADWAY_PACE = (
@@ -128,8 +126,8 @@ class Headway:
         if self._fades(now, spent, left) or is_hopeless:
             advice = _JUMP if crawls else _EVENTS if has_events else _STEPS
             raise NoHeadway(
-                f"no headway: what was done last led from t = {float(before)!r} to {float(now)!r}, and the rest would "
-                f"take {to_go / spent:.0e} times as much at the least",
+                f"no headway: the last interval led from t = {float(before):.9g} to {float(now):.9g}, and the rest of "
+                f"the run would take at least {to_go / spent:.0e} times as much work",
                 advice,
             )
 

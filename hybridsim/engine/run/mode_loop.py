@@ -126,7 +126,7 @@ class ModeLoop:
             elif not why and isinstance(failure, Collapsed):
                 why = advice_on_sizes(self.system)
             reached = self.record.segments[-1].end if self.record.segments else self.origin
-            self.record.message = f"after t = {float(reached)!r}: {failure}" + (f"; {why}" if why else "")
+            self.record.message = f"after t = {float(reached):.9g}: {failure}" + (f"; {why}" if why else "")
         except LimitReached as reached:
             self.record.stop_early("limit", str(reached), self.task.t0)
         except KeyboardInterrupt:
@@ -250,7 +250,7 @@ class ModeLoop:
         """Take a noted state up; the step size to begin with."""
         arrays = checkpoint.arrays
         if "step_size" not in arrays:  # of a method with fixed steps
-            raise damaged("the place where it goes on")
+            raise damaged("the checkpoint")
         self.origin = self.adopted = checkpoint.instant
         if checkpoint.settled is not None:
             self.timetable.kept(checkpoint.settled)
@@ -352,7 +352,9 @@ class ModeLoop:
         record.occurrences.extend(seen_on_the_way(self.system, self.origin, run, record))
         for k in sorted(run.undefined):
             name = self.system.monitor_names[k]
-            record.warn(f"monitor {name} is not a number on a part of the run: no crossing is seen there")
+            record.warn(
+                f"monitor {name} is not a number during a part of the run: its crossings there are not detected"
+            )
 
     # -- events ---------------------------------------------------------------------------------------------
 
@@ -370,7 +372,7 @@ class ModeLoop:
             self.origin = instant
             self.record.status = "backward-nonunique"
             self.record.message = (
-                f"at t = {float(instant)!r}: {arrival.entered} is zero: the mode may have begun here"
+                f"at t = {float(instant):.9g}: {arrival.entered} is zero, so the mode may have begun here"
             )
             return True
         if found is None and appointment is None and (self.forward or arrival.is_bare):
@@ -589,17 +591,17 @@ class ModeLoop:
         # a run that is ended here needs no modes that hold behind it
         is_over = self.forward and instant == self.end and is_only_fatal(system, outcome)
         if outcome.status and not (ended or terminated or is_over):
-            record.status, record.message = outcome.status, f"at t = {float(instant)!r}: {outcome.message}"
+            record.status, record.message = outcome.status, f"at t = {float(instant):.9g}: {outcome.message}"
             return True
         if terminated or ended:
             record.status, record.message = (
                 "terminated",
-                f"ended by {(terminated + ended)[0]} at t = {float(instant)!r}",
+                f"ended by {(terminated + ended)[0]} at t = {float(instant):.9g}",
             )
             return True
         if not self.forward and held(system, outcome.z):
             record.status = "backward-nonunique"
-            record.message = f"at t = {float(instant)!r}: {held(system, outcome.z)}"
+            record.message = f"at t = {float(instant):.9g}: {held(system, outcome.z)}"
             return True
         return False
 

@@ -89,8 +89,8 @@ class Notices:
 
     def accumulated(self, names: list[str]) -> None:
         """Events that follow each other ever faster were replaced by their limit."""
-        self.record.warn(f"accumulation: events of {', '.join(names)} follow each other ever faster; what holds at "
-                         f"their limit goes on from there")  # fmt: skip
+        self.record.warn(f"accumulation: events of {', '.join(names)} follow each other ever faster; the run "
+                         f"continues from their limit")  # fmt: skip
 
     def look(self) -> None:
         """Look at what has come since the last time, if it is enough."""
@@ -134,9 +134,9 @@ class Notices:
             last = _last(self.record.occurrences.blocks, _EVENTS)
             (name, count), *_ = Counter(o.component for o in last).most_common(1)
             self.record.warn(
-                f"chattering: {count} of {_EVENTS} events within {abs(times[-1]):.3g} from t = "
-                f"{float(last[0].instant):.9g} on are of {name}, and between two of them nothing moves by more than "
-                f"{_SHARE:g} of its range: declare a switching surface, or a wider hysteresis"
+                f"chattering: from t = {float(last[0].instant):.9g}, {count} of {_EVENTS} events within "
+                f"{abs(times[-1]):.3g} belong to {name}, and no state moves by more than {_SHARE:g} of its range "
+                "between two of them. Declare a switching surface or a wider hysteresis."
             )
 
     # -- stiffness ------------------------------------------------------------------------------------------
@@ -163,8 +163,8 @@ class Notices:
             return
         self._done.add("stiff")
         self.record.warn(
-            f"stiff: at t = {float(now):.9g} a decay within {h / lengths[longest]:.3g} is long over and keeps the "
-            f"steps at {h:.3g} by stability, not accuracy: rodas5p, cvode-bdf and scipy-radau take longer ones"
+            f"stiff: at t = {float(now):.9g} stability, not accuracy, limits the step to {h:.3g} (time constant "
+            f"{h / lengths[longest]:.3g}). rodas5p, cvode-bdf or scipy-radau will be faster."
         )
 
     def _fastest_turning(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> float:

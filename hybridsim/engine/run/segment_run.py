@@ -128,7 +128,9 @@ class SegmentRun:
             if self.counters.steps == 1:
                 self._check_shape(step)
             if not np.isfinite(step.x1).all():
-                raise StepFailure(f"the state is not finite at the end of a step of {step.s1 - step.s0:.3g}")
+                raise StepFailure(
+                    f"the state is not finite at the end of a step of length {step.s1 - step.s0:.3g}"
+                )
             self.last_step = abs(step.s1 - step.s0)
             self._refuse_standstill(step)
             whole, known = step.s1, self.scale
@@ -169,14 +171,14 @@ class SegmentRun:
         if self.short == IN_A_ROW:
             self._collapse(
                 self.since,
-                f"{IN_A_ROW} steps in a row, which are left out, were shorter than {STANDSTILL:g} of local time "
-                f"{step.s1!r}, the last {length:.3g}",
+                f"{IN_A_ROW} consecutive steps were shorter than {STANDSTILL:g} times the time since the last restart "
+                f"({step.s1:.9g}) and were discarded; the last step was {length:.3g}",
             )
 
     def _collapse(self, since: float, how: str) -> NoReturn:
         """End the run where its steps began to lead nowhere."""
         self._go_back(since)
-        raise Creeping(f"the step size collapsed at t = {float(self.origin.plus(since))!r}: {how}", since)
+        raise Creeping(f"the step size collapsed at t = {float(self.origin.plus(since)):.9g}: {how}", since)
 
     def _go_back(self, s: float) -> None:
         """Forget what came after the end of a step."""
@@ -199,7 +201,7 @@ class SegmentRun:
                 return
         raise UsageError(
             f"the dense output of a step of {getattr(self.method, 'name', 'the integrator')} {found}",
-            remedy="step.dense(times) takes an array of k local times to states of shape (k, n), a row for each time",
+            remedy="step.dense(times) must accept an array of k local times and return states of shape (k, n)",
         )
 
     def carry_on(self, arrival: Arrival, s: float) -> Arrival:
@@ -230,7 +232,7 @@ class SegmentRun:
         if self.system.n == 0:
             return Still(bound)
         if not np.isfinite(self.states[0]).all():
-            raise StepFailure("the state is not finite where a mode begins")
+            raise StepFailure("the state is not finite at the start of a mode")
         if first_step is not None:
             first_step = min(first_step, abs(bound))
         return self.method.start(self.flow, self.states[0], bound, self.tolerances, first_step, self.watch)
@@ -291,7 +293,7 @@ class SegmentRun:
     def _refuse_undefined(self, guard: int, s: float) -> None:
         t = float(self.origin.plus(s))
         raise StepFailure(
-            f"{self.system.guard_title(guard, self.flow.z)} is not a number from t = {t!r} on: "
+            f"{self.system.guard_title(guard, self.flow.z)} is not a number from t = {t:.9g} on: "
             f"write it so that it has a value on both sides of its zero"
         )
 
@@ -466,8 +468,8 @@ class SegmentRun:
             # a corner has one value on both sides, so that the noise about its zero decides nothing
             if not self.system.is_corner[self.system.owner[g]]:
                 raise StepFailure(
-                    f"{self.system.guard_title(g, self.flow.z)} is reported to fall where it rises: events "
-                    f"follow each other more closely than the method's tolerances tell apart"
+                    f"{self.system.guard_title(g, self.flow.z)} was located as falling, but it rises: events "
+                    f"are closer together than the tolerances of the integrator can resolve"
                 )
         stopping = []
         for root in step.roots:

@@ -132,7 +132,7 @@ class _FromDisk(SourceFileLoader):
     def get_data(self, path: str) -> bytes:
         """The bytes of a file."""
         if not is_trusted_file(path):
-            raise PermissionError(f"{path} may be of another user")
+            raise PermissionError(f"{path} may belong to another user")
         return super().get_data(path)
 
 
@@ -153,5 +153,5 @@ def _import(loader: _FromDisk | _FromMemory) -> ModuleType:
     module = importlib.util.module_from_spec(spec)
     loader.exec_module(module)
     if not hasattr(module, "DATA"):
-        raise ImportError(f"{loader.name} is not whole")
+        raise ImportError(f"{loader.name} is incomplete")
     return module

@@ -164,8 +164,8 @@ def step_turns(
     if shift == amplitude == 0.0:
         title = getattr(declared, "title", declared.name)
         raise ModelError(
-            f"'{title}' is zero at all times: a condition on its sign has no meaning",
-            remedy="correct the numbers, or write the case that is meant",
+            f"'{title}' is zero at all times: a condition on its sign is meaningless",
+            remedy="correct the numbers, or write the intended branch without a condition",
         )
     if abs(shift) >= abs(amplitude):  # a wave that only touches zero changes nothing
         return float(shift > 0.0), [], 0.0

@@ -50,7 +50,7 @@ class ForcedCoulombOscillator:
         if c * c >= 4 * m * k:
             raise ValueError("the closed form is for underdamped oscillators")
         if self.force and math.hypot(k - m * w * w, c * w) < math.sqrt(np.finfo(float).eps) * k:
-            raise ValueError("driven at resonance without damping there is no bounded sine response")
+            raise ValueError("without damping the response at resonance is unbounded")
 
     def motion(self, x0: float, v0: float, t_span: tuple[float, float]) -> Motion:
         """Return the exact motion from (x0, v0) over t_span = (t0, t1), t1 >= t0."""

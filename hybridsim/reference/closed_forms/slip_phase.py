@@ -99,7 +99,9 @@ class SlipPhase:
                 return None
             if step <= 2 * math.ulp(s):
                 return s
-        raise ArithmeticError(f"no end was found of the slip phase that starts at forcing angle {self.angle}")
+        raise ArithmeticError(
+            f"no end was found for the slip phase that starts at the forcing angle {self.angle}"
+        )
 
     def _velocity_and_slope(self, s: float) -> tuple[float, float]:
         """Return the velocity and its slope in the direction of the slip."""

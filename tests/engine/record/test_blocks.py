@@ -266,11 +266,11 @@ def test_a_mode_is_to_be_declared_only_where_there_is_none() -> None:
 
     automata = [automaton("p", -1), automaton("q", 1), automaton("r", 1)]
     assert accumulated(Limit(2.5, (0,), 0.1), automata, has_rtol=True).endswith(
-        "t = 2.5, of p: declare the limit that they lead to, a mode of their component"
+        'events of p accumulate at t = 2.5: declare the limit that they lead to, limit = "MODE" of the component'
     )
     held = accumulated(Limit(2.5, (1, 2), 0.1), automata, has_rtol=True)
     assert "of q, r" in held
     assert "q.closed and r.closed cannot be entered there" in held and "declare" not in held
-    assert "of monitors with resets: let a monitor" in accumulated(
+    assert "of monitors with resets accumulate at t = 2.5: let a monitor" in accumulated(
         Limit(2.5, (NOBODY,), 0.1), automata, has_rtol=True
     )

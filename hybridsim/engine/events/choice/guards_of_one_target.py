@@ -35,7 +35,7 @@ def taken_at_once(
         return [], (
             "inconsistent",
             f"guard {automaton.guard_names[mode][first[0]]} of mode {automaton.modes[mode]} ({automaton.name}) would "
-            f"go negative and none of the conditions of its transitions holds",
+            f"become negative, and no condition of its transitions holds",
         )
     declared = system.model.all_components()[component].modes[mode].guards
     found: dict[object, tuple[int, int]] = {}
@@ -60,6 +60,6 @@ def _apart(settling: Settling, component: int, taken: Sequence[tuple[int, int]])
         f"{automaton.guard_names[mode][j]} leads to {to}" for (j, _), to in zip(taken, targets, strict=True)
     ]
     return (
-        f"guards of mode {automaton.modes[mode]} ({automaton.name}) come to zero at once and lead apart: "
-        f"{' and '.join(ways)}; give their choices a `when` that says which one is taken, or one target"
+        f"guards of mode {automaton.modes[mode]} ({automaton.name}) reach zero at the same instant and lead to "
+        f"different modes: {' and '.join(ways)}; add conditions (`when`) that select one, or use one target mode"
     )

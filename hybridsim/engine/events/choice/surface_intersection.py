@@ -101,9 +101,9 @@ def keeps_nothing(settling: Settling, members: list[int], z: np.ndarray) -> str:
             if not np.linalg.det(block) > 8.0 * size * UNIT * largest:
                 names = " and ".join(automata[sliding[i]].name for i in chosen)
                 return (
-                    f"the surfaces {names} do not keep a motion that slides along both: it is one of many"
+                    f"the surfaces {names} do not attract the motion to their intersection: sliding is not unique"
                     if size > 1
-                    else f"the surface {names} does not attract where others are slid along"
+                    else f"the surface {names} does not attract the motion while it slides along other surfaces"
                 )
     return ""
 
@@ -137,15 +137,14 @@ def refused(settling: Settling, members: list[int], message: str) -> tuple[str, 
     if slow:
         names = ", ".join(system.automata[c].name for c in slow)
         return "inconsistent", (
-            f"{message}; {names} acts on higher derivatives of its switching function alone, so that sliding along it "
-            "is of a higher order, which is not followed"
+            f"{message}; {names} acts on higher derivatives of its switching function alone; sliding of such a "
+            "higher order is not supported"
         )
     pull = np.diag(_pull(settling, unique, np.maximum(settling.at.z, 0))) if unique else np.ones(0)
     if (pull < 0.0).any():
         names = ", ".join(system.automata[c].name for c, own in zip(unique, pull, strict=True) if own < 0.0)
         return "nonunique", (
-            f"{message}; {names} drives the motion away from its surface: it may spiral away in as many ways as there "
-            "are directions"
+            f"{message}; {names} drives the motion away from its surface, so the motion that leaves it is not unique"
         )
     return "inconsistent", message
 
@@ -172,9 +171,9 @@ def _words_on_drift(settling: Settling) -> str:
         value = float(settling.series_of(z).guards[number, 0])
         if value < 0.0:
             return (
-                f". Guard {change.guard} is {value:.6g} where a transition leads to {automaton.modes[change.source]}: "
-                "if it should be zero there, the states have drifted by the errors of the integrator; let that "
-                "transition set what the guard depends on, or take a smaller rtol"
+                f". Guard {change.guard} is {value:.6g} where a transition leads to {automaton.modes[change.source]}. "
+                "If it should be zero there, integration errors have accumulated: let that transition set what the "
+                "guard depends on, or pass a smaller rtol"
             )
     return ""
 
@@ -192,8 +191,9 @@ def _words_on_negative_guard(settling: Settling) -> str:
     if not value < 0.0:
         return ""
     return (
-        f". Guard {change.guard} is {value:.6g} in {automaton.modes[mode]} before and after: a guard is positive while "
-        "its mode lasts; turn its sign around, or let its transition change what it depends on"
+        f". Guard {change.guard} is {value:.6g} in {automaton.modes[mode]} before and after its transition. "
+        "A guard must be positive while its mode is active: turn its sign around, or let the transition change a "
+        "state that the guard depends on"
     )
 
 
@@ -217,6 +217,6 @@ def _words_on_opposed_modes(settling: Settling) -> str:
         return ""
     names = " and ".join(component.modes[change.source].name for change in last)
     return (
-        f". Modes {names} push against each other across one surface: the motion slides along it if it is declared as "
-        f'one, [surfaces.NAME] expr = "{guards[0].expr.text}", NAME being +1 on one side and -1 on the other'
+        f". Modes {names} drive the motion against each other across one surface. If the motion should slide along it, "
+        f'declare a switching surface: [surfaces.NAME] expr = "{guards[0].expr.text}" (NAME is +1 or -1 on its sides)'
     )

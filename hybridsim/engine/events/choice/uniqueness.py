@@ -75,7 +75,9 @@ def other_outcomes(
         return candidates[:0]
     if len(members) > MAX_JOINT_COMPONENTS:
         names = ", ".join(automata[c].name for c in members)
-        settling.warnings.append(f"{names} were decided together: uniqueness was not examined")
+        settling.warnings.append(
+            f"more than {MAX_JOINT_COMPONENTS} components ({names}) change mode together: uniqueness was not examined"
+        )
         return candidates[:0]
     others = candidates[(candidates[:, asked] != taken[asked]).any(axis=1)]
     fine = others[all_verdicts(settling, members, others, cluster) == FINE]

@@ -33,7 +33,10 @@ def strike(settling: Settling, open_: set[int]) -> Failure | None:
         return None
     if not settling.forward:
         names = ", ".join(sorted(settling.system.automata[c].name for c in unilateral))
-        return "backward-nonunique", f"the gap of {names} closes: many motions lead to one after an impact"
+        return (
+            "backward-nonunique",
+            f"the gap of {names} closes: different motions before an impact lead to the same motion after it",
+        )
     has_collided = False
     for cluster in settling.system.clusters:
         mine = [c for c in cluster if c in unilateral]
@@ -60,7 +63,7 @@ def _surfaces(settling: Settling) -> tuple[np.ndarray, np.ndarray]:
 def restitution_in_words(name: str, value: float, speed: float) -> str:
     """What is said of a restitution beyond [0, 1]."""
     where = f"at a speed of approach of {speed:.6g}"
-    return f"the restitution of {name} is {value!r} {where}, and should lie between 0 and 1"
+    return f"the restitution of {name} is {value!r} {where}, and must lie between 0 and 1"
 
 
 class _Collision:
@@ -170,7 +173,10 @@ class _Collision:
             *(loads[side][np.ix_(rows[len(normal) :], places)] for side in (0, 1)),
         )
         if count(blow) > MOST:
-            return "inconsistent", f"{len(members)} contacts take part in one impact ({names})"
+            return (
+                "inconsistent",
+                f"{len(members)} contacts take part in one impact ({names}), which are too many to solve",
+            )
         found = answers(blow)
         if len(found) != 1:
             what = "several outcomes" if found else "no outcome"
@@ -181,7 +187,7 @@ class _Collision:
         self._apply(members, found[0], restitution, *among)
         if found[0].reduced:
             self.settling.warnings.append(
-                f"an impact of {names} would gain energy by Newton's law: it rebounds less"
+                f"an impact of {names} would gain energy by Newton's law, so its rebound was reduced"
             )
         return None
 

@@ -61,7 +61,9 @@ def merged_resets(
                 place = _place(system, name)
                 if not np.isfinite(values[place]):
                     state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(system.names, at.x, strict=True))
-                    return f"{reset_in_words(system, key)} sets {name} to no finite number, at {state}"
+                    return (
+                        f"{reset_in_words(system, key)} sets {name} to a value that is not finite, at {state}"
+                    )
                 one = changes.setdefault(name, _Changes())
                 (one.set if part is key else one.added).append(
                     (key, float(values[place]), float(errors[place]))
@@ -90,12 +92,12 @@ def _contradiction(system: System, name: str, one: _Changes) -> str:
     keys = [key for key, _, _ in (*one.set, *one.added)]
     if len(keys) < 2 or not one.set:
         return ""
-    remedy = f'; to add at one instant whatever the order, write {name} = "+= amount"'
+    remedy = f'; to add amounts in any order, write {name} = "+= amount"'
     words = " and ".join(dict.fromkeys(reset_in_words(system, key) for key in keys))
     if one.added:
-        return f"at one instant {words} set {name} and add to it: which comes first is not declared{remedy}"
+        return f"at one instant {words} set {name} and add to it, and their order is not declared{remedy}"
     if any(_reads(system.model, key, name) for key in keys):
-        return f"{words} change {name} at one instant, and one of them reads the {name} that it sets{remedy}"
+        return f"{words} change {name} at one instant, and one of them also reads {name}{remedy}"
     (_, low, low_error), *_, (_, high, high_error) = sorted(one.set, key=lambda c: c[1])
     if high - low > low_error + high_error:
         return f"two resets at one instant set {name} to {low!r} and to {high!r} ({words}){remedy}"

@@ -362,17 +362,17 @@ def accumulated(limit: Limit, automata: Sequence[Automaton], has_rtol: bool) -> 
     changed = [automata[c] for c in limit.components if c != NOBODY]
     names = ", ".join(a.name for a in changed) or "monitors with resets"
     holding = [f"{a.name}.{a.modes[a.resting]}" for a in changed if a.resting >= 0]
-    head = f"events accumulate at t = {limit.time!r}, of {names}"
+    head = f"infinitely many events of {names} accumulate at t = {limit.time:.9g}"
     if not changed:
-        return f"{head}: let a monitor end the run before"
+        return f"{head}: let a monitor end the run before that time"
     if not holding:
-        return f"{head}: declare the limit that they lead to, a mode of their component"
+        return f'{head}: declare the limit that they lead to, limit = "MODE" of the component'
     other = (
         "a smaller rtol or another integrator"
         if has_rtol
         else "a shorter step or an integrator of higher order"
     )
     return (
-        f"{head}, and {' and '.join(holding)} cannot be entered there: take {other}, or let a monitor end the run "
-        "before"
+        f"{head}, and {' and '.join(holding)} cannot be entered there: use {other}, or let a monitor end "
+        "the run before that time"
     )

@@ -144,7 +144,7 @@ class PythonCode:
             return ""
         shown = ", ".join(f"{rate:g}" for rate in found)
         return (
-            f": the function {function_name(function)} returned ({shown}); look there for a division by zero"
+            f": the function {function_name(function)} returned ({shown}); look for a division by zero there"
         )
 
     @property
@@ -156,10 +156,10 @@ class PythonCode:
         """Say in a run's record what it owes to functions that are known by their values alone."""
         if self._rows["watched"]:
             trajectory.warn(
-                "derivatives of guards and monitors come from differences of the Python functions"
+                "derivatives of guards and monitors are finite differences of the Python functions"
             )
         if self.refused:
-            trajectory.warn(f"{self.refused_in_words}: they were called from Python")
+            trajectory.warn(f"{self.refused_in_words}: they were called as Python functions")
         failure = self.last_failure()
         if failure and trajectory.status not in ("finished", "terminated"):
             trajectory.message += f"; {failure}"
@@ -221,7 +221,7 @@ def _refuse_other_arguments(parts: Parts) -> None:
         except TypeError:
             name = function_name(function)
             raise ModelError(
-                f"the function {name} takes {inspect.signature(function)}, and is called with (t, x, p)",
+                f"the function {name} takes {inspect.signature(function)}, but is called with (t, x, p)",
                 remedy="let it take three arguments: the time, the states in order, and the parameters by name "
                 "(p.NAME), whether it uses them or not",
             ) from None
