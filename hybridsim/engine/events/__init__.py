@@ -1,4 +1,4 @@
-"""This folder decides what holds just after an event: transitions, resets, impacts, and who sticks or slips.
+"""This folder decides what holds just after an event: transitions, resets, impacts, and stick or slip of contacts.
 
 Start with `resolve`, which goes through one instant, then `choice` (joint decisions at surfaces).
 """

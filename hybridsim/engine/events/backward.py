@@ -1,4 +1,4 @@
-"""Running backward in time: inside modes and through transversal crossings; anything else has no unique past."""
+"""Run backward in time inside modes and through transversal crossings. Any other event has no unique past."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hybridsim.engine.system.system import System
 
 
 def held(system: System, z: np.ndarray) -> str:
-    """Why a state that is held at a surface has no unique past; empty if none is held."""
+    """Return why a state held at a surface has no unique past, or an empty text if no component is held."""
     names = [a.name for a, m in zip(system.automata, z, strict=True) if a.has_surface and m == a.hold]
     return (
         f"{', '.join(names)} is in a holding mode, which several different motions can enter, so the past is not unique"
@@ -23,14 +23,14 @@ def held(system: System, z: np.ndarray) -> str:
 
 
 def said_of_direction(t0: float, t1: float) -> str:
-    """What is to be known of a run backward that did not reach its end, for whom did not mean to run so."""
+    """Return a note for a backward run that stopped early, in case t1 < t0 was a mistake."""
     return (
         f"; this run goes backward in time, from t = {t0!r} to {t1!r}: swap the ends of t_span to run forward"
     )
 
 
 def entered_here(system: System, z: np.ndarray, fired: tuple[int, ...]) -> str:
-    """Why a guard of a component without a surface cannot be crossed backward; empty if none fired."""
+    """Return why a guard of a component without a surface cannot be crossed backward, or an empty text."""
     for g in fired:
         automaton = system.automata[int(system.owner[g])]
         if not (automaton.has_surface or automaton.is_corner):
@@ -46,7 +46,10 @@ def has_no_past(
     stopping: tuple[int, ...],
     schedules: tuple[int, ...],
 ) -> str:
-    """Why what happened where a segment ended has no unique past: guards, stopping monitors and schedules; or empty."""
+    """Return why the event at the end of a segment has no unique past, or an empty text.
+
+    The arguments are the guards, the stopping monitors and the schedules of that event.
+    """
     model = system.model
     resets = [model.schedules[k].name for k in schedules if model.schedules[k].reset]
     resets += [system.monitor_names[k] for k in stopping if model.monitors[k].reset]
@@ -57,15 +60,15 @@ def has_no_past(
 
 @dataclass(frozen=True)
 class Entry:
-    """A guard of another mode whose zero may be where the present mode was entered: modes to evaluate it in, number."""
+    """A guard of another mode at whose zero the present mode may have been entered."""
 
-    z: np.ndarray
-    guard: int
+    z: np.ndarray  # modes (C,) in which the guard is evaluated
+    guard: int  # its number
     label: str
 
 
 def entries(system: System, z: np.ndarray) -> tuple[Entry, ...]:
-    """The ways into the present modes by declared transitions that reset nothing."""
+    """Return the declared transitions without resets that lead into the present modes."""
     found = []
     for c, automaton in enumerate(system.automata):
         if automaton.has_surface or automaton.is_corner:
@@ -82,10 +85,10 @@ def entries(system: System, z: np.ndarray) -> tuple[Entry, ...]:
 
 
 def cross_backward(system: System, at: Situation, fired: tuple[int, ...]) -> Outcome:
-    """Cross a surface backward, if the motion came through it; status ``backward-nonunique`` otherwise.
+    """Cross a surface backward if the motion came through it; otherwise the status is ``backward-nonunique``.
 
-    The motion is unique when it enters from the other side, leaves on this one, and could not have been
-    held in between: for a force with a limit that is a passage of the velocity through zero.
+    The past is unique if the motion enters from the other side, leaves on this side, and cannot have been held in
+    between. For a force with a limit that is a passage of the velocity through zero.
     """
     before = at.z.copy()
     outcome = Settling(system, at, before, forward=False).run(fired, [])

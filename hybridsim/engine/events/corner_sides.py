@@ -1,10 +1,10 @@
-"""Corners and automata of loads on the sides that hold just after an instant, before anything else is decided there.
+"""Set corners and automata of loads to the sides that hold just after an instant, before any other decision.
 
 Each is a component whose mode follows from the state alone: a corner (`abs`, `min`, a piece of a table), a step in
-time, the load of a contact that opens. A value beyond its error bound decides the side. At zero the first derivative
-along the flow decides that is beyond its own. Corners stand inside each other, and the flow depends on the sides of
-others, so that the sides are taken again until none changes. This ends: what decides a side is of a lower order than
-what the side changes, or stands further inside.
+time, or the load of a contact that opens. A value beyond its error bound decides the side. At zero, the first
+derivative along the flow that is beyond its own bound decides. Corners can be nested, and the flow depends on the sides
+of other corners, so the sides are computed again until none changes. This ends, because the derivative that decides a
+side is of a lower order than what the side changes, or belongs to an inner corner.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ if TYPE_CHECKING:
     from hybridsim.engine.events.resolve import Settling
     from hybridsim.engine.system.system import Automaton
 
-_ROUNDS_PER_MODE = 4  # the orders of a series: each brings at least one more component to rest
+_ROUNDS_PER_MODE = 4  # orders of a series: each order settles at least one more component
 
 
 def sides_along(
     settling: Settling, z: np.ndarray, x: np.ndarray, has_flow: bool = True
 ) -> tuple[np.ndarray, dict[int, int]]:
-    """The modes z with each corner and load on its side along their flow, and the guards of these that are zero.
+    """Return the modes z with each corner and load on its side along the flow, and their guards that are zero.
 
-    The guard that was located at zero is zero on both sides of it, whatever rounding makes of its value. has_flow:
-    False where values alone decide, as the modes of surfaces are still unknown.
+    A guard that was located at zero is zero on both sides, whatever rounding makes of its value. With has_flow=False only
+    values decide, because the modes of surfaces are not known yet.
     """
     system = settling.system
     side_of = side_after if settling.forward else side_before
@@ -58,13 +58,13 @@ def sides_along(
 
 
 def _way_back(automaton: Automaton, mode: int, to: int) -> int:
-    """The guard of a mode that leads back to the mode before."""
+    """Return the guard of a mode that leads back to the previous mode."""
     ways = zip(automaton.guards[mode], automaton.targets[mode], strict=True)
     return next(g for g, targets in ways if to in targets)
 
 
 def take_corners(settling: Settling) -> bool:
-    """Bring the corners and loads of a settling to their sides; whether any changed."""
+    """Set the corners and loads of an event to their sides. Return whether any side changed."""
     at, system = settling.at, settling.system
     if not system.led:
         return False
@@ -79,7 +79,7 @@ def take_corners(settling: Settling) -> bool:
         )
         if automaton.is_corner:
             settling.is_kinked = True
-            if c in zero:  # it is still at zero, on its other side
+            if c in zero:  # it is still at zero, on the other side
                 settling.fired[zero[c]] = True
         settling.jumped = settling.jumped or not automaton.is_corner or automaton.is_step
     if changed:
@@ -90,7 +90,7 @@ def take_corners(settling: Settling) -> bool:
 
 
 def _guard_towards(automaton: Automaton, mode: int, target: int) -> str:
-    """The name of the guard by which a mode is left for another, be it by those between them."""
+    """Return the name of the guard through which a mode is left towards another, possibly via modes in between."""
     for name, targets in zip(automaton.guard_names[mode], automaton.targets[mode], strict=True):
         if (targets[0] > mode) == (target > mode):
             return name

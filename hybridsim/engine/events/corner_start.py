@@ -1,4 +1,4 @@
-"""Surfaces that are at zero within rounding although nothing was located there: what may leave with another."""
+"""Find surfaces that are at zero within rounding although no event was located there."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ if TYPE_CHECKING:
 
 
 def at_zero(settling: Settling, cluster: tuple[int, ...]) -> set[int]:
-    """Components of a cluster on their surfaces to rounding.
+    """Return the components of a cluster whose surfaces are zero within rounding.
 
-    A surface that stays at zero while another component holds its function still (a contact that sticks where a relay
-    switches on the speed) is crossed by no step; it leaves when that component lets go.
+    No step crosses a surface that stays at zero because another component keeps its function constant, such as a relay on
+    the speed of a contact that sticks. Its component leaves when the other component lets go.
     """
     system, at = settling.system, settling.at
     series = system.series(at.s, at.x, at.p, np.maximum(at.z, 0), at.x_error, at.s_error, at.is_put)
@@ -25,10 +25,10 @@ def at_zero(settling: Settling, cluster: tuple[int, ...]) -> set[int]:
 
 
 def past_zero(settling: Settling, cluster: tuple[int, ...]) -> set[int]:
-    """Components of a cluster past their surfaces, which nothing has crossed.
+    """Return the components of a cluster that are past their surfaces without a crossing.
 
-    A step that is taken once more, to end at an event, may end past a surface that it did not cross before, by its
-    error: that was crossed first.
+    A step that is repeated to end at an event may end past a surface that it did not cross before, because of its error.
+    That surface was crossed first.
     """
     system, at = settling.system, settling.at
     series = system.series(at.s, at.x, at.p, np.maximum(at.z, 0), at.x_error, at.s_error, at.is_put)
@@ -43,7 +43,7 @@ def past_zero(settling: Settling, cluster: tuple[int, ...]) -> set[int]:
 
 
 def cross(settling: Settling, components: set[int]) -> None:
-    """Take components to the other side of their surfaces, before what was located."""
+    """Move components to the other side of their surfaces, before the located event."""
     at = settling.at
     settling.fired[:] = False
     for c in sorted(components):

@@ -1,4 +1,4 @@
-"""What stands in the way of a step: a rate or guard without a value, or a state that grows without bound."""
+"""Explain why a step fails: a rate or guard is not a number, or a state grows without bound."""
 
 from __future__ import annotations
 
@@ -15,17 +15,18 @@ if TYPE_CHECKING:
     from hybridsim.engine.system.instant import Instant
     from hybridsim.engine.system.system import System
 
-_GROWN = 1e6  # times the size at the start (or 1): worth saying where no step succeeds any more
-_FASTER = 10.0  # times the rate at the start: what a pole makes of it, and a fall at a constant rate does not
+_GROWN = 1e6  # a state this many times its initial size (or 1) is reported as growing without bound
+_FASTER = 10.0  # ratio to the initial rate that indicates a pole; a constant rate does not reach it
 _SQUARED = 1e150  # norms are sums of squares
-_NEAR, _FARTHEST = 60, 1e-5  # halvings of a probe, which reaches this share of the time so far
+_NEAR, _FARTHEST = 60, 1e-5  # halvings of the probe, and its longest reach as a fraction of the time so far
 
 
-@np.errstate(over="ignore", invalid="ignore")  # it looks for what is too large or no number
+@np.errstate(over="ignore", invalid="ignore")  # overflow and nan are what it looks for
 def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Instant, p: np.ndarray) -> str:
-    """Why no step goes on from where a run stopped, in words; empty where that cannot be told.
+    """Return why no step succeeds from where a run stopped, or an empty text if no reason is found.
 
-    Looks along the tangent at the last state for the first of the rates, then of the active guards, to have no value.
+    The search goes along the tangent at the last state. It looks for the first of the rates, then of the active guards,
+    that is not a number.
     """
     if not system.n:
         return ""
@@ -63,7 +64,7 @@ def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Ins
         without = np.flatnonzero(system.active(z) & ~np.isfinite(guards))
         if len(without):
             titles = [system.guard_title(int(g), z) for g in without]
-            # what a mode holds has the rate of its constraint: the one that is declared is in the guards
+            # a held state has the rate of its constraint; its declared rate enters the guards
             held = [system.names[i] for g in without for i in system.pins.get(int(system.owner[g]), ())]
             return _said(system, "just after,", titles, x, z) + _cause(system, held, float(here), x)
     if power := _power_without_series(system, x, x + reach * rates):
@@ -72,14 +73,14 @@ def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Ins
 
 
 def advice_on_sizes(system: System) -> str:
-    """What to do where steps collapse and nothing is in their way: what is asked for is below what can be computed."""
+    """Return a remedy for steps that collapse without a cause: the tolerance is below rounding error."""
     is_sized = all(state.nominal is not None for state in system.model.states)
     return "pass a larger atol or rtol" if is_sized else "declare `nominal` sizes or pass atol"
 
 
-@np.errstate(over="ignore", invalid="ignore", divide="ignore")  # it looks for what is no number
+@np.errstate(over="ignore", invalid="ignore", divide="ignore")  # nan is what it looks for
 def rates_without_value(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> str:
-    """The states whose rates are no numbers in the modes z, and why, in words; empty where all have a value."""
+    """Return which rates are not numbers in the modes z, and why, or an empty text if all are finite."""
     names = [system.names[i] for i in np.flatnonzero(~np.isfinite(system.flow(s, x, p, z)))]
     if not names:
         return ""
@@ -89,12 +90,12 @@ def rates_without_value(system: System, s: float, x: np.ndarray, p: np.ndarray, 
 
 
 def _cause(system: System, names: list[str], t: float, x: np.ndarray) -> str:
-    """What has no value in the rates of some states; empty where that cannot be told."""
+    """Return why the rates of some states are not numbers, or an empty text if no reason is found."""
     return power_without_value(system, names, t, x) or _division_by_zero(system, names, x)
 
 
 def _of_function(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> str:
-    """What a Python function returns where a rate has no value; empty for a model of expressions."""
+    """Return what a Python function returned as a rate that is not finite, or an empty text for expressions."""
     from hybridsim.engine.system.user_functions.code import PythonCode
 
     return system.code.flow_without_value(s, x, p, z) if isinstance(system.code, PythonCode) else ""
@@ -111,7 +112,7 @@ def _steep(
     first: np.ndarray,
     reach: float,
 ) -> str:
-    """What has a value, and moves too fast or is too large for any step; empty where nothing does."""
+    """Return which values are too large or change too fast for any step, or an empty text."""
     found = [
         f"{system.names[i]} = {x[i]:.3g} is too large to be squared"
         for i in np.flatnonzero(np.abs(x) > _SQUARED)
@@ -125,7 +126,9 @@ def _steep(
         start = record.segments[0]
         rates_before = system.flow(0.0, start.x[0], start.p, start.z)
         guards_before = system.series(0.0, start.x[0], start.p, start.z, none, 0.0).guards[:, 0]
-    steep = (np.abs(rates) * reach > np.maximum(first, np.abs(x))) & (x != 0.0)  # from zero anything is fast
+    steep = (np.abs(rates) * reach > np.maximum(first, np.abs(x))) & (
+        x != 0.0
+    )  # any rate is large relative to a state at zero
     faster = np.abs(rates) > _FASTER * np.abs(rates_before)
     found = [
         f"{system.names[i]} = {x[i]:.3g} has the rate {rates[i]:.3g}" for i in np.flatnonzero(steep & faster)
@@ -138,7 +141,7 @@ def _steep(
 
 
 def power_without_value(system: System, names: list[str], t: float, x: np.ndarray) -> str:
-    """The root or fractional power in the rates of some states that has no value in a state, and what to write."""
+    """Return which root or fractional power in the rates is undefined at a state, with a remedy."""
     from hybridsim.expr.write import write
     from hybridsim.model.meanings import Meanings
     from hybridsim.model.smoothing.nonsmooth import roots_in
@@ -155,14 +158,14 @@ def power_without_value(system: System, names: list[str], t: float, x: np.ndarra
     rates += [expr for mode in modes for expr in mode.set.values()]
     for node, base, power in (found for rate in rates for found in roots_in(rate, meanings)):
         value = number_of(base, values, meanings.lookup)
-        if value is not None and value < 0.0:  # None: it depends on what a mode sets
+        if value is not None and value < 0.0:  # None if it depends on a variable of a mode
             remedy = f"to continue beyond zero, write abs({write(base)})**{power}*sign({write(base)})"
             return f": '{write(node)}' has no value for {write(base)} < 0; {remedy}, or end the run there by a monitor"
     return ""
 
 
 def _power_without_series(system: System, x: np.ndarray, ahead: np.ndarray) -> str:
-    """The whole power under a name that has a value beyond zero and no Taylor series there, and what to write."""
+    """Return which power with a named whole exponent has no Taylor series at x <= 0, with a remedy."""
     from hybridsim.expr.grammar import WHOLE_POWERS
     from hybridsim.expr.write import write
     from hybridsim.model.meanings import Meanings
@@ -191,7 +194,7 @@ def _power_without_series(system: System, x: np.ndarray, ahead: np.ndarray) -> s
 
 
 def _division_by_zero(system: System, names: list[str], x: np.ndarray) -> str:
-    """The denominator in the rates of some states that is zero whatever the modes are; empty where there is none."""
+    """Return which denominator in the rates is zero in every mode, or an empty text."""
     from hybridsim.expr.write import write
     from hybridsim.model.meanings import Meanings
     from hybridsim.model.smoothing.one_sided import number_of
@@ -210,7 +213,7 @@ def _division_by_zero(system: System, names: list[str], x: np.ndarray) -> str:
 
 
 def _said(system: System, head: str, names: list[str], x: np.ndarray, z: np.ndarray) -> str:
-    """What is no number, and where."""
+    """Return a sentence that names quantities that are not numbers, with the state and the modes."""
     state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(system.names, x, strict=True))
     modes = ", ".join(f"{a.name} {a.modes[m]}" for a, m in zip(system.declared, z, strict=False))
     where = f", {modes}" if modes else ""
@@ -218,7 +221,7 @@ def _said(system: System, head: str, names: list[str], x: np.ndarray, z: np.ndar
 
 
 def reset_in_words(system: System, key: tuple[object, ...]) -> str:
-    """Whose reset it is, by its key."""
+    """Return the name of the reset with this key, for messages."""
     model = system.model
     if key[0] == "limit":
         return f"the limit of {system.automata[int(str(key[1]))].name}"

@@ -1,4 +1,4 @@
-"""A contact whose force drives its own relative velocity instead of opposing it: a sign slip, refused."""
+"""Refuse contacts whose force drives their relative velocity instead of opposing it, usually a sign error."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ _MOST = 64  # starts that a system remembers to have been looked at
 
 
 def refuse_driving(system: System, t0: float, x: np.ndarray, discrete: np.ndarray, z: np.ndarray) -> None:
-    """Refuse a contact whose force pushes its own relative velocity on instead of opposing it."""
+    """Raise ModelError for a contact whose force drives its own relative velocity instead of opposing it."""
     start = (t0, x.tobytes(), discrete.tobytes(), z.tobytes())
     if start in system.opposed:
         return
     try:
         effects = system.effects(0.0, x, system.vector(Instant(t0), discrete), np.maximum(z, 0))
     except (ZeroDivisionError, ValueError, OverflowError):
-        return  # not a number at the start: the run itself says where
+        return  # not a number at the start; the run itself reports where
     for c, effect in effects.items():
         automaton = system.automata[c]
         if automaton.is_unilateral:

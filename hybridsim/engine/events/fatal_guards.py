@@ -1,4 +1,4 @@
-"""What guards say whose zero ends a run, where the model has no mode to go to."""
+"""Find the messages of fatal guards: guards whose zero ends a run because the model declares no further mode."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def said_by_leaving(system: System, z: np.ndarray, leaving: Iterable[int], sides: np.ndarray) -> str | None:
-    """By the first of the components that leave their modes through such a guard."""
+    """Return the message of the first fatal guard through which one of these components leaves its mode."""
     for c in leaving:
         automaton, mode = system.automata[c], int(z[c])
         for guard, message in zip(automaton.guards[mode], automaton.fatal[mode]):
@@ -24,13 +24,13 @@ def said_by_leaving(system: System, z: np.ndarray, leaving: Iterable[int], sides
 
 
 def is_only_fatal(system: System, outcome: Outcome) -> bool:
-    """Whether an instant could not be settled because of such a guard alone."""
+    """Return whether an event could not be resolved because of a fatal guard alone."""
     messages = (message for a in system.automata for row in a.fatal for message in row)
     return bool(outcome.status) and any(message and message == outcome.message for message in messages)
 
 
 def said_by_located(system: System, z: np.ndarray, located: Iterable[int]) -> str | None:
-    """By one that was located at zero, in the modes z before: where nothing is admissible, it says why."""
+    """Return the message of a fatal guard that was located at zero in the modes z before the event."""
     for automaton, mode in zip(system.automata, z.tolist()):
         if mode >= 0:
             for guard, message in zip(automaton.guards[mode], automaton.fatal[mode]):
@@ -40,7 +40,7 @@ def said_by_located(system: System, z: np.ndarray, located: Iterable[int]) -> st
 
 
 def said_by_every_mode(system: System, components: Iterable[int], sides: np.ndarray) -> str | None:
-    """By the first of the components that has such a guard, just negative, in each of its modes."""
+    """Return the message of the first component that has a negative fatal guard in each of its modes."""
     for c in components:
         automaton = system.automata[c]
         modes = zip(automaton.guards, automaton.fatal)

@@ -1,4 +1,4 @@
-"""Which modes hold before surfaces are decided: those in which resets read a start, automata that leave in any case."""
+"""Determine the modes before surfaces are decided: those for resets at a start, and automata that leave in any case."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     from hybridsim.engine.system.system import System
 
 
-_MOST_FLOWS = 3**4  # combinations of modes that are looked at; each costs a series
+_MOST_FLOWS = 3**4  # combinations of modes examined at most; each costs a Taylor series
 
 
 def as_given(system: System, at: Situation, jumped: bool = False) -> Situation:
-    """A situation with the modes and the run-time vector in which conditions and resets read the state as it is.
+    """Return a situation with modes and run-time vector in which conditions and resets read the state as it is.
 
-    At a start some components have no mode yet. They are read on the side of their surface on which the state is, and
-    as holding where it rests there. There, and where a reset or a belt has jumped, none is evaluated from a surface.
+    At a start some components have no mode yet. They are read in the mode of the side of their surface, or in the holding
+    mode if they are at rest on it. At a start and after a jump no state is evaluated from a surface.
     """
     is_start = (at.z < 0).any()
     if not (is_start or jumped):
@@ -54,10 +54,10 @@ def as_given(system: System, at: Situation, jumped: bool = False) -> Situation:
 
 
 def certainly_leaving(settling: Settling) -> set[int]:
-    """Automata with a guard that is negative just after, whatever is decided at the surfaces that are at zero.
+    """Return the automata that have a negative guard just after, whatever is decided at surfaces that are zero.
 
-    Their guards have the sides that this is known of. Where these surfaces have too many combinations of modes, the
-    values alone of guards that no force enters are known.
+    The sides of their guards are set accordingly. If these surfaces have too many combinations of modes, only values of
+    guards without forces are used.
     """
     system = settling.system
     owners = [c for c in settling.scope if not (system.has_surface[c] or c in system.led)]
@@ -83,7 +83,7 @@ def certainly_leaving(settling: Settling) -> set[int]:
 
 
 def _resting(settling: Settling) -> tuple[np.ndarray, list[int]]:
-    """The modes, each surface that is off zero in that of its side; and the components whose surfaces are at zero."""
+    """Return the modes with each surface off zero on its side, and the components whose surfaces are zero."""
     at, system = settling.at, settling.system
     p = at.p.copy()
     p[system.layout.pin_at] = 0.0
@@ -101,7 +101,7 @@ def _resting(settling: Settling) -> tuple[np.ndarray, list[int]]:
 
 
 def _negative(settling: Settling, owners: list[int], z: np.ndarray, order: int = ORDER) -> set[int]:
-    """The guards of some components that are negative just after in the modes z, by coefficients up to an order."""
+    """Return the guards of some components that are negative just after in the modes z, up to an order."""
     series = settling.series_of(z)
     side_of = side_after if settling.forward else side_before
     numbers = [g for c in owners for g in settling.system.automata[c].guards[z[c]]]
@@ -110,7 +110,7 @@ def _negative(settling: Settling, owners: list[int], z: np.ndarray, order: int =
 
 
 def _without_forces(system: System) -> list[list[bool]]:
-    """For each guard number and mode of its component whether no force of a surface enters the guard there."""
+    """Return for each guard number and mode whether no force of a surface enters the guard there."""
     meanings, components = Meanings(system.model), system.model.all_components()
     found: list[list[bool]] = [[] for _ in range(system.guard_count)]
     for automaton, component in zip(system.automata, components, strict=True):

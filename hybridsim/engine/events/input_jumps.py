@@ -1,6 +1,6 @@
-"""Whether a jump of an input or a corner carries a surface away from where it was: what held on it holds no longer.
+"""Detect whether a jump of an input or a corner moves a surface, so that its component is no longer held.
 
-A closed gap has its rate as well: a floor that changes its speed at once strikes what lies on it, or leaves it.
+For a closed gap the rate counts as well: a floor that jumps in speed strikes the body on it, or leaves it.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from hybridsim.engine.events.outcome import Situation
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import Series, System
 
-_JOINED = 3.0  # ulps within which times are due together: `hybridsim.engine.system.timetable`
+_JOINED = 3.0  # ulps within which times count as equal, as in `hybridsim.engine.system.timetable`
 
 
 def surfaces_jump(system: System, instant: Instant, at: Situation, forward: bool) -> bool:
-    """Whether surfaces, or rates of closed gaps, differ beyond rounding before and after the inputs' pieces change.
+    """Return whether surfaces, or rates of closed gaps, jump beyond rounding when the pieces of inputs change.
 
-    Times that are due within rounding come together, at the last of them. The pieces before are those before them all.
+    Times that are equal within rounding count as one, at the last of them. The pieces before are those before all of them.
     """
     if not (system.signals and system.surface_of):
         return False
@@ -32,7 +32,7 @@ def surfaces_jump(system: System, instant: Instant, at: Situation, forward: bool
 
 
 def gaps_jump(system: System, at: Situation, before: np.ndarray, after: np.ndarray) -> bool:
-    """Whether the rates of closed gaps differ beyond rounding between the sides of corners."""
+    """Return whether the rates of closed gaps differ beyond rounding between the sides of corners."""
     closed = any(
         system.automata[c].is_unilateral and at.z[c] == system.automata[c].hold for c in system.surface_of
     )
@@ -42,12 +42,12 @@ def gaps_jump(system: System, at: Situation, before: np.ndarray, after: np.ndarr
 def _differ(
     system: System, at: Situation, sides: Sequence[tuple[np.ndarray, np.ndarray]], s_error: float = 0.0
 ) -> bool:
-    """Whether surfaces or rates of closed gaps differ between two vectors and modes, the states as they are."""
+    """Return whether surfaces or rates of closed gaps differ between two pairs of vector and modes at one state."""
     values, bounds = [], []
     for p, z in sides:
         p[system.layout.pin_at] = 0.0
         series = system.series(at.s, at.x, p, z, np.zeros(system.n), s_error)
-        assert isinstance(series, Series)  # models with surfaces are made from expressions
+        assert isinstance(series, Series)  # models with surfaces consist of expressions
         values.append(series.surfaces[:, :2])
         bounds.append(series.surface_bounds[:, :2])
     apart = np.abs(values[1] - values[0]) > bounds[0] + bounds[1]

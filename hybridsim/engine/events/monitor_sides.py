@@ -1,4 +1,4 @@
-"""Decide which monitors fire at an instant: those that leave the side of zero that they had before it."""
+"""Decide which monitors fire at an instant: those that leave their side of zero."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ _WANTED = {"up": (1,), "down": (-1,), "both": (1, -1)}
 
 @dataclass
 class MonitorSides:
-    """The monitors at one instant, each of which fires there once at most.
+    """Sides of the monitors at one instant. Each monitor fires there at most once.
 
     Parameters
     ----------
-    before : their sides just before it; 0 where they were at zero.
-    leads : the side to which the motion before leads those that are zero there, where it is another one; else 0.
-    is_open : whether rounding hides on which side they are and where they go.
-    fired : those that have fired, with their directions.
-    told : those of them that have been recorded.
+    before : sides (M,) just before the instant; 0 for a monitor at zero.
+    leads : side (M,) to which the motion before leads a monitor that is at zero, if it changes; else 0.
+    is_open : mask (M,) of monitors for which rounding hides the side and the direction.
+    fired : monitors that have fired, with their directions.
+    told : the fired monitors that have been recorded.
     """
 
     monitors: Sequence[Monitor]
@@ -40,14 +40,17 @@ class MonitorSides:
 
     @classmethod
     def of(cls, monitors: Sequence[Monitor], before: np.ndarray) -> MonitorSides:
-        """Where nothing is known but the sides."""
+        """Return the sides without any knowledge of the motion."""
         return cls(monitors, before, np.zeros_like(before), np.zeros(len(before), dtype=np.bool_))
 
     @classmethod
     def located(
         cls, monitors: Sequence[Monitor], before: np.ndarray, series: Any, stopping: Sequence[int]
     ) -> MonitorSides:
-        """By their series just before the instant; stopping: those that were located to change their sides there."""
+        """Return the sides with directions from Taylor series just before the instant.
+
+        stopping: monitors that were located to change their sides there.
+        """
         found = cls.of(monitors, before)
         for k, (value, bound) in enumerate(zip(series.monitors, series.monitor_bounds, strict=True)):
             if k in stopping:
@@ -59,9 +62,9 @@ class MonitorSides:
         return found
 
     def fire(self, outcome: Outcome | None, action: str = "") -> list[int]:
-        """Those of an action, or of any, that fire by what holds after an instant; None: by the motion before it.
+        """Mark and return the monitors, of one action or of any, that fire at this instant.
 
-        The motion before tells as well where nothing holds after it.
+        The state after the event decides. With outcome=None, or an outcome that failed, the motion before it decides.
         """
         known = outcome is not None and not outcome.status
         due = []
@@ -75,7 +78,7 @@ class MonitorSides:
         return due
 
     def _left(self, k: int, outcome: Outcome) -> int:
-        """In which direction a monitor has left its side: to the other one, or to zero, at which it stays."""
+        """Return the direction in which a monitor left its side, 0 if it did not."""
         before, after = int(self.before[k]), int(outcome.monitor_sides[k])
         if after == before or (after == 0 and (self.is_open[k] or math.isnan(outcome.monitor_floors[k]))):
             return 0

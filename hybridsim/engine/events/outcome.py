@@ -1,4 +1,4 @@
-"""What goes into the decision of an event and what comes out of it."""
+"""The inputs and the results of resolving an event."""
 
 from __future__ import annotations
 
@@ -14,16 +14,17 @@ _STATE = (
 
 @dataclass
 class Situation:
-    """Where an event happens: the state before it, and how well its instant is known."""
+    """The state before an event, and the uncertainty of its instant."""
 
-    s: float
-    x: np.ndarray
-    p: np.ndarray
-    z: np.ndarray
-    x_error: np.ndarray
-    s_error: float
-    # a start or a reset has put the state where it is: zeros are known to the roundoff of the model's numbers
-    is_put: bool = False
+    s: float  # local time
+    x: np.ndarray  # states (n,)
+    p: np.ndarray  # run-time vector
+    z: np.ndarray  # modes (C,); -1 for a component without a mode yet
+    x_error: np.ndarray  # error bounds (n,) of the states
+    s_error: float  # error bound of the local time
+    is_put: bool = (
+        False  # a start or reset set the state: zeros are accurate to the roundoff of the model's numbers
+    )
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Change:
 
 @dataclass
 class Outcome:
-    """What holds just after an event, or why nothing does."""
+    """The state just after an event, or the reason why there is none."""
 
     x: np.ndarray
     p: np.ndarray
@@ -49,28 +50,28 @@ class Outcome:
     orders: np.ndarray
     monitor_sides: np.ndarray
     monitor_orders: np.ndarray
-    x_error: np.ndarray  # how well the states are known: what locating the event left over
-    guard_floors: np.ndarray  # the same for the guards and monitors that start from zero
-    monitor_floors: np.ndarray
+    x_error: np.ndarray  # error bounds (n,) of the states that remain after locating the event
+    guard_floors: np.ndarray  # error bounds of guards that start from zero
+    monitor_floors: np.ndarray  # the same for monitors
     changes: list[Change] = field(default_factory=list)
-    continuous: bool = False  # the flow went on without a jump: the step size may be kept
+    continuous: bool = False  # the flow has no jump, so the step size may be kept
     status: str = ""
     message: str = ""
     warnings: list[str] = field(default_factory=list)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """What a run needs to go on from here, by names."""
+        """Return the arrays that a run needs to continue from here, by name."""
         state = {name: getattr(self, name) for name in _STATE}
         return state | {"continuous": np.array(self.continuous)}
 
     @classmethod
     def of_arrays(cls, arrays: dict[str, np.ndarray]) -> Outcome:
-        """The outcome of these arrays, with arrays of its own."""
+        """Return an outcome with copies of these arrays."""
         state: dict[str, Any] = {name: arrays[name].copy() for name in _STATE}
         return cls(**state, continuous=bool(arrays["continuous"]))
 
     def copy(self) -> Outcome:
-        """The same with arrays of its own."""
+        """Return a copy with its own arrays."""
         return Outcome(
             self.x.copy(), self.p.copy(), self.z.copy(), self.sides.copy(), self.orders.copy(),
             self.monitor_sides.copy(), self.monitor_orders.copy(), self.x_error.copy(),

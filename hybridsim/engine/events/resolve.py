@@ -1,4 +1,4 @@
-"""At an event: transitions, resets and joint decisions, repeated until every mode is admissible just after."""
+"""Resolve an event: repeat transitions, resets and joint decisions until every mode is admissible just after it."""
 
 from __future__ import annotations
 
@@ -46,17 +46,17 @@ from hybridsim.engine.series.bounded import ORDER, UNIT
 from hybridsim.engine.system.finite_differences import DifferenceSeries
 from hybridsim.engine.system.system import Series, System
 
-# A legitimate cascade passes each component a few times; what has not come to rest after this many rounds for each
-# mode of the model goes round in circles.
+# A legitimate cascade changes each component a few times. A model that needs more than this many rounds for each of
+# its modes is in an endless cycle.
 _ROUNDS_PER_MODE = 8
 _SEVERAL = "several motions are admissible"
 _MOST_CANDIDATES = 3**8  # a cluster of more components needs a complementarity solver, not enumeration
 
 
 class Settling:
-    """One event being settled."""
+    """The resolution of one event."""
 
-    is_thorough = False  # judges all candidates, also those that no choice needs
+    is_thorough = False  # whether to judge all candidates, even if the choice does not need them
 
     def __init__(
         self,
@@ -68,9 +68,9 @@ class Settling:
         inputs: np.ndarray | None = None,
     ) -> None:
         self.system = system
-        # a run-time vector of before, which the first conditions and resets read
+        # run-time vector before the event, read by the first conditions and resets
         self.inputs = inputs
-        # the components that are decided here; a method with rules of its own for surfaces leaves those out
+        # components decided here; a method with its own rules for surfaces leaves those out
         self.scope = set(range(len(system.automata))) if scope is None else set(scope)
         self.at = at
         self.forward = forward
@@ -78,23 +78,23 @@ class Settling:
         self.on_surface = np.zeros(len(system.automata), dtype=np.bool_)
         self.changes: list[Change] = []
         self.warnings: list[str] = []
-        self.jumped = False  # a reset or a jump of an unknown: the field does not go on smoothly
+        self.jumped = False  # whether a reset or an unknown made the flow jump
         self.rounds = 0
         self.most_rounds = _ROUNDS_PER_MODE * (1 + sum(len(a.modes) for a in system.automata))
-        self.is_kinked = False  # a corner has changed its side: the field goes on, its slope does not
-        # guards in the order in which they came to zero
+        self.is_kinked = False  # whether a corner changed its side: the flow is continuous, its slope is not
+        # position of each guard in the order in which they reached zero
         self.rank: dict[int, int] = {}
         self.releases = Releases(system, before)
         self.sides = np.ones(system.guard_count, dtype=np.int64)
         self.orders = np.zeros(system.guard_count, dtype=np.int64)
-        # the series at hand by modes, and what they are the series at: arrays that are replaced, never written to
+        # Taylor series by modes, and the arrays at which they were computed; those are replaced, never modified
         self.series: dict[bytes, Series | DifferenceSeries] = {}
         self.behind: tuple[object, ...] = (None,) * 4
 
     # -- the rounds -----------------------------------------------------------------------------------------
 
     def run(self, fired: Iterable[int] | Mapping[int, int], resets: Iterable[tuple[object, ...]]) -> Outcome:
-        """Settle `fired` guards, located at zero (with the order of their times), and resets that are due, by key."""
+        """Resolve the event with these guards located at zero, in order of time, and these resets that are due."""
         located = {int(g) for g in fired}
         lost = said_by_located(self.system, self.at.z, located)
         self.rank = dict(fired) if isinstance(fired, Mapping) else {int(g): k for k, g in enumerate(fired)}
@@ -136,12 +136,12 @@ class Settling:
         return self._stop(*self._cascade())
 
     def _begins_round(self) -> bool:
-        """Count a round of transitions or decisions; False where no more of them are allowed at one instant."""
+        """Count a round of transitions or decisions. Return False if the limit at one instant is exceeded."""
         self.rounds += 1
         return self.rounds <= self.most_rounds
 
     def _cascade(self) -> tuple[str, str]:
-        """Status and message where transitions follow each other without end."""
+        """Return status and message for transitions that repeat without end."""
         names = ", ".join(
             f"{a.name}: {a.modes[m]}" for a, m in zip(self.system.automata, self.at.z, strict=True)
         )
@@ -155,9 +155,9 @@ class Settling:
         )
 
     def _past_corners(self, open_: set[int]) -> set[int]:
-        """Let corners take their sides first; return the other components whose guards fire on these sides as well.
+        """Set corners to their sides. Return the other components whose guards still fire there.
 
-        What was located by a series past a corner, such as a zero of a guard that turns back there, does not.
+        A zero that was located by a series past a corner, where the guard turns back, does not fire.
         """
         others = open_.difference(self.system.led)
         if not take_corners(self):
@@ -171,9 +171,9 @@ class Settling:
         return others - staying
 
     def _first_modes(self, surfaces: set[int]) -> tuple[str, str] | None:
-        """Corners take the sides of a state that has changed; automata leave modes that no decision could keep.
+        """Set the sides of corners after a change of state, and leave modes that cannot last.
 
-        A contact that is decided in the mode of an automaton that lasts for no time would go on by what held then.
+        Without this, a contact would be decided in a mode of an automaton that lasts for zero time.
         """
         take_corners(self)
         if not surfaces or not (self.jumped or (self.at.z < 0).any()):
@@ -186,14 +186,14 @@ class Settling:
         return None
 
     def take_sides(self, open_: set[int]) -> None:
-        """Give every surface component the mode of the side it is on.
+        """Set every surface component to the mode of the side it is on.
 
-        open_: those to be decided on their surfaces. What a reset has moved off its surface leaves them, and what has
-        come to its surface joins them.
+        open_: the components to be decided on their surfaces. A component that a reset moved off its surface is removed, and
+        one that came to its surface is added.
         """
         at, system = self.at, self.system
         free = at.p.copy()
-        free[system.layout.pin_at] = 0.0  # the states as they are, not as a holding mode would have them
+        free[system.layout.pin_at] = 0.0  # the states as they are, not projected by a holding mode
         series = system.series(at.s, at.x, free, np.maximum(at.z, 0), at.x_error, at.s_error, at.is_put)
         for k, c in enumerate(system.surface_of):
             automaton, value = system.automata[c], series.surfaces[k, 0]
@@ -207,7 +207,7 @@ class Settling:
             open_.discard(c)
             self.on_surface[c] = False
             side = automaton.above if value > 0.0 else automaton.below
-            self.fired[automaton.guards[side][0]] = False  # it was located at its surface, before the reset
+            self.fired[automaton.guards[side][0]] = False  # it was located at its surface before the reset
             if at.z[c] not in (-1, side):
                 self.changes.append(Change(c, "reset", int(at.z[c]), side, at.x, at.x))
             at.z[c] = side
@@ -216,15 +216,15 @@ class Settling:
         return {c for c, a in enumerate(self.system.automata) if a.has_surface and c in self.scope}
 
     def _at_surfaces(self, components: set[int]) -> set[int]:
-        """Those that what fired puts onto their surfaces: a guard on the load of one that slips says nothing of it."""
+        """Return the components whose surfaces are zero; a guard on the load of a sliding contact does not count."""
         fired = {(c, j) for c, j, _ in self._fired_guards()}
         holds = [self.system.automata[c].hold for c in range(len(self.at.z))]
         return {
             c for c in components if self.at.z[c] == holds[c] or (c, 0) in fired
-        }  # the first is the surface's
+        }  # guard 0 of a mode is that of the surface
 
     def _fired_guards(self) -> list[tuple[int, int, int]]:
-        """(component, index in its mode, number) of the located guards."""
+        """Return (component, index in its mode, guard number) of the located guards."""
         table = self.system.guards_of(self.at.z)
         return [
             (c, j, int(g))
@@ -234,7 +234,7 @@ class Settling:
         ]
 
     def series_of(self, z: np.ndarray, x: np.ndarray | None = None) -> Series | DifferenceSeries:
-        """Series along the flow of the modes z, at the state as it is now or at another."""
+        """Return the Taylor series along the flow of the modes z, at the present state or at x."""
         at = self.at
         x = at.x if x is None else x
         behind = (at.s, x, at.p, at.x_error)
@@ -246,7 +246,7 @@ class Settling:
         return self.series[key]
 
     def _judge(self, z: np.ndarray, x: np.ndarray, decreed: np.ndarray, components: Iterable[int]) -> int:
-        """Verdict on the guards of some components in the candidate z."""
+        """Return the verdict on the guards of some components in the candidate modes z."""
         series = self.series_of(z, x)
         active = np.zeros(self.system.guard_count, dtype=np.bool_)
         table = self.system.guards_of(z)
@@ -264,14 +264,14 @@ class Settling:
     def _note_undecided(self, component: int) -> None:
         automaton = self.system.automata[component]
         if automaton.is_corner:
-            return  # either side will do
+            return  # both sides are equally good
         mode = automaton.modes[self.at.z[component]]
         self.warnings.append(f"undecided at rounding: {automaton.name} keeps mode {mode}")
 
     # -- transitions by declared choices --------------------------------------------------------------------
 
     def _transitions(self, components: set[int], resets: list[tuple[object, ...]]) -> tuple[str, str] | None:
-        """Take the declared choices of some components and apply resets, everything evaluated at x-."""
+        """Take the declared choices of some components and apply resets, all evaluated at the state before."""
         at, system = self.at, self.system
         x_plus, p_plus, z_plus = at.x.copy(), at.p.copy(), at.z.copy()
         x_error = at.x_error.copy()
@@ -292,7 +292,7 @@ class Settling:
                 resets.append(("choice", c, mode, j, number))
                 taken.append((c, automaton.guard_names[mode][j], mode, int(z_plus[c])))
             self.fired[list(guards)] = False
-            for g in guards:  # modes share the numbers of their guards, and the next mode's were not located
+            for g in guards:  # modes share guard numbers, and the guards of the next mode were not located
                 self.rank.pop(g, None)
         if resets:
             self.fired[system.is_corner[system.owner]] = False
@@ -306,14 +306,14 @@ class Settling:
         return None
 
     def _place(self, component: int) -> int:
-        """When the first of a component's guards came to zero, as a place in the order of all."""
+        """Return the position of a component's first guard in the order in which guards reached zero."""
         numbers = self.system.automata[component].guards[self.at.z[component]]
         return min((self.rank.get(g, len(self.rank)) for g in numbers), default=len(self.rank))
 
     # -- decisions by admissibility at surfaces -------------------------------------------------------------
 
     def decide(self, open_: set[int]) -> tuple[str, str] | None:
-        """Decide the clusters in which a component is open: it fired, leaves, or has no mode yet."""
+        """Decide the clusters that contain an open component: one that fired, leaves, or has no mode yet."""
         for cluster in self.system.clusters:
             if open_ & set(cluster):
                 failure = self._decide_cluster(cluster, open_)
@@ -383,16 +383,16 @@ class Settling:
         return None
 
     def _current(self, components: list[int], holds: np.ndarray) -> np.ndarray:
-        """The modes that stay if nothing speaks against them: at a start on its surface, a contact rests.
+        """Return the modes that are kept if they are admissible; at a start a contact on its surface sticks.
 
-        So static friction holds what is at its limit as far as rounding tells.
+        Static friction therefore holds a contact that is at its limit within rounding.
         """
         modes = self.at.z[components]
         begins = [modes[k] < 0 and not self.system.automata[c].is_unique for k, c in enumerate(components)]
         return np.where(begins, holds, modes)
 
     def _several(self, components: list[int], candidates: np.ndarray) -> tuple[str, str]:
-        """Status and message where no joint candidate is preferred: from a rate without a value nothing follows."""
+        """Return status and message if no joint candidate is preferred, or if a rate is not a number."""
         at = self.at
         for modes in candidates:
             lost = rates_without_value(self.system, at.s, at.x, at.p, self.with_modes(components, modes))
@@ -406,27 +406,27 @@ class Settling:
         return mask
 
     def _pinned(self, components: list[int]) -> np.ndarray:
-        """x with the surfaces of these components exactly zero."""
+        """Return x with the surfaces of these components exactly zero."""
         z = np.maximum(self.at.z, 0)
         for c in components:
             z[c] = self.system.automata[c].hold
         return self.system.project(self.at.s, self.at.x, self.at.p, z)
 
     def with_modes(self, components: list[int], modes: np.ndarray) -> np.ndarray:
-        """Replace the modes of some components; corners take the sides that hold along that motion."""
+        """Return the modes with some of them replaced, and corners on the sides that hold along that motion."""
         z = self.at.z.copy()
         z[components] = modes
         return sides_along(self, np.maximum(z, 0), self.at.x)[0] if self.system.led else np.maximum(z, 0)
 
     def verdict(self, z: np.ndarray, components: Iterable[int]) -> int:
-        """Whether the guards of some components admit the modes z just after the event."""
+        """Return whether the guards of some components admit the modes z just after the event."""
         components = list(components)
         decreed = self._decreed(z, self._continuous(z, components))
         found = self._judge(z, self.at.x, decreed, components)
         return LEAVES if found == UNDECIDED and not can_hold(self, components, z) else found
 
     def _continuous(self, z: np.ndarray, components: Iterable[int]) -> bool:
-        """Whether every change so far leaves all unknowns as they were."""
+        """Return whether every change so far leaves all unknowns unchanged."""
         return not self.jumped and self.releases.leave_unknowns(self.at, z, components)
 
     def _decreed(self, z: np.ndarray, continuous: bool) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""At a gap of zero without a velocity, friction along the gap sticks where the contact is closed, and only there."""
+"""Let friction along a gap stick exactly when the contact is closed, if the gap is zero without velocity."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from hybridsim.engine.system.system import System
 
 
 def with_tied(system: System, members: list[int]) -> list[int]:
-    """Components that are decided together, and the contacts along the gaps among them: these rest as well."""
+    """Return components that are decided together, with the contacts along the gaps among them."""
     tied = {along for gap, along, is_one in system.ties if is_one and gap in members}
     return sorted(tied.union(members))
 
 
 def together(system: System, members: list[int], candidates: np.ndarray) -> np.ndarray:
-    """The candidates (k, members) in which a gap and a contact along it hold both or neither.
+    """Return the candidates (k, members) in which a gap and a contact along it both hold, or neither.
 
-    Where they have different velocities (a stop beside a belt) they never hold both.
+    If their velocities differ (a stop beside a belt), candidates in which both hold are removed.
     """
     keep = np.ones(len(candidates), dtype=np.bool_)
     for gap, along, is_one in system.ties:

@@ -1,4 +1,4 @@
-"""How a run starts: the modes and states that hold just after its first instant."""
+"""Determine the modes and states that hold just after the start of a run."""
 
 from __future__ import annotations
 
@@ -16,12 +16,14 @@ from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
 from hybridsim.expr import rounding_of
 
-_CLOSE = 1e-9  # of the largest state: by how much a surface may be missed where a mode is said to be on it
-_MOST = 64  # starts that a system remembers: runs that differ in method, tolerance or span often begin alike
+_CLOSE = (
+    1e-9  # distance from a surface, relative to the largest state, that a holding mode at the start may have
+)
+_MOST = 64  # starts cached by a system; runs that differ in method, tolerance or span often start alike
 
 
 def settled_start(system: System, task: Task, origin: Instant, due: tuple[int, ...]) -> Outcome:
-    """What holds just after the start of the run, the schedules due then applied."""
+    """Return the outcome just after the start of the run, with the schedules due then applied."""
     key = task.beginning
     known = system.starts.get(key)
     if known is None:
@@ -29,7 +31,7 @@ def settled_start(system: System, task: Task, origin: Instant, due: tuple[int, .
         at = Situation(0.0, task.x0.copy(), p, task.z0.copy(), start_errors(system, task.x0), 0.0, True)
         resets = [("schedule", k) for k in due]
         known = Settling(system, at, task.z0.copy(), task.forward).run((), resets)
-        # a corner has no side to change before it has found one
+        # the first side of a corner is not a change
         known.changes = [change for change in known.changes if not system.is_corner[change.component]]
         known.warnings = [*known.warnings, *_contradictions(system, task, p, known.z)]
         if len(system.starts) >= _MOST:
@@ -39,12 +41,11 @@ def settled_start(system: System, task: Task, origin: Instant, due: tuple[int, .
 
 
 def start_errors(system: System, x0: np.ndarray) -> np.ndarray:
-    """Bounds of the errors of the states at the start.
+    """Return error bounds (n,) of the initial states.
 
-    Of an expression that of its evaluation and of the numbers in it. Of any other number its own roundoff, as the value
-    of some expression that nobody knows; whole numbers are exact. The bounds of guards count the roundoff of the
-    numbers in them; those of functions, in which nobody can look for numbers, are as if one of the start's size stood
-    beside it.
+    The bound of an expression includes its evaluation and the numbers in it. The bound of another number is its own
+    roundoff; whole numbers are exact. Bounds of guards include the roundoff of the numbers in them. The numbers inside
+    Python functions are unknown, so their bounds assume a number of the size of the initial value.
     """
     rounding = np.where(x0 == np.round(x0), 0.0, UNIT * np.abs(x0))
     errors, declared = rounding.copy(), system.start_state({})
@@ -55,11 +56,11 @@ def start_errors(system: System, x0: np.ndarray) -> np.ndarray:
 
 
 def _contradictions(system: System, task: Task, p: np.ndarray, z: np.ndarray) -> Iterator[str]:
-    """A sentence for each mode that was asked for and that the state at the start rules out."""
+    """Yield a warning for each requested mode that the initial state rules out."""
     if not any(task.z0[c] >= 0 for c in system.surface_of):
         return
     x, free = task.x0, z.copy()
-    for c in system.surface_of:  # where a surface holds, the state would be looked at as it is put onto it
+    for c in system.surface_of:  # a holding mode would project the state onto the surface
         free[c] = system.automata[c].above
     values = system.rows("surfaces", len(system.surface_of), np.zeros(1), x[None], p, free)[0].tolist()
     near = _CLOSE * np.abs(x).max(initial=0.0)
