@@ -29,8 +29,8 @@ def sides_along(
 ) -> tuple[np.ndarray, dict[int, int]]:
     """Return the modes z with each corner and load on its side along the flow, and their guards that are zero.
 
-    A guard that was located at zero is zero on both sides, whatever rounding makes of its value. With has_flow=False only
-    values decide, because the modes of surfaces are not known yet.
+    A guard that was located at zero is zero on both sides, whatever rounding makes of its value. With has_flow=False
+    only values decide, because the modes of surfaces are not known yet.
     """
     system = settling.system
     side_of = side_after if settling.forward else side_before

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
 def at_zero(settling: Settling, cluster: tuple[int, ...]) -> set[int]:
     """Return the components of a cluster whose surfaces are zero within rounding.
 
-    No step crosses a surface that stays at zero because another component keeps its function constant, such as a relay on
-    the speed of a contact that sticks. Its component leaves when the other component lets go.
+    No step crosses a surface that stays at zero because another component keeps its function constant, such as a relay
+    on the speed of a contact that sticks. Its component leaves when the other component lets go.
     """
     system, at = settling.system, settling.at
     series = system.series(at.s, at.x, at.p, np.maximum(at.z, 0), at.x_error, at.s_error, at.is_put)
@@ -27,8 +27,8 @@ def at_zero(settling: Settling, cluster: tuple[int, ...]) -> set[int]:
 def past_zero(settling: Settling, cluster: tuple[int, ...]) -> set[int]:
     """Return the components of a cluster that are past their surfaces without a crossing.
 
-    A step that is repeated to end at an event may end past a surface that it did not cross before, because of its error.
-    That surface was crossed first.
+    A step that is repeated to end at an event may end past a surface that it did not cross before, because of its
+    error. That surface was crossed first.
     """
     system, at = settling.system, settling.at
     series = system.series(at.s, at.x, at.p, np.maximum(at.z, 0), at.x_error, at.s_error, at.is_put)

@@ -27,8 +27,8 @@ _MOST_FLOWS = 3**4  # combinations of modes examined at most; each costs a Taylo
 def as_given(system: System, at: Situation, jumped: bool = False) -> Situation:
     """Return a situation with modes and run-time vector in which conditions and resets read the state as it is.
 
-    At a start some components have no mode yet. They are read in the mode of the side of their surface, or in the holding
-    mode if they are at rest on it. At a start and after a jump no state is evaluated from a surface.
+    At a start some components have no mode yet. They are read in the mode of the side of their surface, or in the
+    holding mode if they are at rest on it. At a start and after a jump no state is evaluated from a surface.
     """
     is_start = (at.z < 0).any()
     if not (is_start or jumped):

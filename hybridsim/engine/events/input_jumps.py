@@ -20,7 +20,8 @@ _JOINED = 3.0  # ulps within which times count as equal, as in `hybridsim.engine
 def surfaces_jump(system: System, instant: Instant, at: Situation, forward: bool) -> bool:
     """Return whether surfaces, or rates of closed gaps, jump beyond rounding when the pieces of inputs change.
 
-    Times that are equal within rounding count as one, at the last of them. The pieces before are those before all of them.
+    Times that are equal within rounding count as one, at the last of them. The pieces before are those before all of
+    them.
     """
     if not (system.signals and system.surface_of):
         return False

@@ -188,8 +188,8 @@ class Settling:
     def take_sides(self, open_: set[int]) -> None:
         """Set every surface component to the mode of the side it is on.
 
-        open_: the components to be decided on their surfaces. A component that a reset moved off its surface is removed, and
-        one that came to its surface is added.
+        open_: the components to be decided on their surfaces. A component that a reset moved off its surface is
+        removed, and one that came to its surface is added.
         """
         at, system = self.at, self.system
         free = at.p.copy()

@@ -1,8 +1,8 @@
-"""A run that one call of its compiled loop takes from start to end: what it leaves behind is made when it is asked for.
+"""Run a task in one call of its compiled loop, and build the full record only on demand.
 
-A short run takes no longer in compiled code than Python takes to lay out what happened, and a program that runs the
-same again and again looks at little of it. So the times of events and the states between them are read from what the
-loop wrote; whoever asks for more gets the record that the mode loop makes of that very call.
+In a short run the compiled loop takes less time than Python needs to build the record, and programs that repeat runs
+use little of it. The times of events and the states between them are therefore read from the arrays of the loop. Other
+attributes trigger the mode loop, which builds the full record from the same call.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ if TYPE_CHECKING:
 
 
 class AtOnce(Trajectory):
-    """The record of a finished run; all but its segments, its events and its cost is made when somebody asks for it.
+    """The record of a finished run. Only its segments, events and cost exist before the full record is requested.
 
     Parameters
     ----------
-    leapt : the call that was all of the run.
-    segments : makes its segments; None where the whole record is needed for them.
+    leapt : the kernel call that was the whole run.
+    segments : makes the segments; None if they need the full record.
     count : makes the counters.
-    make : makes the whole record.
+    make : makes the full record.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class AtOnce(Trajectory):
         self._leapt, self._segments, self._count, self._make = leapt, segments, count, make
 
     def then(self, last: Callable[[Trajectory], None]) -> None:
-        """What is to be done with the whole record, once it is made."""
+        """Register a function to be applied to the full record once it is made."""
         first = self._make
 
         def make() -> Trajectory:
@@ -65,7 +65,7 @@ class AtOnce(Trajectory):
         self._make = make
 
     def whole(self) -> None:
-        """Make the whole record now."""
+        """Make the full record now."""
         vars(self).update(vars(self._make()))
 
     def __getattr__(self, name: str) -> Any:
@@ -78,7 +78,7 @@ class AtOnce(Trajectory):
             found: Chain[Occurrence] = Chain(OccurrenceList)
             if happened is not None:
                 found.add(happened)
-            self.occurrences = found  # once it is whole: another thread may ask as well
+            self.occurrences = found  # assigned when complete, because another thread may read it
         elif name == "segments" and self._segments is not None:
             self.segments = self._segments()
         else:
@@ -87,7 +87,7 @@ class AtOnce(Trajectory):
 
 
 class _BrokenOff:
-    """In place of a compiled loop whose first call raised an error, for the mode loop to deal with it."""
+    """A stand-in for a compiled loop whose first call raised an error, so that the mode loop handles the error."""
 
     leapt = None
 
@@ -95,7 +95,7 @@ class _BrokenOff:
         self.place, self._error = place, error
 
     def leap(self, *_: Any) -> Any:
-        """Raise it."""
+        """Raise the error."""
         raise self._error
 
 
@@ -103,7 +103,7 @@ _leads_nowhere = Door(leads_nowhere)
 
 
 def _is_over(system: System, leapt: Leapt) -> bool:
-    """Whether the call is all of the run for certain: its events have no limit, and hide no bounces."""
+    """Return whether the call is certainly the whole run: its events have no limit and hide no bounces."""
     if not leapt.is_at_target or leapt.has_news or not leapt.count:
         return False
     if leapt.events == 0:
@@ -119,11 +119,11 @@ def _is_over(system: System, leapt: Leapt) -> bool:
 def carried_out(
     system: System, method: Method, task: Task, progress: Callable[[float], None] | None
 ) -> Trajectory:
-    """Run a task: its compiled loop goes first, if it can, and where that is not all of it the mode loop goes on."""
+    """Run a task with its compiled loop if possible, and with the mode loop for the rest."""
     plan, keep = plan_of(system, method, task), task.keep
     start = plan.silent_start
     is_plain = progress is None and task.record is None and task.limits is UNLIMITED
-    # where little is kept the record is small, and what the loop wrote is not
+    # with limited retention the record must be small, but the arrays of the loop are not
     is_kept = keep.events == math.inf and keep.segments in (None, math.inf)
     if start is None or not is_plain or not is_kept:
         return ModeLoop(system, method, task, progress).run()
@@ -141,7 +141,7 @@ def carried_out(
         assert again is not None
         again.leapt = leapt
         record = ModeLoop(system, method, task, None, again).run()
-        if record.status == "interrupted":  # the run is over all the same: it is whoever asks that stops
+        if record.status == "interrupted":  # the run itself is finished; only the access is interrupted
             raise KeyboardInterrupt
         return record
 

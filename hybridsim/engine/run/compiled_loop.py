@@ -1,4 +1,4 @@
-"""Leaps of the compiled mode loop as the general one sees them: segments and events in, the state after them out."""
+"""Call the compiled mode loop from the general one: pass the state in, commit segments and events, return the state."""
 
 from __future__ import annotations
 
@@ -39,20 +39,20 @@ from hybridsim.engine.system.series_at import series_order
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
 
-_SEGMENTS = 1024  # room for one call
-_ROOM = LARGEST // 8  # doubles for the steps of one call, those of a block that is handed on
+_SEGMENTS = 1024  # largest number of segments in one call
+_ROOM = LARGEST // 8  # doubles for the steps of one call, in a reusable block of memory
 _NONE = np.zeros(0, dtype=np.int64)
 _TIGHTEST = 1e-15
-NOT_LINEAR = no_tables()  # for kernels that take their modes by series
+NOT_LINEAR = no_tables()  # for kernels without tables of linear modes
 
 
-Maker = Callable[[System, Tolerances, float], Leaps]  # for a run whose segments are no longer than that
+Maker = Callable[[System, Tolerances, float], Leaps]  # (system, tolerances, longest segment) -> compiled loop
 
 _compiled: list[Maker] = []
 
 
 def compile_leaps(system: System, make: Maker) -> None:
-    """Have ready what leaps call: functions of this system, and their loop, the same for all, once a process."""
+    """Compile the functions of this system that compiled loops call, and once per process the loop itself."""
     functions_of(system)
     if make in _compiled or not system.n:
         return
@@ -73,7 +73,7 @@ def compile_leaps(system: System, make: Maker) -> None:
         np.zeros(guards),
         np.zeros(0),
     )
-    # such as a rate without a value; it is for the run to tell, and compiles by itself
+    # a rate may not be a number here; the run reports such an error itself
     with suppress(StepFailure):
         leaper.leap(nowhere, still, p, nowhere, Trajectory(system))
         leads_nowhere(np.empty((0, 2)), none, system.owner, len(system.automata), np.empty((2, MOST)))
@@ -81,19 +81,17 @@ def compile_leaps(system: System, make: Maker) -> None:
 
 
 class Leaper(ABC):
-    """Leaps of one run; what differs between kernels is left open.
+    """A compiled loop for one run; subclasses define the kernel.
 
     Parameters
     ----------
-    columns : of what the kernel records of each step and state.
-    kind : names the scratch arrays, which are handed on from run to run; each leap takes a pair of its own.
+    columns : number of columns that the kernel records for each step and state.
+    kind : name of the scratch arrays, which are reused from run to run; each call takes a set of its own.
     """
 
-    is_looked_at: ClassVar[bool] = (
-        False  # whether steps are looked at after a leap, even if they are not kept
-    )
+    is_looked_at: ClassVar[bool] = False  # whether steps are examined after a call, even if they are not kept
     codes: CodeShelf  # machine code of the modes
-    taken: tuple[Any, Any]  # the tapes of the last call, and their codes
+    taken: tuple[Any, Any]  # tapes of the last call, and their machine code
 
     def __init__(self, system: System, columns: int, kind: str) -> None:
         self.system, self.columns, layout = system, columns, system.layout
@@ -106,20 +104,21 @@ class Leaper(ABC):
             layout.phases_at,
         )
         self.spare: deque[Any] = system.code.shared(f"scratch for {kind}", deque)
-        self.leapt: Leapt | None = None  # a call that was made ahead, for the next leap to begin with
+        self.leapt: Leapt | None = None  # a call made in advance, with which the next leap starts
         beside = (_SEGMENTS + 1) * (layout.size + 1) + ALIGNED
-        self.steps = max((_ROOM - beside) // (system.n * columns + 2), LEAST)  # that there is room for
+        # largest number of steps in one call
+        self.steps = max((_ROOM - beside) // (system.n * columns + 2), LEAST)
         self._renew()
 
     def anew(self) -> Leaps:
-        """The same for another run."""
+        """Return a copy for another run."""
         other: Leaps = object.__new__(type(self))
         vars(other).update(vars(self))
         return other
 
     @abstractmethod
     def _room(self) -> Any:
-        """Scratch arrays of the kernel for one leap."""
+        """Return scratch arrays of the kernel for one call."""
 
     @abstractmethod
     def _go(
@@ -131,28 +130,30 @@ class Leaper(ABC):
         room: Any,
         rows: Any,
     ) -> tuple[int, int, int]:
-        """Run the kernel, which writes to rows of the record: why it ended, how many steps and segments there are."""
+        """Run the kernel on rows of the record. Return why it ended, and the numbers of steps and segments."""
 
     @abstractmethod
     def _cost(self, room: Any) -> Any:
-        """What a call has cost beyond its steps."""
+        """Return the cost of a call beyond its steps."""
 
     @abstractmethod
     def _count(self, counters: Counters, steps: int, cost: Any) -> None:
-        """Count what so many steps have cost, beside themselves."""
+        """Add the cost of the steps, other than their number, to the counters."""
 
     def _block(self, *arrays: np.ndarray) -> SegmentBlock:
-        """The segments in the arrays of a `SeriesBlock`."""
+        """Return the segments in the arrays as a `SeriesBlock`."""
         return SeriesBlock(self.system, *arrays)
 
     def _renew(self) -> None:
-        """Fresh arrays to write to; blocks that were committed go on using the former ones."""
-        self.used = (0, 0)  # rows of steps, rows of segments
+        """Allocate new arrays to write to; committed blocks keep the former ones."""
+        self.used = (0, 0)  # used rows of steps, and of segments
         self.sheet = self._sheet()
-        self.memory: tuple[np.ndarray, ...] | None = None  # what the sheet describes, once it is needed
+        self.memory: tuple[np.ndarray, ...] | None = (
+            None  # memory with the layout of the sheet, allocated on first use
+        )
 
     def _sheet(self) -> Sheet:
-        """What the kernel writes to; the trajectory keeps it, events longer than steps."""
+        """Return the layout of the arrays that the kernel writes; the trajectory keeps events longer than steps."""
         system, steps, columns = self.system, self.steps, self.columns
 
         def made() -> Sheet:
@@ -161,7 +162,7 @@ class Leaper(ABC):
                 (
                     (float, (steps, 2), 0),
                     (float, (steps, system.n, columns), 0),
-                    # one row more: where each begins and where the last one ends
+                    # one row more, for the end of the last segment
                     (np.int64, (_SEGMENTS + 1,), 0),
                     (float, (_SEGMENTS + 1, 2), 1),
                     (np.int64, (_SEGMENTS + 1, len(system.automata)), 1),
@@ -176,7 +177,7 @@ class Leaper(ABC):
 
     @property
     def place(self) -> tuple[np.ndarray, ...]:
-        """How far the rows are written, and how many there are: where the next call has to pause."""
+        """Return the numbers of used step rows, used segment rows, and all step rows, for a checkpoint."""
         return (np.array([*self.used, self.steps], dtype=float),)
 
     @place.setter
@@ -205,7 +206,7 @@ class Leaper(ABC):
         clock, to = desk.clock, desk.target
         clock[0], clock[1] = origin
         to[0], to[1] = target
-        # before the leap: another thread may put the very modes on the shelf that this one lacks
+        # counted before the call, because another thread may add the modes that this call misses
         known = len(self.shelf.tapes.modes)
         rows, began = self._rows(), perf_counter()
         code, steps, count = self._go(to, clock, desk.as_packed, desk.work, desk.room, rows)
@@ -237,7 +238,7 @@ class Leaper(ABC):
     def leap(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
     ) -> Landing:
-        """As far as ordinary events and the room for them go."""
+        """Run until an event that is not ordinary, the target, or the end of the arrays, and commit the result."""
         leapt, self.leapt = self.leapt or self.go(origin, laid_out(outcome, p), target), None
         instants: list[np.ndarray] = []
         owners: list[np.ndarray] = []
@@ -263,12 +264,12 @@ class Leaper(ABC):
         )
 
     def count(self, leapt: Leapt, counters: Counters) -> None:
-        """Add what a call has cost."""
+        """Add the cost of a call to the counters."""
         leapt.count_in(counters)
         self._count(counters, leapt.steps, leapt.beside[1])
 
     def forget_segments(self, leapt: Leapt) -> bool:
-        """Let go of all segments but the end of the last one, unless their steps are looked at."""
+        """Release all segments except the end of the last one. Return False if their steps are needed."""
         if self.is_looked_at:
             return False
         leapt.forget_segments()
@@ -276,14 +277,14 @@ class Leaper(ABC):
         return True
 
     def _rows(self) -> Any:
-        """The rows that the next call writes to."""
+        """Return the rows that the next call writes."""
         steps, first = self.used
         if self.memory is None:
             self.memory = self.sheet.blank()
         return self.sheet.packed(self.memory, (steps, steps, first + 1, *(first,) * 5))
 
     def segments_of(self, leapt: Leapt) -> SegmentBlock:
-        """The segments of a call that has some, and has let go of none."""
+        """Return the segments of a call that has some and has not released them."""
         first_step, first = leapt.beside[0], leapt.first
         lengths, series, ends, origins, modes, vectors, _, jumps = leapt.rows
         steps, begun = slice(first_step, first_step + leapt.steps), slice(first, first + leapt.count)
@@ -299,7 +300,7 @@ class Leaper(ABC):
         )
 
     def _commit(self, leapt: Leapt, record: Trajectory) -> None:
-        """Leave what one call has written to the trajectory: its segments and events."""
+        """Add the segments and events of one call to the trajectory."""
         self.used = (leapt.beside[0] + leapt.steps, leapt.first + leapt.count + 1)
         if record.segments.is_end_alone and not self.is_looked_at:
             record.segments.keep_only(leapt.last_end)
@@ -313,7 +314,7 @@ _leap = Door(leap)
 
 
 class TaylorLeaper(Leaper):
-    """Leaps of Taylor series."""
+    """The compiled loop of Taylor series."""
 
     def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
         rtol = max(tolerances.rtol, _TIGHTEST)
@@ -357,7 +358,7 @@ class TaylorLeaper(Leaper):
         room: Any,
         rows: Any,
     ) -> tuple[int, int, int]:
-        tapes = self.shelf.tapes  # another thread may put more on the shelf
+        tapes = self.shelf.tapes  # read once, because another thread may replace them
         codes = self.codes.of(tapes)
         code, steps, count = _leap(
             self.functions, self.automata, tapes, self.inputs, NOT_LINEAR, codes, self.places, self.control,
@@ -367,7 +368,7 @@ class TaylorLeaper(Leaper):
         return code, steps, count
 
     def _cost(self, room: Any) -> None:
-        """Nothing."""
+        """Return None: Taylor steps have no further cost."""
 
     def _count(self, counters: Counters, steps: int, cost: None) -> None:
-        counters.rhs_evaluations += 2 * steps  # one series a step, and the check at its end
+        counters.rhs_evaluations += 2 * steps  # one series and one check per step

@@ -1,4 +1,4 @@
-"""What a compiled loop works on during one leap: the state that it moves on, and room; handed on from leap to leap."""
+"""Arrays of a compiled loop during one call: the state that it advances, and scratch. Later calls reuse them."""
 
 from __future__ import annotations
 
@@ -12,34 +12,36 @@ from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.native.simd_products import filled_up
 from hybridsim.engine.native.struct_pack import packed
 
-_NONE, _NO_FLOORS = np.zeros(0, dtype=np.int64), np.zeros(0)  # there are no monitors where there are leaps
+_NONE, _NO_FLOORS = np.zeros(0, dtype=np.int64), np.zeros(0)  # compiled loops have no monitors
 _REAL, _WHOLE = ("x", "x_error", "p", "floors"), ("z", "sides", "orders")
 
 
 class Laid(NamedTuple):
-    """What holds at an instant as a desk has it: arrays one behind the other, real numbers in `real` and whole ones in
-    `whole`, each filled up with zeros, so that they are copied in two pieces."""
+    """A state at an instant in the memory layout of compiled loops.
+
+    All real arrays lie in `real` and all integer arrays in `whole`, each padded with zeros, so that two copies suffice.
+    """
 
     real: np.ndarray
     whole: np.ndarray
     slices: dict[str, slice]
 
     def part(self, name: str) -> np.ndarray:
-        """One of the arrays."""
+        """Return one of the arrays by name."""
         return (self.real if name in _REAL else self.whole)[self.slices[name]]
 
     def copy(self) -> Laid:
-        """The same with arrays of its own."""
+        """Return a copy with its own arrays."""
         return Laid(self.real.copy(), self.whole.copy(), self.slices)
 
     def outcome(self) -> Outcome:
-        """The same as everybody else takes it, in the same memory."""
+        """Return the state as an `Outcome` that shares the memory."""
         x, x_error, p, floors, z, sides, orders = map(self.part, (*_REAL, *_WHOLE))
         return Outcome(x, p, z, sides, orders, _NONE, _NONE, x_error, floors, _NO_FLOORS)
 
 
 def laid_out(outcome: Outcome, p: np.ndarray) -> Laid:
-    """What holds, copied, for a desk; p is the run-time vector there."""
+    """Copy an outcome and the run-time vector p into the memory layout of compiled loops."""
     fields = {
         "x": outcome.x,
         "x_error": outcome.x_error,
@@ -59,29 +61,29 @@ def laid_out(outcome: Outcome, p: np.ndarray) -> Laid:
 
 
 class Desk(NamedTuple):
-    """The state, the same as kernels take it, room for events, scratch arrays of the kernel; clock and target (2,)."""
+    """The arrays of a compiled loop during one call."""
 
-    laid: Laid
-    state: State
-    as_packed: Any
-    work: Any
-    room: Any
-    clock: np.ndarray
-    target: np.ndarray
+    laid: Laid  # the state
+    state: State  # named views of it
+    as_packed: Any  # the same views as kernels receive them
+    work: Any  # work space for events
+    room: Any  # scratch arrays of the kernel
+    clock: np.ndarray  # present instant (2,)
+    target: np.ndarray  # target instant (2,)
 
     @classmethod
     def of(cls, like: Laid, work: Any, room: Any) -> Desk:
-        """A desk for states like this one."""
+        """Return arrays for states with this layout."""
         laid = like.copy()
         state = State(**{name: laid.part(name) for name in laid.slices})
         return cls(laid, state, packed(state), work, room, *np.zeros((2, 2)))
 
     def take_up(self, laid: Laid) -> None:
-        """Begin where this holds."""
+        """Start from this state."""
         self.laid.real[:], self.laid.whole[:] = laid.real, laid.whole
 
     def leave(self) -> Laid:
-        """What holds where the loop has ended."""
+        """Return a copy of the state at which the loop ended."""
         return self.laid.copy()
 
 

@@ -1,4 +1,4 @@
-"""Whether a run comes forward: one that would take days ends by itself, and a stiff method takes over from another."""
+"""Stop runs that would take days, and switch to a stiff method if it is faster."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ if TYPE_CHECKING:
     from hybridsim.engine.run.segment_run import SegmentRun
     from hybridsim.engine.system.system import System
 
-# Seconds of a step, roughly, in Python and in compiled code, and of an event. It is steps that are counted, so that a
-# run ends at the same one on every machine.
+# Approximate seconds for a step in Python, a step in compiled code, and an event. The cost is computed from counts, so
+# that a run ends at the same step on every machine.
 _STEP, _COMPILED_STEP, _EVENT = 1e-4, 1e-6, 1e-5
-_WINDOW = 0.5  # so long a run is looked at before it is judged, again and again
-_WINDOWS = 3  # of these in a row with no better headway are no beginning
-_BETTER = 2.0  # times as far in a window: it gets faster
-_HOPELESS = 1e5  # seconds to go: a day
-# Twice the cost leads no farther than the cost before, so many times in a row, give or take that much; and so many more
-# times would have to lead to the end.
+_WINDOW = 0.5  # cost in seconds between judgements
+_WINDOWS = 3  # consecutive windows without a better pace before a run counts as slow
+_BETTER = 2.0  # ratio of paces that counts as an improvement
+_HOPELESS = 1e5  # predicted seconds to the end after which a run is stopped: about a day
+# Number of consecutive doublings of the cost without more progress, the tolerated ratio of progress, and the least
+# number of further such intervals to the end.
 _TWICE, _FARTHER, _MORE = 3, 1.2, 20.0
-_CRAWLING = 30.0  # seconds to go where a motion goes back and forth across a jump that nobody has declared
-_LAST, _TURNS = 400, 0.2  # steps that are looked at then, and how many of them turn a rate round
-_SOONER = 1.0  # seconds to go by an explicit method from which on a stiff one, a Python step at a time, is sooner there
+_CRAWLING = 30.0  # the same limit for a motion that alternates across an undeclared jump
+_LAST, _TURNS = 400, 0.2  # number of steps examined then, and least fraction of them with a reversal
+_SOONER = 1.0  # predicted seconds by an explicit method above which a stiff method in Python is faster
 
 _JUMP = (
     "the rates jump, and the steps at the jump are very short: declare the surface of the jump ([surfaces.NAME] "
@@ -42,16 +42,16 @@ _STEPS = (
 HEADWAY_SIZE, HEADWAY_PACE = (
     13,
     7,
-)  # numbers to go on with, and which of them is infinite until a window is over
+)  # length of `Headway.place`, and the index of the pace, infinite at first
 
 
 def cost(steps: float, compiled: float, events: float) -> float:
-    """Seconds, roughly, of steps in Python, of steps in compiled code, and of events."""
+    """Return an estimate in seconds of the cost of Python steps, compiled steps and events."""
     return steps * _STEP + compiled * _COMPILED_STEP + events * _EVENT
 
 
 class NoHeadway(StepFailure):
-    """At this pace the run would not come to its end; advice: what to declare or to set where nothing else is known."""
+    """Raised if the run would not reach its end at the present pace; advice: the remedy to report."""
 
     def __init__(self, message: str, advice: str) -> None:
         super().__init__(message)
@@ -59,33 +59,33 @@ class NoHeadway(StepFailure):
 
 
 class TakenOver(Exception):
-    """From here on another method goes on."""
+    """Raised if another method continues the run from here."""
 
 
 class Headway:
-    """Watches one run, from its origin to its end."""
+    """Monitors the pace of one run from its origin to its end."""
 
     def __init__(self, system: System, counters: Counters, origin: Instant, end: Instant) -> None:
         self.system, self.counters, self.end = system, counters, end
-        # rates may jump inside a mode, as what is written with `sign` does where it is not understood
+        # whether rates may jump inside a mode, for example by a `sign` that is not treated as a surface
         self.may_jump = system.has_corners or not system.has_tape
         self._since, self._steps, self._events = origin, counters.steps, counters.events
         self._in_python = 0
-        # time per second in the last window; windows in a row that were no better
+        # simulated time per second in the last window; consecutive windows without improvement
         self._last, self._slow = math.inf, 0
-        # the cost in all, and when it is twice as much; where it was half, how far that led, how often no farther
+        # total cost, next doubling, instant of the last doubling, its progress, doublings without more progress
         self._cost, self._twice, self._half, self._led, self._fading = 0.0, _WINDOW, origin, 0.0, 0
 
     @property
     def place(self) -> np.ndarray:
-        """What it knows, in an array, to go on with."""
+        """Return the state as an array, for a checkpoint."""
         counts = self._steps, self._events, self._in_python, self._last, self._slow
         return np.array(
             [*self._since, *self._half, *counts, self._cost, self._twice, self._led, self._fading]
         )
 
     def go_on(self, place: np.ndarray) -> None:
-        """Take up what was known."""
+        """Restore the state from a checkpoint."""
         high, low, half, rest, steps, events, in_python, last, slow, *cost, fading = place.tolist()
         self._since, self._half = Instant(high, low), Instant(half, rest)
         self._steps, self._events, self._in_python = int(steps), int(events), int(in_python)
@@ -93,18 +93,18 @@ class Headway:
         self._cost, self._twice, self._led = cost
 
     def step(self, now: Instant, run: SegmentRun) -> None:
-        """A step was taken in Python."""
+        """Count a step in Python, and judge the pace after each window."""
         self._in_python += 1
         if self._in_python * _STEP >= _WINDOW:
             self._judge(now, run)
 
     def leapt(self, now: Instant) -> None:
-        """Steps were taken in compiled code."""
+        """Judge the pace after steps in compiled code."""
         if self._spent() >= _WINDOW:
             self._judge(now, None)
 
     def is_sooner(self, now: Instant, h: float, compiled: bool) -> bool:
-        """Whether steps of length h to the end take longer than a stiff method."""
+        """Return whether steps of length h to the end would take longer than a stiff method."""
         return abs(self.end.minus(now)) * (_COMPILED_STEP if compiled else _STEP) > _SOONER * abs(h)
 
     def _spent(self) -> float:
@@ -132,7 +132,7 @@ class Headway:
             )
 
     def _fades(self, now: Instant, spent: float, left: float) -> bool:
-        """Whether each doubling of the cost leads no farther than the one before, and not to the end."""
+        """Return whether several doublings of the cost led no farther each time, and the end is far."""
         self._cost += spent
         if self._cost < self._twice:
             return False
@@ -143,7 +143,7 @@ class Headway:
 
 
 def goes_back_and_forth(run: SegmentRun) -> bool:
-    """Whether a state turns round at every few of the last steps of a segment."""
+    """Return whether a state reverses its direction in many of the last steps of a segment."""
     states = np.array(run.states[-_LAST:])
     if len(states) < _LAST or not states.size:
         return False

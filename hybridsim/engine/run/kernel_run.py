@@ -1,4 +1,4 @@
-"""What one call of a compiled loop has left behind: what it wrote, why it ended, and what holds there."""
+"""The result of one call of a compiled loop: what it wrote, why it ended, and the state there."""
 
 from __future__ import annotations
 
@@ -27,14 +27,15 @@ class Leapt:
 
     Parameters
     ----------
-    sheet, memory : what the record is laid out by, and its blocks, that of the segments and that of the events; None
-        once the segments are let go of. What comes from row `first` on was written.
-    code, steps, count : what the kernel returned: why it ended, and how many steps and segments there are.
-    clock, end : the instant (high, low) where it ended, and what holds there.
-    has_news : modes have been met on the way that were not known before, so that it may go on.
-    seconds : in compiled code.
-    beside : what else its leaper keeps of it.
-    vector : the last run-time vector, where the rows have nothing but the events any more.
+    sheet, memory : layout of the record, and its two blocks of memory, for segments and for events. The block of
+    segments
+        is None after they are released. The call wrote from row `first` on.
+    code, steps, count : return values of the kernel: why it ended, and the numbers of steps and segments.
+    clock, end : the instant (high, low) at which it ended, and the state there.
+    has_news : whether it met modes without tables, so that another call may continue.
+    seconds : time in compiled code.
+    beside : further results of the compiled loop.
+    vector : the last run-time vector, if only the events are kept.
     """
 
     system: System
@@ -55,51 +56,51 @@ class Leapt:
         assert self.memory is not None
         self._happened = rows = self.sheet.rows((None, self.memory[1]))
         first, count = self.first, self.count
-        self.events = 0  # how many of the segments an event ended: all but the last one in any case
-        if count:  # else there may be no row left
-            last = first + count  # where a segment ends is written where the next one would begin
+        self.events = 0  # number of segments that an event ended: all, or all except the last
+        if count:  # without segments there may be no row left
+            last = first + count  # the end of a segment is stored in the row of the next one
             rows.clocks[last], rows.modes[last] = self.clock, self.end.part("z")
             self.events = count if rows.fires[last - 1] >= 0 else count - 1
         self._crossings: Crossings | None = None
 
     @cached_property
     def rows(self) -> Any:
-        """All arrays of the record, a named tuple."""
+        """Return all arrays of the record as a named tuple."""
         assert self.memory is not None
         return self.sheet.rows(self.memory)
 
     def after(self) -> Outcome:
-        """What holds where it ended."""
+        """Return the outcome at the end of the call."""
         return self.end.outcome()
 
     @property
     def is_at_target(self) -> bool:
-        """Whether it came to where it was to go."""
+        """Return whether the call reached its target."""
         return self.code == AT_TARGET
 
     @property
     def is_full(self) -> bool:
-        """Whether it ended for want of room."""
+        """Return whether the call ended because its arrays were full."""
         return self.code == FULL
 
     @property
     def instants(self) -> np.ndarray:
-        """Instants of the events (E, 2)."""
+        """Return the instants (E, 2) of the events."""
         return self._happened.clocks[self.first + 1 : self.first + 1 + self.events]
 
     @property
     def owners(self) -> np.ndarray:
-        """Components whose guards these events are (E,)."""
+        """Return the components (E,) whose guards fired."""
         return self.system.owner[self.fires]
 
     @property
     def fires(self) -> np.ndarray:
-        """Numbers of these guards (E,)."""
+        """Return the numbers (E,) of the fired guards."""
         return self._happened.fires[self._ended]
 
     @property
     def crossings(self) -> Crossings | None:
-        """The events; None if there are none."""
+        """Return the block of events, or None if there are none."""
         if self._crossings is None and self.events:
             rows, ended = self._happened, self._ended
             after = slice(ended.start + 1, ended.stop + 1)
@@ -109,17 +110,17 @@ class Leapt:
                 rows.fires[ended],
                 rows.modes[ended],
                 rows.modes[after],
-                rows.jumps[ended, -2:],  # the states at its end; more begins with that at its start
+                rows.jumps[ended, -2:],  # the states at its end, after the state at its start
             )
         return self._crossings
 
     @property
     def ends_in_event(self) -> bool:
-        """Whether an event ended the last of its segments, so that another state follows at the very same time."""
+        """Return whether an event ended the last segment, so that another state follows at the same time."""
         return self.count > 0 and self.events == self.count
 
     def count_in(self, counters: Counters) -> None:
-        """Add what every call costs."""
+        """Add the cost common to all kernels to the counters."""
         counters.kernel_time += self.seconds
         counters.steps += self.steps
         counters.restarts += self.count
@@ -127,13 +128,13 @@ class Leapt:
 
     @property
     def last_end(self) -> Segment:
-        """The end of the last segment."""
+        """Return the end of the last segment."""
         rows, last = self._happened, self.first + self.count - 1
         vector = self.rows.vectors[last] if self.vector is None else self.vector
         return end_point(Instant(*self.clock), rows.modes[last], vector, rows.jumps[last, -2])
 
     def forget_segments(self) -> None:
-        """Let go of the memory of the segments; there is the end of the last one alone then."""
+        """Release the memory of the segments, except the end of the last one."""
         assert self.memory is not None
         self.vector = self.sheet.row(self.memory, "vectors", self.first + self.count - 1)
         vars(self).pop("rows", None)

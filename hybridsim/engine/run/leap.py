@@ -1,7 +1,7 @@
-"""The compiled mode loop: Taylor steps from event to event, ordinary events settled on the way, no Python between.
+"""The compiled mode loop: Taylor steps from event to event, with ordinary events resolved without Python.
 
-A leap goes over whole segments and commits them one by one. It ends at its target time, or before the first segment
-that holds something which is not ordinary; the mode loop then takes that one segment by its general way.
+A call integrates whole segments and commits them one by one. It ends at its target time, or before the first segment
+with an event that is not ordinary. The general mode loop then takes that segment.
 """
 
 from __future__ import annotations
@@ -46,13 +46,14 @@ from hybridsim.engine.system.programs.modes_index import find_modes
 AT_TARGET, STOPPED, FULL = 0, 1, 2
 _SHORTER = 0.25
 _TRIALS = 30
-LEAST = 64  # steps of a piece of a segment that there is no room for: with less it waits for the next call
+LEAST = 64  # least number of steps in a part of a segment; with less space the next call takes the segment
 
 
 class Room(NamedTuple):
-    """Scratch arrays: series of all registers (registers, order + 1), of active guards and of what may fade, what is
+    """Scratch arrays of the kernel.
     ahead of them, powers of a step and sizes of guards over it, a polynomial, its Bernstein forms, a state, guards,
-    their largest values."""
+    their largest values.
+    """
 
     V: np.ndarray
     W: np.ndarray
@@ -74,22 +75,23 @@ class Room(NamedTuple):
 
 
 class Record(NamedTuple):
-    """What is committed: steps (S, 2) and their series (S, n, order + 1); for each segment the row after its last step,
-    its origin (2,), modes, run-time vector, the guard that fired (-1: none), and the states before and after (2, n)."""
+    """The committed results of a call: S steps, and one row for each segment.
+    its origin (2,), modes, run-time vector, the guard that fired (-1: none), and the states before and after (2, n).
+    """
 
-    steps: np.ndarray
-    series: np.ndarray
-    segments: np.ndarray
-    clocks: np.ndarray
-    modes: np.ndarray
-    vectors: np.ndarray
-    fires: np.ndarray
-    jumps: np.ndarray
+    steps: np.ndarray  # start and length (S, 2)
+    series: np.ndarray  # Taylor coefficients (S, n, order + 1)
+    segments: np.ndarray  # row after the last step of each segment
+    clocks: np.ndarray  # origins (., 2)
+    modes: np.ndarray  # modes (., C)
+    vectors: np.ndarray  # run-time vectors
+    fires: np.ndarray  # the guard that fired, -1 for none
+    jumps: np.ndarray  # states before and after the event (., 2, n)
 
 
 @inlined
 def set_origin(place: Any, rates: Any, hi: float, lo: float, p: Any) -> None:
-    """The run-time vector of a segment whose local time starts at an instant; inputs are left as they are."""
+    """Set the run-time vector for a segment whose local time starts at an instant; inputs stay unchanged."""
     origin_at, phases_at = place
     p[origin_at] = hi + lo
     for i in range(rates.shape[0]):
@@ -98,7 +100,7 @@ def set_origin(place: Any, rates: Any, hi: float, lo: float, p: Any) -> None:
 
 @inlined
 def load(inputs: Any, tapes: Any, k: int, p: Any, V: Any) -> None:
-    """Constants of a segment into their registers."""
+    """Load the constants of a segment into their registers."""
     for i in range(inputs.constants.shape[0]):
         V[inputs.constants[i], 0] = inputs.values[i, 0]
     for i in range(inputs.parameters.shape[0]):
@@ -123,9 +125,10 @@ def series_at(
     U: Any,
     out: Any,
 ) -> None:
-    """Coefficients of the states, to out, of the watched functions and of what may fade, to U, from x at local time s.
+    """Write coefficients of the states to out, and of watched and vanishing functions to U, from x at local time s.
 
-    code: address of a function that does the same; 0 for none. is_known: `values_at` has been there last.
+    code: address of a compiled function that does the same; 0 for none. is_known: `values_at` was called last at this
+    state.
     """
     if code != 0:
         call_series(code, s, 1.0 if is_known else 0.0, x, U, V, out)
@@ -160,13 +163,13 @@ def leap(
     room: Any,
     record: Any,
 ) -> tuple[int, int, int]:
-    """Go from event to event; returns why it ended and how many steps and segments were committed.
+    """Run from event to event. Return why the call ended, and the numbers of committed steps and segments.
 
-    codes: machine code of the tapes, where there is some. places: rates, then where in p the origin and the phases are.
+    codes: machine code of the tapes, if there is any. places: rates, and the positions of origin and phases in p.
     control: rtol, atol, order, max_step, longest segment. target (2,): instant at which to stop. clock (2,): origin of
-    the segment, moved on. state: x, x_error, z, p, sides, orders, floors at the start of the segment, moved on. room:
-    scratch arrays. record: what the committed steps, segments and events are written to; a segment with more steps than
-    there is room for is committed in pieces.
+    the segment, advanced by the call. state: x, x_error, z, p, sides, orders, floors at the start of the segment,
+    advanced by the call. room: scratch arrays. record: receives the committed steps, segments and events. A segment
+    with more steps than fit is committed in parts.
     """
     rates, origin_at, phases_at = places
     rtol, atol, order, max_step, longest = control
@@ -349,7 +352,7 @@ def leap(
             put(y, x)
             for i in range(n):
                 x_error[i] = 4.0 * UNIT * scale[i] + x_error[i]
-            if s < bound:  # a segment that is too long for the room is cut in two
+            if s < bound:  # a segment with more steps than fit is split
                 move_on(s, clock, sides, orders, floors)
                 return FULL, n_steps, n_segments + 1
             clock[0], clock[1] = target[0], target[1]
@@ -382,7 +385,7 @@ def leap(
 
 @inlined
 def move_on(s: float, clock: Any, sides: Any, orders: Any, floors: Any) -> None:
-    """Make local time s the start of a new segment in the same modes; every active guard is positive there."""
+    """Make local time s the start of a new segment in the same modes, where every active guard is positive."""
     clock[0], clock[1] = moved_on(clock[0], clock[1], s)
     for g in range(sides.shape[0]):
         sides[g], orders[g], floors[g] = 1, 0, 0.0
@@ -390,7 +393,7 @@ def move_on(s: float, clock: Any, sides: Any, orders: Any, floors: Any) -> None:
 
 @inlined
 def holding(automata: Any, z: Any) -> bool:
-    """Whether any component holds its surface."""
+    """Return whether any component holds its surface."""
     for c in range(z.shape[0]):
         if automata.hold[c] >= 0 and z[c] == automata.hold[c]:
             return True
@@ -399,7 +402,7 @@ def holding(automata: Any, z: Any) -> bool:
 
 @inlined
 def landing(automata: Any, z: Any) -> bool:
-    """Whether any component keeps its surface by projection, onto which each step is to land."""
+    """Return whether any component keeps its surface by projection, so that each step is projected."""
     for c in range(z.shape[0]):
         if automata.hold[c] >= 0 and z[c] == automata.hold[c] and automata.pin[c, 0] < 0:
             return True

@@ -1,4 +1,4 @@
-"""Where along a step the first event is: guards and monitors searched on the dense output, roots polished."""
+"""Locate the first event along a step: search guards and monitors on the dense output, and refine the roots."""
 
 from __future__ import annotations
 
@@ -13,42 +13,39 @@ from hybridsim.engine.run.stepping import Flow, Step, Watch
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.failures import StepFailure
 
-_POLISH = 200  # iterations: bisection alone needs 52; the search ends when the bracket is down to neighbours
-_WIDER = 6  # doublings of a bracket whose end is on the wrong side, by the error of the polynomial that isolated it
-# Pieces that are halved no further are narrower than this; ends of wider brackets are certain, and what changes sign
-# beyond them is another zero.
+_POLISH = 200  # largest number of iterations; bisection alone needs 52 until the bracket ends are adjacent
+_WIDER = 6  # doublings of a bracket whose end is on the wrong side because of the error of the isolating polynomial
+# Width below which the isolation stops bisecting. The ends of wider brackets are certain: a sign change beyond them is
+# another zero.
 _NARROW = 2.0**-24
-_FAR = 2.0**-10  # of the values on a step: a function that is nearer to zero at its end may be zero there
-_SHORT = 2.0**-13  # of a run's time: on shorter steps it may have been that near all along
+_FAR = 2.0**-10  # of the values on a step; a function closer to zero at its end may be zero there
+_SHORT = 2.0**-13  # of the time of a run; on shorter steps it may be close to zero throughout
 
 
 @dataclass(frozen=True)
 class Hit:
-    """A located zero: theta in (0, 1] of the step, guard or monitor number, direction of the crossing."""
+    """A located zero."""
 
-    theta: float
-    number: int
-    direction: int
+    theta: float  # position in (0, 1] of the step
+    number: int  # guard or monitor number
+    direction: int  # 1 rising, -1 falling
 
 
 @dataclass(frozen=True)
 class Findings:
-    """What a step holds: first exit of each guard, all crossings of monitors, near-grazings, signs at its end.
+    """The zeros found in a step."""
 
-    guard_gaps, monitor_gaps: (theta, number) from which on a function is not a number.
-    """
-
-    exits: tuple[Hit, ...]
-    crossings: tuple[Hit, ...]
-    grazings: tuple[tuple[int, Grazing], ...]
-    guard_ends: np.ndarray
-    monitor_ends: np.ndarray
-    guard_gaps: tuple[tuple[float, int], ...]
-    monitor_gaps: tuple[tuple[float, int], ...]
+    exits: tuple[Hit, ...]  # guards that become negative
+    crossings: tuple[Hit, ...]  # all crossings of monitors
+    grazings: tuple[tuple[int, Grazing], ...]  # guards that come near zero
+    guard_ends: np.ndarray  # sides at the end of the step
+    monitor_ends: np.ndarray  # the same for monitors
+    guard_gaps: tuple[tuple[float, int], ...]  # (theta, number) from which on a guard is not a number
+    monitor_gaps: tuple[tuple[float, int], ...]  # the same for monitors
 
 
 def polish(sample: Callable[[np.ndarray], np.ndarray], crossing: Crossing) -> float:
-    """The zero inside a crossing's bracket, to rounding: secant steps kept inside a shrinking bracket."""
+    """Return the zero inside the bracket of a crossing to rounding, by safeguarded secant steps."""
     left, right = crossing.left, crossing.right
 
     def value(theta: float) -> float:
@@ -65,10 +62,10 @@ def polish(sample: Callable[[np.ndarray], np.ndarray], crossing: Crossing) -> fl
         else:
             break
         width *= 2.0
-    else:  # no zero of these samples is near: a question of rounding
+    else:  # no zero is near: the sign is decided by rounding
         left, right = crossing.left, crossing.right
         low, high = value(left), value(right)
-    low = min(low, 0.0)  # the side where a step begins is known, whatever rounding makes of the value
+    low = min(low, 0.0)  # the side at the start of a step is known, whatever the rounding of the value
     kept = 0
     for _ in range(_POLISH):
         if right - left <= math.ulp(right) or high == 0.0:
@@ -82,7 +79,7 @@ def polish(sample: Callable[[np.ndarray], np.ndarray], crossing: Crossing) -> fl
         if found > 0.0:
             right, high = theta, found
             kept = kept + 1 if kept >= 0 else 0
-            low *= 0.5  # Illinois: the weight of the end that stays is halved
+            low *= 0.5  # Illinois method: halve the value at the end that stays
         elif found < 0.0:
             left, low = theta, found
             high *= 0.5
@@ -96,7 +93,7 @@ def _in_order(hits: list[Hit]) -> tuple[Hit, ...]:
 
 
 class Locator:
-    """Searches the steps of one segment; remembers on which side each guard and monitor is."""
+    """Searches the steps of one segment, and stores the side of each guard and monitor."""
 
     def __init__(self, flow: Flow, watch: Watch) -> None:
         self.flow = flow
@@ -105,10 +102,10 @@ class Locator:
         self.floors, self.monitor_floors = watch.guard_floors, watch.monitor_floors
         self.monitor_numbers = np.arange(len(watch.monitor_sides))
         self.monitor_sides, self.monitor_orders = watch.monitor_sides.copy(), watch.monitor_orders.copy()
-        self.samples: list[np.ndarray] = []  # of guards and of monitors, on the step that was searched last
+        self.samples: list[np.ndarray] = []  # of guards and monitors, on the last searched step
 
     def search(self, step: Step, rounding: Callable[[], np.ndarray]) -> Findings:
-        """All that happens in a step; rounding: of the states, on the segment so far."""
+        """Return all zeros in a step; rounding: returns the errors of the states on the segment so far."""
         flow, width = self.flow, step.s1 - step.s0
         times = step.s0 + width * POINTS
         times[-1] = step.s1
@@ -124,7 +121,7 @@ class Locator:
                 sample, side = self._sampler(step, flow.guards, int(g)), int(self.sides[g])
                 order = int(self.orders[g]) if side else 0
                 floor = self.floors[g]
-                if flow.system.is_corner[flow.system.owner[g]]:  # within rounding either of its sides will do
+                if flow.system.is_corner[flow.system.owner[g]]:  # within rounding both sides are equally good
                     floor = max(floor, self._bound(step, int(g), rounding()))
                 try:
                     found, grazed, guard_ends[g], gap = find_roots(
@@ -167,7 +164,7 @@ class Locator:
                 except StepFailure as failure:
                     if np.isfinite(values[:, k]).all():
                         raise StepFailure(f"monitor {flow.system.monitor_names[k]}: {failure}") from None
-                    found, monitor_ends[k], gap = [], 0, 0.0  # it ends in a pole
+                    found, monitor_ends[k], gap = [], 0, 0.0  # it ends at a pole
                 crossings += [Hit(polish(sample, c), int(k), c.direction) for c in found]
                 monitor_gaps += [(gap, int(k))] if gap <= 1.0 else []
         return Findings(
@@ -181,7 +178,7 @@ class Locator:
         )
 
     def is_clear(self, length: float, time: float) -> bool:
-        """Whether no function comes near zero where a step of this length ends, at such a time."""
+        """Return whether no function is near zero at the end of a step of this length, at this time."""
         found = len(self.samples) == (len(self.numbers) > 0) + (len(self.monitor_numbers) > 0)
         clear = found and (length > _SHORT * time or not self.samples)
         for values in self.samples:
@@ -191,12 +188,12 @@ class Locator:
         return clear
 
     def exit(self, step: Step, guard: int) -> Hit:
-        """The zero of a guard that is positive where a step begins and negative where it ends."""
+        """Return the zero of a guard that is positive at the start of a step and negative at its end."""
         sample = self._sampler(step, self.flow.guards, guard)
         return Hit(polish(sample, Crossing(0.0, 1.0, -1)), guard, -1)
 
     def _rounding(self, step: Step, number: int, is_monitor: bool) -> Callable[[], float]:
-        """Rounding error of a guard's or monitor's values on the step, worked out when it is asked for."""
+        """Return a function for the rounding error of a guard's or monitor's values on the step, computed on demand."""
         known: list[float] = []
 
         def bound() -> float:
@@ -205,10 +202,10 @@ class Locator:
                 states = step.dense(times)
                 rates = np.array([self.flow.rhs(s, x) for s, x in zip(times.tolist(), states, strict=True)])
                 sizes, speeds = (np.abs(np.nan_to_num(v)).max(axis=0) for v in (states, rates))
-                # the time of a sample is rounded as well, and all that is made of it
+                # the time of a sample is rounded, with all values that depend on it
                 errors = 4.0 * UNIT * sizes + 2.0 * math.ulp(max(abs(step.s0), abs(step.s1))) * speeds
                 bound_at_end = self._bound(step, number, errors, is_monitor)
-                if not math.isfinite(bound_at_end):  # without a value there
+                if not math.isfinite(bound_at_end):  # not a number there
                     start = replace(step, s1=step.s0, x1=step.x0)
                     bound_at_end = self._bound(start, number, errors, is_monitor)
                 known.append(bound_at_end)
@@ -217,7 +214,7 @@ class Locator:
         return bound
 
     def _before(self, step: Step, number: int, is_monitor: bool) -> Callable[[float], float]:
-        """What the errors of the states at the start of the segment make of a guard's or monitor's value at theta."""
+        """Return a function of theta: the error of a guard or monitor due to the errors at the start of the segment."""
         known: list[list[float]] = []
 
         def bound(theta: float) -> float:
@@ -234,7 +231,7 @@ class Locator:
         return bound
 
     def _bound(self, step: Step, number: int, errors: np.ndarray, is_monitor: bool = False) -> float:
-        """How far a guard or monitor is off at the end of a step where the states are so far off."""
+        """Return the error of a guard or monitor at the end of a step, given the errors of the states."""
         flow, s_error = self.flow, math.ulp(max(abs(step.s0), abs(step.s1)))
         series = flow.system.series(step.s1, step.x1, flow.p, flow.z, errors, s_error)
         return float((series.monitor_bounds if is_monitor else series.guard_bounds)[number, 0])

@@ -1,4 +1,4 @@
-"""What is known of an event as it was located: the state with bounds of its errors, and what is zero together."""
+"""Determine the state at a located event with error bounds, and all guards and monitors that are zero there."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from hybridsim.engine.system.system import System
 
 
 def situation(system: System, arrival: Arrival, segment: SegmentRun) -> Situation:
-    """The state before an event with bounds of its rounding: of the states, the instant, the residual."""
+    """Return the state before an event, with error bounds from rounding, the instant and the residual."""
     flow, s_error = segment.flow, 2.0 * math.ulp(arrival.s)
     zero, asked = np.zeros(system.n), segment.tolerances
     slopes = np.abs(system.flow(arrival.s, arrival.x, flow.p, flow.z)) if system.n else zero
     located: list[Any] = []
     if arrival.fired or arrival.stopping:
         series = system.series(arrival.s, arrival.x, flow.p, flow.z, zero, 0.0)
-        # of a corner either side will do within its bound: its instant does not make the states worse than asked for
+        # for a corner both sides are equally good if its time error moves the states by less than the tolerance
         fine = asked.atol + asked.rtol * np.abs(arrival.x)
         fired = [
             g
@@ -35,7 +35,7 @@ def situation(system: System, arrival: Arrival, segment: SegmentRun) -> Situatio
             or (distance_of_zero(series.guards[g]) * slopes <= fine).all()
         ]
         located = [*series.guards[fired], *series.monitors[list(arrival.stopping)]]
-    # where a speed dies out below all that is asked for, value and rate are both noise, and tell of no time
+    # if value and rate are far below the tolerance, both are noise and give no time
     least = UNIT * float(asked.atol.min(initial=math.inf))
     for series_of_zero in located:
         if np.abs(series_of_zero[:2]).max() > least:
@@ -47,9 +47,9 @@ def situation(system: System, arrival: Arrival, segment: SegmentRun) -> Situatio
 
 
 def distance_of_zero(series: Any) -> float:
-    """How far in time the zero of a function is, by its Taylor coefficients; 0 where they do not tell.
+    """Return the distance in time of the zero of a function by its Taylor coefficients, or 0 if undetermined.
 
-    A function that only touches zero has a slope that tells nothing: a double zero is sqrt(2 |g/g''|) away.
+    For a function that only touches zero the slope is useless: a double zero is at the distance sqrt(2 |g/g''|).
     """
     value, slope, bend = (abs(float(c)) for c in series[:3])
     by_slope = value / slope if slope > 0.0 else math.inf
@@ -59,22 +59,22 @@ def distance_of_zero(series: Any) -> float:
 
 
 def time_error(series: Any, bounds: Any) -> float:
-    """How well the time of a zero is known, by the bound of the function's value there."""
+    """Return the error of the time of a zero, from the error bound of the function there."""
     return distance_of_zero((bounds[0], *series[1:]))
 
 
 @dataclass(frozen=True)
 class Located:
-    """One instant at which a segment ended.
+    """An instant at which a segment ended.
 
     Parameters
     ----------
     at : the state just before it.
-    fired : guards that are zero and leave, with the order of their times.
+    fired : guards that are zero and become negative, with their order in time.
     monitors : their sides just before it, and those to which the motion leads them.
-    is_met : whether what is due beforehand falls on it.
-    inputs : the run-time vector with the inputs as they were before a jump; None where `at` has them so.
-    waiting : components whose loads are zero and wait for schedules that are due.
+    is_met : whether the instant coincides with what is scheduled.
+    inputs : the run-time vector with the inputs before a jump; None if `at` has them.
+    waiting : components whose loads are zero and that wait for schedules that are due.
     """
 
     at: Situation
@@ -85,16 +85,16 @@ class Located:
     waiting: frozenset[int] = frozenset()
 
     def scope(self, system: System) -> set[int]:
-        """The components that are decided before what is due."""
+        """Return the components that are decided before the schedules."""
         return set(range(len(system.automata))) - self.waiting
 
 
 def coincident(
     system: System, origin: Instant, at: Situation, fired: tuple[int, ...], known: Any = None
 ) -> dict[int, int]:
-    """The located guards and those that are zero with them and leave, with the order of their times.
+    """Return the located guards and those that leave zero at the same instant, with their order in time.
 
-    known: the series there, if they are at hand.
+    known: the series there, if they have been computed.
     """
     series = known or system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
     together: dict[int, float] = {}
@@ -103,7 +103,7 @@ def coincident(
         leaves = abs(value[0]) <= bound[0] and side_after(value, bound, 1)[0] < 0
         if g in fired or leaves:
             together[g] = math.copysign(distance_of_zero(value), float(value[0]))
-    # guards within one ulp of the time are at one place of the order
+    # guards within one ulp of the time share a position in the order
     ulp = math.ulp(max(abs(float(origin.plus(at.s))), math.ulp(1.0)))
     order: dict[int, int] = {}
     place, last = -1, -math.inf
@@ -117,21 +117,21 @@ def coincident(
 def located(
     system: System, origin: Instant, arrival: Arrival, segment: SegmentRun, target: float, is_due: bool
 ) -> Located:
-    """What is zero where a segment ended, and what is to be settled there.
+    """Return which guards and monitors are zero at the end of a segment, and the state there.
 
-    is_due: something is due at the local time `target`, which may be this very instant.
+    is_due: something is scheduled at the local time `target`, which may be this instant.
     """
     at, is_met = situation(system, arrival, segment), False
     series = system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
-    if is_due:  # at a known time it counts how well the motion is known there
+    if is_due:  # at a scheduled time the error of the motion there counts
         wide, known = as_stepped(system, at, arrival, segment)
         zeros = [(known.guards[g], known.guard_bounds[g]) for g in arrival.fired]
         zeros += [(known.monitors[k], known.monitor_bounds[k]) for k in arrival.stopping]
         late = max((time_error(value, bound) for value, bound in zeros), default=0.0)
-        known_at = math.ulp(float(origin.plus(target)))  # it is a number in doubles
+        known_at = math.ulp(float(origin.plus(target)))  # the scheduled time is rounded to double precision
         is_met = abs(target - arrival.s) <= at.s_error + late + known_at
         if is_met:
-            if arrival.s != target:  # by as much as rounding may have moved it
+            if arrival.s != target:  # they differ by rounding
                 shift, arrival = abs(target - arrival.s), segment.carry_on(arrival, target)
                 at = situation(system, arrival, segment)
                 at.s_error += shift
@@ -154,8 +154,8 @@ def located(
 
 
 def as_stepped(system: System, at: Situation, arrival: Arrival, segment: SegmentRun) -> tuple[Situation, Any]:
-    """The state at an event with bounds that count what the steps to it have rounded away, and the series there."""
-    with np.errstate(invalid="ignore"):  # a state may have grown beyond all bounds
+    """Return the state at an event with error bounds that include the rounding of the steps, and the series there."""
+    with np.errstate(invalid="ignore"):  # a state may have become infinite
         wide, way = replace(at), np.abs(np.diff([*segment.states, arrival.x], axis=0)).sum(axis=0)
     add_steps(system, wide, segment.scale + way, len(segment.knots), segment.method.rounding * way)
     return wide, system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
@@ -164,7 +164,7 @@ def as_stepped(system: System, at: Situation, arrival: Arrival, segment: Segment
 def _as_due(
     system: System, origin: Instant, at: Situation, series: Any, arrival: Arrival, known_at: float
 ) -> tuple[Situation, Any]:
-    """The state where something is due, with a bound for the rounding of that time, if more is zero within it."""
+    """Return the state at a scheduled time, with a bound for the rounding of that time if more is zero within it."""
     slopes = np.abs(system.flow(at.s, at.x, at.p, at.z)) if system.n else 0.0
     wide = replace(at, x_error=at.x_error + known_at * slopes, s_error=at.s_error + known_at)
     known = system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
@@ -173,7 +173,7 @@ def _as_due(
 
 
 def others_near(system: System, at: Situation, series: Any, arrival: Arrival, share: float) -> bool:
-    """Whether something that has not fired is zero within so many times its bound, as steps may have rounded it."""
+    """Return whether a function that did not fire is zero within `share` times its bound, by rounding of steps."""
     active = set(map(int, np.flatnonzero(system.active(at.z) & ~system.is_corner[system.owner])))
     monitors = set(range(len(series.monitors))) - set(arrival.stopping)
     values = [(series.guards[g][0], series.guard_bounds[g][0]) for g in active.difference(arrival.fired)]
@@ -182,32 +182,32 @@ def others_near(system: System, at: Situation, series: Any, arrival: Arrival, sh
 
 
 def _number_at_zero(system: System, origin: Instant, at: Situation, arrival: Arrival, series: Any) -> int:
-    """How many guards leave at an event, and how many monitors are zero there."""
+    """Return the number of guards that leave at an event, plus that of monitors that are zero there."""
     watched = zip(series.monitors, series.monitor_bounds, strict=True)
     monitors = sum(abs(value[0]) <= bound[0] for value, bound in watched)
     return len(coincident(system, origin, at, arrival.fired, series)) + monitors
 
 
 def _is_near(series: Any, arrival: Arrival, guard: int, s: float) -> bool:
-    """Whether what was taken for a touch of a guard is its zero at the event itself."""
+    """Return whether a near-grazing of a guard is its zero at the event itself."""
     return abs(arrival.s - s) <= 2.0 * time_error(series.guards[guard], series.guard_bounds[guard])
 
 
 def _before_instant(series: Any, arrival: Arrival, segment: SegmentRun) -> np.ndarray:
-    """Sides of the monitors just before an instant; those that are zero within rounding have not crossed yet.
+    """Return the sides of the monitors just before an instant. Monitors that are zero within rounding have not crossed.
 
-    Where they were seen to cross, the sighting is taken back: the sides before and after the instant decide.
+    If a crossing of such a monitor was recorded, it is removed. The sides before and after the instant decide.
     """
     sides, watch = segment.locator.monitor_sides.copy(), segment.watch
     for k, (value, bound) in enumerate(zip(series.monitors, series.monitor_bounds, strict=True)):
         is_zero = abs(value[0]) <= bound[0]
         before = side_before(value, bound, 1)[0] if is_zero else 0
-        if is_zero and before == 0 and watch.monitor_sides[k] == 0:  # it has stayed at zero
+        if is_zero and before == 0 and watch.monitor_sides[k] == 0:  # it stayed at zero
             sides[k] = 0
         near = 2.0 * time_error(value, bound)
         if before == 0 or (
             watch.monitor_orders[k] > 0 and abs(arrival.s) <= near
-        ):  # it still leaves the last zero
+        ):  # it is still leaving the previous zero
             continue
         sides[k] = before
         segment.sightings = [
@@ -217,7 +217,7 @@ def _before_instant(series: Any, arrival: Arrival, segment: SegmentRun) -> np.nd
 
 
 def located_backward(system: System, origin: Instant, arrival: Arrival, segment: SegmentRun) -> Located:
-    """The same backward in time, where an instant has no further changes."""
+    """Return the same backward in time, where no schedules take part."""
     at = situation(system, arrival, segment)
     fired = coincident(system, origin, at, arrival.fired) if arrival.fired else {}
     sides = segment.locator.monitor_sides
@@ -229,9 +229,9 @@ def located_backward(system: System, origin: Instant, arrival: Arrival, segment:
 def errors_when_due(
     system: System, target: Instant, at: Situation, steps: int, rounding: float, before: np.ndarray
 ) -> np.ndarray:
-    """Errors of the states at a time known beforehand that a compiled loop has reached, by so many steps.
+    """Return errors of the states at a scheduled time that a compiled loop reached in so many steps.
 
-    rounding: of the method; before: the states where the loop began.
+    rounding: of the method. before: the states at which the loop began.
     """
     way = np.abs(at.x - before)
     scale = np.maximum(np.abs(before), np.abs(at.x)) + way
@@ -244,10 +244,10 @@ def errors_when_due(
 def with_evaluated(
     system: System, before: np.ndarray, x: np.ndarray, p: np.ndarray, z: np.ndarray, error: np.ndarray
 ) -> np.ndarray:
-    """Errors of the states where something is due, with those of what the modes until then evaluate.
+    """Return errors of the states at a scheduled time, including those of states held in the modes before.
 
-    That was evaluated at a local time of the run-time vector `before` and is judged at the origin of p: both times are
-    rounded.
+    Held states were evaluated at a local time of the run-time vector `before`, and are judged at the origin of p. Both
+    times are rounded.
     """
     held, error = system.evaluated(z), error.copy()
     if held:
@@ -259,10 +259,10 @@ def with_evaluated(
 
 
 def add_steps(system: System, at: Situation, scale: np.ndarray, steps: int, stages: np.ndarray) -> None:
-    """Add to the errors of the states what so many steps have rounded away.
+    """Add the rounding errors of so many steps to the errors of the states.
 
-    A step is a sum of terms, each rounded. scale: of the states and of the way they went. stages: that way, times what
-    the stages of the method add up to, which cancel each other.
+    A step is a sum of rounded terms. scale: size of the states plus the distance they moved. stages: that distance
+    times the sum of the stages of the method, which cancel each other.
     """
     held = system.evaluated(at.z)
     at.x_error = at.x_error + UNIT * (16.0 * steps * scale + stages)
@@ -270,7 +270,7 @@ def add_steps(system: System, at: Situation, scale: np.ndarray, steps: int, stag
 
 
 def without_fatal(system: System, found: Located) -> Located:
-    """What is located at the end of a run, where nothing has to go on: without guards that would only end it there."""
+    """Return the located event at the end of a run without fatal guards, because nothing has to continue."""
     modes = zip(system.automata, found.at.z.tolist(), strict=True)
     fatal = {g for a, m in modes if m >= 0 for g, message in zip(a.guards[m], a.fatal[m]) if message}
     return replace(found, fired={g: place for g, place in found.fired.items() if g not in fatal})

@@ -1,4 +1,4 @@
-"""The mode loop: integrate to the first event, settle it, go on; it knows no method and no law."""
+"""The mode loop: integrate to the first event, resolve it, and continue. It depends on no method and no law."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.timetable import Appointment, Timetable
 
-_NEAR = 1e-6  # of a time
+_NEAR = 1e-6  # relative to a time
 
 
 class ModeLoop:
-    """One run of a system with one stepping method; leaper: a compiled loop that has been called ahead."""
+    """One run of a system with one stepping method. leaper: a compiled loop that was called in advance."""
 
     def __init__(
         self,
@@ -64,10 +64,10 @@ class ModeLoop:
         self.plan = plan = plan_of(system, method, task)
         self.origin, self.end, self.renewal = plan.origin, plan.end, plan.renewal
         self.timetable = Timetable(system, self.end)
-        self.adopted: Instant | None = None  # the last instant at which an event was settled
-        self.standing: Standing  # what holds at the origin
+        self.adopted: Instant | None = None  # instant of the last resolved event
+        self.standing: Standing  # state at the origin
         self.accumulation = Accumulation(forward=self.forward)
-        self.last_limits: dict[int, float] = {}  # by component
+        self.last_limits: dict[int, float] = {}  # component -> time
         self.headway = Headway(system, self.record.counters, self.origin, self.end)
         self.leaper = leaper or plan.leaper()
         self._led = set(system.led)
@@ -77,33 +77,33 @@ class ModeLoop:
 
     @property
     def outcome(self) -> Outcome:
-        """What holds at the origin."""
+        """Return the outcome at the origin."""
         return self.standing.outcome
 
     @property
     def p(self) -> np.ndarray:
-        """The run-time vector there."""
+        """Return the run-time vector at the origin."""
         return self.standing.p
 
     def _stand(self, instant: Instant, make: Callable[[], Outcome]) -> None:
-        """Take what is made for what holds at an instant."""
+        """Set the state at an instant, which is made on demand."""
         self.standing = Standing(self.system, instant, self.forward, make)
 
     def _progress(self, instant: Instant) -> None:
-        """So far the run has come; raises LimitReached."""
+        """Report the progress and check the limits; raises LimitReached."""
         self._tell(instant)
         if self.gauge is not None:
             self.gauge.check()
 
     def _stepped(self, instant: Instant, run: SegmentRun) -> None:
-        """The same after a step in Python; raises NoHeadway and TakenOver."""
+        """Do the same after a step in Python; raises NoHeadway and TakenOver as well."""
         self._progress(instant)
         self.headway.step(instant, run)
         if self.notices.look_on_the_way(run):
             raise TakenOver
 
     def _take_over(self) -> None:
-        """Go on by the stiff method."""
+        """Continue with the stiff method."""
         assert self.task.successor is not None
         self.method = self.notices.method = self.task.successor
         self.leaper, self.notices.takes_over = None, False
@@ -115,7 +115,7 @@ class ModeLoop:
             self._told((float(instant) - self.task.t0) / (self.task.t1 - self.task.t0))
 
     def run(self) -> Trajectory:
-        """Integrate to the end, or to where the run stops; what was computed is kept in any case."""
+        """Integrate to the end, or until the run stops. Results computed so far are kept in every case."""
         try:
             self._run()
         except StepFailure as failure:
@@ -160,7 +160,7 @@ class ModeLoop:
                 before = self.origin
                 arrived, stop = self._leap(self.leaper, target, appointment)
                 if not (arrived or stop or self.notices.takes_over) and self._reach() == self.renewal:
-                    # compiled code takes no segment longer than that, which may be its only obstacle here
+                    # the limit on segment length may be the only reason why compiled code stopped
                     nearer, renewal = self._no_farther(target, appointment)
                     if nearer != target:
                         arrived, stop = self._leap(self.leaper, nearer, renewal)
@@ -181,11 +181,11 @@ class ModeLoop:
             found: Located | None = None
             try:
                 arrival = self._arrival(segment, bound, step_size)
-                if arrival.is_bare and arrival.s != bound:  # another method goes on from there
+                if arrival.is_bare and arrival.s != bound:  # another method continues from there
                     bound, target = arrival.s, self.origin.plus(arrival.s)
                     appointment = Appointment(target, (), is_renewal=True)
                 at_target = arrival.s == bound
-                # the end is a known time as well; far from it nothing is that rounding may put there
+                # the end is a known time as well; events far from it cannot coincide with it
                 is_over = appointment is None and bound - arrival.s <= _NEAR * max(bound, abs(float(target)))
                 is_due = is_over or (appointment is not None and not appointment.is_renewal)
                 if self.forward and not (
@@ -206,13 +206,13 @@ class ModeLoop:
                 self._take_over()
 
     def _reach(self) -> float:
-        """How long a segment may be from here on."""
+        """Return the longest segment allowed from here."""
         return min(self.renewal, self.accumulation.reach(float(self.origin)))
 
     def _no_farther(
         self, target: Instant, appointment: Appointment | None
     ) -> tuple[Instant, Appointment | None]:
-        """The target and what is due there, or the end of the longest segment allowed if the target is farther."""
+        """Return the target and its appointment, or the end of the longest allowed segment if it is nearer."""
         reach = self._reach()
         if abs(target.minus(self.origin)) <= reach:
             return target, appointment
@@ -220,14 +220,14 @@ class ModeLoop:
         return target, Appointment(target, (), is_renewal=True)
 
     def _arrival(self, segment: SegmentRun, bound: float, step_size: float | None) -> Arrival:
-        """Where a segment ends, or is broken off for another method to go on."""
+        """Return the end of a segment, or the point at which another method takes over."""
         try:
             return segment.run(bound, step_size)
         except TakenOver:
             return segment.cut()
 
     def _mark(self, step_size: float | None) -> None:
-        """Note a state from which the run could go on, where an event has just been settled."""
+        """Store a checkpoint from which the run can continue, just after an event."""
         if self.adopted != self.origin:
             return
         standing, origin = self.standing, self.origin
@@ -247,9 +247,9 @@ class ModeLoop:
         self.record.mark(checkpoint)
 
     def _go_on_from(self, checkpoint: Checkpoint) -> float | None:
-        """Take a noted state up; the step size to begin with."""
+        """Restore a checkpoint. Return the first step size."""
         arrays = checkpoint.arrays
-        if "step_size" not in arrays:  # of a method with fixed steps
+        if "step_size" not in arrays:  # from a method with fixed steps
             raise damaged("the checkpoint")
         self.origin = self.adopted = checkpoint.instant
         if checkpoint.settled is not None:
@@ -267,7 +267,7 @@ class ModeLoop:
         return None if math.isnan(step_size) else step_size
 
     def _leap(self, leaper: Leaps, target: Instant, appointment: Appointment | None) -> tuple[bool, bool]:
-        """Over ordinary events in compiled code; whether the target was reached, and whether the run stops there."""
+        """Run over ordinary events in compiled code. Return whether the target was reached, and whether to stop."""
         steps, x_before = self.record.counters.steps, self.standing.read()[0].x.copy()
         while True:
             landing = leaper.leap(self.origin, *self.standing.read(), target, self.record)
@@ -304,13 +304,13 @@ class ModeLoop:
         return True, self._adopt(target, settled, x, appointment.schedules)
 
     def _at_target(self, target: Instant) -> Situation:
-        """The state just before an instant that a compiled loop has reached."""
+        """Return the state just before an instant that a compiled loop has reached."""
         outcome = self.outcome
         p = self.system.vector(target, self.system.discrete(outcome.p), not self.forward)
         return Situation(0.0, outcome.x.copy(), p, outcome.z.copy(), outcome.x_error.copy(), 0.0)
 
     def _is_event(self, found: Located) -> bool:
-        """Whether something happens at the end of the run: corners alone decide nothing there."""
+        """Return whether an event happens at the end of the run; corners alone do not count."""
         owners = set(self.system.owner[list(found.fired)].tolist())
         return bool(owners - self._led) or bool(found.monitors.leads.any())
 
@@ -340,12 +340,12 @@ class ModeLoop:
             self.forward,
             self._stepped,
         )
-        origin, progress = run.origin, self._progress  # not the run: it would hold itself
+        origin, progress = run.origin, self._progress  # not the run, which would refer to itself
         run.flow.look = lambda s: progress(origin.plus(s))
         return run
 
     def _keep(self, run: SegmentRun) -> None:
-        """Append a segment and what was seen on the way."""
+        """Append a segment, with the events that did not end it."""
         record = self.record
         if len(run.knots) > 1:
             record.segments.append(run.segment())
@@ -366,7 +366,7 @@ class ModeLoop:
         segment: SegmentRun,
         found: Located | None,
     ) -> bool:
-        """Settle what happens where a segment ended; True where the run stops."""
+        """Resolve the event at the end of a segment. Return True if the run stops."""
         schedules = appointment.schedules if appointment else ()
         if arrival.entered:
             self.origin = instant
@@ -389,15 +389,15 @@ class ModeLoop:
         if appointment and not appointment.is_renewal and (found.fired or monitors.leads.any()):
             found = on_new_pieces(self.system, instant, found, schedules, self.forward)
             monitors, s_error = found.monitors, math.ulp(float(instant))
-        # corners decide nothing: where something is due at their instant they take their sides with it
+        # corners need no decision: at a scheduled instant they take their sides together with it
         has_only_corners = appointment is not None and set(self.system.owner[list(found.fired)]) <= self._led
-        if has_only_corners:  # or nothing, where what was located only touches zero
+        if has_only_corners:  # or no guard, if the located ones only touch zero
             error = np.maximum(error, found.at.x_error)
         fired = {} if has_only_corners else found.fired
         resets = self._resets_of_monitors(instant, found, fired, appointment, error, s_error)
         if fired or resets or appointment is None:
             outcome = self._settle_located(instant, found, fired, resets)
-            # surfaces that are taken together, within rounding, short of where their crossings accumulate
+            # surfaces held together within rounding, just before their crossings accumulate
             is_early = appointment is None and holds_several(self.system, outcome)
             limit = self.accumulation.expected(instant) if is_early else None
             stop = None if limit is None else self._gathered(limit)
@@ -411,7 +411,7 @@ class ModeLoop:
         if appointment:
             if not appointment.is_renewal:
                 self.timetable.kept(instant)
-            # what is located at the same instant comes first: it belongs to the signals as they were before it
+            # located events come first, because they belong to the signals before the instant
             outcome = self._settle_appointment(instant, self.outcome, x_minus, schedules, error, s_error)
             outcome = self._apply_crossed(outcome, 0.0, monitors)
             return self._adopt(instant, outcome, x_minus, schedules, monitors)
@@ -426,9 +426,9 @@ class ModeLoop:
         error: np.ndarray,
         s_error: float,
     ) -> list[tuple[object, ...]]:
-        """Resets of the monitors that fire as they come to zero: they read what guards that are zero with them read.
+        """Return the resets of monitors that fire at zero. They read the same state as guards that are zero with them.
 
-        What guards, schedules and inputs make of the instant decides which fire; the resets of monitors do not.
+        Guards, schedules and inputs of the instant decide which monitors fire; the resets of monitors do not.
         """
         monitors, outcome = found.monitors, None
         acting = [k for k, m in enumerate(monitors.monitors) if m.action == "reset" and monitors.leads[k]]
@@ -445,7 +445,7 @@ class ModeLoop:
     def _settle_located(
         self, instant: Instant, found: Located, fired: dict[int, int], resets: list[tuple[object, ...]]
     ) -> Outcome:
-        """Settle the located guards and resets of monitors on a copy of the state."""
+        """Resolve the located guards and the resets of monitors on a copy of the state."""
         at = replace(found.at, x=found.at.x.copy(), z=found.at.z.copy())
         if fired and not self.forward:
             return cross_backward(self.system, at, tuple(fired))
@@ -455,7 +455,7 @@ class ModeLoop:
         return settling.run(fired, resets)
 
     def _apply_crossed(self, outcome: Outcome, s: float, monitors: MonitorSides) -> Outcome:
-        """Apply the resets of monitors that an event moved off their sides, and those that such resets move in turn."""
+        """Apply the resets of monitors that an event or another such reset moved off their sides."""
         changes = list(outcome.changes)
         while not outcome.status and self.forward and (due := monitors.fire(outcome, "reset")):
             monitors.fire(outcome)
@@ -476,10 +476,10 @@ class ModeLoop:
         error: np.ndarray,
         s_error: float = 0.0,
     ) -> Outcome:
-        """Settle a scheduled instant, inputs as they are from then on.
+        """Resolve a scheduled instant with the inputs that hold from then on.
 
-        before: what holds until then. s_error: how well the zeros of what was located there are known. An event that
-        was settled within two roundings of the instant has its zero there as well.
+        before: the outcome that holds until then. s_error: error of the times of zeros located there. An event that was
+        resolved within two roundings of the instant has its zero there as well.
         """
         system, z, discrete = self.system, before.z, self.system.discrete(before.p)
         rounding = math.ulp(float(instant))
@@ -494,9 +494,9 @@ class ModeLoop:
         return settling.run((), resets)
 
     def _accumulated(self, instant: Instant, x_minus: np.ndarray, fired: tuple[int, ...]) -> bool:
-        """Whether events follow each other ever faster; then the run ends, saying where that leads."""
+        """Detect an accumulation of events. Return whether the run ends there."""
         closed = closed_now(self.system, self.outcome)
-        self.accumulation.forget(closed)  # a contact that has closed bounces no more
+        self.accumulation.forget(closed)  # a closed contact does not bounce any more
         changed = {c.component for c in self.outcome.changes}.difference(closed)
         if closed and not changed:
             return False
@@ -505,11 +505,11 @@ class ModeLoop:
         bounces = bounces_of(self.outcome, instant, x_minus)
         hidden = limit_of_hidden(self.system, self.outcome, bounces, self.record)
         if hidden and limit is None and self.system.is_unilateral[list(hidden.components)].all():
-            return bool(self._gathered(hidden))  # where it may not close yet, it bounces on
+            return bool(self._gathered(hidden))  # a contact that cannot close yet continues to bounce
         return self._ends_at(hidden or limit)
 
     def _ends_at(self, limit: Limit | None) -> bool:
-        """Whether the run ends at this limit of events, if it is one; it does where there is nothing that goes on."""
+        """Return whether the run ends at this limit of events, because no motion continues from it."""
         stop = False if limit is None else self._gathered(limit)
         if limit is None or stop is not None:
             return bool(stop)
@@ -518,17 +518,17 @@ class ModeLoop:
         return True
 
     def _gathered(self, limit: Limit) -> bool | None:
-        """Go on behind a limit: along surfaces, in contacts, or as it is declared; whether the run stops there.
+        """Continue from a limit along surfaces, in contacts, or as declared. Return whether the run stops there.
 
-        None where there is nothing that goes on.
+        The result is None if no motion continues.
         """
         is_again = any(self.last_limits.get(c) == limit.time for c in limit.components)
-        if not self.forward or is_again:  # it leads back into its own series
+        if not self.forward or is_again:  # a limit leads back into its own series
             return None
         appointment = self.timetable.next(self.origin, self.forward)
         target = appointment.instant if appointment else self.end
         room = target.minus(self.origin)
-        ahead = min(max(Instant(limit.time).minus(self.origin), 0.0), room)  # what is due until then is due
+        ahead = min(max(Instant(limit.time).minus(self.origin), 0.0), room)  # not beyond the next appointment
         before = self.outcome
         if (after := behind(limit, self.system, before, self.p, ahead)) is None:
             return None
@@ -559,9 +559,10 @@ class ModeLoop:
         monitors: MonitorSides | None = None,
         is_last: bool = True,
     ) -> bool:
-        """Make the state after an event the start of the next segment and record the event; True to stop.
+        """Make the state after an event the start of the next segment, and record the event. Return True to stop.
 
-        is_last: nothing follows at this instant; else only the monitors whose resets are applied are recorded yet.
+        is_last: nothing else follows at this instant. Otherwise only monitors whose resets were applied are recorded
+        yet.
         """
         system, record = self.system, self.record
         self.origin = self.adopted = instant
@@ -588,7 +589,7 @@ class ModeLoop:
             self._occur(instant, "scheduled", schedule.name, "", "", "", 0, x_minus, outcome.x)
             terminated += [schedule.name] if schedule.terminate else []
         ended = self._fired_monitors(instant, outcome, x_minus, monitors, is_last) if monitors else []
-        # a run that is ended here needs no modes that hold behind it
+        # a run that ends here needs no admissible modes after it
         is_over = self.forward and instant == self.end and is_only_fatal(system, outcome)
         if outcome.status and not (ended or terminated or is_over):
             record.status, record.message = outcome.status, f"at t = {float(instant):.9g}: {outcome.message}"
@@ -613,7 +614,7 @@ class ModeLoop:
         monitors: MonitorSides,
         is_last: bool,
     ) -> list[str]:
-        """Record the monitors that fire at an instant; return those that end the run."""
+        """Record the monitors that fire at an instant. Return those that end the run."""
         is_last = is_last or bool(outcome.status)
         if is_last:
             monitors.fire(outcome)

@@ -1,4 +1,4 @@
-"""What a segment passed without ending there: monitors that only record, and guards that it nearly grazed."""
+"""Collect events that did not end a segment: recorded monitors and near-grazings of guards."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hybridsim.engine.system.system import System
 
 
 def seen_on_the_way(system: System, origin: Instant, run: SegmentRun, record: Trajectory) -> list[Occurrence]:
-    """In the order of time; the record is warned of near-grazings."""
+    """Return these events in order of time, and add warnings for near-grazings to the record."""
     passed = [(seen.s, _sighting(system, origin, seen)) for seen in run.sightings]
     declared = [g for g in run.grazings if not system.is_corner[system.owner[g[0]]]]
     if declared:

@@ -1,6 +1,7 @@
-"""What is located where inputs or schedules change something, judged on what begins there: a load that touches zero.
+"""Judge located guards at a jump of inputs or at a schedule by the motion that begins there.
 
-An event is where a guard is negative just after. Located by the slope before a knot, it may turn back there, or stay.
+A guard fires only if it is negative just after. A zero located by the motion before may turn back or stay at zero, such
+as a load that touches zero.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ from hybridsim.engine.system.system import System
 def on_new_pieces(
     system: System, instant: Instant, found: Located, schedules: tuple[int, ...], forward: bool
 ) -> Located:
-    """What was located at the instant of an appointment and is to be settled before it.
+    """Return the located event at an appointment, restricted to what is resolved before the appointment.
 
-    What does not leave on the pieces of inputs that begin there as well is left out. The rest is settled on these;
-    conditions and resets read the inputs as they were before a jump. A load at zero waits for schedules that are due.
+    Guards that do not become negative on the new pieces of inputs are dropped. The rest is resolved on these pieces,
+    while conditions and resets read the inputs before a jump. A load at zero waits for schedules that are due.
     """
     if schedules:
         waiting = _loads_at_zero(system, found)
@@ -41,7 +42,7 @@ def on_new_pieces(
     series, side_of = settling.series_of(settling.at.z), side_after if forward else side_before
     is_open = ~system.active(settling.at.z) | np.isin(
         system.owner, system.led
-    )  # what corners decide by themselves
+    )  # corners have been decided already
     fired = {
         g: place
         for g, place in found.fired.items()
@@ -54,7 +55,7 @@ def on_new_pieces(
 
 
 def _loads_at_zero(system: System, found: Located) -> frozenset[int]:
-    """The components at whose zero the run would end."""
+    """Return the components with a located guard that would end the run."""
     modes = zip(system.automata, found.at.z.tolist())
     ends = [
         c

@@ -1,6 +1,6 @@
-"""What a run is told beside its result: accumulation, chattering, steps kept short by stability.
+"""Produce warnings on a run: accumulation, chattering, and steps limited by stability.
 
-Looked for in what the run leaves behind, every few hundred events or steps and at its end; it never changes the run.
+They are derived from the record every few hundred events or steps and at the end. They never change the run.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ if TYPE_CHECKING:
     from hybridsim.engine.run.headway import Headway
     from hybridsim.engine.run.segment_run import SegmentRun
 
-# Chattering: so many events in a row, between two of which no state moves by more than this share of its range so far.
+# Chattering: this many consecutive events, between which no state moves by more than this fraction of its range.
 _EVENTS, _SHARE = 200, 1e-3
-_FASTER = 0.5  # intervals that shrink by more over these events accumulate, which is another matter
-# Stiff: of the steps looked at so many are longer than this share of what stability allows along the negative axis.
+_FASTER = 0.5  # intervals that shrink by more over these events are an accumulation instead
+# Stiffness: number of examined steps, how many must be near the stability limit, and the fraction that counts as near.
 _STEPS, _LOOKS, _MOST, _NEAR = 500, 8, 6, 0.6
-_DECAYING = 0.25  # share of an eigenvalue that is its decay
-_ITERATIONS, _ALIGNED = 12, 0.9  # of the power method, and how well its vector must have settled on a decay
+_DECAYING = 0.25  # least ratio of the decay rate to the magnitude of an eigenvalue
+_ITERATIONS, _ALIGNED = 12, 0.9  # of the power method, and the required alignment of its vector with a decay
 
-# Of a step the number of its segment, local time and length, the state at its start, run-time vector and modes.
+# A step: number of its segment, local time, length, state at its start, run-time vector and modes.
 Sample = tuple[int, float, float, np.ndarray, np.ndarray, np.ndarray]
 
 
 @kernel
 def moves_little(states: Any, share: float, extent: Any) -> bool:
-    """Whether no state moves by more than a share of its range from one event to the next.
+    """Return whether no state moves by more than a fraction `share` of its range between consecutive events.
 
-    states (k, 2, n): before and after each event. extent (2, n): the range so far, least and largest, which takes in
-    that before each event.
+    states (k, 2, n): before and after each event. extent (2, n): least and largest states so far, which this function
+    extends.
     """
     count, _, n = states.shape
     still = True
@@ -60,10 +60,10 @@ def moves_little(states: Any, share: float, extent: Any) -> bool:
 
 
 class Notices:
-    """Watches one run.
+    """Monitors one run for warnings.
 
-    A stiffness is found as in the code DOP853 (Hairer, Norsett and Wanner 1996, section IV.2), by h |lambda| against
-    the border of the stability region; lambda, the fastest rate, by the power method on differences of the flow.
+    Stiffness is detected as in the code DOP853 (Hairer, Norsett and Wanner 1996, section IV.2), by comparing h |lambda|
+    with the border of the stability region. The power method on differences of the flow gives lambda, the fastest rate.
     """
 
     def __init__(
@@ -76,24 +76,24 @@ class Notices:
         is_compiled: bool,
     ) -> None:
         self.system, self.method, self.tolerances, self.record = system, method, task.tolerances, record
-        self._events = self._steps = 0  # at the last look
-        # known where a stiff method may take over
+        self._events = self._steps = 0  # counts at the last examination
+        # None unless a stiff method may take over
         self._headway, self._is_compiled, self.takes_over = headway, is_compiled, False
         self._start = task.x0
         self._done: set[str] = set()
 
     @cached_property
     def _range(self) -> np.ndarray:
-        """Least and largest states (2, n) so far."""
+        """Return the least and largest states (2, n) so far."""
         return np.array([self._start, self._start])
 
     def accumulated(self, names: list[str]) -> None:
-        """Events that follow each other ever faster were replaced by their limit."""
+        """Warn that events of these components were replaced by their limit."""
         self.record.warn(f"accumulation: events of {', '.join(names)} follow each other ever faster; the run "
                          f"continues from their limit")  # fmt: skip
 
     def look(self) -> None:
-        """Look at what has come since the last time, if it is enough."""
+        """Examine the new events and steps if there are enough."""
         counters = self.record.counters
         if counters.events - self._events >= _EVENTS:
             self._events = counters.events
@@ -104,7 +104,7 @@ class Notices:
             self._look_for_stiffness(_sampled(block), lambda i: Instant(*block.origins[i].tolist()))
 
     def look_on_the_way(self, run: SegmentRun) -> bool:
-        """Look at the steps of a segment that is not over yet; whether a stiff method is to take over."""
+        """Examine the steps of an unfinished segment. Return whether a stiff method takes over."""
         counters = self.record.counters
         if not self.method.stable_to or counters.steps - self._steps < _STEPS or len(run.knots) <= _STEPS:
             return False
@@ -168,7 +168,7 @@ class Notices:
         )
 
     def _fastest_turning(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> float:
-        """The largest |lambda| of what decays as fast as it turns, which the power method does not settle on."""
+        """Return the largest |lambda| of oscillating decays, on which the power method does not converge."""
         jacobian = Flow(self.system, p, z, Counters()).jacobian(s, x)
         if not np.isfinite(jacobian).all():
             return 0.0
@@ -179,11 +179,10 @@ class Notices:
 
 @kernel
 def fastest_decay(flow: Any, s: float, x: Any, p: Any, z: Any, floors: Any, work: Any) -> float:
-    """The largest rate of the flow at a state, with a minus sign if it is not that of a decay without turning.
+    """Return the fastest rate of the flow at a state, negative unless it is a decay without oscillation.
 
-    It is found by the power method on differences.
-
-    floors (n,): sizes of states that are none; work (5, n) is written to.
+    The power method on differences of the flow is used. floors (n,): sizes for states that are zero. work (5, n):
+    scratch.
     """
     here, sizes, v, moved, image = work[0], work[1], work[2], work[3], work[4]
     call(flow, s, x, p, z, here)
@@ -217,7 +216,7 @@ def fastest_decay(flow: Any, s: float, x: Any, p: Any, z: Any, floors: Any, work
 
 
 def _last_transitions(blocks: Sequence[Any], count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Instants (k, 2) and states on both sides (k, 2, n) of those that are transitions among so many of the last."""
+    """Return instants (k, 2) and states (k, 2, n) on both sides of the transitions among the last events."""
     parts, missing = [], count
     for block in reversed(blocks):
         first = max(0, len(block) - missing)
@@ -235,7 +234,7 @@ def _last_transitions(blocks: Sequence[Any], count: int) -> tuple[np.ndarray, np
 
 
 def _last(blocks: Sequence[Any], count: int) -> list[Occurrence]:
-    """So many of the last occurrences, or all that there are."""
+    """Return the last `count` events, or all if there are fewer."""
     found: list[Occurrence] = []
     for block in reversed(blocks):
         first = max(0, len(block) - (count - len(found)))
@@ -246,20 +245,20 @@ def _last(blocks: Sequence[Any], count: int) -> list[Occurrence]:
 
 
 def _sampled(block: Any) -> list[Sample]:
-    """Some steps that no event cut short, evenly among the segments of a block."""
+    """Return steps that no event cut short, spread evenly over the segments of a block."""
     chosen = _evenly(len(block), _LOOKS)
     share = -(-_LOOKS // len(chosen))
     found: list[Sample] = []
     for i in chosen:
         knots, states, p, z = block.steps_of(i)
-        for k in _evenly(len(knots) - 2, share):  # steps but for the last
+        for k in _evenly(len(knots) - 2, share):  # all steps except the last
             s, end = float(knots[k]), float(knots[k + 1])
             found.append((i, s, end - s, np.ascontiguousarray(states[k]), p, z))
     return found[:_LOOKS]
 
 
 def _evenly(count: int, most: int) -> list[int]:
-    """So many numbers below a count at most, from the first to the last one."""
+    """Return at most `most` numbers below count, evenly spaced from the first to the last."""
     if count <= most:
         return list(range(count))
     return [k * (count - 1) // (most - 1) for k in range(most)] if most > 1 else [0]

@@ -1,4 +1,4 @@
-"""What the engine makes of a model: clusters, held states, linear modes, and what compiling it costs."""
+"""Report the engine's view of a model: clusters, held states, linear modes, and the cost of compiling it."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from hybridsim.model.smoothing.explicit_corners import smoothed
 if TYPE_CHECKING:
     from hybridsim.model.parts.model import Model
 
-# Seconds of a processor to compile a function: a fixed part and a part for each character of its text. Fitted to the
-# packaged models (0.1 s each) and to two discs that collide (5.0 s, 570 000 characters); good to a factor of two.
+# CPU seconds to compile a function: a fixed part, and a part per character of its source. Fitted to the packaged models
+# (0.1 s each) and to two colliding discs (5.0 s, 570 000 characters); accurate to a factor of two.
 _SECONDS, _SECONDS_PER_CHARACTER = 0.006, 9e-6
 
 
@@ -26,14 +26,14 @@ class Report:
 
     Parameters
     ----------
-    clusters : names of the surface components that are decided together.
-    held : component to the state, or states, that its holding mode evaluates from the constraint.
-    projected : component to the states that its holding mode keeps on the surface by projection.
-    linear : component to its modes whose flow is linear in the states; "" stands for the states' own equations.
+    clusters : names of the surface components that are decided jointly.
+    held : for each component, the state or states that its holding mode evaluates from the constraint.
+    projected : for each component, the states that its holding mode keeps on the surface by projection.
+    linear : for each component, its modes with a flow linear in the states; "" is the base equations of the states.
     rates : number of angles that grow in time and are kept modulo 2 pi.
-    operations : operations in the generated code, all modes counted.
-    lowering_seconds : what it took to derive and write these operations, as measured; 0 where they were on disk.
-    compile_seconds : estimate for the functions that are not compiled yet, of which a run uses some; 0 where all are.
+    operations : number of operations in the generated code of all modes.
+    lowering_seconds : measured time to derive and write these operations; 0 if they were on disk.
+    compile_seconds : estimate for the functions not compiled yet, of which a run uses some; 0 if all are compiled.
     """
 
     clusters: tuple[tuple[str, ...], ...]
@@ -47,14 +47,14 @@ class Report:
 
 
 def describe(model: Model) -> Report:
-    """Lower a model (nothing is compiled) and say what came of it; what no run would start with is refused."""
+    """Lower a model without compiling it, and report the result. A model that no run could start with is refused."""
     model = smoothed(model)
     system = System(model, as_written=True)
     discrete = np.array(list(model.discrete_values().values()), dtype=float)
     modes = np.array([automaton.initial for automaton in system.automata], dtype=np.int64)
     refuse_driving(system, 0.0, system.start_state({}), discrete, modes)
     code = compiled(model)
-    assert isinstance(code, Compiled)  # a model of Python functions is in no file
+    assert isinstance(code, Compiled)  # models of Python functions are not described here
     data = code.data
     components = model.all_components()
     names = [c.name for c in components]

@@ -1,4 +1,4 @@
-"""One segment: steps of a method from an event to the next, each searched for events, the event time refined."""
+"""Integrate one segment: take steps from one event to the next, search each step, and refine the event time."""
 
 from __future__ import annotations
 
@@ -24,62 +24,59 @@ from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.errors import UsageError
 
-_NEIGHBOURHOOD = 0.125  # share of a step within which an event time is corrected
-_CORRECTIONS = 5  # of an event time; they converge quadratically from the accuracy of the dense output
+_NEIGHBOURHOOD = 0.125  # fraction of a step by which an event time may be corrected
+_CORRECTIONS = 5  # Newton iterations for an event time, starting at the accuracy of the dense output
 _DIRECTIONS = {"up": 1, "down": -1, "both": 0}
 
 
 @dataclass(frozen=True)
 class Sighting:
-    """A monitor that changed its side, and the state there."""
+    """A crossing of a monitor that did not end the segment."""
 
-    s: float
-    x: np.ndarray
-    number: int
-    direction: int
+    s: float  # local time
+    x: np.ndarray  # states (n,)
+    number: int  # of the monitor
+    direction: int  # 1 rising, -1 falling
 
 
 @dataclass(frozen=True)
 class Arrival:
-    """The end of a segment: local time and state, the guards located there and the monitors that stop the run.
+    """The end of a segment."""
 
-    entered names, backward in time, a guard through which the present mode may have been entered.
-    """
-
-    s: float
-    x: np.ndarray
-    fired: tuple[int, ...] = ()
-    stopping: tuple[int, ...] = ()
-    entered: str = ""
+    s: float  # local time
+    x: np.ndarray  # states (n,)
+    fired: tuple[int, ...] = ()  # located guards
+    stopping: tuple[int, ...] = ()  # monitors that stop the run or reset states
+    entered: str = ""  # backward in time: a guard through which the present mode may have been entered
 
     @property
     def is_bare(self) -> bool:
-        """Whether nothing happens there."""
+        """Return whether the segment ends without an event."""
         return not (self.fired or self.stopping or self.entered)
 
 
-# Of a step that says otherwise than the field at its start this part is tried: the first tenth of it is a step of
-# its own, and what it finds there is found again.
+# Fraction of a step to retry if the step contradicts the flow at its start. A first tenth is a step of its own, and
+# finds the same events there.
 _SHORTER = 0.1
 
 
 class Still:
-    """The stepper of a model without continuous states: one step to the bound, nothing moves."""
+    """The stepper of a model without continuous states: one step to the bound."""
 
     def __init__(self, bound: float) -> None:
         self.bound = bound
 
     def step(self) -> Step:
-        """The whole segment."""
+        """Return the whole segment as one step."""
         return Step(0.0, self.bound, np.zeros(0), np.zeros(0), lambda s: np.zeros((len(s), 0)))
 
     def restep(self, step: Step, s: float) -> Step:
-        """The same up to s."""
+        """Return the step up to s."""
         return Step(step.s0, s, step.x0, step.x1, step.dense)
 
 
 class SegmentRun:
-    """Integrates one segment and keeps what it passed."""
+    """Integrates one segment, and stores its steps and events."""
 
     def __init__(
         self,
@@ -103,18 +100,23 @@ class SegmentRun:
         self.monitors = system.model.monitors
         self.knots, self.states = [0.0], [x]
         self.interpolants: list[Dense] = []
-        self.scale = np.abs(x)  # largest size of each state on the segment: what rounding is relative to
+        self.scale = np.abs(
+            x
+        )  # largest magnitude of each state on the segment, to which rounding is relative
         self.sightings: list[Sighting] = []
         self.grazings: list[tuple[int, float, float]] = []  # guard, local time, distance
         self.undefined: set[int] = set()  # monitors that were not a number somewhere
         self.last_step: float | None = None
-        self.short, self.since = 0, 0.0  # steps in a row that hardly moved on, and where they began
+        self.short, self.since = (
+            0,
+            0.0,
+        )  # consecutive steps that are too short, and the local time at which they began
         self.entries = () if forward else entries(system, z)
 
     def run(self, bound: float, first_step: float | None) -> Arrival:
         """Step to the first event, or to the bound."""
         undecided = self.watch.guards[np.isnan(self.watch.guard_floors[self.watch.guards])]
-        # rates are told of by the stepper
+        # the stepper reports rates that are not finite
         if len(undecided) and np.isfinite(self.flow.rhs(0.0, self.states[0])).all():
             self._refuse_undefined(int(undecided[0]), 0.0)
         stepper = self._start(bound, first_step)
@@ -141,7 +143,9 @@ class SegmentRun:
                 arrival = self._take_roots(step)
             if self.entries:
                 step, arrival = self._look_for_entries(step, arrival)
-            if step.s1 != whole:  # it may be a small part of the step, at whose end the states are far larger
+            if (
+                step.s1 != whole
+            ):  # only a part is used; the states at the end of the whole step may be far larger
                 parts = np.array([step.s0, 0.5 * (step.s0 + step.s1), step.s1])
                 self.scale = np.maximum(known, np.abs(step.dense(parts)).max(axis=0))
             self.knots.append(step.s1)
@@ -155,12 +159,12 @@ class SegmentRun:
                 return Arrival(step.s1, self._projected(step))
 
     def cut(self) -> Arrival:
-        """The end of the last step, as far as the segment goes where it is broken off."""
+        """Return the end of the last step as the end of an unfinished segment."""
         s = self.knots[-1]
         return Arrival(s, self.flow.project(np.array([s]), self.states[-1][None, :])[0])
 
     def _refuse_standstill(self, step: Step) -> None:
-        """Stop a run that would not come to an end; what it did at a standstill is left out."""
+        """Stop a run whose steps have become too short. The steps at the standstill are discarded."""
         length = abs(step.s1 - step.s0)
         if length >= STANDSTILL * abs(step.s1):
             self.short = 0
@@ -176,19 +180,19 @@ class SegmentRun:
             )
 
     def _collapse(self, since: float, how: str) -> NoReturn:
-        """End the run where its steps began to lead nowhere."""
+        """End the run at the local time at which its steps became too short."""
         self._go_back(since)
         raise Creeping(f"the step size collapsed at t = {float(self.origin.plus(since)):.9g}: {how}", since)
 
     def _go_back(self, s: float) -> None:
-        """Forget what came after the end of a step."""
+        """Discard everything after the end of a step."""
         kept = self.knots.index(s)
         del self.knots[kept + 1 :], self.states[kept + 1 :], self.interpolants[kept:]
         self.sightings = [seen for seen in self.sightings if seen.s <= s]
         self.grazings = [grazing for grazing in self.grazings if grazing[1] <= s]
 
     def _check_shape(self, step: Step) -> None:
-        """Refuse dense output of another shape than the contract has; its times are not as many as there are states."""
+        """Refuse dense output with a wrong shape. The number of test times differs from that of states."""
         n = self.system.n
         times = np.linspace(step.s0, step.s1, 2 if n != 2 else 3)
         try:
@@ -205,7 +209,7 @@ class SegmentRun:
         )
 
     def carry_on(self, arrival: Arrival, s: float) -> Arrival:
-        """The end moved on to a time so near that rounding alone is between."""
+        """Return the end moved to a time that differs by rounding only."""
         if not self.interpolants:
             return arrival
         before, after = self.interpolants[-1](np.array([arrival.s, s]))
@@ -214,16 +218,16 @@ class SegmentRun:
         return replace(arrival, s=s, x=x)
 
     def is_clear_at_end(self, t: float) -> bool:
-        """Whether guards and monitors are far from zero where the last step ends, at time t, by samples of it."""
+        """Return whether guards and monitors are far from zero at the end of the last step, at time t."""
         s = self.knots[-1]
         return len(self.knots) > 1 and self.locator.is_clear(s - self.knots[-2], max(s, abs(t)))
 
     def rounding(self) -> np.ndarray:
-        """How well the states are known on the segment: its own rounding and what the last event left over."""
+        """Return error bounds of the states on the segment: its rounding plus the errors at its start."""
         return 4.0 * UNIT * self.scale + self.watch.x_error
 
     def segment(self) -> Segment:
-        """The finished piece of trajectory."""
+        """Return the finished segment of the trajectory."""
         knots, flow = np.array(self.knots), self.flow
         states = flow.project(knots, np.array(self.states).reshape(len(knots), -1))
         return Segment(self.origin, flow.z, flow.p, knots, states, Pieces(knots, tuple(self.interpolants)))
@@ -243,7 +247,7 @@ class SegmentRun:
     # -- events that the engine locates ---------------------------------------------------------------------
 
     def _examine(self, stepper: Stepper, step: Step) -> tuple[Step, Arrival | None]:
-        """Search a step; where something stops the segment, return the step up to there and the arrival."""
+        """Search a step. If an event stops the segment, return the step up to it and the arrival."""
         found = self.locator.search(step, self.rounding)
         first = self._first_stop(found)
         if first is not None and self._has_not_moved(step, *first):
@@ -275,10 +279,10 @@ class SegmentRun:
         return self._at_step_end(stepper, step, found)
 
     def _has_not_moved(self, step: Step, hit: Hit, is_monitor: bool) -> bool:
-        """Whether a guard leaves early in the first step, where its own series has not taken it from zero yet.
+        """Return whether a guard leaves in the first step before its own series has moved it from zero.
 
-        The step says otherwise than the field at its start, as a long step of a stiff method does where the motion
-        grows away from the surface: a shorter one is to be searched.
+        The step then contradicts the flow at its start, as a long step of a stiff method may if the motion grows away
+        from the surface. A shorter step is searched instead.
         """
         order = 0 if is_monitor else int(self.watch.orders[hit.number])
         if step.s0 != 0.0 or order == 0 or hit.theta >= _SHORTER or self.method.dense_is_accurate:
@@ -287,7 +291,7 @@ class SegmentRun:
         series = self.system.series(0.0, x, self.flow.p, self.flow.z, 4.0 * UNIT * self.scale, 0.0)
         leading, rounding = abs(series.guards[hit.number, order]), series.guard_bounds[hit.number, 0]
         found, shorter = abs(hit.theta * step.s1), abs(_SHORTER * step.s1)
-        # a step no longer than what rounding hides would say nothing either
+        # the shorter step must be long enough for the guard to exceed rounding
         return bool(leading * found**order <= rounding < leading * shorter**order)
 
     def _refuse_undefined(self, guard: int, s: float) -> None:
@@ -302,7 +306,7 @@ class SegmentRun:
         return want in (0, direction)
 
     def _is_recorded(self, hit: Hit, first: tuple[Hit, bool] | None) -> bool:
-        """Whether a monitor is only to be recorded, before the first stop."""
+        """Return whether a monitor crossing is only to be recorded, before the first stop."""
         is_before = first is None or hit.theta < first[0].theta
         recorded = self.monitors[hit.number].action == "record"
         return is_before and recorded and self._wanted(hit.number, hit.direction)
@@ -317,15 +321,15 @@ class SegmentRun:
         return min(stops, key=lambda stop: stop[0].theta, default=None)
 
     def _remember_monitors(self, found: Findings, theta: float) -> None:
-        """Sides of the monitors just before a stop."""
+        """Store the sides of the monitors just before a stop."""
         for hit in found.crossings:
             if hit.theta < theta:
                 self.locator.monitor_sides[hit.number] = hit.direction
 
     def _at_step_end(self, stepper: Stepper, step: Step, found: Findings) -> tuple[Step, Arrival | None]:
-        """Sides for the next step; a zero at the end of this one belongs to it.
+        """Set the sides for the next step; a zero at the end of this step belongs to it.
 
-        A guard that the search left open and that is negative beyond rounding at the end was zero before it.
+        A guard that the search left undecided and that is negative beyond rounding at the end was zero before it.
         """
         locator = self.locator
         start = dict(vars(locator))
@@ -372,17 +376,17 @@ class SegmentRun:
                     self.sightings.append(Sighting(step.s1, x, k, side))
                 else:
                     stopping.append(k)
-                    locator.monitor_sides[k] = before[k]  # which decides the direction that is recorded
+                    locator.monitor_sides[k] = before[k]  # this decides the recorded direction
         if fired or stopping:
             return step, Arrival(step.s1, x, tuple(fired), tuple(stopping))
         return step, None
 
     def _refine(self, stepper: Stepper, step: Step, hit: Hit, is_monitor: bool) -> tuple[Step, bool]:
-        """The step up to the event, with the method's own accuracy there, and True; or a shorter one, and False.
+        """Return the step up to the event with the accuracy of the method and True, or a shorter step and False.
 
-        Where the dense output is less accurate than the method, the step is repeated to the event time and
-        that time corrected by Newton's method until the guard is zero to rounding. An event of a step whose error
-        there is not within the tolerance is none: a shorter step is to be searched in its place.
+        If the dense output is less accurate than the method, the step is repeated to the event time, which Newton's
+        method corrects until the guard is zero within rounding. An event in a step whose error there exceeds the
+        tolerance is discarded, and a shorter step is searched instead.
         """
         s = step.s0 + hit.theta * (step.s1 - step.s0) if hit.theta < 1.0 else step.s1
         if self.method.dense_is_accurate or s == step.s0:
@@ -391,7 +395,7 @@ class SegmentRun:
             x = step.dense(np.array([s]))[0]
             return Step(step.s0, s, step.x0, x, step.dense), True
         on_dense = s
-        # the dense output errs by a small part of a step: what Newton's method finds further off is another zero
+        # the dense output errs by a small part of a step, so a zero farther away is another one
         window = _NEIGHBOURHOOD * abs(step.s1 - step.s0)
         low = max(min(step.s0, step.s1), s - window)
         high = min(max(step.s0, step.s1), s + window)
@@ -415,11 +419,11 @@ class SegmentRun:
             return ended, False
         if self._is_zero(ended, hit.number, is_monitor):
             return ended, True
-        # the dense output crosses zero and the repeated step does not reach it: go by the dense output
+        # the dense output crosses zero but the repeated step does not reach it: use the dense output
         return Step(step.s0, on_dense, step.x0, step.dense(np.array([on_dense]))[0], step.dense), True
 
     def _is_zero(self, step: Step, number: int, is_monitor: bool) -> bool:
-        """Whether a guard or monitor is zero at the end of a step, within the rounding of state and time."""
+        """Return whether a guard or monitor is zero at the end of a step, within rounding of state and time."""
         x = self._projected(step)
         errors = 2.0 * self.rounding() + np.abs(self.flow.rhs(step.s1, x)) * 8.0 * math.ulp(step.s1)
         series = self.system.series(step.s1, x, self.flow.p, self.flow.z, errors, 8.0 * math.ulp(step.s1))
@@ -428,7 +432,7 @@ class SegmentRun:
         return bool(abs(values[number, 0]) <= bounds[number, 0])
 
     def _look_for_entries(self, step: Step, arrival: Arrival | None) -> tuple[Step, Arrival | None]:
-        """Backward in time: stop where the present mode may have been entered through a guard of another."""
+        """Stop a backward run where the present mode may have been entered through a guard of another."""
         for entry in self.entries:
             sample = self._entry_sampler(step, entry)
             found, *_ = find_roots(sample, sample(POINTS), 0, 0, 0, lambda: 0.0, lambda _: 0.0, 0.0)
@@ -465,7 +469,7 @@ class SegmentRun:
         rising = [g for g in located if series.guards[g, 1] * direction > series.guard_bounds[g, 1]]
         fired = tuple(g for g in located if g not in rising)
         for g in rising:
-            # a corner has one value on both sides, so that the noise about its zero decides nothing
+            # a corner has the same value on both sides, so noise near its zero is harmless
             if not self.system.is_corner[self.system.owner[g]]:
                 raise StepFailure(
                     f"{self.system.guard_title(g, self.flow.z)} was located as falling, but it rises: events "
@@ -477,7 +481,7 @@ class SegmentRun:
                 continue
             wanted = self._wanted(root.number, root.direction)
             if wanted and self.monitors[root.number].action != "record":
-                # its side before the event decides the direction that is recorded
+                # its side before the event decides the recorded direction
                 stopping.append(root.number)
                 continue
             self.locator.monitor_sides[root.number] = root.direction

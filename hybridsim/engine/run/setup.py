@@ -1,4 +1,4 @@
-"""What a run works out before its first instant: the same each time that its task is carried out, so kept with it."""
+"""The set-up of a run before its first instant. It is stored with the task, because it is the same for each run."""
 
 from __future__ import annotations
 
@@ -18,38 +18,39 @@ if TYPE_CHECKING:
     from hybridsim.engine.run.stepping import Leaps, Method
     from hybridsim.engine.system.system import System
 
-# Local time rounds angles that grow in time, by 1e-13 after this many turns: a stretch without events begins anew then.
+# Turns of the fastest angle after which a segment without events is restarted, because rounding then reaches 1e-13.
 _TURNS = 100
 
 
 class Plan:
-    """Of a task for a system by a method; it is kept with the task, and so does not hold it."""
+    """The set-up shared by all runs of one task with one method. It is stored in the task and does not refer to it."""
 
     def __init__(self, system: System, method: Method, task: Task) -> None:
         self.system, self.method = system, method
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
         self.renewal = _TURNS * 2.0 * math.pi / system.fastest if system.fastest else math.inf
         self._pattern = self._leaper(task)
-        self.begins_silently = False  # known after `start`: nothing is to be recorded there
+        self.begins_silently = False  # set by `start`: whether nothing is recorded at the start
         self._start: tuple[Outcome, np.ndarray] | None = None
-        self._laid: Laid | None = None  # the same
+        self._laid: Laid | None = None  # the same in the layout of compiled loops
 
     def _leaper(self, task: Task) -> Leaps | None:
-        """The compiled loop, where method and model allow it."""
+        """Return the compiled loop if method and model allow it, else None."""
         system, model = self.system, self.system.model
         if not self.method.leaps or not task.forward or system.n == 0 or model.monitors or model.inputs:
             return None
         return self.method.leaper(system, task.tolerances, self.renewal)
 
     def leaper(self) -> Leaps | None:
-        """A compiled loop for one run; None where there is none."""
+        """Return a compiled loop for one run, or None."""
         return None if self._pattern is None else self._pattern.anew()
 
     @property
     def silent_start(self) -> Laid | None:
-        """What holds at the start, which nobody may change; known from the second run on.
+        """Return the read-only state at the start if it causes no record, known from the second run on.
 
-        None where something is to be recorded there, or at times known beforehand, or where there is no compiled loop.
+        The result is None if an event is recorded at the start, if there are schedules or input signals, or if there is
+        no compiled loop.
         """
         system = self.system
         is_free = self._pattern is not None and not system.model.schedules and not system.signals
@@ -58,7 +59,7 @@ class Plan:
         return self._laid
 
     def start(self, task: Task, due: tuple[int, ...]) -> Standing:
-        """What holds just after the start of its task, the schedules due then applied."""
+        """Return the state just after the start of the task, with the schedules due then applied."""
         system, forward = self.system, task.forward
         if self._start is None:
             outcome = settled_start(system, task, self.origin, due)
@@ -69,7 +70,7 @@ class Plan:
 
 
 def plan_of(system: System, method: Method, task: Task) -> Plan:
-    """The plan that is kept with a task, made where there is none."""
+    """Return the set-up stored with a task, and create it if needed."""
     plan = task.plans.get("last")
     if plan is None or plan.system is not system or plan.method is not method:
         plan = task.plans["last"] = Plan(system, method, task)

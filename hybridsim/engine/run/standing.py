@@ -1,4 +1,4 @@
-"""What holds at the origin of a segment, made when somebody asks for it: a run of one leap never does."""
+"""The state at the origin of a segment, made on demand; a run of one compiled call never needs it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Standing:
     Parameters
     ----------
     make : makes the outcome.
-    shared : both as they are kept elsewhere, for who only reads them.
+    shared : outcome and vector stored elsewhere, for reading only.
     """
 
     def __init__(
@@ -41,14 +41,14 @@ class Standing:
 
     @cached_property
     def outcome(self) -> Outcome:
-        """What holds."""
+        """Return the outcome."""
         return self._make()
 
     @cached_property
     def p(self) -> np.ndarray:
-        """The run-time vector."""
+        """Return the run-time vector."""
         return self._system.vector(self._instant, self._system.discrete(self.outcome.p), self._forward)
 
     def read(self) -> tuple[Outcome, np.ndarray]:
-        """Outcome and run-time vector, which are not to be changed."""
+        """Return outcome and run-time vector, which must not be modified."""
         return self._shared or (self.outcome, self.p)

@@ -1,4 +1,4 @@
-"""What the mode loop asks of an integrator: a flow goes in, steps with dense output come out."""
+"""The interface between the mode loop and integrators: a flow goes in, steps with dense output come out."""
 
 from __future__ import annotations
 
@@ -25,53 +25,50 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Root:
-    """A zero that an integrator located by itself: of guard `number`, or of a monitor, falling (-1) or rising (+1)."""
+    """A zero located by the integrator itself."""
 
-    number: int
-    direction: int
+    number: int  # of the guard or monitor
+    direction: int  # -1 falling, 1 rising
     is_monitor: bool = False
 
 
 @dataclass(frozen=True)
 class Step:
-    """One accepted step from s0 to s1 (local times) with its dense output.
+    """One accepted step with its dense output."""
 
-    roots is None where the mode loop locates events itself; else the zeros at s1 that the integrator found.
-    holds, of a method that tests its dense output at the end of a step alone, tests it at a time inside, too.
-    """
-
-    s0: float
-    s1: float
-    x0: np.ndarray
-    x1: np.ndarray
-    dense: Dense
-    roots: tuple[Root, ...] | None = None
-    holds: Callable[[float], bool] | None = None
+    s0: float  # local time at the start
+    s1: float  # local time at the end
+    x0: np.ndarray  # states (n,) at the start
+    x1: np.ndarray  # states (n,) at the end
+    dense: Dense  # local times (k,) -> states (k, n)
+    roots: tuple[Root, ...] | None = (
+        None  # zeros at s1 found by the integrator; None if the mode loop searches
+    )
+    holds: Callable[[float], bool] | None = (
+        None  # whether the dense output is accurate at a time inside the step
+    )
 
 
 @dataclass(frozen=True)
 class Watch:
-    """What to look for in one segment: active guards and all monitors, with side and leading order at its start.
+    """The active guards and all monitors of one segment, with their sides and leading orders at its start."""
 
-    guards are the numbers of the active guards; the other arrays are over all guards, and over all monitors. x_error
-    is how well the states are known at the start, the floors what that makes of the guards that start from zero.
-    """
-
-    guards: np.ndarray
-    sides: np.ndarray
-    orders: np.ndarray
-    monitor_sides: np.ndarray
-    monitor_orders: np.ndarray
-    x_error: np.ndarray
-    guard_floors: np.ndarray
-    monitor_floors: np.ndarray
+    guards: np.ndarray  # numbers of the active guards
+    sides: np.ndarray  # sides (G,) of all guards
+    orders: np.ndarray  # leading orders (G,)
+    monitor_sides: np.ndarray  # sides (M,) of all monitors
+    monitor_orders: np.ndarray  # leading orders (M,)
+    x_error: np.ndarray  # error bounds (n,) of the states at the start
+    guard_floors: np.ndarray  # resulting error bounds (G,) of guards that start from zero
+    monitor_floors: np.ndarray  # the same (M,) for monitors
 
 
 @dataclass
 class Flow:
-    """The smooth field of one segment, as integrators see it: rhs(s, x), counted.
+    """The smooth vector field of one segment, as integrators see it: rhs(s, x), with counters.
 
-    look: told the local time by a method that does a whole segment in one call; raises where the run has to end.
+    look: called with the local time by a method that integrates a whole segment in one call. It raises an error if the
+    run has to end.
     """
 
     system: System
@@ -89,13 +86,13 @@ class Flow:
         self._projected = sorted({i for c in holding for i in system.projected[c]})
 
     def rhs(self, s: float, x: np.ndarray) -> np.ndarray:
-        """dx/dt in a fresh array; NaN where the model has no value."""
+        """Return dx/dt in a new array; NaN if the model has no value."""
         out = np.empty(self.n)
         evaluate(self._flow, float(s), x, self.p, self.z, out)
         return out
 
     def jacobian(self, s: float, x: np.ndarray) -> np.ndarray:
-        """d(dx/dt)/dx, (n, n), as it is differentiated from the declaration; of Python functions by differences."""
+        """Return d(dx/dt)/dx (n, n), derived from the declaration, or by differences for Python functions."""
         if not self.system.has_tape:
             return self.system.jacobian(float(s), np.ascontiguousarray(x, dtype=float), self.p, self.z)
         tangent, columns, both = (
@@ -111,12 +108,12 @@ class Flow:
         return columns.T
 
     def project(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """States (k, n) at local times (k,) with held states on their constraints."""
+        """Return states (k, n) at local times (k,) with held states on their constraints."""
         x = np.ascontiguousarray(x, dtype=float)
         return self.system.rows("project", self.n, s, x, self.p, self.z) if self.system.can_hold else x
 
     def landed(self, s: float, x: np.ndarray) -> np.ndarray:
-        """The end of a step, with states that a projection keeps on a surface put back onto it."""
+        """Return the end of a step, with states that a projection keeps on a surface moved back onto it."""
         if not self._projected:
             return x
         held = x.copy()
@@ -124,7 +121,7 @@ class Flow:
         return held
 
     def guards(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Guard values (k, guards); held states are evaluated from their constraints on the way."""
+        """Return guard values (k, guards), with held states evaluated from their constraints."""
         self.counters.guard_evaluations += len(s)
         out = np.empty((len(s), self.system.guard_count))
         evaluate_rows(
@@ -133,7 +130,7 @@ class Flow:
         return out
 
     def monitors(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Monitor values (k, monitors), likewise."""
+        """Return monitor values (k, monitors), with held states evaluated from their constraints."""
         out = np.empty((len(s), len(self.system.monitor_names)))
         evaluate_rows(
             self.system.address("monitors"), s, np.ascontiguousarray(x, dtype=float), self.p, self.z, out
@@ -145,24 +142,23 @@ class Stepper(Protocol):
     """An integration in progress through one smooth segment."""
 
     def step(self) -> Step:
-        """The next accepted step; raises StepFailure."""
+        """Take and return the next accepted step; raises StepFailure."""
 
     def restep(self, step: Step, s: float) -> Step:
-        """The step anew from its start to s exactly: the method's own accuracy at an event time.
+        """Repeat the step from its start to exactly s, with the accuracy of the method.
 
-        Where its error there is not within the tolerance, a shorter step, from whose end the next one goes on.
+        If the error there exceeds the tolerance, return a shorter step, from whose end the next one continues.
         """
 
 
-ARRIVED, PAUSED, BEFORE_SOMETHING = 0, 1, 2  # why a leap ended
+ARRIVED, PAUSED, BEFORE_SOMETHING = 0, 1, 2  # why a compiled call ended
 
 
 class Landing(NamedTuple):
-    """Where a leap ended: the origin of the next segment, what holds there, and why it ended.
+    """The end of a compiled call: the origin of the next segment, the state there, and why it ended.
 
-    ARRIVED at its target; PAUSED for want of room, to be taken up where it ended; BEFORE_SOMETHING that is not
-    ordinary. instants (E, 2) are those of the events on the way, owners (E,) the components whose
-    guards they are. outcome: makes what holds there, which a run that ends there does not ask for.
+    end: ARRIVED at the target, PAUSED because the arrays are full, or BEFORE_SOMETHING that is not ordinary. instants
+    (E, 2): instants of the events. owners (E,): the components whose guards fired. outcome: makes the state on demand.
     """
 
     origin: Instant
@@ -173,75 +169,75 @@ class Landing(NamedTuple):
 
 
 class Leaps(Protocol):
-    """A compiled mode loop of one run: whole segments and their ordinary events at once.
+    """A compiled mode loop of one run, which integrates whole segments with their ordinary events.
 
-    It adds what it went over to the record as blocks (`hybridsim.engine.record.blocks`) and counts in its counters.
-    leapt: a call of the kernel that `go` made ahead, for the next leap to begin with.
+    It adds them to the record as blocks (`hybridsim.engine.record.blocks`) and updates its counters. leapt: a kernel
+    call that `go` made in advance, with which the next leap starts.
     """
 
     leapt: Leapt | None
 
     @property
     def place(self) -> tuple[np.ndarray, ...]:
-        """What it remembers from leap to leap, in arrays that nobody changes."""
+        """Return the state kept between calls as arrays that are never modified, for a checkpoint."""
 
     @place.setter
     def place(self, place: np.ndarray) -> None:
-        """Take it up again, all in a row, where a run goes on."""
+        """Restore that state from one concatenated array."""
 
     def anew(self) -> Leaps:
-        """The same for another run, which remembers nothing yet; this one has never leapt."""
+        """Return a fresh copy for another run; this object must not have been used."""
 
     def leap(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
     ) -> Landing:
-        """As far as ordinary events and the room for them go."""
+        """Run until an event that is not ordinary, the target, or the end of the arrays, and commit the result."""
 
     def go(self, origin: Instant, laid: Laid, target: Instant) -> Leapt | None:
-        """Call the kernel, and leave it at that; None where it cannot be called."""
+        """Call the kernel without committing the result; None if it cannot be called."""
 
     def count(self, leapt: Leapt, counters: Counters) -> None:
-        """Add what a call has cost."""
+        """Add the cost of a call to the counters."""
 
     def segments_of(self, leapt: Leapt) -> SegmentBlock:
-        """The segments of a call that has some, and has let go of none."""
+        """Return the segments of a call that has some and has not released them."""
 
     def forget_segments(self, leapt: Leapt) -> bool:
-        """Let go of the memory that is for segments but for the end of the last one, unless it is needed: then False.
+        """Release the memory of segments except the end of the last one. Return False if it is needed.
 
-        No leap follows.
+        No further leap may follow.
         """
 
 
 class Method(Protocol):
-    """What the mode loop uses of an integrator."""
+    """The part of an integrator that the mode loop uses."""
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """Return the name of the integrator."""
 
     @property
     def lacks(self) -> Mapping[str, str]:
-        """What it cannot do, with reasons; "adaptive" where it has a step and no rtol."""
+        """Return its missing capabilities with reasons; "adaptive" if it has a fixed step and no rtol."""
 
     @property
     def dense_is_accurate(self) -> bool:
-        """Whether the dense output is as accurate as the method."""
+        """Return whether the dense output is as accurate as the method."""
 
     @property
     def leaps(self) -> bool:
-        """Whether it has a compiled loop."""
+        """Return whether it has a compiled loop."""
 
     @property
     def stable_to(self) -> float:
-        """How far along the negative axis of h*lambda its steps are stable; 0 where they are far enough for any."""
+        """Return the stability limit of -h*lambda on the negative axis; 0 if there is none."""
 
     @property
     def rounding(self) -> float:
-        """What its steps round away at most, in units of rounding of the way that the states went."""
+        """Return the largest rounding error of its steps, in units of rounding of the distance moved."""
 
     def leaper(self, system: System, tolerances: Tolerances, longest: float) -> Leaps | None:
-        """Its compiled loop for one run, no segment longer than `longest`; None where this model rules it out."""
+        """Return its compiled loop for one run with segments up to `longest`, or None if the model rules it out."""
 
     def start(
         self,
@@ -252,4 +248,4 @@ class Method(Protocol):
         first_step: float | None,
         watch: Watch,
     ) -> Stepper:
-        """Begin a segment at local time 0 towards s_bound (negative when time runs backward)."""
+        """Begin a segment at local time 0 towards s_bound (negative backward in time)."""

@@ -1,4 +1,4 @@
-"""Joint candidates of a cluster at its surfaces, and verdicts on as many of them as a choice needs."""
+"""Enumerate the joint candidates of a cluster at its surfaces, and judge as many as the choice needs."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 def all_verdicts(
     settling: Settling, members: list[int], candidates: np.ndarray, cluster: tuple[int, ...]
 ) -> np.ndarray:
-    """Verdicts on all joint candidates."""
+    """Return the verdicts on all joint candidates."""
     found = [settling.verdict(settling.with_modes(members, modes), cluster) for modes in candidates]
     return np.array(found, dtype=np.int64)
 
@@ -28,10 +28,10 @@ def verdicts_on(
     holds: np.ndarray,
     cluster: tuple[int, ...],
 ) -> tuple[np.ndarray, bool]:
-    """Verdicts on joint candidates in the order in which `choose` prefers them, and whether they are on all of them.
+    """Return verdicts on joint candidates in the order of preference, and whether all of them were judged.
 
-    They end with those that are preferred as much as the first that it takes: the others stand as if they were not
-    admissible. Where a motion has to be the only one, all are judged.
+    The search ends after the candidates that `choose` prefers as much as the first one it accepts. The others count as
+    not admissible. If a member needs a unique motion, all candidates are judged.
     """
     if settling.is_thorough or any(settling.system.automata[c].is_unique for c in members):
         return all_verdicts(settling, members, candidates, cluster), True

@@ -1,4 +1,4 @@
-"""Guards of one mode that come to zero at once: all of them are taken where they lead to one mode."""
+"""Take all guards of one mode that reach zero at one instant, if they lead to one mode."""
 
 from __future__ import annotations
 
@@ -17,10 +17,11 @@ Failure = tuple[str, str]  # status and message
 def taken_at_once(
     settling: Settling, given: Situation, component: int, leaving: Sequence[int]
 ) -> tuple[list[tuple[int, int]], Failure | None]:
-    """The guards of a mode that are taken, each with the number of its choice; or why none can be.
+    """Return the guards of a mode that are taken, each with the number of its choice, or why none can be taken.
 
-    leaving: places of the guards that are about to be negative, in the order in which they came to zero. given: what
-    conditions and resets read. Of guards that are negative as the mode begins the first that is declared is taken.
+    leaving: positions of the guards that become negative, in the order in which they reached zero. given: the situation
+    that conditions and resets read. If several guards are negative when the mode begins, the first declared one is
+    taken.
     """
     system, mode = settling.system, int(settling.at.z[component])
     automaton = system.automata[component]
@@ -43,7 +44,7 @@ def taken_at_once(
         if number >= 0:
             choice = declared[j].then[number]
             what = (choice.to, tuple((n, e.text) for n, e in choice.reset.items()))
-            # what only sets does the same once more
+            # a second reset that only sets values changes nothing
             found.setdefault((what, j if amounts_of(choice.reset) else -1), (j, number))
     taken = list(found.values())
     apart = _apart(settling, component, taken)
@@ -51,7 +52,7 @@ def taken_at_once(
 
 
 def _apart(settling: Settling, component: int, taken: Sequence[tuple[int, int]]) -> str:
-    """Why several guards cannot be taken at once; empty if they lead to one mode, where resets must agree."""
+    """Return why several guards cannot be taken together, or an empty text if they lead to one mode."""
     automaton, mode = settling.system.automata[component], int(settling.at.z[component])
     targets = [automaton.modes[automaton.targets[mode][j][number]] for j, number in taken]
     if len(set(targets)) <= 1:

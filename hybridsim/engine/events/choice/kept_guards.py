@@ -1,7 +1,7 @@
-"""Find located guards that a decision at a surface keeps from going negative: they are no events.
+"""Find located guards that do not become negative because a surface is decided first. They are not events.
 
-A guard on the velocity of a contact comes to zero with it, by the motion before. Where the contact then sticks, the
-guard stays at zero; where an impact throws the motion back, it only touches zero.
+A guard on the velocity of a contact reaches zero together with it, according to the motion before. If the contact then
+sticks, the guard stays at zero. If an impact reverses the motion, the guard only touches zero.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def kept(settling: Settling, automata: set[int], surfaces: set[int]) -> set[int]:
-    """The automata whose located guards would not fire if the surfaces were decided first."""
+    """Return the automata whose located guards would not fire if the surfaces were decided first."""
     ahead = copy(settling)
     ahead.at = replace(settling.at, z=settling.at.z.copy())
     ahead.fired, ahead.on_surface = settling.fired.copy(), settling.on_surface.copy()

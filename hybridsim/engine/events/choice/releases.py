@@ -1,4 +1,4 @@
-"""Which components leave their holding mode by the guard that was located, and whether the motion goes on smoothly."""
+"""Determine which components leave their holding mode through the located guard, and whether the flow is continuous."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ _NONE = -1  # no located guard releases the component
 
 
 class Releases:
-    """The releases of one event; `before`: the modes that it found, -1 for what had none yet."""
+    """The releases of one event. before: the modes at the event (C,), -1 for a component without a mode yet."""
 
     def __init__(self, system: System, before: np.ndarray) -> None:
         self.system, self.before = system, before
-        # the first located guard of each: 0 releases above, 1 below
+        # first located guard of each component: 0 releases to above, 1 to below
         self._by = [_NONE] * len(system.automata)
 
     def locate(self, located: set[int]) -> None:
-        """Note the guards at which the event was located."""
+        """Store the guards at which the event was located."""
         for c, automaton in enumerate(self.system.automata):
             held = automaton.has_surface and self.before[c] == automaton.hold
             guards = automaton.guards[automaton.hold] if held else ()
             self._by[c] = next((j for j, g in enumerate(guards) if g in located), _NONE)
 
     def has(self, c: int, z: np.ndarray) -> bool:
-        """Whether c leaves its holding mode through the guard that was located for it."""
+        """Return whether component c leaves its holding mode through the guard that was located for it."""
         hold = self.system.automata[c].hold
         if hold < 0 or self.before[c] != hold or z[c] == hold:
             return False
@@ -38,7 +38,7 @@ class Releases:
         return 0 if z[c] == self.system.automata[c].above else 1
 
     def leave_unknowns(self, at: Situation, z: np.ndarray, components: Iterable[int]) -> bool:
-        """Whether every change among some components leaves all unknowns as they were: a release without a jump."""
+        """Return whether every change among some components is a release without a jump of an unknown."""
         is_corner = self.system.is_corner
         changed = [c for c in components if z[c] != self.before[c] and not is_corner[c]]
         if not changed:

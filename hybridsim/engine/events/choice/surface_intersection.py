@@ -1,12 +1,12 @@
-"""Where switching surfaces meet: whether one motion alone is admissible, and whether the surfaces keep it.
+"""Check at intersections of switching surfaces that one motion alone is admissible and that the surfaces attract it.
 
-On k surfaces at once ds/dt = a + B u with u in [-1, 1]^k. Where all principal minors of -B are positive (a P-matrix),
-one choice of u, among the corners, edges and the inside of that cube, is consistent whatever a is (Cottle, Pang and
-Stone, The Linear Complementarity Problem, SIAM, 2009, doi:10.1137/1.9780898719000). On two surfaces the motion is then
-drawn to where they meet: a turn around it shrinks by ((B12 + B11)**2 - a1**2)/((B12 - B11)**2 - a1**2) times the same
-of the other; surfaces to which all fields point (nodal attractivity) are among these. On more of them it is the one
-that slides, though others may spiral about it. Where -B is no such matrix, a motion that slides along several surfaces
-is one of many.
+On k surfaces at once ds/dt = a + B u with u in [-1, 1]^k. If all principal minors of -B are positive (a P-matrix),
+exactly one choice of u, among the corners, edges and the inside of that cube, is consistent for every a (Cottle, Pang
+and Stone, The Linear Complementarity Problem, SIAM, 2009, doi:10.1137/1.9780898719000). On two surfaces the motion is
+then attracted to the intersection: a turn around it contracts by ((B12 + B11)**2 - a1**2)/((B12 - B11)**2 - a1**2)
+times the same factor of the other surface. Surfaces to which all fields point (nodal attractivity) are a special case.
+On more than two surfaces the sliding motion is the selected one, though others may spiral about it. If -B is not a
+P-matrix, a motion that slides along several surfaces is not unique.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from hybridsim.model.meanings import Meanings
 if TYPE_CHECKING:
     from hybridsim.engine.events.resolve import Settling
 
-_SAME = 64.0 * UNIT  # two series of one motion differ by the rounding of a few operations
+_SAME = 64.0 * UNIT  # relative difference of two series of one motion, by the rounding of a few operations
 
 
 def rivals(
     settling: Settling, members: list[int], candidates: np.ndarray, verdicts: np.ndarray
 ) -> np.ndarray:
-    """The admissible joint candidates, where they differ in the mode of a switching surface and in the motion.
+    """Return the admissible joint candidates if they differ in the mode of a switching surface and in the motion.
 
-    None where they do not. A relay that is just strong enough has one motion in two modes: it may slide, or be on the
-    side that moves no more.
+    Otherwise the result is empty. A relay that is just strong enough has one motion in two modes: it may slide, or be
+    on the side on which nothing moves any more.
     """
     unique = [k for k, c in enumerate(members) if settling.system.automata[c].is_unique]
     if not unique:
@@ -45,7 +45,7 @@ def rivals(
 
 
 def is_one_motion(settling: Settling, members: list[int], candidates: np.ndarray) -> bool:
-    """Whether the states go on alike in all of these modes, as those of a body at rest between two that slip."""
+    """Return whether the states have the same Taylor series in all of these modes."""
     motions = [settling.series_of(settling.with_modes(members, modes)).states for modes in candidates]
     if not np.isfinite(motions).all():
         return False
@@ -54,7 +54,7 @@ def is_one_motion(settling: Settling, members: list[int], candidates: np.ndarray
 
 
 def can_hold(settling: Settling, members: list[int], z: np.ndarray) -> bool:
-    """Whether what the modes z hold has values: a speed at rest and a relay that acts on it are not held together."""
+    """Return whether the quantities held in the modes z have values, which fails if held surfaces conflict."""
     automata = settling.system.automata
     if sum(automata[c].has_surface and z[c] == automata[c].hold for c in members) < 2:
         return True
@@ -63,9 +63,9 @@ def can_hold(settling: Settling, members: list[int], z: np.ndarray) -> bool:
 
 
 def on_its_side(settling: Settling, members: list[int], candidates: np.ndarray) -> int:
-    """The number of the first of these modes that stay on their sides of all surfaces to the last bit; 0 if none does.
+    """Return the number of the first candidate whose motion stays on its sides of all surfaces exactly, or 0.
 
-    A body at rest may slip either way to rounding; what holds it there leaves it a speed, or a rate, of some sign.
+    A body at rest may slip either way within rounding. Its holding mode leaves it a speed, or a rate, of some sign.
     """
     system, at = settling.system, settling.at
     for number, modes in enumerate(candidates):
@@ -83,21 +83,21 @@ def on_its_side(settling: Settling, members: list[int], candidates: np.ndarray) 
 
 
 def keeps_nothing(settling: Settling, members: list[int], z: np.ndarray) -> str:
-    """Why a motion that slides along several surfaces may not be the only one; empty where it is."""
+    """Return why a motion along several surfaces may not be unique, or an empty text if it is."""
     automata = settling.system.automata
     sliding = [c for c in members if automata[c].is_unique and z[c] == automata[c].hold]
     if len(sliding) < 2:
         return ""
     pull = _pull(settling, sliding, z)
     if not np.isfinite(pull).all():
-        return ""  # nothing follows from it: the run says what is no number
-    # one whose rate no relay moves is held by the surface of its rate (hybridsim.engine.lowering.second_order)
+        return ""  # no conclusion is possible; the run reports what is not a number
+    # a surface whose rate no relay changes is held by the surface of its rate (hybridsim.engine.lowering.second_order)
     moved = np.flatnonzero(pull.any(axis=1))
     sliding, pull = [sliding[i] for i in moved], pull[np.ix_(moved, moved)]
     for size in range(1, len(sliding) + 1):
         for chosen in combinations(range(len(sliding)), size):
             block = pull[np.ix_(chosen, chosen)]
-            largest = float(np.prod(np.abs(block).sum(axis=1)))  # no minor is above this
+            largest = float(np.prod(np.abs(block).sum(axis=1)))  # upper bound of the minor
             if not np.linalg.det(block) > 8.0 * size * UNIT * largest:
                 names = " and ".join(automata[sliding[i]].name for i in chosen)
                 return (
@@ -109,7 +109,7 @@ def keeps_nothing(settling: Settling, members: list[int], z: np.ndarray) -> str:
 
 
 def _pull(settling: Settling, sliding: list[int], z: np.ndarray) -> np.ndarray:
-    """-B: by how much the rate of each surface falls from one side of each to the other."""
+    """Return -B (k, k): the decrease of the rate of each surface from one side of each surface to the other."""
     automata, order = settling.system.automata, settling.system.surface_of
     rows = [order.index(c) for c in sliding]
     found = np.empty((len(sliding), len(sliding)))
@@ -122,13 +122,13 @@ def _pull(settling: Settling, sliding: list[int], z: np.ndarray) -> np.ndarray:
             other[c] = side
             series: Any = settling.series_of(other)
             rates.append(series.surfaces[rows, 1])
-        with np.errstate(invalid="ignore"):  # of two that are infinite
-            found[:, j] = 0.5 * rates[0] - 0.5 * rates[1]  # halved first, so that no difference is too large
+        with np.errstate(invalid="ignore"):  # the difference of two infinite rates
+            found[:, j] = 0.5 * rates[0] - 0.5 * rates[1]  # halved first, to avoid overflow
     return found
 
 
 def refused(settling: Settling, members: list[int], message: str) -> tuple[str, str]:
-    """Status and message where no joint candidate is admissible, with what is to be known of switching surfaces."""
+    """Return status and message if no joint candidate is admissible, with hints on switching surfaces."""
     system = settling.system
     if said := said_by_every_mode(system, members, settling.sides):
         return "inconsistent", said
@@ -150,7 +150,7 @@ def refused(settling: Settling, members: list[int], message: str) -> tuple[str, 
 
 
 def words_on_cascade(settling: Settling) -> str:
-    """What to do about transitions that follow each other without end, where that can be told; else empty."""
+    """Return a hint on transitions that repeat without end, or an empty text."""
     for words in (_words_on_opposed_modes, _words_on_negative_guard, _words_on_drift):
         if found := words(settling):
             return found
@@ -158,7 +158,7 @@ def words_on_cascade(settling: Settling) -> str:
 
 
 def _words_on_drift(settling: Settling) -> str:
-    """Of a guard that is a little below zero where a transition leads back to its mode."""
+    """Return a hint on a guard slightly below zero after a transition leads back to its mode."""
     system, last = settling.system, settling.changes[-2:]
     if len(last) < 2 or last[0].component != last[1].component or last[0].source != last[1].target:
         return ""
@@ -179,7 +179,7 @@ def _words_on_drift(settling: Settling) -> str:
 
 
 def _words_on_negative_guard(settling: Settling) -> str:
-    """Of a guard that is below zero after its own transition."""
+    """Return a hint on a guard that is negative after its own transition."""
     if not settling.changes:
         return ""
     change, system = settling.changes[-1], settling.system
@@ -198,7 +198,7 @@ def _words_on_negative_guard(settling: Settling) -> str:
 
 
 def _words_on_opposed_modes(settling: Settling) -> str:
-    """Of two modes of an automaton that push against each other across one surface."""
+    """Return a hint on two modes that drive the motion against each other across one surface."""
     model, last = settling.system.model, settling.changes[-2:]
     if len(last) < 2 or last[0].component != last[1].component or last[0].source != last[1].target:
         return ""

@@ -1,9 +1,9 @@
-"""Which joint candidates have a cause, and whether the one that is taken is the only one where that may fail.
+"""Select joint candidates that have a cause, and check that the selected motion is the only one.
 
-Static friction above kinetic friction makes several combinations admissible: where one contact lets go, the force on
-another changes by a jump. A contact that is below its limit has no cause to let go unless the others leave it none, as
-in `hybridsim.mechanics.series_loop.decision`. Friction that a reaction loads may have several admissible motions by
-itself (P. Painleve, C. R. Acad. Sci. Paris 121 (1895) 112): no rule prefers one of them.
+Static friction above kinetic friction makes several combinations admissible: if one contact releases, the force on
+another jumps. A contact below its limit has no cause to release unless the other contacts leave no alternative, as in
+`hybridsim.mechanics.series_loop.decision`. Friction that is loaded by a reaction may have several admissible motions by
+itself (P. Painleve, C. R. Acad. Sci. Paris 121 (1895) 112), and no rule prefers one of them.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from hybridsim.engine.events.choice.verdict import FINE
 if TYPE_CHECKING:
     from hybridsim.engine.events.resolve import Settling
 
-# Components at their surfaces whose other outcomes are all looked at; of more, 3^4 verdicts would be too slow.
+# Largest number of components at their surfaces whose other outcomes are examined; 3^5 verdicts would be too slow.
 MAX_JOINT_COMPONENTS = 4
 
 
 def with_cause(settling: Settling, members: list[int], candidates: np.ndarray) -> np.ndarray:
-    """Mask of the candidates in which friction that holds, and is certainly below its limits, goes on to hold."""
+    """Return a mask of the candidates in which friction that is certainly below its limits keeps sticking."""
     system, at = settling.system, settling.at
     automata, modes = system.automata, np.maximum(at.z, 0)
     holding = [
@@ -36,9 +36,7 @@ def with_cause(settling: Settling, members: list[int], candidates: np.ndarray) -
     if not holding or len(members) == 1:
         return mask
     begun = [members[k] for k in holding]
-    modes[begun] = [
-        automata[c].hold for c in begun
-    ]  # at a start, too, a contact on its surface rests if it can
+    modes[begun] = [automata[c].hold for c in begun]  # at a start, a contact on its surface sticks if it can
     series = settling.series_of(modes)
     values, bounds = series.guards[:, 0], series.guard_bounds[:, 0]
     for k in holding:
@@ -57,9 +55,9 @@ def other_outcomes(
     open_: set[int],
     cluster: tuple[int, ...],
 ) -> np.ndarray:
-    """Admissible candidates with another motion than the one that is taken, where friction is loaded by a reaction.
+    """Return admissible candidates with a motion other than the selected one, if friction is loaded by a reaction.
 
-    Contacts whose mode goes on as it was are not asked about: the present mode stays if it is admissible.
+    Contacts that keep their mode are not examined, because the present mode stays if it is admissible.
     """
     system, at, taken = settling.system, settling.at, candidates[number]
     automata = system.automata

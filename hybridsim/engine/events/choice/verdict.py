@@ -1,8 +1,8 @@
-"""The event decisions, as pure functions of arrays: they call no model code and know no tolerance.
+"""The event decisions as pure functions of arrays, without model code and without tolerances.
 
-Each guard comes as Taylor coefficients along the flow of a candidate mode, with running error bounds, and with
-the number of leading coefficients that are zero by decree (the set Z of the event contract). A compiled loop
-and the Python driver share these functions.
+Each guard is given by Taylor coefficients along the flow of a candidate mode, with running error bounds, and by the
+number of leading coefficients that are zero by decree (the set Z of the event contract). Compiled loops and the Python
+driver share these functions.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ NONUNIQUE, NONE = -1, -2  # outcomes of a choice that names no candidate
 
 @inlined
 def side_after(series: Any, bounds: Any, decreed: int) -> tuple[int, int]:
-    """Sign of a guard just after the instant, and the order that decides it.
+    """Return the sign of a guard just after the instant, and the order that decides it.
 
-    The first coefficient that is beyond its bound decides; those before `decreed` are zero whatever rounding
-    made of them. (0, number of coefficients) where none is beyond its bound, or one before it is no number: the
-    logarithm of a negative number has a slope.
+    The first coefficient beyond its bound decides. Coefficients before `decreed` are zero, whatever rounding made of
+    them. The result is (0, number of coefficients) if no coefficient is beyond its bound, or if one before it is nan.
+    The logarithm of a negative number, for example, is nan but has a finite slope.
     """
     for k in range(decreed, series.shape[0]):
         if math.isnan(series[k]):
@@ -40,7 +40,7 @@ def side_after(series: Any, bounds: Any, decreed: int) -> tuple[int, int]:
 
 @kernel
 def side_before(series: Any, bounds: Any, decreed: int) -> tuple[int, int]:
-    """Sign of a guard just before the instant: odd orders count with the opposite sign."""
+    """Return the sign of a guard just before the instant: odd orders count with the opposite sign."""
     side, order = side_after(series, bounds, decreed)
     if order % 2 == 1:
         side = -side
@@ -49,7 +49,7 @@ def side_before(series: Any, bounds: Any, decreed: int) -> tuple[int, int]:
 
 @inlined
 def open_question(series: Any, bounds: Any, decreed: int) -> bool:
-    """Whether a guard without a side is a question of rounding (and not zero identically)."""
+    """Return whether a guard without a side is undecided by rounding, and not identically zero."""
     for k in range(decreed, series.shape[0]):
         if series[k] != 0.0 or bounds[k] != 0.0:
             return True
@@ -58,7 +58,7 @@ def open_question(series: Any, bounds: Any, decreed: int) -> bool:
 
 @inlined
 def verdict_with(verdict: int, series: Any, bounds: Any, decreed: int, side: int) -> int:
-    """A candidate's verdict so far, and with one more guard, whose side just after is known."""
+    """Return the verdict on a candidate after one more guard, whose side just after is known."""
     if side < 0:
         return LEAVES
     if side == 0 and verdict == FINE and open_question(series, bounds, decreed):
@@ -70,10 +70,10 @@ def verdict_with(verdict: int, series: Any, bounds: Any, decreed: int, side: int
 def judge(
     series: Any, bounds: Any, decreed: Any, active: Any, backward: bool, sides: Any, orders: Any
 ) -> int:
-    """Judge the guards of one candidate: LEAVES if any goes negative, UNDECIDED if any is open, else FINE.
+    """Judge the guards of one candidate: LEAVES if any becomes negative, UNDECIDED if any is open, else FINE.
 
-    series, bounds (guards, orders); decreed, active, sides, orders (guards,). The sides and orders found are
-    written for the root search that follows.
+    series, bounds (guards, orders); decreed, active, sides, orders (guards,). The sides and orders found are written
+    for the root search that follows.
     """
     verdict = FINE
     for g in range(series.shape[0]):
@@ -91,7 +91,7 @@ def judge(
 
 @inlined
 def preference(modes: Any, current: Any, holds: Any, n: int) -> int:
-    """Rank of a joint candidate of n components: most keep their mode, and then most hold; n*(n + 1) if all keep it."""
+    """Return the rank of a joint candidate: most modes kept, then most holding; n*(n + 1) or more if all are kept."""
     kept, held = 0, 0
     for i in range(n):
         kept += modes[i] == current[i]
@@ -101,11 +101,11 @@ def preference(modes: Any, current: Any, holds: Any, n: int) -> int:
 
 @inlined
 def choose(modes: Any, verdicts: Any, current: Any, holds: Any) -> int:
-    """Choose among joint candidates: rows of `modes`, one column for each component of the cluster.
+    """Choose among joint candidates, given as rows of `modes` with one column for each component of the cluster.
 
-    The current modes stay if admissible (undecided counts: what is open keeps its mode); else, among the
-    certainly admissible, those of the highest `preference`; a tie is NONUNIQUE. Candidates that are merely undecided
-    are taken only where none is certain. NONE if there is none at all.
+    The current modes stay if they are admissible or undecided. Otherwise the certainly admissible candidate with the
+    highest `preference` is chosen, and a tie is NONUNIQUE. Undecided candidates are chosen only if no candidate is
+    certain. The result is NONE if no candidate is left.
     """
     best, best_score, ties = -1, -1, 0
     n = modes.shape[1]
@@ -129,13 +129,12 @@ def choose(modes: Any, verdicts: Any, current: Any, holds: Any) -> int:
 def decreed_zeros(
     is_first: bool, is_on: bool, is_holding: bool, is_smooth: bool, is_fired: bool, is_gap: bool
 ) -> int:
-    """How many leading coefficients of a guard of a candidate mode the event decrees to be zero.
+    """Return the number of leading coefficients of a guard that the event decrees to be zero in a candidate mode.
 
-    is_first: the first guard of a mode beside a surface is that surface. is_on: the surface is zero; is_holding: the
-    candidate holds it; is_smooth: the component is released from it and all unknowns stay as they were, so that the
-    surface starts with a zero rate as well. is_gap: the surface is a gap, which is on where its rate is zero too: one
-    more of each. is_fired: the guard was located at zero, its mode goes on, and it is still
-    what was located: `is_decreed`.
+    is_first: the guard is the first of a mode beside a surface, which is that surface. is_on: the surface is zero.
+    is_holding: the candidate holds the surface. is_smooth: the component is released and all unknowns stay unchanged,
+    so that the rate of the surface is zero as well. is_gap: the surface is a gap, which is on only if its rate is zero
+    too; this adds one zero. is_fired: the guard was located at zero, its mode continues, and `is_decreed` is true.
     """
     if is_first and is_on and not is_holding:
         return (2 if is_smooth else 1) + (1 if is_gap else 0)
@@ -144,9 +143,9 @@ def decreed_zeros(
 
 @inlined
 def is_decreed(is_holding: bool, continuous: bool) -> bool:
-    """Whether a guard that was located at zero is zero in a candidate in which its mode goes on.
+    """Return whether a guard that was located at zero is zero in a candidate in which its mode continues.
 
-    Those of a holding mode are limits of its unknown, which the jump of another unknown may have taken off the limit.
+    Guards of a holding mode are limits of its unknown. A jump of another unknown may have moved it off the limit.
     """
     return continuous or not is_holding
 
@@ -164,10 +163,10 @@ def decree_orders(
 ) -> None:
     """Count the leading zeros that the event decrees for the guards of one candidate; see `decreed_zeros`.
 
-    guards_of (components, widest): active guard numbers, -1 where none; holding[c]: component c holds its surface
-    in this candidate; on_surface[c]: its surface is zero; released[c]: c leaves its holding mode here;
-    continuous: every change of this candidate leaves the unknowns as they were; fired[g]: guard g was located at zero
-    and its mode goes on; gaps[c]: the surface of c is a gap.
+    guards_of (components, widest): active guard numbers, -1 for none. holding[c]: component c holds its surface in this
+    candidate. on_surface[c]: its surface is zero. released[c]: c leaves its holding mode here. continuous: every change
+    of this candidate leaves the unknowns unchanged. fired[g]: guard g was located at zero and its mode continues.
+    gaps[c]: the surface of c is a gap.
     """
     for c in range(guards_of.shape[0]):
         for j in range(guards_of.shape[1]):
@@ -178,7 +177,7 @@ def decree_orders(
 
 
 def joint_candidates(sizes: Iterable[int]) -> np.ndarray:
-    """All combinations of modes of a cluster, one row each; not to be written to."""
+    """Return all combinations of modes of a cluster, one row each. The array must not be modified."""
     return _joint(tuple(sizes))
 
 

@@ -1,4 +1,4 @@
-"""Where a compiled loop ends a segment: what is known of the state there, the event settled, the next origin."""
+"""Resolve the event at the end of a segment in a compiled loop: error bounds there, the event, the next origin."""
 
 from __future__ import annotations
 
@@ -14,30 +14,31 @@ from hybridsim.engine.native.kernels import call_kernel, inlined, kernel, kernel
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.instant import two_sum
 
-_STEADY = 1e-3  # of the ratio of intervals between events: what it may change by in a series that accumulates
-_SHALLOW = 2.0**-18  # of a guard's values on the last step: how far below zero it goes, times four, at least
-_HIDDEN = 16.0  # four times its rounding, at least
+_STEADY = 1e-3  # relative change allowed in the ratio of intervals of an accumulating series
+_SHALLOW = 2.0**-18  # least depth below zero, times four, relative to a guard's values on the last step
+_HIDDEN = 16.0  # least depth below zero, times four, in rounding errors of the guard
 STAGES = 200.0  # the largest `rounding` of a method with a compiled loop
-_ULPS = 64.0  # events closer than this are for the general way to tell apart
+_ULPS = 64.0  # events closer than this are left to the general mode loop
 
 
 class State(NamedTuple):
-    """What holds at the start of a segment: x, x_error (n,), z (C,), p, and sides, orders, floors (G,) of guards."""
+    """The state at the start of a segment."""
 
-    x: np.ndarray
-    x_error: np.ndarray
-    z: np.ndarray
-    p: np.ndarray
-    sides: np.ndarray
-    orders: np.ndarray
-    floors: np.ndarray
+    x: np.ndarray  # states (n,)
+    x_error: np.ndarray  # error bounds (n,)
+    z: np.ndarray  # modes (C,)
+    p: np.ndarray  # run-time vector
+    sides: np.ndarray  # sides (G,) of the guards
+    orders: np.ndarray  # leading zeros (G,) of the guards
+    floors: np.ndarray  # error bounds (G,) of the guards
 
 
 @kernel
 def is_crowded(gap: float, clock: Any, pace: Any) -> bool:
-    """Whether events follow each other so closely, or ever faster, that it is not for a compiled loop to go on.
+    """Return whether events follow each other so closely, or ever faster, that a compiled loop has to stop.
 
-    gap: since the last event. pace (3,): the gap before, its ratio to the one before that, how often it was steady.
+    gap: time since the last event. pace (3,): the gap before, its ratio to the one before that, and how often that
+    ratio was steady.
     """
     ratio = gap / pace[0]
     steady = ratio < CLOSING_IN and abs(ratio - pace[1]) <= _STEADY * ratio
@@ -49,7 +50,7 @@ def is_crowded(gap: float, clock: Any, pace: Any) -> bool:
 def state_errors(
     automata: Any, s_error: float, y: Any, scale: Any, x_error: Any, z: Any, slopes: Any, out: Any
 ) -> None:
-    """Bounds of the states at an event: rounding on the segment (of sizes `scale`), what was left, the instant's."""
+    """Write error bounds of the states at an event: rounding (of sizes `scale`), earlier errors, the instant."""
     for i in range(y.shape[0]):
         out[i] = 4.0 * UNIT * scale[i] + x_error[i] + s_error * abs(slopes[i])
     for c in range(z.shape[0]):
@@ -62,16 +63,16 @@ def state_errors(
 
 @inlined
 def spread(steps: int, rounding: float) -> float:
-    """How many of its bounds a guard may be from zero by what steps round away: see `engine.run.located.add_steps`."""
+    """Return the factor on guard bounds that covers rounding of the steps: see `engine.run.located.add_steps`."""
     return 1.0 + 12.0 * steps + 0.5 * rounding
 
 
 @inlined
 def is_shallow(slope: float, bend: float, length: float) -> bool:
-    """Whether a guard that was located at zero turns back so soon that it may do no more than touch it.
+    """Return whether a guard located at zero turns back so soon that it may only touch zero.
 
-    slope, bend: its first and second coefficient there; length: of the step before, over which they say how large it
-    was. Then `is_hidden` has the last word.
+    slope, bend: its first and second Taylor coefficient there. length: of the step before, which gives its size.
+    `is_hidden` decides then.
     """
     return bend > 0.0 and slope * slope < _SHALLOW * bend * length * (abs(slope) + bend * length)
 
@@ -80,7 +81,7 @@ def is_shallow(slope: float, bend: float, length: float) -> bool:
 def judge(
     automata: Any, tapes: Any, inputs: Any, lin: Any, s: float, s_error: float, state: Any, work: Any
 ) -> None:
-    """Series of the active guards with bounds, to `judged` of the work space, at the state y, y_error there."""
+    """Write the series of the active guards with bounds to `judged` of the work space, at the state y, y_error."""
     work.real[AT], work.real[AT_ERROR], work.whole[FIRED] = s, s_error, NOBODY
     call_kernel(work.reached[SETTLE], (automata, tapes, inputs, lin, state, work))
 
@@ -99,9 +100,9 @@ def is_hidden(
     state: Any,
     work: Any,
 ) -> bool:
-    """Whether a guard comes back before it is beyond the rounding of all that its expression is made of.
+    """Return whether a guard turns back before it exceeds the rounding error of its expression.
 
-    At the state in the work space, at local time s.
+    The state is that in the work space, at local time s.
     """
     judge(automata, tapes, inputs, lin, s, s_error, state, work)
     return slope * slope < _HIDDEN * bend * work.judged[1, g, 0]
@@ -120,10 +121,10 @@ def differ_by_rounding(
     state: Any,
     work: Any,
 ) -> bool:
-    """Whether values of the active guards and the sums of their series differ by no more than rounding.
+    """Return whether values of the active guards and the sums of their series agree within rounding.
 
-    A guard may be the small difference of large terms, which no shorter step makes agree better. Row k is that of the
-    modes; y of the work space is the state from which the series are taken, at local time s.
+    A guard may be the small difference of large terms, and then shorter steps do not improve the agreement. k: row of
+    the modes. y of the work space is the state from which the series are computed, at local time s.
     """
     for i in range(work.y.shape[0]):
         work.y_error[i] = 4.0 * UNIT * abs(work.y[i])
@@ -137,13 +138,13 @@ def differ_by_rounding(
 
 @inlined
 def moved_on(high: float, low: float, s: float) -> tuple[float, float]:
-    """An instant and a time after it."""
+    """Return an instant (high, low) advanced by a time s."""
     high, rest = two_sum(high, s)
     return two_sum(high, rest + low)
 
 
 def reach_settling(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> None:
-    """Compile the kernel that settles events and those it reaches, if need be; put addresses where loops find them."""
+    """Compile the kernel that resolves events and its callees if needed, and store their addresses."""
     x = work.y
     work.reached[SERIES] = kernel_address(interpreted_series, tapes, inputs, 0, 0.0, 0.0, x, x, state.p, work)
     work.reached[SETTLE] = kernel_address(settle_event, automata, tapes, inputs, lin, state, work)
@@ -163,10 +164,10 @@ def settle_and_move_on(
     state: Any,
     work: Any,
 ) -> bool:
-    """Settle an ordinary event and make what follows it the start of the next segment; False leaves all as it was.
+    """Resolve an ordinary event and start the next segment there. False leaves the state unchanged.
 
-    y, y_error of the work space are the state at the event, to which so many steps led. lin: tables of linear modes,
-    empty for others. state: `State`, moved on with the clock.
+    y, y_error of the work space are the state at the event, after `steps` steps. lin: tables of linear modes, empty for
+    others. state: `State`, advanced together with the clock.
     """
     work.real[AT], work.real[AT_ERROR], work.whole[FIRED] = s, s_error, fired
     work.real[SPREAD] = spread(steps, STAGES)

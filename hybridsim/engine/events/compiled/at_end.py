@@ -1,7 +1,7 @@
-"""Whether a guard may be zero at the known time at which a compiled loop ends a segment: it leaves that to others.
+"""Check whether a guard may be zero at the known time at which a compiled loop ends a segment.
 
-What is zero there within rounding comes before what is due. The general way has the bounds that decide it; those here
-are wider, so that both loops decide alike.
+A guard that is zero there within rounding comes before what is due, and the general loop decides it with its bounds.
+The bounds here are wider, so that both loops decide alike.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from hybridsim.engine.linear.motion import guard_terms
 from hybridsim.engine.native.kernels import inlined, kernel
 from hybridsim.engine.series.bounded import UNIT
 
-_NEAR = 2.0**-32  # of what a guard is made of: far beyond all that rounding leaves of a zero
-_FAR = 2.0**-10  # of the largest value of a guard on a segment: nearer than this its bound is asked for
-_SHORT = 2.0**-13  # of a run's time: on shorter segments a guard may have been that near all along
+_NEAR = 2.0**-32  # of the terms of a guard: far more than the rounding error of a zero
+_FAR = 2.0**-10  # of the largest value of a guard on a segment; below it the error bound is computed
+_SHORT = 2.0**-13  # of the time of a run; on shorter segments a guard may be close to zero throughout
 
 
 @inlined
 def is_clear(values: Any, largest: Any, s: float, time: float) -> bool:
-    """Whether guards are far from zero at the end of a segment, at local time s, by their largest values on it."""
+    """Return whether guards are far from zero at the end s of a segment, relative to their largest values on it."""
     clear = s > _SHORT * time
     for i in range(values.shape[0]):
         clear = clear and (abs(values[i]) > _FAR * largest[i] or largest[i] == 0.0)
@@ -42,9 +42,10 @@ def may_be_at_zero(
     state: Any,
     work: Any,
 ) -> bool:
-    """Whether a guard of the modes in row k may be zero and about to be negative, after so many steps of a segment.
+    """Return whether a guard of the modes in row k may be zero and about to become negative.
 
-    y of the work space is the state there, at local time s, slopes its rates; scale: as for `state_errors`.
+    y of the work space is the state at local time s, after `steps` steps of the segment; slopes: its rates; scale: as
+    for `state_errors`.
     """
     s_error = 8.0 * 2.0**-52 * time
     for i in range(scale.shape[0]):
@@ -65,7 +66,10 @@ def may_be_at_zero(
 def may_be_at_zero_of_linear(
     lin: Any, tapes: Any, k: int, s: float, time: float, v: Any, sizes: Any, terms: Any
 ) -> bool:
-    """The same for linear modes at modal coordinates v, of these sizes on the segment. terms (TERMS,): room."""
+    """Return the same for linear modes at modal coordinates v, with `sizes` on the segment.
+
+    terms (TERMS,): scratch.
+    """
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         g, size = tapes.active[i], 0.0
         guard_terms(lin, k, g, v, terms)

@@ -1,8 +1,8 @@
-"""Events of linear modes whose outcome is plain at first sight: one contact changes its mode, all else is clear.
+"""Resolve events of linear modes with a clear outcome: one contact changes its mode, no other guard is near zero.
 
-What decides is the coefficient of each guard that its decreed zeros leave first. Where all of these are far beyond
-their rounding errors, the outcome is that of `hybridsim.engine.events.compiled.resolve_surface`, for a fraction of
-the work; where any is not, nothing has been decided.
+The first coefficient of each guard after its decreed zeros decides. If all of these are far beyond their rounding
+errors, the outcome is that of `hybridsim.engine.events.compiled.resolve_surface`, at a fraction of the cost. Otherwise
+nothing is decided.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _UNCLEAR = 0
 
 @inlined
 def _zeros_of(automata: Any, z: Any, c: int, g: int, is_smooth: bool) -> int:
-    """The decreed zeros of a guard in modes z, which component c begins at its surface."""
+    """Return the decreed zeros of a guard in modes z, which component c begins at its surface."""
     is_its = automata.owner[g] == c
     is_holding = z[c] == automata.hold[c]
     return decreed_zeros(automata.place[g] == 0, is_its, is_holding, is_smooth, False, False)
@@ -33,7 +33,7 @@ def _zeros_of(automata: Any, z: Any, c: int, g: int, is_smooth: bool) -> int:
 def _verdict(
     automata: Any, tapes: Any, lin: Any, k: int, c: int, is_smooth: bool, size: float, work: Any
 ) -> int:
-    """1 where the modes on trial, which row k is of, certainly go on; -1 where c leaves them; _UNCLEAR."""
+    """Return 1 if the trial modes of row k certainly last, -1 if c leaves them, else _UNCLEAR."""
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         few()
         g = tapes.active[i]
@@ -46,7 +46,7 @@ def _verdict(
 
 @inlined
 def _is_alone(tapes: Any, lin: Any, k: int, fired: int, size: float, work: Any) -> bool:
-    """Whether the guard that fired certainly goes on beyond its zero, and no other of the modes in row k is at zero."""
+    """Return whether the fired guard certainly becomes negative and no other guard in row k is near zero."""
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         few()
         g = tapes.active[i]
@@ -58,21 +58,21 @@ def _is_alone(tapes: Any, lin: Any, k: int, fired: int, size: float, work: Any) 
 
 @kernel
 def settle_clearly(automata: Any, tapes: Any, lin: Any, state: Any, work: Any) -> bool:
-    """Whether the event in the work space is clear; then what holds after it has taken the place of the state.
+    """Return whether the event in the work space is clear. If so, the state after it replaces the state.
 
-    `ROW` of the work space is that of the modes before it, and then of those after it. Another event is left to others,
-    whatever has been written to the rest of the work space.
+    `ROW` of the work space is the row of the modes before the event, and then of those after it. If the event is not
+    clear, other parts of the work space may have been overwritten.
     """
     fired, at = work.whole[FIRED], located(state, work)
     c = automata.owner[fired]
     hold, now = automata.hold[c], at.z[c]
     if hold < 0 or automata.is_corner[c] or (now != hold and automata.place[fired] > 0):
-        return False  # a guard on the load does not put the contact onto its surface
+        return False  # a guard on the load does not move the contact onto its surface
     for i in range(automata.cluster_start[c], automata.cluster_start[c + 1]):
         few()
         d = automata.cluster[i]
         if automata.is_unilateral[d] or (d != c and at.z[d] == automata.hold[d]):
-            return False  # they are decided together
+            return False  # such components are decided together
     before = work.whole[ROW]
     x, x_error, trial = work.x_after, work.slopes, work.trial
     put(at.x_error, x_error)
@@ -87,7 +87,7 @@ def settle_clearly(automata: Any, tapes: Any, lin: Any, state: Any, work: Any) -
         x_error[pin] = UNIT * abs(x[pin])
     found, after, is_smooth = -1, -1, False
     for turn in range(3):
-        mode = (hold + turn) % 3  # the one that holds is preferred to those beside it
+        mode = (hold + turn) % 3  # the holding mode is preferred to the other two
         if mode == now:
             continue
         trial[c] = mode

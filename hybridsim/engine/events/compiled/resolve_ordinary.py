@@ -1,9 +1,8 @@
-"""Events that need no discussion, settled in compiled code: one guard of one component, everything certain just after.
+"""Resolve ordinary events in compiled code: one guard of one component, with a certain outcome.
 
-The rules are those of `hybridsim.engine.events.choice.verdict`, as everywhere. What is not ordinary (several guards
-at once, a case undecided at rounding, a cascade, no or several admissible motions, an impact, an event in a model
-that also slides where it jumps) is left untouched for `hybridsim.engine.events.resolve`, which can say what is the
-matter.
+The rules are those of `hybridsim.engine.events.choice.verdict`. Other events are left unchanged for
+`hybridsim.engine.events.resolve`, which can report the reason: several guards at once, a case undecided at rounding, a
+cascade, no or several admissible motions, an impact, or an event in a model that also slides where it jumps.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ from hybridsim.engine.system.programs.modes_index import find_modes
 
 @inlined
 def is_alone(tapes: Any, lin: Any, k: int, fired: int, x: Any, x_error: Any, work: Any) -> bool:
-    """Whether no other guard can be zero together with the one that fired, given the rounding of the steps."""
+    """Return whether no other guard can be zero together with the fired one, given the rounding of the steps."""
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         g = tapes.active[i]
         if g == fired:
@@ -66,7 +65,7 @@ def take_choice(
     p: Any,
     work: Any,
 ) -> bool:
-    """The declared transition of the guard, with its reset; False where surfaces may have been jumped over."""
+    """Apply the declared transition of the guard with its reset. Return False if it may move surfaces."""
     for d in range(z.shape[0]):
         if automata.hold[d] >= 0 and not automata.is_corner[automata.owner[fired]]:
             return False
@@ -104,11 +103,11 @@ def take_choice(
 
 @merged
 def settle_ordinary(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> bool:
-    """Whether the event is ordinary; then what holds just after it is in the work space: x_after, slopes and z_after.
+    """Return whether the event is ordinary. If so, the state after it is in x_after, slopes and z_after.
 
-    A transition of a component without a surface may change the run-time vector: it is written to p_after then. Another
-    event is left to others, whatever has been written. Sides, orders and floors of the guards in the new modes are in
-    the work space as well.
+    A transition of a component without a surface may change the run-time vector, which is then written to p_after.
+    Sides, orders and floors of the guards in the new modes are in the work space as well. If the event is not ordinary,
+    other parts of the work space may have been overwritten.
     """
     functions, fired, at = called_by(work), work.whole[FIRED], located(state, work)
     x, x_error, z, p = work.x_after, work.slopes, work.z_after, work.p_after
@@ -131,11 +130,11 @@ def settle_ordinary(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any
             return False
     if automata.hold[c] >= 0:
         if z[c] != automata.hold[c] and automata.place[fired] > 0:
-            return False  # a guard on the load does not put the contact onto its surface
+            return False  # a guard on the load does not move the contact onto its surface
         number = decide_surface(automata, tapes, inputs, lin, state, work, fired, k, is_known)
         if number < 0:
             return False
-        # all has been judged there
+        # if the cluster has all components, `decide_surface` has judged all guards
         if automata.cluster_start[c + 1] - automata.cluster_start[c] == z.shape[0]:
             put(work.all_sides[number], sides)
             put(work.all_orders[number], orders)
@@ -164,10 +163,10 @@ def settle_ordinary(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any
 
 
 def settle_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> int:
-    """Settle the event in the work space and put what follows in place of the state: 1, or 0 where it is not ordinary.
+    """Resolve the event in the work space and replace the state. Return 1, or 0 if it is not ordinary.
 
-    Where nobody has fired, the series of the active guards are left in the work space, and that is all. lin: tables of
-    linear modes, empty for others. state: `hybridsim.engine.events.compiled.after_segment.State`.
+    If no guard fired, only the series of the active guards are written to the work space. lin: tables of linear modes,
+    empty for others. state: `hybridsim.engine.events.compiled.after_segment.State`.
     """
     if work.whole[FIRED] == NOBODY:
         at, k = located(state, work), find_modes(tapes, state.z)

@@ -1,4 +1,4 @@
-"""Events at surfaces that compiled loops decide in passing: which modes of a cluster are admissible just after."""
+"""Resolve events at surfaces in compiled loops: find the modes of a cluster that are admissible just after."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def decide_single(
     is_known: bool,
     c: int,
 ) -> int:
-    """As `decide_surface`, for one component at its surface: what `choose` makes of its three modes, one by one."""
+    """Decide one component at its surface as `decide_surface` does, by judging its three modes one by one."""
     z, trial = work.z_after, work.trial
     now, hold = z[c], automata.hold[c]
     if not goes_on(automata, lin, k, z, fired, is_known, work.x_after, work.slopes, work):
@@ -77,11 +77,11 @@ def decide_surface(
     k: int,
     is_known: bool,
 ) -> int:
-    """The admissible modes, written to `work.z_after`, of the components of a cluster that are at their surfaces.
+    """Write the admissible modes of the components of a cluster at their surfaces to `work.z_after`.
 
-    Returns the number of that candidate; -1 where it is not plain. Candidates are tried in the order in which `choose`
-    prefers them, up to the first that it will take. k: the row of the modes before; is_known: their guards' series are
-    there.
+    Returns the number of that candidate, or -1 if the outcome is not certain. Candidates are tried in the order of
+    preference of `choose`, up to the first accepted one. k: row of the modes before; is_known: whether the series of
+    their guards are in the work space.
     """
     at, x, x_error, z = located(state, work), work.x_after, work.slopes, work.z_after
     members, trial, candidates, verdicts = work.members, work.trial, work.candidates, work.verdicts
@@ -106,7 +106,7 @@ def decide_surface(
         trial[members[i]] = hold[members[i]]
     call(called_by(work).project, at.s, at.x, at.p, trial, x)
     for i in range(count):
-        if pin[members[i], 0] >= 0:  # a unilateral contact, which has two, is not ordinary
+        if pin[members[i], 0] >= 0:  # a unilateral contact holds two states and is not ordinary
             x_error[pin[members[i], 0]] = UNIT * abs(x[pin[members[i], 0]])
     for i in range(x.shape[0]):
         is_known = is_known and x[i] == at.x[i] and x_error[i] == at.x_error[i]
@@ -127,7 +127,7 @@ def decide_surface(
         for number in range(total):
             if ranks[number] != rank:
                 continue
-            # what holds below its limits has no cause to let go: `hybridsim.engine.events.choice.uniqueness`
+            # a contact below its limits has no cause to release: `hybridsim.engine.events.choice.uniqueness`
             is_caused = True
             for i in range(count):
                 trial[members[i]] = candidates[number, i]

@@ -1,4 +1,4 @@
-"""What compiled loops hold of an event: as it was located, room to settle it in, the model's functions it needs."""
+"""Scratch arrays of compiled loops for one event: the located event, work arrays, and functions of the model."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from hybridsim.engine.native.simd_products import vector_of
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.bounded import ORDER
 
-MOST = 3  # components at their surfaces at once: more make too many candidates to try in passing
-FIRED, DISCRETE, DISCRETE_AT, ROW = range(4)  # of `Work.whole`
-AT, AT_ERROR, SPREAD = range(3)  # of `Work.real`
-SETTLE, LEAP, SERIES = range(3)  # of `Work.reached`
-NOBODY = -1  # in place of the guard that fired
+MOST = 3  # most components at their surfaces at once; more have too many candidates for compiled loops
+FIRED, DISCRETE, DISCRETE_AT, ROW = range(4)  # indices of `Work.whole`
+AT, AT_ERROR, SPREAD = range(3)  # indices of `Work.real`
+SETTLE, LEAP, SERIES = range(3)  # indices of `Work.reached`
+NOBODY = -1  # no guard fired
 
 
 class Functions(NamedTuple):
-    """Addresses of a model's functions; 0 for those that it does not need."""
+    """Addresses of the functions of a model; unused ones are never called."""
 
     flow: Any
     project: Any
@@ -29,51 +29,44 @@ class Functions(NamedTuple):
 
 
 class Before(NamedTuple):
-    """An event as it was located: local time and its error, state, its error bounds, run-time vector, modes."""
+    """An event as it was located."""
 
-    s: float
-    s_error: float
-    x: np.ndarray
-    x_error: np.ndarray
-    p: np.ndarray
-    z: np.ndarray
+    s: float  # local time
+    s_error: float  # its error bound
+    x: np.ndarray  # states (n,)
+    x_error: np.ndarray  # their error bounds (n,)
+    p: np.ndarray  # run-time vector
+    z: np.ndarray  # modes (C,)
 
 
 class Work(NamedTuple):
-    """Room for one event: series with bounds (registers, 4), judged (2, guards, 4): those of guards and their bounds,
-    what holds after it, candidates.
+    """Work arrays for one event.
 
-    functions (5,): those of `Functions`. reached (3,): addresses of kernels: the one that settles it, that of a leap,
-    and the interpreter of the series of guards. whole, real: what the places named FIRED, AT and so on say; SPREAD: how
-    many of their bounds guards that are zero at one instant may be from zero, by the rounding of steps. y, y_error
-    (n,): the state at the event, slopes (n,) of the flow there. x_after, z_after, p_after: what follows it; bounds of
-    x_after take the place of the slopes. factors, w, w_error: functions of time of linear modes, which are to hold at
-    the event when it is settled; sizes, w_sizes: of states and of these. sides, orders, floors (G,): of the guards just
-    after it. The last ones have a row for each joint candidate.
+    The last ones, from `candidates` on, have a row for each joint candidate.
     """
 
-    functions: np.ndarray
-    reached: np.ndarray
-    whole: np.ndarray
-    real: np.ndarray
-    y: np.ndarray
-    y_error: np.ndarray
-    slopes: np.ndarray
-    x_after: np.ndarray
-    z_after: np.ndarray
-    p_after: np.ndarray
-    V: np.ndarray
-    E: np.ndarray
-    factors: np.ndarray
-    w: np.ndarray
-    w_error: np.ndarray
-    sizes: np.ndarray
-    w_sizes: np.ndarray
-    judged: np.ndarray
-    sides: np.ndarray
-    orders: np.ndarray
-    floors: np.ndarray
-    on_surface: np.ndarray
+    functions: np.ndarray  # addresses (5,): `Functions`
+    reached: np.ndarray  # addresses (3,) of kernels at SETTLE, LEAP, SERIES
+    whole: np.ndarray  # integers at FIRED, DISCRETE, DISCRETE_AT, ROW
+    real: np.ndarray  # numbers at AT, AT_ERROR, SPREAD (bounds by which simultaneous guards may be from zero)
+    y: np.ndarray  # states (n,) at the event
+    y_error: np.ndarray  # their error bounds (n,)
+    slopes: np.ndarray  # rates (n,) at the event, then error bounds of x_after
+    x_after: np.ndarray  # states (n,) after the event
+    z_after: np.ndarray  # modes (C,) after the event
+    p_after: np.ndarray  # run-time vector after the event
+    V: np.ndarray  # Taylor coefficients (registers, 4)
+    E: np.ndarray  # their error bounds (registers, 4)
+    factors: np.ndarray  # functions of time of linear modes, with errors
+    w: np.ndarray  # monomials of these functions at the event
+    w_error: np.ndarray  # their error bounds
+    sizes: np.ndarray  # sizes (n,) of the states
+    w_sizes: np.ndarray  # sizes of the monomials
+    judged: np.ndarray  # series of the guards and their bounds (2, G, 4)
+    sides: np.ndarray  # sides (G,) of the guards just after the event
+    orders: np.ndarray  # their leading zeros (G,)
+    floors: np.ndarray  # their error bounds (G,)
+    on_surface: np.ndarray  # mask (C,) of components on their surfaces
     jumps: np.ndarray
     out: np.ndarray
     everything: np.ndarray
@@ -93,19 +86,19 @@ class Work(NamedTuple):
 
 @inlined
 def called_by(work: Any) -> Any:
-    """The functions that the loop calls which a work space is for."""
+    """Return the functions of the model that belong to a work space."""
     f = work.functions
     return Functions(f[0], f[1], f[2], f[3], f[4])
 
 
 @merged
 def located(state: Any, work: Any) -> Before:
-    """The event in a work space; state: at the beginning of the segment that it ends."""
+    """Return the event in a work space. state: the state at the start of the segment that the event ends."""
     return Before(work.real[AT], work.real[AT_ERROR], work.y, work.y_error, state.p, state.z)
 
 
 def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> Work:
-    """Room for the events of one system; for linear modes also for their functions of time."""
+    """Return work arrays for the events of a system; linear modes need atoms and monomials of time as well."""
     guards, count = system.guard_count, len(system.automata)
     registers = system.registers.count
     together = min(MOST, len(system.surface_of))
@@ -159,14 +152,14 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> Work:
 
 
 def _atoms(count: int) -> np.ndarray:
-    """Room for the values of so many atoms and their errors, and one, which has none."""
+    """Return an array for the values of `count` atoms with their errors, and for the constant one."""
     factors = np.zeros((2 * count + 1, 2))
     factors[-1, 0] = 1.0
     return factors
 
 
 def functions_of(system: Any) -> Functions:
-    """The functions that a compiled loop calls."""
+    """Return the functions that a compiled loop calls."""
     return system.code.shared("loop functions", lambda: _functions(system))
 
 

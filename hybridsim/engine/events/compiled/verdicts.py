@@ -1,4 +1,4 @@
-"""Verdicts of compiled loops on modes: whether the guards of a candidate leave it again just after an event."""
+"""Judge modes in compiled loops: whether the guards of a candidate become negative just after an event."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ UNKNOWN = -2  # in place of a verdict
 def interpreted_series(
     tapes: Any, inputs: Any, k: int, s: float, s_error: float, x: Any, x_error: Any, p: Any, work: Any
 ) -> int:
-    """As `guard_series`, by the interpreter of tapes; reached by its address."""
+    """Compute `guard_series` with the tape interpreter. This kernel is called by address."""
     judged, V, E = work.judged, work.V, work.E
     constant = tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]]
     rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
@@ -51,9 +51,10 @@ def interpreted_series(
 
 @inlined
 def guard_series(tapes: Any, inputs: Any, lin: Any, k: int, at: Any, x: Any, x_error: Any, work: Any) -> None:
-    """Coefficients to third order of the active guards, with bounds, along the flow of the modes in row k, by the tape.
+    """Write coefficients to third order of the active guards, with bounds, along the flow of the modes in row k.
 
-    Linear modes have them as rows over states and functions of time, and are asked for those that decide: `sides_of`.
+    For linear modes these are rows over states and functions of time, and only those that decide are computed, by
+    `sides_of`.
     """
     if is_linear(lin):
         return
@@ -66,7 +67,7 @@ def guard_series(tapes: Any, inputs: Any, lin: Any, k: int, at: Any, x: Any, x_e
 
 @inlined
 def is_linear(lin: Any) -> bool:
-    """Whether there are tables of linear modes."""
+    """Return whether there are tables of linear modes."""
     return lin.counts.shape[0] > 0
 
 
@@ -74,9 +75,9 @@ def is_linear(lin: Any) -> bool:
 def guard_side(
     lin: Any, k: int, g: int, decreed: int, x: Any, x_error: Any, work: Any
 ) -> tuple[int, int, bool]:
-    """Sign of a guard just after, the order that decides it, and whether that is a question of rounding.
+    """Return the sign of a guard just after, the order that decides it, and whether rounding leaves it open.
 
-    k: the row of the modes whose `guard_series` were asked for last.
+    k: the row of the modes whose `guard_series` were computed last.
     """
     if is_linear(lin):
         return call_apart(linear_side, (lin, k, g, decreed, x, x_error, work))
@@ -87,7 +88,7 @@ def guard_side(
 
 @inlined
 def size_at(lin: Any, k: int, g: int, x: Any, x_error: Any, work: Any) -> tuple[float, float]:
-    """The value of a guard and its bound."""
+    """Return the value of a guard and its error bound."""
     if is_linear(lin):
         return linear_coefficient(lin, k, g, 0, x, x_error, work)
     return work.judged[0, g, 0], work.judged[1, g, 0]
@@ -95,7 +96,7 @@ def size_at(lin: Any, k: int, g: int, x: Any, x_error: Any, work: Any) -> tuple[
 
 @inlined
 def is_release(automata: Any, before: Any, z: Any, c: int, fired: int) -> bool:
-    """Whether a component leaves its holding mode through the guard that was located."""
+    """Return whether a component leaves its holding mode through the located guard."""
     if automata.hold[c] < 0 or before[c] != automata.hold[c] or z[c] == automata.hold[c]:
         return False
     side = 0 if z[c] == automata.above[c] else 1
@@ -106,7 +107,7 @@ def is_release(automata: Any, before: Any, z: Any, c: int, fired: int) -> bool:
 def is_continuous(
     functions: Any, automata: Any, at: Any, x: Any, z: Any, members: Any, fired: int, jumps: Any
 ) -> bool:
-    """Whether every change among some components is a release at which nothing jumps."""
+    """Return whether every change among some components is a release without a jump."""
     asked = False
     for i in range(members.shape[0]):
         c = members[i]
@@ -141,11 +142,11 @@ def judge_members(
     orders: Any,
     floors: Any,
 ) -> int:
-    """Verdict on the guards of some components in the candidate z, which row k is of.
+    """Return the verdict on the guards of some components in the candidate z of row k.
 
-    sides, orders, floors: of all guards, with bounds of their values; of use unless the verdict is LEAVES. is_on: the
-    located guard is still to be crossed; a corner's is at zero on both its sides. continuous: all unknowns stay as they
-    were.
+    sides, orders, floors: of all guards, with bounds of their values; valid unless the verdict is LEAVES. is_on:
+    whether the located guard is still to be crossed; a corner is at zero on both sides. continuous: whether all
+    unknowns stay unchanged.
     """
     on_surface, guards_of, hold = work.on_surface, automata.guards_of, automata.hold
     verdict = FINE
@@ -179,9 +180,9 @@ def judge_members(
 def goes_on(
     automata: Any, lin: Any, k: int, z: Any, fired: int, is_known: bool, x: Any, x_error: Any, work: Any
 ) -> bool:
-    """Whether the located guard certainly leaves the modes z in row k, in which it was located, after its zero as well.
+    """Return whether the located guard certainly becomes negative in the modes z in row k.
 
-    Then that is the verdict on them: LEAVES. is_known: the guards' series there are known.
+    The verdict on these modes is then LEAVES. is_known: whether the series of their guards are in the work space.
     """
     if not (is_known or is_linear(lin)):
         return False
@@ -192,7 +193,7 @@ def goes_on(
 
 @merged
 def cluster_of(automata: Any, c: int) -> Any:
-    """The components whose modes are decided together with that of one."""
+    """Return the components whose modes are decided together with that of component c."""
     return automata.cluster[automata.cluster_start[c] : automata.cluster_start[c + 1]]
 
 
@@ -209,11 +210,11 @@ def judge_candidate(
     c: int,
     number: int,
 ) -> int:
-    """Verdict on the modes in `work.trial`, with what goes with it in the work space's rows of that number.
+    """Return the verdict on the modes in `work.trial`, and write its details to the rows of that number.
 
-    state: before the event; what follows it has the states `work.x_after`, which are good to `work.slopes`. c: one of
-    the components that are decided. UNKNOWN where these modes are not on the shelf. is_known: their guards' series are
-    there.
+    state: before the event; the states after it are `work.x_after` with error bounds `work.slopes`. c: one of the
+    decided components. The result is UNKNOWN if there are no tables for these modes. is_known: whether the series of
+    their guards are in the work space.
     """
     k = find_modes(tapes, work.trial)
     if k < 0:

@@ -1,4 +1,4 @@
-"""Impacts while an event is settled: which contacts take part, and the states after their impulses."""
+"""Resolve impacts at an event: find the contacts that take part, and the states after their impulses."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from hybridsim.model.parts.impact import ROUNDING
 if TYPE_CHECKING:
     from hybridsim.engine.events.resolve import Settling
 
-# Newton's method from an error of location, which is rounding, is at rounding of the gap after one correction; the
-# second is for steps that end a little inside.
+# The error of location is rounding, so one Newton correction makes the gap zero within rounding. The second correction
+# is for steps that end slightly inside.
 _CORRECTIONS = 2
 
 Failure = tuple[str, str]
 
 
 def strike(settling: Settling, open_: set[int]) -> Failure | None:
-    """Let the contacts among `open_` whose gaps close collide; what comes out without a speed stays among `open_`.
+    """Let the contacts among `open_` whose gaps close collide. Contacts left without a velocity stay in `open_`.
 
-    A contact that is there and has one, of separation, is open from now on.
+    A contact at zero gap with a velocity of separation is open from now on.
     """
     unilateral = [c for c in open_ if settling.system.automata[c].is_unilateral]
     if not unilateral:
@@ -52,7 +52,7 @@ def strike(settling: Settling, open_: set[int]) -> Failure | None:
 
 
 def _surfaces(settling: Settling) -> tuple[np.ndarray, np.ndarray]:
-    """Coefficients of the surfaces with bounds, the states as they are and not as a mode would hold them."""
+    """Return Taylor coefficients of the surfaces with bounds, at the states without projection by a mode."""
     at, system = settling.at, settling.system
     free = at.p.copy()
     free[system.layout.pin_at] = 0.0
@@ -61,13 +61,13 @@ def _surfaces(settling: Settling) -> tuple[np.ndarray, np.ndarray]:
 
 
 def restitution_in_words(name: str, value: float, speed: float) -> str:
-    """What is said of a restitution beyond [0, 1]."""
+    """Return the message for a restitution outside [0, 1]."""
     where = f"at a speed of approach of {speed:.6g}"
     return f"the restitution of {name} is {value!r} {where}, and must lie between 0 and 1"
 
 
 class _Collision:
-    """The contacts of one cluster, some of which have come to a gap of zero."""
+    """One collision of the contacts of a cluster, some of which have reached a zero gap."""
 
     def __init__(
         self, settling: Settling, cluster: tuple[int, ...], mine: list[int], open_: set[int]
@@ -78,7 +78,7 @@ class _Collision:
         self.rates = dict.fromkeys(mine, 0.0)
 
     def run(self) -> tuple[Failure | None, bool]:
-        """Why the run ends, if it does; and whether there was an impact."""
+        """Return why the run ends, or None, and whether there was an impact."""
         failure = self._measure()
         if failure:
             return failure, False
@@ -91,7 +91,7 @@ class _Collision:
         return self._collide(), True
 
     def _measure(self) -> Failure | None:
-        """Rates of the gaps, zero where they cannot be told from it; contacts whose gaps are open leave."""
+        """Measure the rates of the gaps, and remove contacts whose gaps are open."""
         settling, at, automata = self.settling, self.at, self.system.automata
         if not settling.jumped and all(at.z[c] == automata[c].hold for c in self.rates):
             return None
@@ -120,7 +120,7 @@ class _Collision:
         return _surfaces(self.settling)
 
     def _join(self) -> None:
-        """Friction without a velocity is decided together with the force that may load it from now on."""
+        """Add friction without a velocity, which is decided together with the force that may load it."""
         values, bounds = self._surfaces
         for c in self.cluster:
             k = self.place[c]
@@ -128,7 +128,7 @@ class _Collision:
                 self.open_.add(c)
 
     def _opens(self, c: int) -> None:
-        """Open from here on; its gap is zero by decree, where it is zero."""
+        """Open a contact. Its gap is zero by decree if it is zero now."""
         automaton = self.system.automata[c]
         if self.at.z[c] == automaton.hold:
             self._changes(c, "impact", automaton.above)
@@ -192,7 +192,7 @@ class _Collision:
         return None
 
     def _velocities(self, rubbing: list[int]) -> list[float]:
-        """Relative velocities before the impact."""
+        """Return the relative velocities before the impact."""
         values, bounds = self._surfaces
         rows = [self.place[c] for c in rubbing]
         return [0.0 if abs(values[k, 0]) <= bounds[k, 0] else float(values[k, 0]) for k in rows]
@@ -213,13 +213,13 @@ class _Collision:
         x = np.where(moved, at.x + shares.sum(axis=0), self._on_gaps(normal))
         sizes = np.abs(at.x) + np.abs(shares).sum(axis=0)
         error = at.x_error + 8.0 * UNIT * sizes + np.abs(changes).T @ self._uncertain(answer)
-        # states that are evaluated from gaps are as exact as the gaps
+        # states evaluated from gaps are as accurate as the gaps
         kept = np.where(settling.pinned_states(normal), 0.0, at.x_error)
         at.x, at.x_error = x, np.where(moved, error, np.maximum(kept, UNIT * np.abs(x)))
-        # a rate that cannot be told from zero any more is the end of an accumulation
+        # a rate that is zero within rounding is the end of an accumulation
         is_lost = np.abs(answer.after) <= np.abs(slopes) @ at.x_error
         if len(normal) == 1 and 0.0 < restitution[0] < 1.0:
-            is_lost[0] = False  # it bounces: where that ends is found from its bounces (`hidden_bounces`)
+            is_lost[0] = False  # it bounces; `hidden_bounces` finds the end
         if is_lost.any():
             ends = answer.zero | is_lost
             sliding = np.where(ends, 0.0, np.sign(answer.after))
@@ -243,14 +243,14 @@ class _Collision:
                 self._opens(c)
 
     def _on_gaps(self, normal: list[int]) -> np.ndarray:
-        """The state with these gaps exactly zero, or zero to rounding: their rates change by impulses alone.
+        """Return the state with these gaps zero, or zero within rounding, at unchanged velocities.
 
-        A gap that is linear in a position gives it. Others move the positions along their gradients, by no more than
-        the error with which the impact was located; a holding mode would move them until the rates are zero as well.
+        A gap that is linear in a position determines it. Other gaps move the positions along their gradients, by at
+        most the error of locating the impact. A holding mode would also make the rates of the gaps zero.
         """
         at, system = self.at, self.system
         z = np.maximum(at.z, 0)
-        # what slides, sticks or lies elsewhere would go by velocities as they were, or by those of a floor that set out
+        # other holding modes would use velocities from before the impact, so they are opened for the projection
         for c, automaton in enumerate(system.automata):
             if automaton.has_surface and z[c] == automaton.hold:
                 z[c] = automaton.above
@@ -273,5 +273,5 @@ class _Collision:
         return x
 
     def _uncertain(self, answer: Answer) -> np.ndarray:
-        """Rounding of the impulses."""
+        """Return rounding error bounds of the impulses."""
         return 8.0 * UNIT * len(answer.impulses) * np.abs(answer.impulses)

@@ -1,4 +1,4 @@
-"""The impact law as a pure function: impulses of contacts struck together, from rates before to rates after.
+"""Compute the impulses of contacts struck together, and the rates after the impact, as a pure function.
 
 Of the contacts that take part, some are normal (their rates are those of gaps) and the others tangential:
 
@@ -10,9 +10,9 @@ A friction impulse counts as positive where it opposes a positive velocity, as t
 
 Energy. With p = (P, -P_t) the work of the impulses is p . (u- + u+)/2. For normal impulses it is the sum of
 -(1 - e_i)/2 P_i |u-_i|; for friction without rebound (e = 0) it is -p . G p/2 or less; with friction and rebound
-together it may be positive (Kane's paradox). Then the impulses are taken on the straight way
-from those without rebound to those of the law, as far as no energy is gained: admissible impulses form a convex set, so
-these are admissible too.
+together it may be positive (Kane's paradox). Then the impulses are taken on the straight line from those without
+rebound to those of the law, as far as no energy is gained. Admissible impulses form a convex set, so these are
+admissible too.
 
 Sources: J. J. Moreau, in Nonsmooth Mechanics and Applications (Springer, 1988) 1, doi:10.1007/978-3-7091-2624-0_1;
 C. Glocker, Multibody Syst. Dyn. 29 (2013) 77, doi:10.1007/s11044-012-9316-9, on the energy.
@@ -28,21 +28,21 @@ import numpy as np
 
 from hybridsim.engine.series.bounded import UNIT
 
-MOST = 3**8  # combinations of contacts that push or do not, that slip or stick
-_OPERATIONS = 64.0  # roundings in a number of the solution, at most, per contact
+MOST = 3**8  # largest number of combinations of closed, open, slipping and sticking contacts
+_OPERATIONS = 64.0  # largest number of roundings per contact in a number of the solution
 _OFF, _ON, _FORWARD, _BACKWARD = range(4)
 
 
 @dataclass(frozen=True)
 class Blow:
-    """Contacts of which one is struck, normal ones first.
+    """An impact on several contacts, the normal ones first.
 
     Parameters
     ----------
     effects : G (m, m).
-    before : u- (m,), zero where it is known to be.
-    restitution : e (k,) of the k normal ones.
-    up, down : friction at the upper and the lower end for a unit of each normal impulse, (m - k, k).
+    before : u- (m,), exactly zero if it is known to be.
+    restitution : e (k,) of the k normal contacts.
+    up, down : friction impulse limits at the upper and lower end for a unit of each normal impulse, (m - k, k).
     """
 
     effects: np.ndarray
@@ -53,28 +53,28 @@ class Blow:
 
     @property
     def normal(self) -> int:
-        """How many are normal."""
+        """Return the number of normal contacts."""
         return len(self.restitution)
 
 
 @dataclass(frozen=True)
 class Answer:
-    """Impulses P (m,), rates after them (m,) with bounds, and which rates are exactly zero by the law."""
+    """A solution of the impact law."""
 
-    impulses: np.ndarray
-    after: np.ndarray
-    bounds: np.ndarray
-    zero: np.ndarray
-    reduced: bool = False  # there would have been a gain of energy
+    impulses: np.ndarray  # P (m,)
+    after: np.ndarray  # rates after the impact (m,)
+    bounds: np.ndarray  # their error bounds (m,)
+    zero: np.ndarray  # mask (m,) of rates that are exactly zero by the law
+    reduced: bool = False  # whether the impulses were reduced because energy would have grown
 
 
 def count(blow: Blow) -> int:
-    """The combinations to be tried."""
+    """Return the number of combinations to try."""
     return 2**blow.normal * 3 ** (len(blow.before) - blow.normal)
 
 
 def answers(blow: Blow) -> list[Answer]:
-    """All the answers of the law that differ in the motion; one where contacts are independent and without friction."""
+    """Return all solutions that differ in the motion; one if the contacts are independent and without friction."""
     rebound = blow.restitution * np.maximum(-blow.before[: blow.normal], 0.0)
     found = _answers(blow, rebound)
     if len(found) != 1 or not _gains(blow, found[0].impulses) or not rebound.any():
@@ -84,7 +84,7 @@ def answers(blow: Blow) -> list[Answer]:
 
 
 def energy(blow: Blow, impulses: np.ndarray) -> tuple[float, float]:
-    """Work of the impulses, and a bound of its rounding error."""
+    """Return the work of the impulses, and a bound of its rounding error."""
     n = blow.normal
     sign = np.where(np.arange(len(impulses)) < n, 1.0, -1.0)
     p, metric = sign * impulses, blow.effects * sign
@@ -103,7 +103,7 @@ def _rounding(blow: Blow) -> float:
 
 
 def _answers(blow: Blow, rebound: np.ndarray) -> list[Answer]:
-    """All combinations at once: of each the impulses, and whether the law admits them."""
+    """Solve for the impulses of all combinations, and return those that the law admits."""
     m, n = len(blow.before), blow.normal
     state = _combinations(blow)
     matrix, right = np.tile(np.eye(m), (len(state), 1, 1)), np.zeros((len(state), m))
@@ -143,7 +143,7 @@ def _answers(blow: Blow, rebound: np.ndarray) -> list[Answer]:
 
 
 def _combinations(blow: Blow) -> np.ndarray:
-    """What each contact does, one row each: those that push most come first, and then those that stick."""
+    """Return the state of each contact, one combination per row: first most contacts closed, then most sticking."""
     found = []
     for normal in product((_ON, _OFF), repeat=blow.normal):
         pushed = np.array(normal) == _ON
@@ -158,9 +158,9 @@ def _same(one: Answer, other: Answer) -> bool:
 
 
 def _between(blow: Blow, dead: Answer, lively: Answer) -> Answer:
-    """The last impulses on the way from one answer to the other whose work is not positive.
+    """Return the last impulses on the line from one solution to the other whose work is not positive.
 
-    The work is quadratic in the way w, not positive at 0 and positive at 1.
+    The work is quadratic in the position w on this line, not positive at 0 and positive at 1.
     """
     start, end = energy(blow, dead.impulses)[0], energy(blow, lively.impulses)[0]
     middle = energy(blow, 0.5 * (dead.impulses + lively.impulses))[0]

@@ -1,6 +1,6 @@
-"""The resets of one instant together: all read the state before; those that add are summed, those that set must agree.
+"""Apply the resets of one instant together: all read the state before, additions are summed, assignments must agree.
 
-Each new value carries the bound of its error: of what it was made from, and of its own evaluation.
+Each new value carries an error bound, from the values it was made of and from its own evaluation.
 """
 
 from __future__ import annotations
@@ -31,11 +31,9 @@ Key = tuple[Any, ...]
 
 @dataclass
 class _Changes:
-    """What the resets of one instant do to one variable: values that are set and amounts that are added."""
+    """The changes of one variable by the resets of one instant: values assigned and amounts added."""
 
-    set: list[tuple[Key, float, float]] = field(
-        default_factory=list
-    )  # the reset, the value, the bound of its error
+    set: list[tuple[Key, float, float]] = field(default_factory=list)  # key of the reset, value, error bound
     added: list[tuple[Key, float, float]] = field(default_factory=list)
 
 
@@ -47,7 +45,7 @@ def merged_resets(
     p_plus: np.ndarray,
     x_error: np.ndarray,
 ) -> str:
-    """Write what all resets of one instant make of the state; a message where they contradict each other."""
+    """Write the state after all resets of one instant. Return a message if they contradict each other."""
     changes: dict[str, _Changes] = {}
     for key in keys:
         if key not in system.resets:
@@ -74,7 +72,7 @@ def merged_resets(
             return clash
         place = _place(system, name)
         if one.set:
-            # those that agree within their bounds: the best known, whatever the order
+            # the values agree within their bounds; take the most accurate one, independent of order
             _, value, error = min(one.set, key=lambda c: (c[2], c[1]))
         else:
             before, known = (at.x[place], x_error[place]) if place < n else (at.p[discrete + place - n], 0.0)
@@ -88,7 +86,7 @@ def merged_resets(
 
 
 def _contradiction(system: System, name: str, one: _Changes) -> str:
-    """Why the changes of one variable at one instant do not go together; empty where they do."""
+    """Return why the changes of one variable at one instant are incompatible, or an empty text."""
     keys = [key for key, _, _ in (*one.set, *one.added)]
     if len(keys) < 2 or not one.set:
         return ""
@@ -105,17 +103,17 @@ def _contradiction(system: System, name: str, one: _Changes) -> str:
 
 
 def _place(system: System, name: str) -> int:
-    """Place of a variable among the states and then the discrete states."""
+    """Return the index of a variable among the states followed by the discrete states."""
     if name in system.names:
         return system.names.index(name)
     return system.n + [d.name for d in system.model.discrete].index(name)
 
 
 def _reads(model: Model, key: Key, name: str) -> bool:
-    """Whether a reset reads the variable that it sets, by whatever definitions and variables of modes."""
+    """Return whether a reset reads the variable that it sets, also through definitions or mode variables."""
     value = declared_reset(model, key)[name]
     if isinstance(value, FunctionExpression):
-        return False  # nobody can look into it
+        return False  # a Python function cannot be inspected
     behind = {n: [e.tree] for n, e in model.definitions}
     for component in model.all_components():
         for mode in component.modes:
@@ -131,9 +129,9 @@ def _reads(model: Model, key: Key, name: str) -> bool:
 
 
 def _evaluated(system: System, at: Situation, key: Key) -> tuple[np.ndarray, np.ndarray]:
-    """What one reset gives to the states and discrete states, with bounds of the errors.
+    """Return the values that one reset assigns to states and discrete states, with error bounds.
 
-    To first order, from the errors of all that it reads; each is at least its own roundoff.
+    The bounds are first-order propagations of the errors of all inputs. Each is at least the roundoff of the value.
     """
     x, p = at.x.copy(), at.p.copy()
     system.apply_reset(key, at.s, at.x, at.p, at.z, x, p)
@@ -149,7 +147,7 @@ def _evaluated(system: System, at: Situation, key: Key) -> tuple[np.ndarray, np.
 
 
 def _of_numbers(system: System, at: Situation, key: Key) -> np.ndarray:
-    """What the numbers written in a reset add to the errors of states; nothing where it reads definitions."""
+    """Return the errors of states due to the numbers in a reset; zero if it reads definitions."""
     found = np.zeros(system.n + len(system.model.discrete))
     values = dict(zip(system.names, at.x.tolist(), strict=True))
     discrete = at.p[system.layout.discrete_slice].tolist()
@@ -169,7 +167,7 @@ def _of_numbers(system: System, at: Situation, key: Key) -> np.ndarray:
 
 
 def _slopes(system: System, at: Situation, key: Key, errors: np.ndarray) -> np.ndarray | None:
-    """Derivatives of what a reset of expressions gives, by all that it reads; None where they have no value."""
+    """Return derivatives of the values of a reset of expressions by all that it reads, or None if not finite."""
     n, size = system.n, len(errors)
     seeds = np.eye(size)
     x, p = with_slopes(at.x, seeds[:n]), with_slopes(at.p, seeds[n:-1])
@@ -187,7 +185,7 @@ def _slopes(system: System, at: Situation, key: Key, errors: np.ndarray) -> np.n
 
 
 def _differences(system: System, at: Situation, key: Key, errors: np.ndarray) -> np.ndarray:
-    """The same by differences over the errors: for functions that are known by their values alone."""
+    """Return the same derivatives by finite differences, for code without usable derivatives."""
     n, discrete = system.n, system.layout.discrete_slice
     columns = []
     for shift in np.diag(errors):

@@ -1,4 +1,4 @@
-"""This folder recognises events that accumulate, and finds the motion that goes on in their limit.
+"""This folder detects events that accumulate, and finds the motion that continues from their limit.
 
 Start with `accumulation`.
 """

@@ -1,7 +1,7 @@
-"""Accumulation: events that follow each other ever faster, like the terms of a geometric series.
+"""Detect accumulation: events whose intervals shrink like the terms of a geometric series.
 
-Each component has its own. The events of one turn may be several, at distances of their own: a motion between two
-relays crosses one from either side. So each interval is held against the one a few before it.
+Each component has its own series. One turn may have several events at different distances: a motion between two relays
+crosses each of them from both sides. Each interval is therefore compared with the one a few events before it.
 """
 
 from __future__ import annotations
@@ -17,23 +17,24 @@ from hybridsim.engine.record.checkpoint import BEGINNING, Pace
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import Automaton
 
-# So many intervals in a row must shrink by one factor before they count as a series: a transient does not.
+# Number of consecutive intervals that must shrink by one factor before they count as a series, unlike a transient.
 _TERMS = 10
-MOST = 4  # events of one turn
-_SEVERAL = 32  # components among whose events each one is followed
-NOBODY = -1  # as the component of events that are of none: resets of monitors
-_KEPT = _TERMS + 2 * MOST  # intervals
-_AHEAD = 16.0  # times its last intervals a series under way is looked ahead in
-_FEW = 2  # intervals more than two turns after which one may be on its way
-# How well the factor must repeat; a bouncing ball's does to rounding, a friction oscillator's decay does not.
+MOST = 4  # largest number of events in one turn
+_SEVERAL = 32  # largest number of components whose events are all tracked
+NOBODY = -1  # component of events without one, such as resets of monitors
+_KEPT = _TERMS + 2 * MOST  # number of stored intervals
+_AHEAD = 16.0  # look-ahead in a series, in units of its last intervals
+_FEW = 2  # intervals beyond two turns after which a series may have begun
+# Relative accuracy with which the factor must repeat. A bouncing ball repeats it within rounding; the decay of a
+# friction oscillator does not.
 SAME_FACTOR = 1e-3
-# A series whose intervals shrink by less may as well be a motion that settles, such as an oscillation at resonance.
+# A series with a factor closer to 1 may be a motion that settles, such as an oscillation at resonance.
 CLOSING_IN = 0.995
-# A series that has shrunk by so much may come to where rounding hides its events, and end in a stutter of them.
+# After shrinking by this factor, rounding may hide the events of a series.
 _FAR_DOWN = 1e-6
-# Events closer than this many ulps of the time, so many in a row, are one, whatever their factor.
+# Many consecutive events closer than this many ulps of the time count as one, whatever their factor.
 _ULPS = 16.0
-# A series with so few ulps of the time to go has come to its end: states that rounding moves decide what follows.
+# A series with this many ulps of the time left has ended, because rounding errors of the states decide what follows.
 _END = 1024.0
 _NO_INTERVALS = np.empty(0)
 
@@ -42,7 +43,7 @@ _NO_INTERVALS = np.empty(0)
 def _follow(
     gap: float, now: float, i: int, known: int, longest: float, shortest: float, resolution: float, work: Any
 ) -> bool:
-    """Take the i-th interval, which ends now; whether the series may have come to its end. See `may_end`."""
+    """Process the i-th interval, which ends now. Return whether the series may have ended. See `may_end`."""
     before, falls, ended = work[0], work[1], False
     is_nothing = gap <= max(shortest, _ULPS * 2.0**-52 * abs(now))
     end = max(resolution, _END * 2.0**-52 * abs(now), _FAR_DOWN * longest)
@@ -58,7 +59,7 @@ def _follow(
 
 @inlined
 def _goes_on(work: Any) -> bool:
-    """Whether the last intervals are in a series."""
+    """Return whether the last intervals form a shrinking series."""
     for turn in range(MOST):
         if work[1, turn] >= _TERMS:
             return True
@@ -78,17 +79,17 @@ def may_end(
     work: Any,
     last: Any,
 ) -> tuple[bool, int]:
-    """Whether a series of intervals goes on at the last event, or may have come to its end before; how many there are.
+    """Return whether a series continues at the last event or may have ended before, and the number of intervals.
 
-    In a series an interval is shorter than the one a turn before it, or next to nothing, many times in a row. It is not
-    at its end as long as the next interval alone, by the factor of the last ones, is more than what ends it.
-    gaps (k,): intervals up to the instant in `at` (2,), if the series is begun. After it those of the instants (E, 2)
-    follow whose owner (E,) is the component; the last of them is left in `at`. work (2, events of a turn at most) is
-    written to, and last (m,): the last intervals of all, number i in place i % m.
+    In a series an interval is shorter than the one a turn before it, or negligible, many times in a row. The series has
+    not ended while the next interval, predicted by the last factor, exceeds the threshold. gaps (k,): intervals up to
+    the instant in `at` (2,), if is_begun. They are followed by those of the instants (E, 2) whose owner (E,) is the
+    component; `at` becomes the last instant. work (2, largest number of events in a turn): scratch. last (m,): receives
+    the last intervals, number i at index i % m.
     """
     longest, known, ended, i = 0.0, gaps.shape[0], False, 0
     high, low = at[0], at[1]
-    # the last intervals; falls in a row, for turns of 1, 2, ... events
+    # the last intervals, and the consecutive decreases for turns of 1, 2, ... events
     work[0, :], work[1, :] = math.inf, 0.0
     for e in range(-known, instants.shape[0]):
         if e < 0:
@@ -111,13 +112,13 @@ def may_end(
 
 @kernel
 def leads_nowhere(instants: Any, fires: Any, owner: Any, components: int, work: Any) -> bool:
-    """Whether the first events of a run, at instants (E, 2), certainly have no limit, of whatever component they are.
+    """Return whether the first events of a run, at instants (E, 2), certainly do not accumulate.
 
-    fires (E,): the guards, owner: of each its component. work (2, events of a turn at most) is written to. Where it is
-    not certain, `Accumulation.limit_of_all` finds out.
+    fires (E,): the guards that fired; owner: the component of each guard. work (2, largest number of events in a turn):
+    scratch. If the result is False, `Accumulation.limit_of_all` decides.
     """
     count = instants.shape[0]
-    if count <= _TERMS:  # a series has more
+    if count <= _TERMS:  # too few for a series
         return True
     if count <= _KEPT + 1 or components > _SEVERAL:
         return False
@@ -139,12 +140,12 @@ def leads_nowhere(instants: Any, fires: Any, owner: Any, components: int, work: 
 
 
 def turn_of(gaps: Sequence[float], count: int, same: float) -> tuple[int, float]:
-    """Events of a turn, and the factor by which the last `count` intervals and a turn's shrink; (0, 1) if they do not.
+    """Return the events in a turn and the factor by which the last `count` intervals and a turn shrink, or (0, 1).
 
-    same : how well the factor must repeat.
+    same : relative accuracy with which the factor must repeat.
     """
     for turn in range(1, MOST + 1):
-        terms = count + turn - 1  # of every event of the turn
+        terms = count + turn - 1  # each event of the turn counts
         if len(gaps) < terms + turn:
             break
         if not gaps[-1] < gaps[-1 - turn] * (1.0 - SAME_FACTOR):
@@ -157,82 +158,83 @@ def turn_of(gaps: Sequence[float], count: int, same: float) -> tuple[int, float]
 
 
 class Limit(NamedTuple):
-    """Where the events of some components accumulate, and how long the last of them before it took."""
+    """The limit of the events of some components."""
 
     time: float
-    components: tuple[int, ...]
-    passed: float
+    components: tuple[int, ...]  # NOBODY for resets of monitors
+    passed: float  # duration of the last events before the limit
 
 
 class Accumulation:
-    """Watches the intervals between events of one run, of each component for itself."""
+    """Monitors the intervals between the events of one run, separately for each component."""
 
     def __init__(self, resolution: float = 0.0, shortest: float = 0.0, forward: bool = True) -> None:
         self._sign = 1.0 if forward else -1.0
-        # a rest of the series shorter than this is the end of it, whatever rounding says
+        # a series whose rest is shorter than this has ended
         self.resolution = resolution
-        self.shortest = shortest  # what the method can tell apart; events that close, many in a row, are one
+        # shortest interval that the method can resolve; many consecutive events that close count as one
+        self.shortest = shortest
         self.paces: dict[int, Pace] = {}
         self._shrinking: set[int] = set()
-        self._unjudged: set[int] = (
-            set()
-        )  # components of which it is not known yet whether they are among these
+        self._unjudged: set[int] = set()  # components whose series have not been judged yet
 
     @property
     def _under_way(self) -> set[int]:
-        """The components whose last intervals shrink by one factor."""
+        """Return the components whose last intervals shrink by a common factor."""
         for c in self._unjudged:
             self._judge(c)
         self._unjudged.clear()
         return self._shrinking
 
     def is_under_way(self, now: float) -> bool:
-        """Whether the last intervals of a component shrink by one factor."""
+        """Return whether the last intervals of a component shrink by a common factor."""
         for c in sorted(self._under_way):
             limit, rest = self._ahead(self.paces[c])
-            if self._sign * (now - limit) > rest + _END * math.ulp(now):  # it has broken off
+            if self._sign * (now - limit) > rest + _END * math.ulp(
+                now
+            ):  # the series has ended without a limit
                 self._under_way.discard(c)
         return bool(self._under_way)
 
     def is_closing_in(self, now: float) -> bool:
-        """Whether one of these shrinks so fast that its events are to be settled one by one."""
+        """Return whether a series shrinks so fast that its events have to be resolved one by one."""
         return self.is_under_way(now) and any(
             _next_turn(self.paces[c])[1] < CLOSING_IN for c in self._under_way
         )
 
     def reach(self, now: float) -> float:
-        """How far ahead to look: what comes in a series under way is not judged by the roundings of a long run."""
+        """Return a time span ahead in which rounding of the long run does not hide events of a series."""
         if not self.is_under_way(now):
             return math.inf
         return min(_AHEAD * max(self.paces[c].intervals[-MOST:]) for c in self._under_way)
 
     def go_on(self, paces: dict[int, Pace]) -> None:
-        """Take up what was known."""
+        """Restore the state from a checkpoint."""
         self.paces = dict(paces)
         self._shrinking, self._unjudged = set(), set(paces)
 
     def forget(self, components: tuple[int, ...]) -> None:
-        """Begin anew with these: what came before has been dealt with."""
+        """Discard the series of these components."""
         for c in components:
             self.paces.pop(c, None)
             self._shrinking.discard(c)
             self._unjudged.discard(c)
 
     def limit_of_all(self, instants: np.ndarray, owners: np.ndarray) -> Limit | None:
-        """Note events (E, 2) in a row, each of one component (E,); the limit as soon as there is one, else None."""
+        """Add events (E, 2) in a row, each of one component (E,). Return the first limit, or None."""
         count = len(instants)
-        is_short = count <= _KEPT + 1  # a series under way there has forecasts, which are made one by one
+        is_short = count <= _KEPT + 1  # a series there has forecasts, which need single events
         if count < 2 or (is_short and self.paces):
             return self._one_by_one(instants, owners)
         counts = np.bincount(owners).tolist()
         among = [c for c, events in enumerate(counts) if events]
-        if len(among) > _SEVERAL:  # what fires seldom among so many is in no series that is near its end
+        if len(among) > _SEVERAL:  # a component with few of so many events is not near a limit
             among = [c for c in among if counts[c] > _TERMS]
             self.forget(tuple(set(self.paces).difference(among)))
         paces = []
         for component in among:
             may_have_ended, pace = self._paced(instants, owners, component)
-            if may_have_ended or (is_short and _next_turn(pace)[0]):  # worth a closer look
+            if may_have_ended or (is_short and _next_turn(pace)[0]):  # examine the events one by one
                 kept = np.isin(owners, among)
                 return self._one_by_one(instants[kept], owners[kept])
             paces.append((component, pace))
@@ -241,7 +243,7 @@ class Accumulation:
         return None
 
     def _paced(self, instants: np.ndarray, owners: np.ndarray, component: int) -> tuple[bool, Pace]:
-        """Whether a series of a component may end with these events, and what is to be noted of them if none does."""
+        """Return whether a series of a component may end with these events, and the pace to store if not."""
         pace = self.paces.get(component, BEGINNING)
         known = np.array(pace.intervals) if pace.intervals else _NO_INTERVALS
         at, work, last = np.array(pace.last or (0.0, 0.0)), np.empty((2, MOST)), np.empty(_KEPT)
@@ -260,13 +262,13 @@ class Accumulation:
         return None
 
     def limit(self, instant: Instant, components: tuple[int, ...]) -> Limit | None:
-        """Note an event of these components; the limit once the rest of a series is below the resolution, else None."""
+        """Add an event of these components. Return the limit if the rest of a series is negligible, else None."""
         times = {c: self._limit_of(instant, c) for c in components}
         ended = [(self._sign * time, c) for c, time in times.items() if time is not None]
         return self._shared(self._sign * min(ended)[0], min(ended)[1]) if ended else None
 
     def expected(self, instant: Instant) -> Limit | None:
-        """The limit of a series so far in whose rest an instant lies that is not in step with it."""
+        """Return the limit of a series whose rest contains an instant that does not belong to it, or None."""
         for c in sorted(self._under_way):
             time = _expected(self.paces[c], instant)
             if time is not None:
@@ -274,7 +276,7 @@ class Accumulation:
         return None
 
     def _shared(self, time: float, first: int) -> Limit:
-        """The limit with all components whose series lead to it."""
+        """Return the limit with all components whose series converge to it."""
         among = {first}
         for c in self._under_way:
             forecast = self.paces[c].forecast
@@ -295,7 +297,7 @@ class Accumulation:
             self._shrinking.discard(component)
 
     def _ahead(self, pace: Pace) -> tuple[float, float]:
-        """The limit of a series under way by its last intervals, and how far ahead of its last event it is."""
+        """Return the limit predicted by the last intervals of a series, and its distance from the last event."""
         turn, factor = _next_turn(pace)
         rest = sum(pace.intervals[-turn:]) * factor / (1.0 - factor)
         assert pace.last is not None
@@ -334,7 +336,7 @@ def _next_turn(pace: Pace) -> tuple[int, float]:
 
 
 def _expected(pace: Pace, instant: Instant) -> float | None:
-    """The limit of the series, where an instant that is not in step with it lies within its rest."""
+    """Return the limit of a series if an instant that does not belong to it lies within its rest, else None."""
     if pace.forecast is None:
         return None
     limit, rest = pace.forecast
@@ -344,10 +346,10 @@ def _expected(pace: Pace, instant: Instant) -> float | None:
 
 
 def _steadier(before: Pace, limit: float, least: float) -> tuple[float, float, float]:
-    """Which forecast of a series moved least to the next two: (by how much this one moved, how much that, which).
+    """Return the forecast of a series that changed least until the next two: (its change, that change, forecast).
 
-    The first ones miss what the series is not geometric by; in the last ones rounding takes over, where the place at
-    which events happen is not at zero.
+    The first forecasts miss the deviation of the series from a geometric one. The last ones are dominated by rounding,
+    unless the events are located at zero.
     """
     if before.forecast is None or before.steadiest is None:
         return math.inf, math.inf, limit
@@ -358,7 +360,7 @@ def _steadier(before: Pace, limit: float, least: float) -> tuple[float, float, f
 
 
 def accumulated(limit: Limit, automata: Sequence[Automaton], has_rtol: bool) -> str:
-    """What a run says that ends where events accumulate and nothing says what follows."""
+    """Return the message of a run that ends where events accumulate without a declared limit."""
     changed = [automata[c] for c in limit.components if c != NOBODY]
     names = ", ".join(a.name for a in changed) or "monitors with resets"
     holding = [f"{a.name}.{a.modes[a.resting]}" for a in changed if a.resting >= 0]

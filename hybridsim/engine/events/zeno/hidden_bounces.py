@@ -1,11 +1,11 @@
-"""Bounces that rounding hides: where they come to their end.
+"""Find the end of bounces that rounding hides.
 
-A guard w is at zero and left with w' = u > 0 and w'' = -g, for a flight of 2 u/g; the next ones take e, e**2, ... of
-it, with e the ratio of the speeds after and before: together 2 u/(g (1 - e)). What a bounce loses, (1 - e) u**2/g of
-the height, comes to be less than rounding: then no crossing that follows is to be told from noise. An error h of w
-changes the times of all that follows by h/u, so the last bounces tell least; the first ones miss how g and e change
-meanwhile. The forecast is that of the first bounce with which all later ones agree within their errors (Lepski's
-rule, Theory Probab. Appl. 35 (1991) 454, doi:10.1137/1135065).
+A guard w leaves zero with w' = u > 0 and w'' = -g, for a flight of 2 u/g. The next flights last e, e**2, ... of it,
+with e the ratio of the speeds after and before, so that they take 2 u/(g (1 - e)) in total. A bounce loses
+(1 - e) u**2/g of the height. When this is less than rounding, later crossings are hidden by noise. An error h of w
+changes all later times by h/u, so the last bounces are least accurate, while the first ones miss how g and e change
+meanwhile. The forecast is that of the first bounce with which all later ones agree within their errors (Lepski's rule,
+Theory Probab. Appl. 35 (1991) 454, doi:10.1137/1135065).
 """
 
 from __future__ import annotations
@@ -24,40 +24,40 @@ from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import Automaton, Series, System
 
-_STRIDE = 1.5  # ratio of the speeds of the bounces that are looked at
-_LEAST_LOSS = 1e-4  # of speed in a bounce; with less there are 10**4 of them and more to a digit
-_FEW = 2  # bounces that have to agree where it is no law of impacts that says what they are
+_STRIDE = 1.5  # ratio of the speeds of the examined bounces
+_LEAST_LOSS = 1e-4  # least relative loss of speed in a bounce; less means over 10**4 bounces per digit
+_FEW = 2  # bounces that have to agree if they are not impacts of a declared law
 
 
 class Bounce(NamedTuple):
-    """A transition of a component: when, the modes on both sides, the guard that fired, the states on both sides."""
+    """A transition of a component."""
 
     instant: Instant
-    source: int
-    guard: str
-    target: int
-    x_minus: np.ndarray
-    x_plus: np.ndarray
+    source: int  # mode before
+    guard: str  # name of the guard that fired
+    target: int  # mode after
+    x_minus: np.ndarray  # states (n,) before
+    x_plus: np.ndarray  # states (n,) after
 
 
 class _Departure(NamedTuple):
-    """How a guard leaves zero: its speed, its time of flight, and by how much of the flight rounding moves its end."""
+    """The motion of a guard as it leaves zero."""
 
     speed: float
-    flight: float
-    unknown: float
+    flight: float  # duration of the flight
+    unknown: float  # fraction of the flight by which rounding moves its end
 
 
 class _Forecast(NamedTuple):
-    """When bounces end, how well that is known, and the part of what a bounce loses that is rounding."""
+    """A forecast of the end of bounces."""
 
-    limit: float
-    error: float
-    hidden: float
+    limit: float  # time of the end
+    error: float  # its error bound
+    hidden: float  # rounding relative to the loss of a bounce
 
 
 def bounces_of(outcome: Outcome, now: Instant, x_minus: np.ndarray) -> dict[int, Bounce]:
-    """The transitions of an event that led to the outcome, of each component the first one."""
+    """Return the first transition of each component in an event that led to the outcome."""
     found: dict[int, Bounce] = {}
     for change in outcome.changes:
         bounce = Bounce(now, change.source, change.guard, change.target, x_minus, outcome.x)
@@ -66,7 +66,7 @@ def bounces_of(outcome: Outcome, now: Instant, x_minus: np.ndarray) -> dict[int,
 
 
 def last_bounces(system: System, happened: Sequence[Occurrence]) -> dict[int, Bounce]:
-    """The one that is the last of what happened."""
+    """Return the last recorded event as a bounce."""
     if not happened:
         return {}
     last = happened[-1]
@@ -82,7 +82,7 @@ def _recorded(automaton: Automaton, o: Occurrence) -> Bounce:
 def limit_of_hidden(
     system: System, outcome: Outcome, bounces: dict[int, Bounce], record: Trajectory
 ) -> Limit | None:
-    """The limit of the components whose last bounces have just come to be hidden; None if there is none."""
+    """Return the limit of the components whose last bounces have just become hidden, or None."""
     found = {}
     for c, departure in _barely_seen(system, outcome, bounces).items():
         last = bounces[c]
@@ -98,12 +98,12 @@ def limit_of_hidden(
 
 
 def may_be_hidden(system: System, outcome: Outcome, happened: Sequence[Occurrence]) -> bool:
-    """Whether there may be a limit of components whose bounces come to be hidden after what happened last."""
+    """Return whether bounces may have become hidden after the last event."""
     return bool(_barely_seen(system, outcome, last_bounces(system, happened)))
 
 
 def _barely_seen(system: System, outcome: Outcome, bounces: dict[int, Bounce]) -> dict[int, _Departure]:
-    """Of those after which a flight is so short that rounding may hide what the next one loses, how they leave."""
+    """Return the departures of components whose flights are so short that rounding may hide the next loss."""
     found = {}
     for c, last in bounces.items() if system.has_tape else ():
         automaton = system.automata[c]
@@ -119,7 +119,7 @@ def _barely_seen(system: System, outcome: Outcome, bounces: dict[int, Bounce]) -
 def _agreed(
     system: System, outcome: Outcome, c: int, best: _Forecast, speed: float, last: Bounce, record: Trajectory
 ) -> tuple[float, int]:
-    """The limit by the first bounce that all later ones agree with, and how many of those looked at do."""
+    """Return the limit by the first bounce that all later ones agree with, and the number of agreeing ones."""
     count = 1
     for bounce in _backward(system.automata[c], last, record):
         departure = _departure(system, outcome, c, bounce)
@@ -135,7 +135,7 @@ def _agreed(
 
 
 def _departure(system: System, outcome: Outcome, c: int, bounce: Bounce) -> _Departure | None:
-    """How a guard of the new mode leaves zero and turns back; None where none does."""
+    """Return how a guard of the new mode leaves zero and turns back, or None."""
     series = _series(system, outcome, c, bounce.instant, bounce.target, bounce.x_plus)
     for guard in system.automata[c].guards[bounce.target]:
         (value, rate, curve), bound = series.guards[guard, :3].tolist(), float(series.guard_bounds[guard, 0])
@@ -147,7 +147,7 @@ def _departure(system: System, outcome: Outcome, c: int, bounce: Bounce) -> _Dep
 def _forecast(
     system: System, outcome: Outcome, c: int, bounce: Bounce, departure: _Departure
 ) -> _Forecast | None:
-    """What a bounce tells of the limit; None where there is no loss of speed."""
+    """Return the forecast of the limit by one bounce, or None if no speed is lost."""
     automaton = system.automata[c]
     names = automaton.guard_names[bounce.source]
     if bounce.guard not in names:
@@ -165,7 +165,7 @@ def _forecast(
 
 
 def _backward(automaton: Automaton, last: Bounce, record: Trajectory) -> Iterator[Bounce]:
-    """The bounces of a component before the last one, backward, until it rested."""
+    """Yield the bounces of a component before the last one, backward, until it rested."""
     blocks = reversed(record.occurrences.blocks)
     events = (block[i] for block in blocks for i in range(len(block) - 1, -1, -1))
     for o in islice(events, LOOKED_BACK_ON):
@@ -177,7 +177,7 @@ def _backward(automaton: Automaton, last: Bounce, record: Trajectory) -> Iterato
 
 
 def _series(system: System, outcome: Outcome, c: int, instant: Instant, mode: int, x: np.ndarray) -> Series:
-    """Of the guards in a mode of the component, with the others in theirs."""
+    """Return the series of the guards in a mode of the component, with the others in their modes."""
     z = outcome.z.copy()
     z[c] = mode
     p = system.vector(instant, system.discrete(outcome.p))

@@ -1,4 +1,4 @@
-"""Where events accumulate: from there on the motion slides along their surfaces, rests in contacts, or as declared."""
+"""Continue from the limit of accumulating events: slide along surfaces, rest in contacts, or take the declared mode."""
 
 from __future__ import annotations
 
@@ -12,19 +12,18 @@ from hybridsim.engine.events.resolve import Settling
 from hybridsim.engine.events.zeno.accumulation import Limit
 from hybridsim.engine.system.system import System
 
-LIMIT = "limit"  # as the guard of the changes that are made where events accumulate
-_SURE = 2.0**-46  # how well the state at the limit has to be known
-_REACH = (
-    2.0  # a surface this many times as far away as it may move in the time that is left is not the limit's
-)
+LIMIT = "limit"  # guard name of the changes at a limit of events
+_SURE = 2.0**-46  # required relative accuracy of the state at the limit
+_REACH = 2.0  # a surface farther away than this many times its possible motion is not part of the limit
 
 
 def behind(
     limit: Limit, system: System, outcome: Outcome, p: np.ndarray, s: float
 ) -> tuple[float, Outcome] | None:
-    """What holds from a limit at local time s on: along surfaces, in contacts, or as declared; None if nothing.
+    """Return what holds from a limit at local time s on, or None: along surfaces, in contacts, or as declared.
 
-    With the local time from which it holds: now, where something else may come before the limit.
+    The first item is the local time from which it holds. That is the present time if another event may come before the
+    limit.
     """
     found = _gathered(system, outcome, p, s, s + limit.passed, limit.components)
     return found if found is not None else _at_declared_limit(system, outcome, p, s, limit.components)
@@ -33,13 +32,13 @@ def behind(
 def _gathered(
     system: System, outcome: Outcome, p: np.ndarray, s: float, left: float, changed: tuple[int, ...]
 ) -> tuple[float, Outcome] | None:
-    """At the limit of crossings or impacts; None if it is none of what can be held.
+    """Return what holds at the limit of crossings or impacts, or None if nothing can be held.
 
-    It is of the surfaces that their rates and these rates' own may bring to zero within the time `left`, and of the
-    contacts whose gaps and their rates come to zero in it. They are held from here on: on the average, bounces that
-    follow each other ever faster carry the load that a closed contact carries, and crossings to and fro slide. So is
-    friction among those that changed, which has come to rest to rounding. The decision is that of any event
-    (`hybridsim.engine.events.resolve`).
+    The limit is on the surfaces whose rates, or derivatives of rates, may bring them to zero within the time `left`,
+    and in the contacts whose gaps and rates become zero in it. They are held from here on. On average, bounces that
+    follow each other ever faster carry the load of a closed contact, and alternating crossings slide. Friction that
+    changed and has come to rest within rounding is held as well. `hybridsim.engine.events.resolve` decides, as at any
+    event.
     """
     near = _within_reach(system, outcome, p, left, changed)
     if len(near) < (2 if all(system.automata[c].is_unique for c in near) else 1):
@@ -55,7 +54,7 @@ def _gathered(
 
 
 def _without_bounces(system: System, outcome: Outcome, p: np.ndarray, near: list[int]) -> np.ndarray:
-    """The state after impulses that end the motion of these contacts, and leave those that are closed so."""
+    """Return the state after impulses that stop these contacts and keep closed contacts closed."""
     automata, modes, of = system.automata, outcome.z, system.surface_of
     if not system.is_unilateral[near].any():
         return outcome.x
@@ -79,7 +78,7 @@ def _without_bounces(system: System, outcome: Outcome, p: np.ndarray, near: list
 
 
 def _moved(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, s0: float, s: float) -> np.ndarray:
-    """The state at local time s from x at s0, in one step of the classical Runge-Kutta method."""
+    """Return the state at local time s from x at s0, by one step of the classical Runge-Kutta method."""
     h, middle = s - s0, 0.5 * (s0 + s)
     a = system.flow(s0, x, p, z)
     b = system.flow(middle, x + 0.5 * h * a, p, z)
@@ -91,11 +90,11 @@ def _moved(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, s0: floa
 def _held_at(
     system: System, outcome: Outcome, p: np.ndarray, s: float, near: list[int], x: np.ndarray, z: np.ndarray
 ) -> Outcome | None:
-    """What is decided at local time s, where x is on these surfaces; None unless switching surfaces stay held."""
+    """Return the outcome at local time s with x on these surfaces, or None unless switching surfaces are held."""
     if not np.isfinite(x).all():
         return None
     z = z.copy()
-    z[near] = -1  # no mode yet: the decision takes them as they are at a start
+    z[near] = -1  # no mode yet, as at a start
     at = Situation(s, x, p, z, outcome.x_error.copy(), 0.0)
     found = Settling(system, at, outcome.z.copy(), forward=True).run((), [])
     if found.status or any(
@@ -112,7 +111,7 @@ def _held_at(
 def _at_the_end(
     system: System, start: np.ndarray, p: np.ndarray, z: np.ndarray, s: float, apart: Collection[int]
 ) -> np.ndarray | None:
-    """The state at local time s; None where that is not sure to rounding, or something else may happen before."""
+    """Return the state at local time s, or None if it is not accurate to rounding or another event may intervene."""
     with np.errstate(over="ignore", invalid="ignore"):
         whole = _moved(system, start, p, z, 0.0, s)
         halves = _moved(system, _moved(system, start, p, z, 0.0, 0.5 * s), p, z, 0.5 * s, s)
@@ -130,7 +129,7 @@ def _at_the_end(
 def _at_declared_limit(
     system: System, outcome: Outcome, p: np.ndarray, s: float, changed: tuple[int, ...]
 ) -> tuple[float, Outcome] | None:
-    """At the limit of transitions of these components; None where none says what holds there."""
+    """Return what holds at the declared limit of these components, or None if no limit is declared."""
     entered = tuple(c for c in changed if c >= 0 and system.automata[c].limit >= 0)
     if not entered:
         return None
@@ -149,7 +148,7 @@ def _at_declared_limit(
 
 
 def closed_now(system: System, outcome: Outcome) -> tuple[int, ...]:
-    """The contacts that an event has closed."""
+    """Return the contacts that an event has closed."""
     automata = system.automata
     return tuple(
         c.component
@@ -159,16 +158,16 @@ def closed_now(system: System, outcome: Outcome) -> tuple[int, ...]:
 
 
 def holds_several(system: System, outcome: Outcome) -> bool:
-    """Whether an event ends with several switching surfaces held that were not held before it."""
+    """Return whether an event ends with several switching surfaces held that were not held before it."""
     changed = [(system.automata[c.component], c.target) for c in outcome.changes]
     return sum(automaton.is_unique and target == automaton.hold for automaton, target in changed) > 1
 
 
-@np.errstate(over="ignore")  # what is too large to tell is within reach
+@np.errstate(over="ignore")  # overflow counts as within reach
 def _within_reach(
     system: System, outcome: Outcome, p: np.ndarray, left: float, changed: tuple[int, ...]
 ) -> list[int]:
-    """The contacts and surfaces that come to zero in this time; friction that they load or move, or that changed."""
+    """Return the contacts and surfaces that become zero in this time, with the friction they affect."""
     series = system.series(0.0, outcome.x, p, outcome.z, outcome.x_error, 0.0)
     found: list[int] = []
     rubbing: list[int] = []
