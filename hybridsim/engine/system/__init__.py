@@ -1,4 +1,4 @@
-"""A `System` is a model with numbers: compiled functions, a run-time vector, and the times at which something is due.
+"""A `System` is a model with parameter values: compiled functions, a run-time vector, and scheduled times.
 
 Start with `system`, then `instant` (times as two doubles) and `timetable`.
 """

@@ -1,18 +1,18 @@
-"""Why a step of an integrator cannot be taken."""
+"""Errors of integrators that cannot take a step."""
 
 from __future__ import annotations
 
 
 class StepFailure(Exception):
-    """The integrator cannot go on from here; the message says why."""
+    """The integrator cannot continue from here; the message gives the reason."""
 
 
 class Collapsed(StepFailure):
-    """No step is short enough."""
+    """The step size became too small without success."""
 
 
 class Creeping(Collapsed):
-    """The integrator has led nowhere for many steps: the solution ends at the local time `since`."""
+    """The steps have become too short for progress; the solution ends at the local time `since`."""
 
     def __init__(self, message: str, since: float) -> None:
         super().__init__(message)

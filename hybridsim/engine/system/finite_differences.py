@@ -1,10 +1,10 @@
-"""Taylor series of functions that are known by their values alone: differences along the flow, with error bounds.
+"""Compute Taylor series of Python functions by finite differences along the flow, with error bounds.
 
-With x_1 = f(s, x) the rate of f along the straight path x + x_1 h is 2 x_2, and along x + x_1 h + x_2 h**2 its second
-derivative is 6 x_3: higher terms of the path do not enter. So no integration is needed, only derivatives at h = 0 of
-functions of one variable. Each comes from two central differences of neighbouring order on the same nine points
-(Fornberg 1988, doi:10.1090/S0025-5718-1988-0935077-0, table 1), whose difference bounds what the step leaves out; the
-step is the first, from very short ones upward, beyond which this and the rounding of the values grow again.
+With x_1 = f(s, x), the rate of f along the straight path x + x_1 h is 2 x_2, and its second derivative along
+x + x_1 h + x_2 h**2 is 6 x_3, because higher terms of the path do not enter. No integration is needed, only derivatives
+at h = 0 of functions of one variable. Each derivative comes from two central differences of neighbouring order on the
+same nine points (Fornberg 1988, doi:10.1090/S0025-5718-1988-0935077-0, table 1). Their difference bounds the truncation
+error. Steps are tried from very short ones upward, until truncation and rounding errors grow again.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ import numpy as np
 from hybridsim.engine.native.kernels import allocating_kernel, call, kernel
 from hybridsim.engine.series.bounded import ORDER, UNIT
 
-# Weights of f(k h) - f(-k h), for even derivatives of f(k h) + f(-k h) - 2 f(0), k = 1..4, over k! of the derivative:
-# the better formula, then the one on seven points that it is held against.
+# Weights of f(k h) - f(-k h), or of f(k h) + f(-k h) - 2 f(0) for even derivatives, k = 1..4, divided by the factorial
+# of the order: the formula on nine points, then the one on seven points for comparison.
 _WEIGHTS = np.array(
     [
         [[4 / 5, -1 / 5, 4 / 105, -1 / 280], [3 / 4, -3 / 20, 1 / 60, 0.0]],
@@ -26,35 +26,37 @@ _WEIGHTS = np.array(
         [[-61 / 180, 169 / 720, -1 / 20, 7 / 1440], [-13 / 48, 1 / 6, -1 / 48, 0.0]],
     ]
 )
-_GAIN = np.abs(_WEIGHTS[:, 0]).sum(axis=1) * np.array([2.0, 4.0, 2.0])  # of the values' rounding
-# no power of two: a period of one is not met by whole steps
+_GAIN = np.abs(_WEIGHTS[:, 0]).sum(axis=1) * np.array(
+    [2.0, 4.0, 2.0]
+)  # amplification of the rounding of values
+# not a power of two, so that a function with period 1 is not sampled at whole periods
 _SHORTEST, _RATIO, _LEVELS = (
     0.618 * 2.0**-56,
     8.0,
     23,
 )
-_WORSE = 16.0  # times the best bound: the step has become too long
-# roundings by which a state is moved to see what it does: its effect stands out of the noise
+_WORSE = 16.0  # ratio to the best bound at which the step counts as too long
+# shift of a state in units of rounding, so that its effect exceeds the noise
 _APART = 2.0**10
-_SMALLEST = 2.0**-40  # what a state is moved by where nothing tells its size
+_SMALLEST = 2.0**-40  # shift of a state of unknown size
 
 
 @dataclass(frozen=True)
 class DifferenceSeries:
-    """Taylor coefficients of states (n, 4), guards and monitors along a flow, with error bounds of the last two."""
+    """Taylor coefficients of states (n, 4), guards and monitors along a flow, with bounds of the last two."""
 
     states: np.ndarray
     guards: np.ndarray
     guard_bounds: np.ndarray
     monitors: np.ndarray
     monitor_bounds: np.ndarray
-    surfaces: np.ndarray = field(default_factory=lambda: np.empty((0, ORDER + 1)))  # there are none
+    surfaces: np.ndarray = field(default_factory=lambda: np.empty((0, ORDER + 1)))  # always empty
     surface_bounds: np.ndarray = field(default_factory=lambda: np.empty((0, ORDER + 1)))
 
 
 @kernel
 def _at(function: Any, s: float, moving: float, C: Any, h: float, p: Any, z: Any, x: Any, out: Any) -> None:
-    """A function at the point h of a path: states C[:, 0] + C[:, 1] h + ..., time s + moving h."""
+    """Evaluate a function at the point h of a path: states C[:, 0] + C[:, 1] h + ..., time s + moving h."""
     for i in range(C.shape[0]):
         total = C[i, 3]
         for k in range(2, -1, -1):
@@ -65,7 +67,7 @@ def _at(function: Any, s: float, moving: float, C: Any, h: float, p: Any, z: Any
 
 @allocating_kernel
 def _noise(function: Any, s: float, t: float, C: Any, p: Any, z: Any, x: Any, low: Any, high: Any) -> Any:
-    """Rounding (m,) of a function's values, that of its arguments included; t is the whole time."""
+    """Return the rounding error (m,) of a function's values, including that of its arguments; t: absolute time."""
     m, n = low.shape[0], C.shape[0]
     noise = np.zeros(m)
     x[:] = C[:, 0]
@@ -91,9 +93,9 @@ def _noise(function: Any, s: float, t: float, C: Any, p: Any, z: Any, x: Any, lo
 def along(
     function: Any, s: float, t: float, moving: float, C: Any, p: Any, z: Any, D: Any, B: Any, H: Any
 ) -> None:
-    """Taylor coefficients D (m, 4) of a function along a path with bounds B, and the steps H they were found with.
+    """Write Taylor coefficients D (m, 4) of a function along a path, their bounds B, and the steps H used.
 
-    C (n, 4): the path, as in `_at`; moving: 1 where time goes along, 0 where it stands.
+    C (n, 4): the path, as in `_at`. moving: 1 if time advances along the path, else 0.
     """
     m, n = D.shape[0], C.shape[0]
     x, values, scatter = np.empty(n), np.empty((9, m)), np.zeros((m, ORDER + 1))
@@ -118,12 +120,12 @@ def along(
                 finite = finite and abs(values[k, i]) < np.inf
                 size = max(size, abs(values[k, i]))
                 varies = varies or values[k, i] != middle
-            if not finite:  # out of what the function is defined on: longer steps are no better
+            if not finite:  # outside the domain of the function; longer steps do not help
                 open_[i, 1:] = False
                 continue
             if not open_[i, 1:].any():
                 continue
-            if not varies:  # too short a step to see anything, or a constant
+            if not varies:  # the step is too short, or the function is constant
                 any_open = True
                 continue
             varied[i] = True
@@ -140,7 +142,7 @@ def along(
                     better += _WEIGHTS[d - 1, 0, k - 1] * pair
                     other += _WEIGHTS[d - 1, 1, k - 1] * pair
                 apart = abs(better - other)
-                scatter[i, d] = max(scatter[i, d], apart)  # rounding inside the function shows itself here
+                scatter[i, d] = max(scatter[i, d], apart)  # this shows rounding inside the function
                 rounding = max(_GAIN[d - 1] * noise[i], scatter[i, d]) + _GAIN[d - 1] * UNIT * size
                 bound = (2.0 * apart + rounding) / power
                 if bound < B[i, d]:
@@ -152,7 +154,7 @@ def along(
             break
         h *= _RATIO
     for i in range(m):
-        if not varied[i] and abs(values[4, i]) < np.inf:  # it was constant all the way
+        if not varied[i] and abs(values[4, i]) < np.inf:  # it was constant for all steps
             B[i, 1:] = 0.0
         for k in range(ORDER + 1):
             if not (abs(D[i, k]) < np.inf and B[i, k] < np.inf):
@@ -161,7 +163,7 @@ def along(
 
 @allocating_kernel
 def _path(flow: Any, s: float, t: float, x: Any, p: Any, z: Any, C: Any, E: Any, H: Any) -> None:
-    """Taylor coefficients C (n, 4) of the states along the flow with bounds E, and steps H (n, 4) of their rates."""
+    """Write Taylor coefficients C (n, 4) of the states along the flow, bounds E, and steps H (n, 4) of their rates."""
     D, B = np.empty_like(C), np.empty_like(C)
     C[:], E[:], H[:] = 0.0, 0.0, 0.0
     C[:, 0] = x
@@ -189,7 +191,7 @@ def _series(
     G: Any,
     GE: Any,
 ) -> None:
-    """Coefficients of the states and of the watched functions along the flow, as far as rounding and steps go."""
+    """Write coefficients of the states and the watched functions along the flow, with bounds for rounding and steps."""
     _path(flow, s, t, x, p, z, C, E, H)
     if G.shape[0]:
         along(watched, s, t, 1.0, C, p, z, G, GE, np.empty_like(G))
@@ -200,10 +202,10 @@ def run_differences(
     flow: Any, watched: Any, s: float, t: float, s_error: float, x: Any, x_error: Any, p: Any, z: Any, C: Any, G: Any,
     GE: Any,
 ) -> None:  # fmt: skip
-    """Coefficients C (n, 4) of the states and G (m, 4) of the watched functions along the flow, and bounds GE of these.
+    """Write coefficients C (n, 4) of the states and G (m, 4) of the watched functions along the flow, with bounds GE.
 
-    s is the local time, t the whole. s_error, x_error: how well time and states are known. What they do to each
-    coefficient is seen by moving them a little. Without any, only steps and rounding are in the bounds.
+    s: local time, t: absolute time. s_error, x_error: errors of time and states. Their effect on each coefficient is
+    measured by small shifts. Without them the bounds contain only step and rounding errors.
     """
     n, m = x.shape[0], G.shape[0]
     E, H = np.empty((n, ORDER + 1)), np.empty((n, ORDER + 1))
@@ -223,7 +225,7 @@ def run_differences(
         if j >= 0:
             d = max(d, _APART * UNIT * abs(C[j, 1]) * H[j, 1])
         d = d if d > 0.0 else _SMALLEST
-        for sign in (1.0, -1.0):  # the other way where the first leaves what the functions are defined on
+        for sign in (1.0, -1.0):  # the second direction is for states at the edge of the domain
             if j < 0:
                 _series(flow, watched, s + sign * d, t + sign * d, x, p, z, C1, E1, H1, G1, GE1)
             else:
@@ -244,7 +246,7 @@ def run_differences(
 
 @allocating_kernel
 def run_jacobian(flow: Any, s: float, t: float, x: Any, p: Any, z: Any, out: Any) -> None:
-    """d(dx/dt)/dx (n, n)."""
+    """Write d(dx/dt)/dx (n, n) to out."""
     n = x.shape[0]
     D, B, H = np.empty((n, ORDER + 1)), np.empty((n, ORDER + 1)), np.empty((n, ORDER + 1))
     C = np.zeros((n, ORDER + 1))

@@ -1,4 +1,4 @@
-"""Times that lose no digits: an instant is the unevaluated sum of two doubles, (high, low).
+"""Times in double-double precision: an instant is the unevaluated sum of two doubles, (high, low).
 
 Error-free sums and products after T. J. Dekker, Numer. Math. 18 (1971) 224, doi:10.1007/BF01397083.
 """
@@ -12,7 +12,7 @@ import numpy as np
 
 from hybridsim.engine.native.kernels import inlined, kernel
 
-_SPLITTER = 134217729.0  # 2**27 + 1: cuts a 53-bit significand into two halves whose products are exact
+_SPLITTER = 134217729.0  # 2**27 + 1: splits a 53-bit significand into two halves with exact products
 # 2*pi to 107 + 53 bits as an unevaluated sum of three doubles
 _TWO_PI = (6.283185307179586, 2.4492935982947064e-16, -5.989539619436679e-33)
 
@@ -24,22 +24,22 @@ class Instant(NamedTuple):
     low: float = 0.0
 
     def plus(self, step: float) -> Instant:
-        """This instant moved by a double, rounded to the pair."""
+        """Return this instant plus a double, rounded to the pair."""
         high, error = two_sum(self.high, step)
         return Instant(*two_sum(high, error + self.low))
 
     def minus(self, other: Instant) -> float:
-        """Difference of two instants, rounded once to a double."""
+        """Return the difference of two instants, rounded once to a double."""
         high, error = two_sum(self.high, -other.high)
         return high + (error + (self.low - other.low))
 
     def __float__(self) -> float:
-        return float(self.high + self.low)  # a NumPy double would be refused here
+        return float(self.high + self.low)  # float() must not return a NumPy double
 
 
 @inlined
 def two_sum(a: float, b: float) -> tuple[float, float]:
-    """Rounded sum and its exact error."""
+    """Return the rounded sum and its exact error."""
     s = a + b
     v = s - a
     return s, (a - (s - v)) + (b - v)
@@ -47,7 +47,7 @@ def two_sum(a: float, b: float) -> tuple[float, float]:
 
 @inlined
 def two_product(a: float, b: float) -> tuple[float, float]:
-    """Rounded product and its exact error (barring overflow and underflow)."""
+    """Return the rounded product and its exact error (barring overflow and underflow)."""
     product = a * b
     t = _SPLITTER * a
     a_high = t - (t - a)
@@ -59,30 +59,30 @@ def two_product(a: float, b: float) -> tuple[float, float]:
 
 
 def times(instant: Instant, factor: float) -> Instant:
-    """An instant times a double, as a pair."""
+    """Return an instant times a double, as a pair."""
     high, error = two_product(instant.high, factor)
     return Instant(*two_sum(high, error + instant.low * factor))
 
 
 def multiple(start: float, k: int, period: float) -> Instant:
-    """The k-th scheduled time, start + k*period, never a running sum."""
+    """Return the k-th scheduled time, start + k*period, without a running sum."""
     high, error = two_product(float(k), period)
     total, rest = two_sum(start, high)
     return Instant(*two_sum(total, rest + error))
 
 
 def phase(instant: Instant, rate: float, offset: float) -> float:
-    """(rate*instant + offset) modulo 2 pi, for an angle of any number of turns; see `phase_of`."""
+    """Return (rate*instant + offset) modulo 2 pi, accurate for any number of turns; see `phase_of`."""
     return float(phase_of(instant.high, instant.low, rate, offset))
 
 
 @kernel
 def phase_of(high: float, low: float, rate: float, offset: float) -> float:
-    """(rate*(high + low) + offset) modulo 2 pi, for an angle of any number of turns.
+    """Return (rate*(high + low) + offset) modulo 2 pi, accurate for any number of turns.
 
-    In [-pi, pi], or beyond an end of it by as much as the rounding of the whole angle where that is half a turn.
-    The product and the reduction are carried in two doubles: after 1e6 turns the angle is still
-    good to one ulp, where a plain ``rate*t`` would have lost six digits.
+    The result is in [-pi, pi], or outside by the rounding of the whole angle if that is half a turn. The product and
+    the reduction use two doubles. After 1e6 turns the angle is accurate to one ulp, while a plain ``rate*t`` would have
+    lost six digits.
     """
     product, error = two_product(high, rate)
     angle, rest = two_sum(product, error + low * rate)

@@ -1,4 +1,4 @@
-"""Generated modules on disk: found by the hash of the model's structure, imported, compiled, never built twice."""
+"""Load the generated module of a model: find it on disk by the hash of the model's structure, or generate it."""
 
 from __future__ import annotations
 
@@ -25,60 +25,60 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Compiled:
-    """A model's functions: addresses for kernels, plain Python for what runs once an event."""
+    """The functions of a model: compiled ones with addresses for kernels, and Python ones for use at events."""
 
     module: ModuleType
-    seconds: float  # what lowering took; 0 when the module was found in the cache
+    seconds: float  # time of lowering; 0 if the module was cached
     _kept: dict[str, tuple[Any, Any]] = field(default_factory=dict)
     _shared: dict[str, Any] = field(default_factory=dict)
 
-    is_current = True  # expressions read nothing from outside
+    is_current = True  # expressions depend on nothing outside the model
 
     @property
     def data(self) -> dict[str, Any]:
-        """Everything about the model that the functions do not say."""
+        """Return all data about the model that is not in the functions."""
         return self.module.DATA
 
     def shared(self, name: str, make: Callable[[], Any]) -> Any:
-        """Something that follows from the structure alone, made once for all systems that share it.
+        """Return a value that depends on the structure alone, made once for all systems that share it.
 
-        Of threads that make it at the same time, all get what the first one has left.
+        If several threads make it at the same time, all get the value of the first one.
         """
         if name not in self._shared:
             self._shared.setdefault(name, make())
         return self._shared[name]
 
     def lengths_to_compile(self) -> list[int]:
-        """The lengths of the texts of those functions that have no machine code yet."""
+        """Return the source lengths of the functions that have no machine code yet."""
         from hybridsim.engine.native.kernels import texts_to_compile
 
         return [len(text) for text in texts_to_compile(self.module)]
 
     def address(self, name: str) -> Any:
-        """Address of one of flow, tangent, project, guards, surfaces, monitors, quantities; compiled on first use."""
+        """Return the address of a function: flow, tangent, project, guards, surfaces, monitors or quantities."""
         if name not in self._kept:
             from hybridsim.engine.native.kernels import compile_model_function
 
-            # another thread may have been first: its code is in use, and must not be let go
+            # another thread may have been first; its code is in use and must be kept
             self._kept.setdefault(name, compile_model_function(self.module, name))
         return self._kept[name][0]
 
 
 _loaded: dict[str, Compiled] = {}
-_STRUCTURES = 64  # that are kept, those that were asked for last; others are read from disk again
-_MOST = 16  # models of Python functions that are kept; their functions cannot be found again on disk
+_STRUCTURES = 64  # most recently used modules kept in memory; others are read from disk again
+_MOST = 16  # models of Python functions kept in memory; these are not stored on disk
 _of_functions: dict[tuple[Any, ...], PythonCode] = {}
-_lock = SharedLock()  # of these
+_lock = SharedLock()  # for both dictionaries
 
 
 def compiled(model: Model) -> Compiled | PythonCode:
-    """The compiled form of a model, from memory, from disk, or lowered now."""
+    """Return the compiled form of a model, from memory or disk, or by lowering it."""
     if model.flow is not None:
         return _code_of_functions(model)
     name: str = model.once("module", lambda: _name(model))
     code = _loaded.get(name) or _load(model, name)
     with _lock:
-        # another thread may have been first: what it has is in use
+        # another thread may have been first; its module is in use
         code = _loaded.pop(name, code)
         _loaded[name] = code
         while len(_loaded) > _STRUCTURES:
@@ -89,7 +89,7 @@ def compiled(model: Model) -> Compiled | PythonCode:
 def _code_of_functions(model: Model) -> PythonCode:
     from hybridsim.engine.system.user_functions.code import PythonCode
 
-    # copies with other values have the same functions
+    # copies with other parameter values have the same functions
     key = (model.structure(), model.flow, model.components, model.monitors, model.schedules, model.outputs)
     with _lock:
         if key in _of_functions and not _of_functions[key].is_current:
@@ -127,23 +127,23 @@ def _load(model: Model, name: str) -> Compiled:
 
 
 class _FromDisk(SourceFileLoader):
-    """Reads a module, or what Python compiled of it, from files that nobody else can have written."""
+    """Loads a module or its bytecode from files that only this user can have written."""
 
     def get_data(self, path: str) -> bytes:
-        """The bytes of a file."""
+        """Return the bytes of a file."""
         if not is_trusted_file(path):
             raise PermissionError(f"{path} may belong to another user")
         return super().get_data(path)
 
 
 class _FromMemory(InspectLoader):
-    """The module of a model where nothing is kept on disk."""
+    """Loads the module of a model if nothing is stored on disk."""
 
     def __init__(self, name: str, text: str) -> None:
         self.name, self._text = name, text
 
     def get_source(self, fullname: str) -> str:
-        """Its text."""
+        """Return its source text."""
         return self._text
 
 

@@ -1,4 +1,4 @@
-"""The period of a model's forcing, where it has one."""
+"""Determine the period of a model's forcing."""
 
 from __future__ import annotations
 
@@ -11,29 +11,29 @@ if TYPE_CHECKING:
     from hybridsim.engine.system.system import System
     from hybridsim.model.parts.model import Model
 
-# Ratios of periods that differ from a whole number by less than this are whole: parameters carry rounding.
+# Ratios of periods closer than this to a whole number count as whole, because parameters are rounded.
 _COMMENSURATE = 1e-9
-_MOST = 64  # times the longest period: what repeats later does not repeat
+_MOST = 64  # longest common period, in units of the longest single period
 
 
 def system_period(system: System) -> float | None:
-    """Period of everything that varies in time in a known way: the longest, if the others divide it; else None."""
+    """Return the period of all known time dependence: the longest, if the others divide it; else None."""
     periods = forcing_periods(system)
     return _multiple_of_all(periods, 1) if periods else None
 
 
 def common_period(system: System) -> float | None:
-    """After how long all forcing, inputs and clocks repeat: the least multiple of the longest period, or None."""
+    """Return the time after which all forcing, inputs and clocks repeat, or None."""
     return common_multiple(all_periods(system))
 
 
 def common_multiple(periods: list[float]) -> float | None:
-    """The least multiple of the longest of some periods that the others divide, or None."""
+    """Return the least multiple of the longest period that all other periods divide, or None."""
     return _multiple_of_all(periods, _MOST) if periods else None
 
 
 def all_periods(system: System) -> list[float]:
-    """The periods of all forcing, inputs and clocks; none where one of the forcings has none."""
+    """Return the periods of all forcing, inputs and clocks; an empty list if one forcing has no period."""
     periods = forcing_periods(system)
     if periods is None:
         return []
@@ -42,7 +42,7 @@ def all_periods(system: System) -> list[float]:
 
 
 def forcing_periods(system: System) -> list[float] | None:
-    """The period of each sine of time and of each input; None where one of them has none."""
+    """Return the period of each sine of time and of each input; None if one of them has no period."""
     values = system.values
     periods = [2.0 * math.pi / abs(float(rate)) for rate in system.rates if rate != 0.0]
     for declared in system.model.inputs:
@@ -62,7 +62,7 @@ def _multiple_of_all(periods: list[float], most: int) -> float | None:
 
 
 def forcing_period(model: Model) -> float | None:
-    """Period of a model's forcing at its parameter values, or None where it has no single one."""
+    """Return the period of a model's forcing at its parameter values, or None if it has no single one."""
     from hybridsim.engine.native.kernels import announce_compilation
     from hybridsim.engine.system.system import System
 

@@ -1,4 +1,4 @@
-"""The Taylor series of one segment: the lean tape of its modes, its constants in place, ready to be expanded."""
+"""Expand Taylor series of one segment, with the lean tape of its modes and its constants."""
 
 from __future__ import annotations
 
@@ -11,31 +11,31 @@ from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
 
 _SMALLEST_ORDER = 4
-_SMOOTH = 1.5  # times the short order
-# p! rtol = 3**p is met at 16, 20, 24 for rtol = 1e-6, 1e-9, 1e-12: so many times the short order
+_SMOOTH = 1.5  # ratio of the order to the short order
+# The same ratio for linear flows: p! rtol = 3**p holds at p = 16, 20, 24 for rtol = 1e-6, 1e-9, 1e-12.
 _LINEAR = 1.6
-_LITTLE = 2.0**-44  # of the time so far: hardly a step
-# Terms beyond this, or below its inverse, are left out of a series whose first ones are of moderate size: with powers
-# of a step they are of that size again, and those have to be doubles, too.
+_LITTLE = 2.0**-44  # step relative to the time so far that counts as none
+# Terms larger than this, or smaller than its inverse, are dropped from a series whose first terms are of moderate size.
+# They are multiplied by powers of the step, which must be doubles as well.
 _MOST, _MODERATE = 1e250, 1e100
-_TIGHTEST = 1e-15  # what a series in doubles can still be asked for
+_TIGHTEST = 1e-15  # tightest tolerance of series in double precision
 
 
 def short_order(rtol: float) -> int:
-    """The order at which series are cheapest where nothing but convolutions takes time: 1 - ln(rtol)/2.
+    """Return the cheapest order of series if only convolutions cost time: 1 - ln(rtol)/2.
 
-    Their number grows with the square of the order (Jorba and Zou 2005, section 3).
+    The number of convolutions grows with the square of the order (Jorba and Zou 2005, section 3).
     """
     return max(_SMALLEST_ORDER, math.ceil(1.0 - 0.5 * math.log(rtol)))
 
 
 def series_order(rtol: float, linear: bool = False) -> int:
-    """The order at which Taylor's method is cheapest.
+    """Return the order at which Taylor's method is cheapest.
 
-    What a step takes beside convolutions (its length, guards, the look at its end) makes longer steps cheaper: by
-    measurement an order of 1.4 to 1.6 times the short one for rtol from 1e-6 to 1e-13. A linear flow has neither
-    convolutions nor a radius of convergence. There the order is the one whose terms (w h)**p/p! fall to rtol at
-    w h = 3 for the fastest rate w, beyond which the sum would cancel.
+    The other costs of a step (its length, guards, the check at its end) favour longer steps. Measurements give an order
+    of 1.4 to 1.6 times the short one for rtol from 1e-6 to 1e-13. A linear flow has neither convolutions nor a radius
+    of convergence. Its order is the one whose terms (w h)**p/p! decrease to rtol at w h = 3 for the fastest rate w; for
+    larger w h the sum would cancel.
     """
     order = 1.0 - 0.5 * math.log(rtol)
     return max(_SMALLEST_ORDER, math.ceil((_LINEAR if linear else _SMOOTH) * order))
@@ -61,20 +61,21 @@ class SeriesRun:
         self.watched = np.concatenate([self.guards, self.lean.monitors])
 
     def expand(self, s: float, x: np.ndarray, longest: float) -> tuple[float, np.ndarray]:
-        """How far the series from (s, x) reach, at most `longest`; coefficients of the states (n, order + 1).
+        """Return the reach of the series from (s, x), at most `longest`, and coefficients of the states (n, order + 1).
 
-        They have fewer terms where the unit of time is so far from the motion's that doubles do not hold the rest.
+        There are fewer terms if the unit of time is so far from the time scale of the motion that the rest would
+        overflow.
         """
-        with np.errstate(over="ignore", invalid="ignore"):  # of what is left out, or makes the reach NaN
+        with np.errstate(over="ignore", invalid="ignore"):  # in dropped terms, or in a reach that is NaN
             expand(self.lean.rows, self.high, self.places, self.order, s, x, self.V)
         order = self._representable()
         h = self._reach(self.watched, order, longest)
-        if not h > min(_LITTLE * abs(s), longest):  # no monitor stops a run where it has a pole or no value
+        if not h > min(_LITTLE * abs(s), longest):  # a pole of a monitor must not stop the run
             h = self._reach(self.guards, order, longest)
         return float(h), self.V[self.states, : order + 1]
 
     def _representable(self) -> int:
-        """Up to which order the coefficients of the states are within doubles, those that began so."""
+        """Return the order up to which the coefficients of states of moderate size stay within range."""
         sizes = np.abs(self.V[self.states])
         if not len(sizes):
             return self.order

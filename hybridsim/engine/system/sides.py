@@ -1,4 +1,4 @@
-"""Modes of the components that a state alone decides: sides of corners and jumps, pieces of tables."""
+"""Determine the modes of components that a state alone decides: corners, jumps, and pieces of tables."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ if TYPE_CHECKING:
 def modes_by_state(
     system: System, components: Iterable[int], s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray
 ) -> np.ndarray:
-    """The modes z with those of some components replaced by the ones that hold at x.
+    """Return the modes z, with those of some components replaced by the modes that hold at x.
 
-    A component on a border keeps its mode where that is one of the two; on a surface it holds where it can. An argument
-    may itself have corners, so that the modes are taken again until none changes.
+    A component on a border keeps its mode if that is one of the two; on a surface it holds if possible. An argument may
+    have corners itself, so the modes are computed again until none changes.
     """
     z, row, numbers = z.copy(), np.ascontiguousarray(x)[None, :], tuple(components)
 
     def violated(c: int, mode: int) -> int | None:
-        """The first guard of a mode that is negative at x."""
+        """Return the first guard of a mode that is negative at x, or None."""
         z[c] = mode
         values = system.rows("guards", system.guard_count, np.array([s]), row, p, z)[0]
         guards = system.automata[c].guards[mode]
         return next((k for k, number in enumerate(guards) if not values[number] >= 0.0), None)
 
     def on_surface(c: int, automaton: Automaton) -> int:
-        """The mode of a surface: above, below, or the one that holds where that is admissible."""
+        """Return the mode of a surface: above, below, or the holding one if it is admissible."""
         above, below = violated(c, automaton.above) is None, violated(c, automaton.below) is None
         if above and below and violated(c, automaton.hold) is None:
             return automaton.hold
         return automaton.above if above else automaton.below
 
     def on_side(c: int, automaton: Automaton) -> int:
-        """The mode of a corner or a table, from border to border."""
+        """Return the mode of a corner or a table, by following borders."""
         mode = int(z[c])
         for _ in automaton.modes:
             k = violated(c, mode)

@@ -1,4 +1,4 @@
-"""Inputs at run time: the piece of a table, wave or chirp that holds from an instant on, and its next knot."""
+"""Evaluate inputs at run time: the piece of a table, wave or chirp that holds from an instant on, and the next knot."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hybridsim.model.parts.inputs import Input
 
 _TWO_PI = 2.0 * math.pi
-# knots of a wave as fractions of its period, with (value, slope per period) just after each
+# knots of a wave as fractions of its period, with (value, slope per period) just after each knot
 _SHAPES = {
     "triangle": ((-0.25, -1.0, 4.0), (0.25, 1.0, -4.0)),
     "sawtooth": ((0.0, -1.0, 2.0),),
@@ -26,7 +26,7 @@ _SHAPES = {
 
 
 class Signal:
-    """One input with its numbers: pieces and knots."""
+    """One input with its parameter values: pieces and knots."""
 
     def __init__(self, declared: Input, values: Mapping[str, float]) -> None:
         self.kind = declared.kind
@@ -42,7 +42,7 @@ class Signal:
             self._corners = square if self.shape == "square" else _SHAPES[str(self.shape)]
 
     def piece(self, origin: Instant, forward: bool) -> tuple[float, ...]:
-        """The six slots of the piece at `origin`: to its right, or to its left when time runs backward."""
+        """Return the six numbers of the piece at `origin`: to its right, or to its left backward in time."""
         if self.kind == "table":
             return self._table_piece(origin, forward)
         if self.kind == "step":
@@ -57,9 +57,9 @@ class Signal:
         return self._wave_piece(origin, forward)
 
     def next_knot(self, after: Instant, forward: bool) -> Instant | None:
-        """The first knot strictly after an instant (before it, backward in time)."""
+        """Return the first knot strictly after an instant (before it, backward in time), or None."""
         if self.kind == "table":
-            # pairs compare in the order of time; a table may have many knots, and each asks for the next
+            # pairs compare in order of time, so bisection works for long tables
             index = bisect_right(self._knots, after) if forward else bisect_left(self._knots, after) - 1
             return self._knots[index] if 0 <= index < len(self._knots) else None
         if self.kind == "chirp":
@@ -77,7 +77,7 @@ class Signal:
         return min(ahead_of, key=float) if forward else max(ahead_of, key=float)
 
     def _step_turns(self, near: Instant) -> list[tuple[Instant, float]]:
-        """The changes of a step near an instant, each with the value from then on."""
+        """Return the changes of a step input near an instant, each with the value from then on."""
         if self._period == 0.0:
             return [(Instant(time), value) for time, value in self._turns]
         k0 = math.floor(float(near) / self._period)
@@ -147,12 +147,12 @@ class Signal:
 def step_turns(
     number: Mapping[str, float], declared: Input
 ) -> tuple[float, list[tuple[float, float]], float]:
-    """The value of a step before all its changes, these with the values from then on, and their period (or 0).
+    """Return the value of a step before all its changes, the changes with their new values, and the period (or 0).
 
     Raises
     ------
     ModelError
-        Where what decides is zero at all times.
+        If the deciding expression is zero at all times.
     """
     shift, rate, amplitude = number["shift"], number["rate"], number.get("amplitude")
     if amplitude is None:
@@ -167,7 +167,7 @@ def step_turns(
             f"'{title}' is zero at all times: a condition on its sign is meaningless",
             remedy="correct the numbers, or write the intended branch without a condition",
         )
-    if abs(shift) >= abs(amplitude):  # a wave that only touches zero changes nothing
+    if abs(shift) >= abs(amplitude):  # a wave that only touches zero has no sign change
         return float(shift > 0.0), [], 0.0
     # sin(phase + rate t) > -shift/amplitude between two angles, for a positive amplitude
     low = math.asin(-shift / amplitude)
@@ -184,7 +184,7 @@ def _exact(instant: Instant) -> Fraction:
 
 
 def _table(declared: Input) -> tuple[list[Instant], list[tuple[float, float, float, float]]]:
-    """Knots, and the cubic after each (index 0: before the first); the end values hold beyond the table."""
+    """Return knots, and the cubic after each (index 0: before the first); end values hold beyond the table."""
     times, values = np.array(declared.times), np.array(declared.values)
     if declared.interpolation == "cubic":
         from scipy.interpolate import CubicSpline

@@ -1,4 +1,4 @@
-"""A model bound to parameter values: its compiled functions, its run-time vector, its series with error bounds."""
+"""A model bound to parameter values: its compiled functions, its run-time vector, and series with error bounds."""
 
 from __future__ import annotations
 
@@ -30,16 +30,16 @@ if TYPE_CHECKING:
     from hybridsim.model.parts.model import Model
 
 
-CORNER = "corner"  # the kind of an event that is a corner's change of side
+CORNER = "corner"  # kind of the event in which a corner changes its side
 
 
 @dataclass(frozen=True)
 class Automaton:
-    """One component as the engine sees it; modes and guards are numbers."""
+    """One component as the engine represents it; modes and guards are numbers."""
 
     name: str
     modes: tuple[str, ...]
-    guards: tuple[tuple[int, ...], ...]  # global guard number of each guard of each mode
+    guards: tuple[tuple[int, ...], ...]  # mode -> global numbers of its guards
     guard_names: tuple[tuple[str, ...], ...]
     targets: tuple[tuple[tuple[int, ...], ...], ...]  # mode, guard -> target modes of its choices
     fatal: tuple[tuple[str | None, ...], ...]
@@ -48,31 +48,31 @@ class Automaton:
     hold: int = -1
     initial: int = -1
     is_unilateral: bool = False  # its surface is a gap: there is no mode below
-    is_unique: bool = False  # its surface takes a motion only where no other is admissible
-    is_corner: bool = False  # made by the program of a corner; both its modes agree where it changes
-    is_step: bool = False  # except those of a step in time
+    is_unique: bool = False  # a switching surface: one motion alone must be admissible
+    is_corner: bool = False  # a corner: both modes agree at the border
+    is_step: bool = False  # a corner whose modes may differ at the border: a step in time
     is_load: bool = False  # the load of a contact that opens
-    limit: int = -1  # the mode that is entered where its transitions accumulate
+    limit: int = -1  # mode that is entered at the limit of its transitions
 
     @property
     def kind(self) -> str:
-        """What a change of its mode is called."""
+        """Return the kind of event that a change of its mode is."""
         return CORNER if self.is_corner else "transition"
 
     @property
     def resting(self) -> int:
-        """The mode that it may be in where its events accumulate; -1 if there is none."""
+        """Return the mode that it may take at the limit of its events, or -1."""
         return self.hold if self.has_surface else self.limit
 
     @property
     def has_surface(self) -> bool:
-        """Whether its mode is decided by admissibility at a surface."""
+        """Return whether its mode is decided by admissibility at a surface."""
         return self.hold >= 0
 
 
 @dataclass(frozen=True)
 class Series:
-    """Taylor coefficients along a flow, order along the last axis, with rounding error bounds."""
+    """Taylor coefficients along a flow, with the order along the last axis, and rounding error bounds."""
 
     V: np.ndarray
     E: np.ndarray
@@ -80,37 +80,37 @@ class Series:
 
     @property
     def guards(self) -> np.ndarray:
-        """Of all guards (guards, orders)."""
+        """Return coefficients of all guards (guards, orders)."""
         return self.V[self.place.guards]
 
     @property
     def guard_bounds(self) -> np.ndarray:
-        """Error bounds of the guards' coefficients."""
+        """Return error bounds of the coefficients of the guards."""
         return self.E[self.place.guards]
 
     @property
     def surfaces(self) -> np.ndarray:
-        """Of the surfaces."""
+        """Return coefficients of the surfaces (surfaces, orders)."""
         return self.V[self.place.surfaces]
 
     @property
     def surface_bounds(self) -> np.ndarray:
-        """Error bounds of the surfaces' coefficients."""
+        """Return error bounds of the coefficients of the surfaces."""
         return self.E[self.place.surfaces]
 
     @property
     def monitors(self) -> np.ndarray:
-        """Of the monitors."""
+        """Return coefficients of the monitors (monitors, orders)."""
         return self.V[self.place.monitors]
 
     @property
     def monitor_bounds(self) -> np.ndarray:
-        """Error bounds of the monitors' coefficients."""
+        """Return error bounds of the coefficients of the monitors."""
         return self.E[self.place.monitors]
 
     @property
     def states(self) -> np.ndarray:
-        """Of the states."""
+        """Return coefficients of the states (n, orders)."""
         return self.V[self.place.states]
 
 
@@ -144,7 +144,7 @@ def _automaton(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automaton
 
 
 class _Frame:
-    """What systems of one structure have in common."""
+    """The data shared by all systems of one structure."""
 
     def __init__(self, model: Model, data: dict[str, Any]) -> None:
         self.names = tuple(s.name for s in model.states)
@@ -167,7 +167,7 @@ class _Frame:
         self.guard_table = self._guard_table()
 
     def _guard_table(self) -> np.ndarray:
-        """Guard numbers (components, modes, widest) of every mode, -1 where it has fewer."""
+        """Return guard numbers (components, modes, widest) of every mode, padded with -1."""
         most = max((len(a.modes) for a in self.automata), default=0)
         widest = max((len(g) for a in self.automata for g in a.guards), default=0)
         table = np.full((len(self.automata), most, max(widest, 1)), -1, dtype=np.int64)
@@ -181,17 +181,16 @@ _run_series = Door(run_series)
 
 
 class System:
-    """A model with values: what integrators and the mode loop work on.
+    """A model with parameter values, on which integrators and the mode loop work.
 
     Parameters
     ----------
-    as_written : take corners inside a mode as they stand, instead of as components
-    (`hybridsim.model.smoothing.explicit_corners`), which
-        come after those that the model declares.
+    as_written : keep corners inside modes as they are, instead of making them components that follow the declared ones
+        (`hybridsim.model.smoothing.explicit_corners`).
     """
 
     def __init__(self, model: Model, as_written: bool = False) -> None:
-        self.written = model  # held for as long as the system is: `system_cache` knows systems by it
+        self.written = model  # kept alive, because `system_cache` finds systems by its identity
         self.model = model = model if as_written else smoothed(model)
         self.code = compiled(model)
         data = self.code.data
@@ -200,12 +199,12 @@ class System:
         self.n = len(self.names)
         self.layout: Layout = frame.layout
         self.automata: tuple[Automaton, ...] = frame.automata
-        self.declared: tuple[Automaton, ...] = frame.declared  # those that are no corners
+        self.declared: tuple[Automaton, ...] = frame.declared  # without corners
         self.has_surface: np.ndarray = frame.has_surface
         self.is_corner: np.ndarray = frame.is_corner
         self.is_unilateral: np.ndarray = frame.is_unilateral
         self.led: tuple[int, ...] = frame.led  # corners and loads: their modes follow from the state
-        # by impacts or resets; friction and relays alone do not
+        # true for impacts or resets; friction and relays alone do not bounce
         self.may_bounce = bool((frame.is_unilateral | ~(frame.has_surface | frame.is_corner)).any())
         self.owner: np.ndarray = frame.owner  # component of each guard
         self.guard_count: int = data["guard_count"]
@@ -229,13 +228,13 @@ class System:
         self._turning = tuple(enumerate(self.rates.tolist(), self.layout.phases_at))
         numbers = {**model.discrete_values(), **constant_inputs(model), **self.values} if model.inputs else {}
         self.signals = tuple(Signal(i, numbers) for i in model.inputs)
-        self.starts: dict[tuple[Any, ...], Any] = {}  # what `hybridsim.engine.events.start` has found
-        self.tables: dict[float, Any] = {}  # what `hybridsim.engine.linear.tables` has made last
-        self.runs: dict[Any, Any] = {}  # what `hybridsim.preparation` remembers
+        self.starts: dict[tuple[Any, ...], Any] = {}  # cache of `hybridsim.engine.events.start`
+        self.tables: dict[float, Any] = {}  # cache of `hybridsim.engine.linear.tables`
+        self.runs: dict[Any, Any] = {}  # cache of `hybridsim.preparation`
         self.opposed: set[tuple[Any, ...]] = (
             set()
-        )  # starts that `hybridsim.engine.events.dissipation_check` has let pass
-        self.has_tape: bool = data["tape"] is not None  # it is made from expressions
+        )  # starts accepted by `hybridsim.engine.events.dissipation_check`
+        self.has_tape: bool = data["tape"] is not None  # whether the model consists of expressions
         if self.has_tape:
             self._registers: Registers = self.code.shared(
                 "registers", lambda: Registers(data["tape"], self.layout)
@@ -245,38 +244,38 @@ class System:
 
     @property
     def has_corners(self) -> bool:
-        """Whether a flow, guard or monitor has a corner or a jump inside a mode."""
+        """Return whether a flow, guard or monitor has a corner or a jump inside a mode."""
         return self.has_tape and self.code.shared("corners", lambda: has_corners(self.code.data["tape"]))
 
     @cached_property
     def is_linear(self) -> bool:
-        """Whether the flow of every mode is linear in the states."""
+        """Return whether the flow of every mode is linear in the states."""
         return all(all(modes) for modes in self.linear.values())
 
     @cached_property
     def heard(self) -> tuple[str, ...]:
-        """Names of all that events can be of: components, monitors, schedules, inputs."""
+        """Return the names that events can have: components, monitors, schedules, inputs."""
         model = self.model
         named = (self.automata, model.monitors, model.schedules, model.inputs)
         return tuple(part.name for parts in named for part in parts)
 
     @property
     def can_hold(self) -> bool:
-        """Whether some mode holds states on a surface."""
+        """Return whether some mode holds states on a surface."""
         return bool(self.pins or self.projected)
 
     def holds(self, z: np.ndarray) -> bool:
-        """Whether a mode in z holds states on a surface."""
+        """Return whether a mode in z holds states on a surface."""
         return any(z[c] == self.automata[c].hold for c in (*self.pins, *self.projected))
 
     def evaluated(self, z: np.ndarray) -> list[int]:
-        """The states that the modes in z evaluate from their constraints, each exactly."""
+        """Return the states that the modes in z evaluate exactly from their constraints."""
         return [i for c, held in self.pins.items() if z[c] == self.automata[c].hold for i in held]
 
     # -- values ---------------------------------------------------------------------------------------------
 
     def start_state(self, overrides: Mapping[str, float]) -> np.ndarray:
-        """Initial states, in order."""
+        """Return the initial states in order."""
         values = self._start | dict(overrides)
         return np.array([float(values[n]) for n in self.names])
 
@@ -286,12 +285,12 @@ class System:
 
     @cached_property
     def discrete_start(self) -> np.ndarray:
-        """Initial discrete states, in order."""
+        """Return the initial discrete states in order."""
         values = self.model.discrete_values()
         return np.array([values[d.name] for d in self.model.discrete], dtype=float)
 
     def vector(self, origin: Instant, discrete: np.ndarray, forward: bool = True) -> np.ndarray:
-        """The run-time vector p of a segment whose local time starts at `origin`."""
+        """Return the run-time vector p of a segment whose local time starts at `origin`."""
         p = self._base.copy()
         at = self.layout
         p[at.discrete_slice] = discrete
@@ -304,15 +303,15 @@ class System:
         return p
 
     def discrete(self, p: np.ndarray) -> np.ndarray:
-        """Discrete states in p."""
+        """Return the discrete states in p."""
         return p[self.layout.discrete_slice]
 
     def mode_names(self, z: np.ndarray) -> dict[str, str]:
-        """Mode of every component by name."""
+        """Return the mode of every component by name."""
         return {a.name: a.modes[m] for a, m in zip(self.automata, z, strict=True)}
 
     def hot_functions(self) -> tuple[str, ...]:
-        """The functions that every run needs compiled; the others are compiled when they are first used."""
+        """Return the functions that every run needs; others are compiled on first use."""
         names = ["flow", *(["guards"] if self.guard_count else []), *(["project"] if self.can_hold else [])]
         names += ["monitors"] if self.monitor_names else []
         return tuple(names)
@@ -320,28 +319,28 @@ class System:
     # -- functions ------------------------------------------------------------------------------------------
 
     def address(self, name: str) -> Any:
-        """Address of a compiled function, for kernels."""
+        """Return the address of a compiled function, for kernels."""
         return self.code.address(name)
 
     @property
     def registers(self) -> Registers:
-        """Where the tape's inputs and results are."""
+        """Return the registers of the tape's inputs and results."""
         return self._registers
 
     def rates_at(self, p: np.ndarray) -> np.ndarray:
-        """The rates at which angles grow in time, at the values of parameters in p."""
+        """Return the rates at which angles grow in time, at the parameter values in p."""
         out = np.zeros(self.layout.phases)
         self.code.module.rates(0.0, np.zeros(0), p, np.zeros(0, dtype=np.int64), out)
         return out
 
     def flow(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """dx/dt."""
+        """Return dx/dt (n,)."""
         out = np.empty(self.n)
         evaluate(self.address("flow"), s, x, p, z, out)
         return out
 
     def project(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """x with every held state evaluated from its constraint."""
+        """Return x with every held state evaluated from its constraint."""
         if not self.can_hold:
             return x
         out = np.empty(self.n)
@@ -351,19 +350,19 @@ class System:
     def rows(
         self, name: str, count: int, s: np.ndarray, x: np.ndarray, p: np.ndarray, z: np.ndarray
     ) -> np.ndarray:
-        """A function at many points: s (k,), x (k, n) -> (k, count)."""
+        """Evaluate a function at many points: s (k,), x (k, n) -> (k, count)."""
         out = np.empty((len(s), count))
         evaluate_rows(self.address(name), s, x, p, z, out)
         return out
 
     def jumps(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> dict[int, tuple[float, float]]:
-        """Jump of each unknown on release to above and to below, by component."""
+        """Return the jump of each unknown on release to above and to below, by component."""
         out = np.zeros(2 * len(self.surface_of))
         self._in_python("jumps", s, x, p, z, out)
         return {c: (float(out[2 * k]), float(out[2 * k + 1])) for k, c in enumerate(self.surface_of)}
 
     def effects(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> dict[int, float]:
-        """Effect of each unknown on the rate of its own surface, by component; negative for one that opposes it."""
+        """Return the effect of each unknown on the rate of its own surface; negative if it opposes the rate."""
         out = np.zeros(len(self.surface_of))
         self._in_python("effects", s, x, p, z, out)
         return {c: float(out[k]) for k, c in enumerate(self.surface_of)}
@@ -371,7 +370,7 @@ class System:
     def impulses(
         self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """For m surfaces the slopes of their u (m, n), changes of the states by impulses (m, n), loads (2, m, m).
+        """Return for m surfaces the slopes of u (m, n), changes of states by impulses (m, n), and loads (2, m, m).
 
         u is the rate of a gap, or a relative velocity; see `hybridsim.engine.lowering.impulse_rows`.
         """
@@ -385,7 +384,7 @@ class System:
         )
 
     def gap_slopes(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """d(gap)/dx (m, n) of the m surfaces; zero for those that are no gaps."""
+        """Return d(gap)/dx (m, n) of the m surfaces; zero for surfaces that are not gaps."""
         out = np.zeros(len(self.surface_of) * self.n)
         self._in_python("gap_slopes", s, x, p, z, out)
         return out.reshape(-1, self.n)
@@ -393,21 +392,21 @@ class System:
     def restitutions(
         self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray, speeds: np.ndarray
     ) -> np.ndarray:
-        """Coefficient of restitution (m,) of the surfaces at their speeds of approach (m,); 0 where there is none."""
+        """Return the coefficient of restitution (m,) at the approach speeds (m,); 0 for other surfaces."""
         out = np.zeros(len(self.surface_of))
         self._in_python("restitutions", s, np.concatenate([x, speeds]), p, z, out)
         return out
 
     def choose(self, component: int, mode: int, guard: int, s: float, x: Any, p: Any, z: Any) -> int:
-        """Number of the first choice of a guard whose condition holds; -1 if none."""
+        """Return the number of the first choice of a guard whose condition holds, or -1."""
         out = np.zeros(1)
         has_value = self._in_python("choose", s, x, p, np.array([*z, component, mode, guard]), out)
-        return int(out[0]) if has_value else -1  # a condition without a value holds no more than a false one
+        return int(out[0]) if has_value else -1  # a condition that is not a number counts as false
 
     def apply_reset(
         self, key: tuple[Any, ...], s: float, x: Any, p: Any, z: Any, x_plus: Any, p_plus: Any
     ) -> None:
-        """Write the values that one reset sets; everything is evaluated at (s, x, p, z)."""
+        """Write the values that one reset sets, all evaluated at (s, x, p, z)."""
         if key in self.resets:
             at = self.layout.discrete_slice
             out = np.concatenate([x_plus, p_plus[at]])
@@ -417,15 +416,15 @@ class System:
             x_plus[:], p_plus[at] = out[: self.n], out[self.n :]
 
     def _in_python(self, name: str, s: float, x: Any, p: Any, z: Any, out: np.ndarray) -> bool:
-        """Evaluate a function of the module that is called too seldom to be compiled; whether it has a value.
+        """Evaluate a rarely called function of the module in Python. Return whether it has a value.
 
-        Where it has none, as the standard library's functions beyond their domain, out is filled with NaN.
+        Outside the domain of a function of the standard library there is none, and out is filled with NaN.
         """
-        with np.errstate(all="ignore"):  # what is no number is dealt with where it is used
+        with np.errstate(all="ignore"):  # nan is handled by the callers
             try:
                 getattr(self.code.module, name)(s, x, p, z, out)
             except (ValueError, ArithmeticError):
-                if name != "reset":  # which may set but a few of all
+                if name != "reset":  # a reset sets only some of them
                     out[:] = np.nan
                 return False
         return True
@@ -433,32 +432,32 @@ class System:
     # -- series ---------------------------------------------------------------------------------------------
 
     def guards_of(self, z: np.ndarray) -> np.ndarray:
-        """Active guard numbers (components, widest), -1 where a mode has fewer."""
+        """Return active guard numbers (components, widest), padded with -1."""
         return np.asarray(self._frame.guard_table[self._frame.component_numbers, z])
 
     def guard_title(self, guard: int, z: np.ndarray) -> str:
-        """A guard of the modes z in words."""
+        """Return the name of a guard in the modes z, for messages."""
         automaton, mode = self.automata[self.owner[guard]], int(z[self.owner[guard]])
         name = automaton.guard_names[mode][automaton.guards[mode].index(guard)]
         of = "" if automaton.name == SINGLE else f" of {automaton.name}"
         return f"guard {name}{of} in mode {automaton.modes[mode]}"
 
     def active(self, z: np.ndarray) -> np.ndarray:
-        """Mask of the guards that the modes in z have."""
+        """Return a mask of the guards that are active in the modes z."""
         mask = np.zeros(self.guard_count, dtype=np.bool_)
         numbers = self.guards_of(z)
         mask[numbers[numbers >= 0]] = True
         return mask
 
     def mode_rows(self, z: np.ndarray) -> list[tuple[int, ...]]:
-        """The rows of the tape in the modes z."""
+        """Return the rows of the tape in the modes z."""
         rows: list[tuple[int, ...]] = []
         for component, branches in self.code.data["tape"]["parts"]:
             rows += branches[0 if component < 0 else z[component]]
         return rows
 
     def lean_tape(self, z: np.ndarray) -> LeanTape:
-        """The tape of the modes z for series of any order."""
+        """Return the tape of the modes z for series of any order."""
         key = z.tobytes()
         if key not in self._lean:
             active = np.flatnonzero(self.active(z))
@@ -466,7 +465,7 @@ class System:
         return self._lean[key]
 
     def high_rows(self, z: np.ndarray) -> list[tuple[int, ...]]:
-        """The rows of that tape for high orders of states, active guards and monitors."""
+        """Return the rows of that tape for high orders of states, active guards and monitors."""
         key = z.tobytes()
         if key in self._high:
             return self._high[key]
@@ -486,9 +485,9 @@ class System:
         s_error: float,
         with_numbers: bool = False,
     ) -> Series | DifferenceSeries:
-        """Coefficients up to third order of guards, surfaces, monitors and states along the flow of z.
+        """Return coefficients up to third order of guards, surfaces, monitors and states along the flow of z.
 
-        with_numbers: the bounds count the own roundoff of the model's numbers.
+        with_numbers: whether the bounds include the roundoff of the numbers in the model.
         """
         if not self.has_tape:
             return self._differences(s, x, p, z, x_error, s_error)
@@ -504,7 +503,7 @@ class System:
     def _differences(
         self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray, x_error: np.ndarray, s_error: float
     ) -> DifferenceSeries:
-        """The same where functions are known by their values alone."""
+        """Return the same by finite differences, for models of Python functions."""
         guards = self.guard_count
         shape = (guards + len(self.monitor_names), ORDER + 1)
         C, G, E = np.empty((self.n, ORDER + 1)), np.empty(shape), np.empty(shape)
@@ -516,14 +515,14 @@ class System:
         return DifferenceSeries(C, G[:guards], E[:guards], G[guards:], E[guards:])
 
     def jacobian(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """d(dx/dt)/dx (n, n) by differences: for functions that are known by their values alone."""
+        """Return d(dx/dt)/dx (n, n) by differences, for models of Python functions."""
         out = np.empty((self.n, self.n))
         t = float(p[self.layout.origin_at]) + s
         run_jacobian(self.address("flow"), s, t, x, self._probing(p), z, out)
         return out
 
     def _probing(self, p: np.ndarray) -> np.ndarray:
-        """p for differences, which go far from the run: what Python functions raise there is not noted."""
+        """Return p for differences, which suppresses notes on errors that Python functions raise far from the run."""
         p = p.copy()
         p[self.layout.pin_at] = 0.0
         return p

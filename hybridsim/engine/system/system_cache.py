@@ -1,4 +1,4 @@
-"""The systems of the models that were run last: a model that is run again and again is validated and bound once."""
+"""Cache the systems of recent models, so that a model run repeatedly is validated and bound once."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from hybridsim.forks import SharedLock
 if TYPE_CHECKING:
     from hybridsim.model.parts.model import Model
 
-_MOST = 16  # kept with their models; a loop over a few models finds them all
+_MOST = 16  # largest number of cached systems, enough for loops over several models
 
 _kept: dict[int, System] = {}
 _lock = SharedLock()
 
 
 def known_system(model: Model) -> System | None:
-    """The system of a model that was run lately."""
-    # a system holds its model, so nothing else has that number while it is kept
+    """Return the cached system of a model, or None."""
+    # a system keeps its model alive, so no other object has the same id
     return _kept.get(id(model))
 
 
 def system_of(model: Model) -> System:
-    """The system of a valid model, the same for the same object: models are frozen and systems keep nothing of a run.
+    """Return the system of a valid model, cached by identity. Models are frozen, and systems keep no state of runs.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""First derivatives of rates, guards, surfaces and monitors by everything they depend on: the tape run on tangents.
+"""Compute first derivatives of rates, guards, surfaces and monitors by everything they depend on.
 
-Forward automatic differentiation (A. Griewank and A. Walther, Evaluating Derivatives, 2nd ed., SIAM 2008, chapter 3):
-beside the value of each register stand its derivatives in D directions, and each operation has its own rule for them.
+This is forward automatic differentiation of the tape (A. Griewank and A. Walther, Evaluating Derivatives, 2nd ed., SIAM
+2008, chapter 3). Each register has its value and its derivatives in D directions, and each operation has its own rule.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ from hybridsim.engine.system.system import System
 
 @inlined
 def _combine(D: Any, out: int, first: float, a: int, second: float, b: int) -> None:
-    """D[out] = first D[a] + second D[b]; what has no tangent does not count, however large its factor."""
+    """Set D[out] = first D[a] + second D[b]. Zero tangents contribute zero, even with infinite factors."""
     for j in range(D.shape[1]):
         total = 0.0
         if D[a, j] != 0.0:
@@ -57,7 +57,7 @@ def _combine(D: Any, out: int, first: float, a: int, second: float, b: int) -> N
 
 @kernel
 def _tangent(op: int, a: int, b: int, c: int, out: int, V: Any, D: Any) -> None:
-    """The rule of one operation, all values V[register, 0] being known."""
+    """Apply the rule of one operation. All values V[register, 0] are known."""
     u, v, y = V[a, 0], V[b, 0], V[out, 0]
     if op in (ADD, ADD_CONSTANT):
         _combine(D, out, 1.0, a, 1.0, b)
@@ -96,7 +96,7 @@ def _tangent(op: int, a: int, b: int, c: int, out: int, V: Any, D: Any) -> None:
         _combine(D, out, 1.0 if takes_a else 0.0, a, 0.0 if takes_a else 1.0, b)
     elif op == SELECT:
         source = b if u != 0.0 else c
-        for j in range(D.shape[1]):  # what is so at one point alone is not so beside it
+        for j in range(D.shape[1]):  # equality at one point does not hold next to it
             D[out, j] = D[c, j] if u != 0.0 and D[a, j] != 0.0 else D[source, j]
     elif op == EQUAL:
         _combine(D, out, 1.0, a, -1.0, b)
@@ -118,9 +118,9 @@ def run_tangents(
     values: Any,
     tangents: Any,
 ) -> None:
-    """Values (m, W) and tangents (m, W, D) of the wanted registers (W,) at local times s (m,) and states x (m, n).
+    """Write values (m, W) and tangents (m, W, D) of registers (W,) at local times s (m,) and states x (m, n).
 
-    seeds (n + 1 + P, D): directions of the states, of local time and of each entry of p.
+    seeds (n + 1 + P, D): directions of the states, of local time, and of each entry of p.
     """
     time, states = inputs.time[0], inputs.states
     n = states.shape[0]
@@ -159,11 +159,11 @@ class Tangents(NamedTuple):
 
 
 class TangentTape:
-    """Rates, and whatever else is asked for, of one vector of modes with their derivatives.
+    """The tape of one vector of modes for rates and further functions with their derivatives.
 
     Parameters
     ----------
-    guards, monitors, surfaces : numbers of those that are wanted behind the rates of the n states.
+    guards, monitors, surfaces : numbers of the functions that follow the rates of the n states.
     """
 
     def __init__(
@@ -188,11 +188,11 @@ class TangentTape:
         self._registers = system.registers
 
     def is_same(self, other: TangentTape) -> bool:
-        """Whether another tape computes the same quantities by the same operations."""
+        """Return whether another tape computes the same quantities by the same operations."""
         return np.array_equal(self._rows, other._rows) and np.array_equal(self._wanted, other._wanted)
 
     def __call__(self, s: np.ndarray, x: np.ndarray, p: np.ndarray, seeds: np.ndarray) -> Tangents:
-        """At local times s (m,) and states x (m, n), along the directions seeds (n + 1 + len(p), D)."""
+        """Evaluate at local times s (m,) and states x (m, n), along the directions seeds (n + 1 + len(p), D)."""
         count, wanted, directions = self._registers.count, len(self._wanted), seeds.shape[1]
         values, slopes = np.empty((len(s), wanted)), np.empty((len(s), wanted, directions))
         run_tangents(

@@ -1,4 +1,4 @@
-"""What happens at times known beforehand: scheduled resets, clock ticks, knots of inputs."""
+"""Schedule the events at known times: scheduled resets, clock ticks, and knots of inputs."""
 
 from __future__ import annotations
 
@@ -16,10 +16,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Appointment:
-    """An instant to be stepped to, and the schedules that are due then (none: a knot of an input).
+    """An instant to step to exactly, and the schedules due then (none for a knot of an input).
 
-    A schedule in whose list this time stands several times is there as often.
-    At a renewal nothing happens but that local time begins anew.
+    A schedule that lists this time several times occurs as often. At a renewal only the local time is restarted.
     """
 
     instant: Instant
@@ -32,7 +31,7 @@ class Timetable:
 
     def __init__(self, system: System, end: Instant) -> None:
         self._end = end
-        self.settled: Instant | None = None  # the last appointment that was kept, or the start of the run
+        self.settled: Instant | None = None  # last completed appointment, or the start of the run
         values = system.values
         self._signals = system.signals
         self._schedules = []
@@ -44,11 +43,11 @@ class Timetable:
             self._schedules.append((times, start, period, count))
 
     def kept(self, instant: Instant) -> None:
-        """Note that an instant is settled: what lies within rounding of it is not due once more."""
+        """Mark an instant as done, so that times within rounding of it are not due again."""
         self.settled = instant
 
     def due_at_start(self, start: Instant) -> tuple[int, ...]:
-        """Schedules whose very first time is the start of the run: a clock ticks at its offset."""
+        """Return the schedules whose first time is the start of the run, such as a clock at its offset."""
         return tuple(
             k
             for k in range(len(self._schedules))
@@ -57,10 +56,10 @@ class Timetable:
         )
 
     def next(self, after: Instant, forward: bool) -> Appointment | None:
-        """The nearest appointment strictly after an instant; what coincides within rounding comes together.
+        """Return the nearest appointment strictly after an instant. Times that agree within rounding are merged.
 
-        Two clocks whose periods are rounded to doubles differ by up to two ulps where they should meet. The last one
-        meets the end of the run in the same way; None where nothing is left before it.
+        Two clocks with rounded periods may differ by two ulps at a common time. The last time may coincide with the end
+        of the run in the same way. The result is None if no time is left before the end.
         """
         found: list[tuple[Instant, int]] = []
         for k in range(len(self._schedules)):
@@ -87,7 +86,7 @@ class Timetable:
         return Appointment(latest, tuple(k for k in due for _ in range(self._count(k, nearest))))
 
     def _count(self, k: int, instant: Instant) -> int:
-        """How often an instant, within rounding, stands in the list of a schedule that is due then; 1 for a clock."""
+        """Return how often an instant, within rounding, is in the list of a due schedule; 1 for a clock."""
         times, slack = self._schedules[k][0], self._slack(instant)
         if not times:
             return 1
@@ -95,7 +94,7 @@ class Timetable:
         return sum(abs(time.minus(instant)) <= slack for time in times[first:last])
 
     def _slack(self, near: Instant) -> float:
-        """What rounding of periods and offsets amounts to at an instant."""
+        """Return the rounding error of scheduled times near an instant."""
         return 2.0 * math.ulp(max(abs(near.high), *(abs(start) for _, start, _, _ in self._schedules), 0.0))
 
     def _first(self, k: int) -> Instant | None:
@@ -104,7 +103,7 @@ class Timetable:
 
     def _next(self, k: int, after: Instant, forward: bool) -> Instant | None:
         times, start, period, count = self._schedules[k]
-        if times:  # a list may be long
+        if times:  # bisection, because a list may be long
             index, step = (bisect_right(times, after), 1) if forward else (bisect_left(times, after) - 1, -1)
             while 0 <= index < len(times):
                 if not self._is_settled(times[index]):
@@ -120,6 +119,6 @@ class Timetable:
         return None if not ahead else (ahead[0] if forward else ahead[-1])
 
     def _is_settled(self, instant: Instant) -> bool:
-        """Whether it lies within rounding of the last appointment that was kept."""
+        """Return whether an instant is within rounding of the last completed appointment."""
         settled = self.settled
         return settled is not None and abs(instant.minus(settled)) <= self._slack(settled)

@@ -9,9 +9,9 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Error control of a run: rtol, atol for each state, bounds of the step."""
+    """Error control of a run: tolerances and bounds of the step."""
 
     rtol: float
-    atol: np.ndarray
+    atol: np.ndarray  # (n,)
     max_step: float = np.inf
     first_step: float | None = None

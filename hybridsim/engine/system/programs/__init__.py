@@ -1,4 +1,4 @@
-"""This folder keeps the tapes and the machine code for each combination of modes that a run meets.
+"""This folder stores the tapes and the machine code for each combination of modes that a run meets.
 
 Start with `mode_tables` (the tapes), then `mode_code` and `code_shelf` (their machine code).
 """

@@ -1,8 +1,7 @@
-"""Machine code of a structure's modes: for those that a run goes on in for long.
+"""Compile machine code for the modes in which a run takes many steps.
 
-A mode begins with the interpreter of `hybridsim.engine.series.interpreter`; where it has taken enough steps its code
-is compiled, or read from disk where an earlier process has left it. Both give the same bits, so it does not matter
-when.
+A mode starts with the interpreter of `hybridsim.engine.series.interpreter`. After enough steps its code is compiled, or
+read from disk if an earlier process stored it. Both give the same bits, so the time of the switch does not matter.
 """
 
 from __future__ import annotations
@@ -29,10 +28,10 @@ class CodeShelf(ABC):
 
     Parameters
     ----------
-    kind : names the files in which it is kept.
+    kind : name of the files in which the code is stored.
 
-    A shelf's `codes` is a named tuple of integer arrays: for each of its `functions` the addresses, one for each
-    vector of modes, 0 where there is none; and `lacked`, the steps that were taken without.
+    `codes` is a named tuple of integer arrays. For each of the `functions` it has the addresses, one for each vector of
+    modes, 0 for none. `lacked` counts the steps taken without code.
     """
 
     codes: ClassVar[Any]
@@ -41,20 +40,20 @@ class CodeShelf(ABC):
     def __init__(self, system: System, kind: str) -> None:
         self.system, self.kind = system, kind
         self._lock = SharedLock()
-        self._engines: list[Any] = []  # what keeps the code alive
+        self._engines: list[Any] = []  # references that keep the code alive
         self._known: tuple[Tapes | None, Any, Any] = (None, self._blank(0), None)
 
     @abstractmethod
     def _text(self, tape: ModeTape) -> str:
-        """A module with the functions of a mode, their names followed by _0."""
+        """Return the source of a module with the functions of a mode, whose names end with _0."""
 
     def _blank(self, count: int) -> Any:
-        """Codes for so many vectors of modes: no address yet."""
+        """Return codes without addresses for so many vectors of modes."""
         return self.codes(*(np.zeros(count, dtype=np.int64) for _ in self.codes._fields))
 
     def of(self, tapes: Tapes) -> Any:
-        """The code for these tapes, packed as kernels take it."""
-        known = self._known  # read once: other threads may put theirs in its place at any time
+        """Return the code for these tapes, packed for kernels."""
+        known = self._known  # read once, because other threads may replace it
         if known[0] is not tapes:
             with self._lock:
                 former, codes = self._known[1], self._blank(len(tapes.modes))
@@ -62,13 +61,13 @@ class CodeShelf(ABC):
                     shared = min(len(old), len(new))
                     new[:shared] = old[:shared]
                 known = tapes, codes, packed(codes)
-                # a shelf only grows, but another thread may be ahead
+                # codes only grow, but another thread may be ahead
                 if len(codes.lacked) >= len(former.lacked):
                     self._known = known
         return known[2]
 
     def look(self, tapes: Tapes, codes: Any) -> None:
-        """Get code ready for the modes that have taken many steps without it."""
+        """Prepare code for the modes that have taken many steps without it."""
         if not ENABLED or max(codes.lacked.tolist(), default=0) < KNOWN:
             return
         for k in np.flatnonzero(codes.lacked >= KNOWN).tolist():
@@ -83,7 +82,7 @@ class CodeShelf(ABC):
         tape = mode_tape(self.system, z)
         codes.lacked[k] = NEVER
         if tape.is_known:
-            with suppress(TooLong):  # it stays with the interpreter
+            with suppress(TooLong):  # too long to compile; the interpreter stays in use
                 names = tuple(f"{name}_0" for name in self.functions)
                 addresses, engine = compile_series(place, names, lambda: self._text(tape))
                 self._engines.append(engine)
@@ -91,4 +90,4 @@ class CodeShelf(ABC):
 
     def _put(self, codes: Any, k: int, addresses: list[int]) -> None:
         for name, address in zip(self.functions[::-1], addresses[::-1], strict=True):
-            getattr(codes, name)[k] = address  # the first one last: kernels look at it first
+            getattr(codes, name)[k] = address  # in reverse order, because kernels test the first one

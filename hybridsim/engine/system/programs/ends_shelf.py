@@ -1,4 +1,4 @@
-"""The machine code of Runge-Kutta methods: short series at the ends of steps, for the modes of a structure."""
+"""Machine code of Runge-Kutta methods: short series at the ends of steps, for the modes of a structure."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hybridsim.engine.system.system import System
 
 
 class EndsCodes(NamedTuple):
-    """As of a `CodeShelf`: functions at the end of a step, where a segment begins, and of guards along a step."""
+    """A `CodeShelf` tuple with functions at the end of a step, at the start of a segment, and for guards."""
 
     ends: np.ndarray
     first: np.ndarray
@@ -26,9 +26,9 @@ class EndsShelf(CodeShelf):
 
     Parameters
     ----------
-    terms : of the states at the end of a step.
-    first : order of the states where a segment begins.
-    order : of the guards along a step.
+    terms : number of terms of the states at the end of a step.
+    first : order of the states at the start of a segment.
+    order : order of the guards along a step.
     """
 
     codes = EndsCodes

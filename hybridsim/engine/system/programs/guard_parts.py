@@ -1,4 +1,4 @@
-"""Of the tapes on a shelf, what the guards alone need: fewer rows than the flow, and often only linear ones."""
+"""Extract from tapes the rows that the guards need: fewer than for the flow, and often only linear operations."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LINEAR = {ADD, SUB, NEG, ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB, SCALE, DIVID
 class Parts(NamedTuple):
     """Rows for the guards of each vector of modes, one slice each, and whether these are linear in states and time.
 
-    The other rows are those that a step needs: of the flow, and of guards where they are linear.
+    The step rows are those that a step needs: of the flow, and of guards that are linear.
     """
 
     start: np.ndarray
@@ -43,15 +43,15 @@ class _ModeParts(NamedTuple):
 
 
 class GuardParts:
-    """The parts of the tapes last seen; they follow from the structure of a model alone."""
+    """The parts of the most recent tapes, which depend on the structure of a model alone."""
 
     def __init__(self) -> None:
         self._known: tuple[Tapes, Parts] | None = None
-        self._of_modes: dict[bytes, _ModeParts] = {}  # tapes grow by a few vectors of modes again and again
+        self._of_modes: dict[bytes, _ModeParts] = {}  # reused when tapes grow
 
     def of(self, tapes: Tapes) -> Parts:
-        """The parts of these tapes."""
-        known = self._known  # read once: other threads may put theirs in its place at any time
+        """Return the parts of these tapes."""
+        known = self._known  # read once, because other threads may replace it
         if known is None or known[0] is not tapes:
             self._known = known = tapes, self._parts(tapes)
         return known[1]

@@ -1,4 +1,4 @@
-"""What machine code of one vector of modes is written from, and where it is kept on disk."""
+"""Provide the input for machine code of one vector of modes, and its location on disk."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     from hybridsim.engine.system.system import System
 
 _KIND = {EXP: EXPONENTIAL, SINHCOSH: HYPERBOLIC, TANGENT: HYPERBOLIC, SQRT: ROOT}
-KNOWN = 32  # times without it that make it worth reading machine code (2 ms): each costs a microsecond
-WORTH = 2000  # times after which there are likely to be as many more as pay for compiling (0.1 s)
-NEVER = -(2**62)  # in place of these times: there is code, or there will be none
+KNOWN = 32  # misses after which machine code is read from disk (2 ms); each miss costs about 1 us
+WORTH = 2000  # misses after which compiling (0.1 s) is likely to pay
+NEVER = -(2**62)  # count of misses if code exists, or cannot be made
 
 
 def mode_tape(system: System, z: np.ndarray) -> ModeTape:
-    """The tape of a vector of modes, with its active guards."""
+    """Return the tape of a vector of modes with its active guards."""
     tape, lean = system.code.data["tape"], system.lean_tape(z)
     return ModeTape(
         rows=_rows(lean.rows),
@@ -47,7 +47,7 @@ def mode_tape(system: System, z: np.ndarray) -> ModeTape:
 
 
 def _holding(system: System, z: np.ndarray) -> Iterator[int]:
-    """The registers of pin > 0: so it is but where states are looked at as they are, outside of a mode."""
+    """Yield the registers of the condition pin > 0, which is true except outside of modes."""
     tape = system.code.data["tape"]
     zeros = [register for register, value, _ in tape["constants"] if value == 0.0]
     pins = [register for register, source in tape["parameters"] if source == system.layout.pin_at]
@@ -57,7 +57,7 @@ def _holding(system: System, z: np.ndarray) -> Iterator[int]:
 
 
 def computed_rates(system: System, z: np.ndarray) -> list[bool]:
-    """Whether the rate of a state is worked out as time goes on: it is no constant, no other state, and not held."""
+    """Return for each state whether its rate is computed, rather than constant, another state, or held."""
     tape, sure = system.lean_tape(z), frozenset(_holding(system, z))
     rows = _rows(tape.rows)
     chosen = {out: b for op, a, b, _, out in rows if op == SELECT and a in sure}
@@ -71,7 +71,7 @@ def computed_rates(system: System, z: np.ndarray) -> list[bool]:
 
 
 def fading(system: System, z: np.ndarray) -> list[int]:
-    """Arguments of what may fade, as numbers of register, power and kind.
+    """Return the arguments of functions that may vanish, encoded as register, power and kind.
 
     See `hybridsim.engine.roots.vanishing_terms`.
     """
@@ -85,7 +85,7 @@ def fading(system: System, z: np.ndarray) -> list[int]:
 
 
 def _highest_power(rows: Iterable[tuple[int, ...]], first: int, count: int) -> int:
-    """To which power so many registers from the first on are raised by products, at most; by quotients the larger."""
+    """Return the highest power to which products raise `count` registers from `first` on."""
     powers = dict.fromkeys(range(first, first + count), 1)
     for row in rows:
         op, out = row[0], row[4]
@@ -99,7 +99,7 @@ def _highest_power(rows: Iterable[tuple[int, ...]], first: int, count: int) -> i
 
 
 def most_fading(system: System) -> int:
-    """How many these are at most, whatever the modes."""
+    """Return the largest number of such functions in any modes."""
     parts = system.code.data["tape"]["parts"]
     return sum(_may_fade(op, b) for _, branches in parts for rows in branches for op, _, b, *_ in rows)
 
@@ -109,12 +109,12 @@ def _may_fade(op: int, b: int) -> bool:
 
 
 def constant_rows(system: System, z: np.ndarray) -> tuple[tuple[int, ...], ...]:
-    """The rows of it that are run once a segment."""
+    """Return the rows that are executed once per segment."""
     return _rows(system.lean_tape(z).constant_rows)
 
 
 def given(system: System) -> Given:
-    """Where the constants of a system's tapes come from."""
+    """Return the sources of the constants of a system's tapes."""
     tape = system.code.data["tape"]
     return Given(
         {register: (value, error) for register, value, error in tape["constants"]},
@@ -124,7 +124,7 @@ def given(system: System) -> Given:
 
 
 def kept(system: System, kind: str, z: np.ndarray) -> Path | None:
-    """Where code of a kind is kept, if it is; the name of the machine comes behind it."""
+    """Return the path stem of stored code of a kind, or None; the name of the machine is appended."""
     file = getattr(system.code.module, "__file__", None)
     if file is None:
         return None

@@ -1,4 +1,4 @@
-"""A model's automata as arrays, and the tapes of every vector of modes that a run has met, for compiled loops."""
+"""Arrays for compiled loops: a model's automata, and the tapes of every vector of modes that a run has met."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ from hybridsim.engine.system.programs.modes_index import index_of
 from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
 
-_ALL = 27  # vectors of modes, as of three contacts: so many are on a shelf from the first on
+_ALL = 27  # largest number of vectors of modes that are all present from the start, as for three contacts
 
 
 class Automata(NamedTuple):
-    """What does not change: components, their guards, clusters, choices. -1 stands for none.
+    """The constant structure of a model: components, guards, clusters and choices. -1 stands for none.
 
     guards_of (C, M, W); hold, above, surface (C,); pin (C, most): states
     that a holding mode evaluates; owner, place (G,): component of a guard, index in its mode;
@@ -42,26 +42,26 @@ class Automata(NamedTuple):
     is_corner, is_unique, is_unilateral (C,).
     """
 
-    guards_of: np.ndarray
-    hold: np.ndarray
-    above: np.ndarray
-    pin: np.ndarray
-    surface: np.ndarray
-    owner: np.ndarray
-    place: np.ndarray
-    cluster_start: np.ndarray
-    cluster: np.ndarray
-    target: np.ndarray
-    reset: np.ndarray
-    reset_start: np.ndarray
-    reset_slot: np.ndarray
-    is_corner: np.ndarray
-    is_unique: np.ndarray
-    is_unilateral: np.ndarray
+    guards_of: np.ndarray  # guard numbers (C, M, W) of component and mode
+    hold: np.ndarray  # holding mode (C,)
+    above: np.ndarray  # mode above the surface (C,)
+    pin: np.ndarray  # states (C, most) that a holding mode evaluates
+    surface: np.ndarray  # number of the surface (C,)
+    owner: np.ndarray  # component (G,) of each guard
+    place: np.ndarray  # index (G,) of each guard in its mode
+    cluster_start: np.ndarray  # start (C + 1,) of each cluster in `cluster`
+    cluster: np.ndarray  # members of the cluster of each component
+    target: np.ndarray  # target mode (C, M, W, T) of each choice
+    reset: np.ndarray  # reset (C, M, W, T) of each choice
+    reset_start: np.ndarray  # start of each reset in `reset_slot`
+    reset_slot: np.ndarray  # what a reset sets: index of a state, or n + index of a discrete state
+    is_corner: np.ndarray  # (C,)
+    is_unique: np.ndarray  # (C,)
+    is_unilateral: np.ndarray  # (C,)
 
 
 class Tapes(NamedTuple):
-    """One row or one slice for each vector of modes: modes, lean rows, those of high orders, constant rows, active
+    """The tapes of K vectors of modes, one row or one slice each.
     guards, registers. places: see `hybridsim.engine.system.programs.modes_index`.
 
     computed: whether the rate of a state is worked out as time goes on, and is no constant and no other state. fading:
@@ -70,33 +70,33 @@ class Tapes(NamedTuple):
     was missed.
     """
 
-    modes: np.ndarray
-    places: np.ndarray
+    modes: np.ndarray  # modes (K, C)
+    places: np.ndarray  # hash table: `hybridsim.engine.system.programs.modes_index`
     lean_start: np.ndarray
-    lean: np.ndarray
+    lean: np.ndarray  # rows of the lean tapes
     high_start: np.ndarray
-    high: np.ndarray
+    high: np.ndarray  # rows for high orders
     constant_start: np.ndarray
-    constant: np.ndarray
+    constant: np.ndarray  # rows executed once per segment
     active_start: np.ndarray
-    active: np.ndarray
+    active: np.ndarray  # active guards
     fading_start: np.ndarray
-    fading: np.ndarray
-    derivatives: np.ndarray
-    computed: np.ndarray
-    guards: np.ndarray
-    bounds: np.ndarray
-    lacked: np.ndarray
+    fading: np.ndarray  # vanishing functions: `hybridsim.engine.system.programs.mode_code`
+    derivatives: np.ndarray  # registers of the rates
+    computed: np.ndarray  # whether the rate of each state is computed
+    guards: np.ndarray  # registers of the guards
+    bounds: np.ndarray  # addresses of code for short series of the guards with bounds, 0 for none
+    lacked: np.ndarray  # number of times that this code was missing
 
 
 def automata_of(system: System) -> Automata:
-    """The arrays of a system's automata, as kernels take them."""
+    """Return the arrays of a system's automata, packed for kernels."""
     automata: Automata = system.code.shared("automata", lambda: packed(_automata(system)))
     return automata
 
 
 def shelf_of(system: System) -> TapeShelf:
-    """The shelf of all systems of one structure."""
+    """Return the tapes shared by all systems of one structure."""
     shelf: TapeShelf = system.code.shared("shelf", lambda: TapeShelf(system))
     return shelf
 
@@ -149,16 +149,16 @@ def _automata(system: System) -> Automata:
 
 
 def _flat(lists: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Where each of several lists begins, and all of them in a row."""
+    """Return the start of each list in their concatenation, and the concatenation."""
     starts = np.cumsum([0, *(len(part) for part in lists)])
     return starts.astype(np.int64), np.array([i for part in lists for i in part], dtype=np.int64)
 
 
 class TapeShelf:
-    """The tapes of the modes met so far; grows when a run comes to a new vector of modes.
+    """The tapes of the modes met so far; it grows when a run reaches a new vector of modes.
 
-    Where there are few it holds all of them from the first on: what is on the shelf decides which way an event is
-    taken, and so the last digits, which then do not depend on what was run before.
+    If there are few vectors, all are present from the start. The presence of a tape decides how an event is resolved,
+    and so affects the last digits. These digits then do not depend on earlier runs.
     """
 
     def __init__(self, system: System) -> None:
@@ -167,13 +167,13 @@ class TapeShelf:
         self._met: dict[bytes, np.ndarray] = {}
         self._surrounded: set[bytes] = set()
         self._lock = SharedLock()
-        self._engines: list[Any] = []  # what keeps machine code alive
+        self._engines: list[Any] = []  # references that keep the machine code alive
         self._code = np.zeros((2, 0), dtype=np.int64)
-        self._rows: list[_ModeRows] = []  # of the vectors of modes met
+        self._rows: list[_ModeRows] = []  # rows of the vectors of modes met so far
         self.tapes = self._stacked()
 
     def look(self) -> None:
-        """Get code ready for the short series that were missed often."""
+        """Prepare code for the short series that were often missed."""
         tapes = self.tapes
         if not ENABLED or max(tapes.lacked.tolist(), default=0) < KNOWN:
             return
@@ -191,7 +191,7 @@ class TapeShelf:
         tapes.lacked[k] = NEVER
         if can_bound(tape, rows):
             numbers = np.flatnonzero(system.active(z)).tolist()
-            with suppress(TooLong):  # it stays with the interpreter
+            with suppress(TooLong):  # too long to compile; the interpreter stays in use
                 (address,), engine = compile_series(
                     place,
                     ("bounds_0",),
@@ -201,7 +201,7 @@ class TapeShelf:
                 tapes.bounds[k] = address
 
     def surround(self, z: np.ndarray) -> None:
-        """Put the tapes of a vector of modes on the shelf, and those of the modes that one event may lead to."""
+        """Add the tapes of a vector of modes, and of the modes to which one event may lead."""
         if z.tobytes() in self._surrounded:
             return
         with self._lock:
@@ -220,7 +220,7 @@ class TapeShelf:
             self._surrounded.add(z.tobytes())
 
     def rows_of(self, vectors: np.ndarray) -> np.ndarray:
-        """Rows of these vectors of modes (k, components), which are put on the shelf where they are not there."""
+        """Return the rows of these vectors of modes (k, components), and add missing ones."""
         with self._lock:
             met = len(self._met)
             for z in vectors:
@@ -257,7 +257,7 @@ class TapeShelf:
 
 
 class _ModeRows(NamedTuple):
-    """What `Tapes` has of one vector of modes."""
+    """The rows of `Tapes` for one vector of modes."""
 
     lean: np.ndarray
     high: np.ndarray
@@ -270,7 +270,7 @@ class _ModeRows(NamedTuple):
 
     @classmethod
     def of(cls, system: System, z: np.ndarray) -> _ModeRows:
-        """Worked out once: a shelf that grows by a few vectors of modes again and again takes up the others."""
+        """Compute the rows. They are reused whenever the tapes grow."""
         tape = system.lean_tape(z)
         return cls(
             tape.rows,
@@ -285,6 +285,6 @@ class _ModeRows(NamedTuple):
 
 
 def in_a_row(parts: list[np.ndarray], columns: tuple[int, ...] = (5,)) -> tuple[np.ndarray, np.ndarray]:
-    """Where each of several arrays of whole numbers begins, and all of them; columns: shape of an entry."""
+    """Return the start of each integer array in their concatenation, and the concatenation; columns: entry shape."""
     starts = np.cumsum([0, *(len(part) for part in parts)]).astype(np.int64)
     return starts, np.concatenate([np.zeros((0, *columns), dtype=np.int64), *parts])

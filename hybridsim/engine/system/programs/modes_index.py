@@ -1,7 +1,8 @@
-"""Where a vector of modes is on a shelf: by a table of remainders once it is long, so that no event searches all of it.
+"""Find a vector of modes among the tapes, by a hash table if there are many.
 
-Open addressing: a vector goes to the first free place from the one that its number, written with its modes as digits,
-leaves as a remainder (D. E. Knuth, The Art of Computer Programming, vol. 3, 2nd ed. 1998, section 6.4, algorithm L).
+The table uses open addressing: a vector is stored at the first free slot after its hash, the number with its modes as
+digits modulo the table size (D. E. Knuth, The Art of Computer Programming, vol. 3, 2nd ed. 1998, section 6.4,
+algorithm L).
 """
 
 from __future__ import annotations
@@ -13,8 +14,8 @@ import numpy as np
 from hybridsim.engine.native.kernels import inlined, kernel
 from hybridsim.engine.native.loop_hints import few
 
-_SEARCHED = 32  # vectors of a shelf that is searched from one end to the other
-_ROOM = 4  # places for each vector, at least
+_SEARCHED = 32  # largest number of vectors with a linear search
+_ROOM = 4  # least number of slots for each vector
 _FREE = -1
 
 
@@ -29,7 +30,7 @@ def _is_at(modes: Any, k: int, z: Any) -> bool:
 
 @inlined
 def _first_place(z: Any, count: int) -> int:
-    """The remainder of a vector's number, for a power of two."""
+    """Return the hash of a vector: its number modulo a power of two."""
     number = 0
     for c in range(z.shape[0]):
         few()
@@ -47,7 +48,7 @@ def _fill(modes: Any, index: Any) -> None:
 
 
 def index_of(modes: np.ndarray) -> np.ndarray:
-    """The table of these vectors (K, components), no two alike: rows, or -1 where a place is free."""
+    """Return the hash table of these distinct vectors (K, components): rows, or -1 for a free slot."""
     if len(modes) <= _SEARCHED:
         return np.full(1, _FREE, dtype=np.int64)
     index = np.full(1 << (_ROOM * len(modes) - 1).bit_length(), _FREE, dtype=np.int64)
@@ -57,7 +58,7 @@ def index_of(modes: np.ndarray) -> np.ndarray:
 
 @inlined
 def find_modes(tapes: Any, z: Any) -> int:
-    """Row of a vector of modes on the shelf; -1 where it is not."""
+    """Return the row of a vector of modes in the tapes, or -1."""
     modes, index = tapes.modes, tapes.places
     if modes.shape[0] <= _SEARCHED:
         for k in range(modes.shape[0]):

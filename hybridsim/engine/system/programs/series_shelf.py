@@ -1,4 +1,4 @@
-"""The machine code of Taylor's method: series of one order, for the modes of a structure."""
+"""Machine code of Taylor's method: series of one order, for the modes of a structure."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hybridsim.engine.system.system import System
 
 
 class Codes(NamedTuple):
-    """As of a `CodeShelf`: series, values, ahead, sizes are those of `hybridsim.engine.series.emit_series`.
+    """A `CodeShelf` tuple: series, values, ahead and sizes are those of `hybridsim.engine.series.emit_series`.
 
     bernstein: addresses of the functions of `hybridsim.engine.series.emit_bernstein`.
     """

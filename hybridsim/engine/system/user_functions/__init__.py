@@ -1,4 +1,4 @@
-"""This folder runs models whose rates are Python functions: compiled where numba can, else called.
+"""This folder runs models of Python functions: compiled by numba if possible, else called from the engine.
 
 Start with `forms`, then `compiled` and `code`.
 """

@@ -1,4 +1,4 @@
-"""The code of a model whose rates are Python functions: what `hybridsim.engine.system.modules` emits for all others."""
+"""The code of a model of Python functions, in place of the generated code of `hybridsim.engine.system.modules`."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class RunRecord(Protocol):
-    """The part of a run's record to which user functions add what they have to say."""
+    """The part of the record of a run to which user functions add warnings."""
 
     status: str
     message: str
@@ -31,9 +31,9 @@ class RunRecord(Protocol):
 
 
 class PythonCode:
-    """A model's Python functions, compiled where numba can, else called back from the engine.
+    """The Python functions of a model, compiled by numba if possible, else called back from the engine.
 
-    It is used like `hybridsim.engine.system.modules.Compiled`; ``data["tape"]`` is None.
+    It has the interface of `hybridsim.engine.system.modules.Compiled`; ``data["tape"]`` is None.
     """
 
     seconds = 0.0
@@ -75,7 +75,7 @@ class PythonCode:
         self._kept: dict[str, Any] = {}
         self._things: dict[str, Any] = {}
         self._compiler: Any = None
-        self.refused = ""  # numba's reason, where it cannot compile them
+        self.refused = ""  # reason of numba if it cannot compile them
         self._surroundings = surroundings(self._functions)
         if kernels.ENABLED:
             from hybridsim.engine.system.user_functions.compiled import Compiler
@@ -91,18 +91,18 @@ class PythonCode:
 
     @property
     def is_current(self) -> bool:
-        """Whether the globals that the functions read are as they were when they were compiled."""
+        """Return whether the globals that the functions read are the same as when they were compiled."""
         is_live = self._compiler is None or bool(self.refused)
         return is_live or surroundings(self._functions) == self._surroundings
 
     def shared(self, name: str, make: Callable[[], Any]) -> Any:
-        """As in `Compiled`."""
+        """Return a value made once, as in `Compiled`."""
         if name not in self._things:
             self._things.setdefault(name, make())
         return self._things[name]
 
     def address(self, name: str) -> Any:
-        """Address of one of flow, guards, monitors, quantities, and watched: guards and monitors together."""
+        """Return the address of flow, guards, monitors, quantities, or watched (guards and monitors)."""
         if name not in self._kept:
             self._kept.setdefault(name, self._addressed(name))
         return self._kept[name][0]
@@ -122,22 +122,23 @@ class PythonCode:
         return compiled
 
     def last_failure(self) -> str:
-        """The last exception of a run in words, empty where there was none; the next call tells of what came since."""
+        """Return the last exception of a run as text, or an empty text, and reset it."""
         if self._compiler is not None and not self.refused:
             self._compiler.replay(self.forms.failures)
         last, self.forms.failures.last = self.forms.failures.last, ""
         return last
 
     def flow_without_value(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> str:
-        """What a flow returns where a rate is no finite number, in words with its name.
+        """Return which flow returned a rate that is not finite, with its values, as text.
 
-        Empty where it raises: that is told by `report`, also where compiled code does not (it divides by zero).
+        The text is empty if the flow raises an error. `report` covers that case, even if compiled code does not raise,
+        as in a division by zero.
         """
         function, given = self.forms.flow_of(z), self.forms.arguments(s, x, p)
         try:
-            with np.errstate(all="ignore"):  # it looks for what is no number
+            with np.errstate(all="ignore"):  # nan is what it looks for
                 found = rates(function, self.parts.states, *given)
-        except Exception as fault:  # a user's code may raise anything
+        except Exception as fault:  # user code may raise anything
             self.forms.failures.note(function, given[0], fault, True)
             return ""
         if np.isfinite(found).all():
@@ -149,11 +150,11 @@ class PythonCode:
 
     @property
     def refused_in_words(self) -> str:
-        """Why the functions are not compiled."""
+        """Return why the functions are not compiled."""
         return f"numba cannot compile its Python functions ({self.refused})"
 
     def report(self, trajectory: RunRecord) -> None:
-        """Say in a run's record what it owes to functions that are known by their values alone."""
+        """Add warnings to the record of a run about derivatives, compilation and exceptions."""
         if self._rows["watched"]:
             trajectory.warn(
                 "derivatives of guards and monitors are finite differences of the Python functions"
@@ -165,9 +166,9 @@ class PythonCode:
             trajectory.message += f"; {failure}"
 
     def check(self, x: np.ndarray, p: np.ndarray) -> None:
-        """Call each function once, in plain Python: shapes and mistakes show here, by the name of the function.
+        """Call each function once in plain Python, to report wrong shapes and mistakes with the name of the function.
 
-        What is not a number there (out of its domain, in a mode that does not hold) is left to the run.
+        Values that are not numbers there (outside the domain, or in an inactive mode) are left to the run.
         """
         t, state, named = self.forms.arguments(0.0, x, p)
         flows = [(function, True) for _, function in self.parts.flows]
@@ -183,16 +184,16 @@ class PythonCode:
                 raise
             except (ArithmeticError, ValueError):
                 continue
-            except Exception as fault:  # a user's code may raise anything; told with its place
+            except Exception as fault:  # user code may raise anything; the error names its place
                 name = function_name(function)
                 message = f"the function {name} raised {type(fault).__name__}: {fault} at t = {t!r}"
                 remedy = f"call {name}(t, x, p) with the initial values to see where"
                 raise ModelError(message, remedy=remedy) from fault
 
-    # -- what runs once an event, in plain Python -----------------------------------------------------------
+    # -- functions called once per event, in plain Python ---------------------------------------------------
 
     def _choose(self, s: float, x: Any, p: Any, z: Any, out: Any) -> int:
-        """As the generated function of that name; component, mode and guard stand behind the modes."""
+        """Act as the generated function of that name; component, mode and guard follow the modes in z."""
         c, m, g = (int(k) for k in z[-3:])
         out[0] = -1.0
         for k, condition in enumerate(self.conditions[c, m, g]):
@@ -202,7 +203,7 @@ class PythonCode:
         return 0
 
     def _reset(self, s: float, x: Any, p: Any, z: Any, out: Any) -> int:
-        """As the generated function of that name; the number of the reset stands behind the modes."""
+        """Act as the generated function of that name; the number of the reset follows the modes in z."""
         names = [state.name for state in self.model.states]
         for name, function in self.resets[int(z[-1])][1].items():
             out[names.index(name)] = self.forms.number(function, s, x, p)
@@ -216,7 +217,7 @@ def _refuse_other_arguments(parts: Parts) -> None:
     for function in filter(callable, functions):
         try:
             inspect.signature(function).bind(0.0, None, None)
-        except ValueError:  # what was written in C may have no signature: the first call tells
+        except ValueError:  # C functions may have no signature; the first call will show
             continue
         except TypeError:
             name = function_name(function)
@@ -237,9 +238,9 @@ def _conditions(model: Model) -> dict[tuple[int, int, int], tuple[Any, ...]]:
 
 
 def _resets(model: Model) -> list[tuple[tuple[Any, ...], dict[str, Any]]]:
-    """(what, state -> function or number) of every reset: of choices, limits, monitors and schedules.
+    """Return (key, state -> function or number) of every reset: of choices, limits, monitors and schedules.
 
-    Behind them, by `added`, stand the amounts of those that add.
+    They are followed by the added amounts, with keys made by `added`.
     """
     found: list[tuple[tuple[Any, ...], Any]] = [
         (("choice", c, m, g, k), choice.reset)

@@ -1,4 +1,4 @@
-"""A user's Python functions compiled by numba into the engine's form, or called back from it. Needs the compiler."""
+"""Compile a user's Python functions with numba into the form of the engine, or call them back. Needs the compiler."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from hybridsim.engine.system.user_functions.forms import Failures, Parts, Scalar
 from hybridsim.engine.system.user_functions.helpers import compiled_with_helpers
 from hybridsim.expr import function_name
 
-_REASON = 160  # characters of numba's reason that are shown
+_REASON = 160  # largest number of characters shown of a reason
 _HEADS = ("Failed in nopython mode", "During:", "File ", "<source", "def ", "- Resolution", "^")
 
 
 @intrinsic
 def _doubles_at(typingctx: Any, address: Any) -> Any:
-    """A pointer to doubles out of an address."""
+    """Return a pointer to doubles at an address."""
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.inttoptr(args[0], context.get_value_type(signature.return_type))
@@ -37,7 +37,7 @@ def _doubles_at(typingctx: Any, address: Any) -> Any:
 
 @numba.njit
 def _mark(address: int, function: int, t: float, x: Any, p: Any) -> None:
-    """Note in memory of ours the last call that raised: number of the function, from one, t, states, parameters."""
+    """Store the last call that raised: number of the function (from 1), t, states, parameters."""
     room = numba.carray(_doubles_at(address), (2 + x.shape[0] + p.shape[0],))
     room[0], room[1] = function, t
     room[2 : 2 + x.shape[0]] = x
@@ -45,7 +45,7 @@ def _mark(address: int, function: int, t: float, x: Any, p: Any) -> None:
 
 
 class Compiler:
-    """Compiles the functions of one model; `refused` is numba's reason where it cannot."""
+    """Compiles the functions of one model; `refused` is the reason if numba cannot."""
 
     def __init__(self, parts: Parts) -> None:
         self.parts = parts
@@ -61,7 +61,7 @@ class Compiler:
             self.refused = self.refused or self._take(function, is_flow)
 
     def flow(self) -> tuple[int, Any]:
-        """Address of the flow, and what keeps it alive."""
+        """Return the address of the flow, and an object that keeps it alive."""
         flows = [(mode, self._written[id(function), True]) for mode, function in self.parts.flows]
         chosen = _in_every_mode(flows[-1][1])
         for mode, write in flows[-2::-1]:
@@ -69,7 +69,7 @@ class Compiler:
         return _as_cfunc(chosen)
 
     def row(self, scalars: tuple[Scalar, ...]) -> tuple[int, Any]:
-        """Address of a function of several numbers."""
+        """Return the address of a function of several numbers, and an object that keeps it alive."""
         chain = _nothing
         for k, scalar in reversed(list(enumerate(scalars))):
             f = scalar.function
@@ -78,7 +78,7 @@ class Compiler:
         return _as_cfunc(chain)
 
     def replay(self, failures: Failures) -> None:
-        """Call again, in plain Python, what raised last in compiled code, to tell what it said."""
+        """Repeat in plain Python the last call that raised in compiled code, to get its error."""
         if self.room[0] == 0.0:
             return
         function, is_flow = self.functions[int(self.room[0]) - 1]
@@ -87,11 +87,11 @@ class Compiler:
         self.room[0] = 0.0
         try:
             rates(function, self.parts.states, t, x, p) if is_flow else number(function, t, x, p)
-        except Exception as fault:  # a user's code may raise anything; the run ends with what it said
+        except Exception as fault:  # user code may raise anything; the run ends with its error
             failures.note(function, t, fault, True)
 
     def _take(self, function: Any, is_flow: bool) -> str:
-        """Compile a function, and what writes its result into out; numba's reason where it cannot."""
+        """Compile a function and the code that writes its result to out. Return the reason if numba cannot."""
         if (id(function), is_flow) in self._written:
             return ""
         if not (inspect.isfunction(function) or hasattr(function, "py_func")):
@@ -101,7 +101,11 @@ class Compiler:
         signature = (types.float64, types.Array(types.float64, 1, "C"), named)
         try:
             own.compile(signature)
-        except (NumbaError, NotImplementedError, TypeError) as fault:  # the last of arguments with defaults
+        except (
+            NumbaError,
+            NotImplementedError,
+            TypeError,
+        ) as fault:  # TypeError is for arguments with defaults
             return f"{function_name(function)}: {_in_short(fault)}"
         returned = own.overloads[signature].signature.return_type
         if _put_compiled(returned, None, None, None) is None:
@@ -112,7 +116,7 @@ class Compiler:
         return ""
 
     def _wrapped(self, function: Any, number: int, width: int) -> Any:
-        """width: how many numbers it returns in a row; -1 for a single one that is no row."""
+        """Return code that calls a function and writes `width` numbers; width = -1 for a scalar."""
         n, count, origin = self.parts.states, self.count, self.parts.origin_at
         parameters, address, length = self.parts.parameters, self.room.ctypes.data, abs(width)
 
@@ -123,10 +127,10 @@ class Compiler:
             try:
                 named = parameters(*to_fixed_tuple(given, count))
                 _put(function(t, state.copy(), named), out, at, width)
-            except Exception:  # numba compiles no other clause; what it was a second call tells
+            except Exception:  # numba supports no other clause; a repeated call gives the error
                 raised = True
             if raised:
-                if p[origin + 1] > 0.0:  # on the run, not in differences far from it
+                if p[origin + 1] > 0.0:  # on the run, not in finite differences far from it
                     _mark(address, number, t, state, given)
                 for i in range(length):
                     out[at + i] = math.nan
@@ -135,12 +139,12 @@ class Compiler:
 
 
 def _put(given: Any, out: Any, at: int, width: int) -> None:
-    """Write what a function returned, `width` numbers in a row or (-1) a single one; raises where it is not that."""
+    """Write the result of a function, `width` numbers or (-1) a scalar; raises if it has another form."""
     raise NotImplementedError("compiled code only")
 
 
 def _put_compiled(given: Any, out: Any, at: Any, width: Any) -> Any:
-    """How to write what is of this type; None for what is not numbers."""
+    """Return code that writes a result of this type, or None for a type that is not numeric."""
     real = (types.Float, types.Integer, types.Boolean)
     parts = given.types if isinstance(given, types.BaseTuple) else (getattr(given, "dtype", given),)
     if not all(isinstance(part, real) for part in parts):
@@ -153,7 +157,7 @@ def _put_compiled(given: Any, out: Any, at: Any, width: Any) -> Any:
             out[at] = given
 
         return single
-    if isinstance(given, types.Tuple):  # of different types
+    if isinstance(given, types.Tuple):  # a tuple of different types
 
         def mixed(given: Any, out: Any, at: Any, width: Any) -> Any:
             if len(given) != width:
@@ -183,7 +187,7 @@ overload(_put)(_put_compiled)
 
 @numba.njit
 def _nothing(s: float, x: Any, p: Any, z: Any, out: Any) -> None:
-    """End of a chain."""
+    """Do nothing: the end of a chain."""
 
 
 def _constant(value: float) -> Any:
@@ -195,7 +199,7 @@ def _constant(value: float) -> Any:
 
 
 def _one_more(write: Any, place: int, component: int, mode: int, rest: Any) -> Any:
-    """A chain with one more number in front; 1 where its mode is not active."""
+    """Return a chain with one more number in front, which is 1 if its mode is not active."""
 
     @numba.njit
     def chain(s: float, x: Any, p: Any, z: Any, out: Any) -> None:
@@ -209,7 +213,7 @@ def _one_more(write: Any, place: int, component: int, mode: int, rest: Any) -> A
 
 
 def _either(component: int, mode: int, write: Any, other: Any) -> Any:
-    """A flow that is `write` in one mode."""
+    """Return a flow that is `write` in one mode, and `other` in the rest."""
 
     @numba.njit
     def chosen(s: float, x: Any, p: Any, z: Any, out: Any) -> None:
@@ -239,7 +243,7 @@ def _as_cfunc(function: Any) -> tuple[int, Any]:
 
 
 def called_back(form: Callable[..., int], parts: Parts, components: int, width: int) -> tuple[int, Any]:
-    """Address of a C function that calls a Python form, and what keeps it alive."""
+    """Return the address of a C function that calls a Python form, and an object that keeps it alive."""
     sizes = (parts.states, parts.origin_at + 2)
 
     def call(s: float, x: int, p: int, z: int, out: int) -> int:
@@ -260,7 +264,7 @@ def called_back(form: Callable[..., int], parts: Parts, components: int, width: 
 
 
 def _in_short(fault: Exception) -> str:
-    """The first line of a reason that says something, without colours."""
+    """Return the first informative line of an error, without colours."""
     lines = [line.strip() for line in re.sub(r"\x1b\[[0-9;]*m", "", str(fault)).splitlines()]
     telling = [line for line in lines if line and not line.startswith(_HEADS)]
     text = (telling or [type(fault).__name__])[0]

@@ -1,4 +1,4 @@
-"""A model's Python functions in the one form that the engine calls, f(t, x, p, z, out) -> status, as plain Python."""
+"""Wrap a model's Python functions in the form that the engine calls, f(t, x, p, z, out) -> status, as plain Python."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ class Scalar(NamedTuple):
 
 @dataclass(frozen=True)
 class Parts:
-    """The functions of a model in the engine's order.
+    """The functions of a model in the order of the engine.
 
-    flows: (mode or -1, function) with the flow of the model last; `component` is the one whose modes have their own.
+    flows: (mode or -1, function), with the flow of the model last. component: the one whose modes have their own flows.
     """
 
     component: int
@@ -47,11 +47,11 @@ class Parts:
 
 
 def parts_of(model: Model) -> Parts:
-    """What a valid model of Python functions is made of."""
+    """Return the functions of a valid model of Python functions."""
     assert model.flow is not None
     names = [p.name for p in model.parameters]
     try:
-        # mypy wants the names of a namedtuple written out
+        # mypy needs literal names for a namedtuple
         parameters = namedtuple("Parameters", names)  # type: ignore[misc]  # its fields are known at run time
     except ValueError as fault:
         message = f"model {model.name}: its functions cannot get the parameters as p.name: {fault}"
@@ -81,18 +81,18 @@ def parts_of(model: Model) -> Parts:
 
 
 def value(expr: Expression) -> Function | float:
-    """The function that stands for an expression, or its constant value."""
+    """Return the function of an expression, or its constant value."""
     return expr.function if isinstance(expr, FunctionExpression) else evaluate(expr, {})
 
 
 class Failures:
-    """The last exception that a function raised in a run: what raises is not a number there."""
+    """The last exception that a function raised in a run. Its value counts as not a number."""
 
     def __init__(self) -> None:
         self.last = ""
 
     def note(self, function: Function, t: float, fault: Exception, on_the_run: bool) -> None:
-        """Keep it, if it is none of differences, which go far from the run."""
+        """Store an exception, unless it comes from finite differences far from the run."""
         if on_the_run:
             self.last = (
                 f"the function {function_name(function)} raised {type(fault).__name__}: {fault} at t = {t!r}"
@@ -100,37 +100,37 @@ class Failures:
 
 
 class Forms:
-    """The Python forms of all functions; what raises is NaN there, noted in `failures`."""
+    """The Python forms of all functions. A call that raises gives NaN and is noted in `failures`."""
 
     def __init__(self, parts: Parts) -> None:
         self.parts, self.failures = parts, Failures()
 
     def arguments(self, s: float, x: Any, p: Any) -> tuple[float, np.ndarray, Any]:
-        """(t, x, p) as the user's functions see them; x is theirs, to do with what they like."""
+        """Return (t, x, p) for the user's functions; x is a copy that they may modify."""
         parts = self.parts
         count = len(parts.parameters._fields)
         state = np.array(x[: parts.states], dtype=float)
         return float(p[parts.origin_at] + s), state, parts.parameters(*(float(v) for v in p[:count]))
 
     def flow(self, s: float, x: Any, p: Any, z: Any, out: Any) -> int:
-        """Rates in the modes z."""
+        """Write the rates in the modes z to out."""
         parts, function = self.parts, self.flow_of(z)
         t, state, named = self.arguments(s, x, p)
         try:
             out[: parts.states] = rates(function, parts.states, t, state, named).tolist()
-        except Exception as fault:  # a user's code may raise anything; told where the step is judged
+        except Exception as fault:  # user code may raise anything; reported when the step is judged
             self.failures.note(function, t, fault, bool(p[parts.origin_at + 1]))
             out[: parts.states] = [math.nan] * parts.states
             return 1
         return 0
 
     def flow_of(self, z: Any) -> Function:
-        """The function that gives the rates in the modes z."""
+        """Return the function that gives the rates in the modes z."""
         mode = z[self.parts.component] if self.parts.component >= 0 else -1
         return next(f for m, f in self.parts.flows if m in (mode, -1))
 
     def row(self, scalars: tuple[Scalar, ...]) -> Function:
-        """Form of several numbers; those of modes that are not active are 1."""
+        """Return the form of several numbers; those of inactive modes are 1."""
 
         def form(s: float, x: Any, p: Any, z: Any, out: Any) -> int:
             status = 0
@@ -144,19 +144,19 @@ class Forms:
         return form
 
     def number(self, function: Function | float, s: float, x: Any, p: Any) -> float:
-        """Value of one function."""
+        """Return the value of one function."""
         if not callable(function):
             return function
         t, state, named = self.arguments(s, x, p)
         try:
             return number(function, t, state, named)
-        except Exception as fault:  # a user's code may raise anything; told where the step is judged
+        except Exception as fault:  # user code may raise anything; reported when the step is judged
             self.failures.note(function, t, fault, bool(p[self.parts.origin_at + 1]))
             return math.nan
 
 
 def rates(function: Function, count: int, t: float, x: np.ndarray, p: Any) -> np.ndarray:
-    """What a flow returns, as an array; an error that names the function where it is none of n numbers."""
+    """Return the result of a flow as an array; raises an error with its name if it is not n numbers."""
     given = function(t, x, p)
     found = _array(given)
     if found is None or found.shape != (count,):
@@ -168,7 +168,7 @@ def rates(function: Function, count: int, t: float, x: np.ndarray, p: Any) -> np
 
 
 def number(function: Function, t: float, x: np.ndarray, p: Any) -> float:
-    """What a scalar function returns; an error that names the function where it is no number."""
+    """Return the result of a scalar function; raises an error with its name if it is not a number."""
     given = function(t, x, p)
     found = _array(given)
     if found is None or found.shape != ():
@@ -179,10 +179,10 @@ def number(function: Function, t: float, x: np.ndarray, p: Any) -> float:
 
 
 def _array(given: Any) -> np.ndarray | None:
-    """Real numbers as an array; None where it holds anything else."""
+    """Return real numbers as an array, or None for anything else."""
     try:
         found = np.asarray(given)
-    except ValueError:  # rows of different lengths
+    except ValueError:  # rows of unequal length
         return None
     return found.astype(float) if found.dtype.kind in "biuf" else None
 

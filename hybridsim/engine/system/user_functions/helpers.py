@@ -1,4 +1,4 @@
-"""Plain Python functions that a user's function calls by name, compiled along with it: numba takes no others."""
+"""Compile the plain Python functions that a user's function calls by name, because numba needs them compiled."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numba
 
 from hybridsim.engine.system.user_functions.surroundings import closure_of, globals_of
 
-_NUMBA_KNOWS = ("numpy", "numba", "math")  # modules whose functions it replaces by its own
+_NUMBA_KNOWS = ("numpy", "numba", "math")  # modules whose functions numba replaces
 
 
 def compiled_with_helpers(function: FunctionType, made: dict[FunctionType, Any] | None = None) -> Any:
-    """A function for numba, with bounds checked; globals and closures that are plain functions are compiled likewise.
+    """Return a function compiled with bounds checks, and compile plain functions in its globals and closures.
 
-    Bounds are checked since differences and trial steps go where an index into a table may be beyond it.
+    Bounds are checked, because finite differences and trial steps may index beyond a table.
     """
     made = {} if made is None else made
     compiled = numba.njit(error_model="numpy", boundscheck=True)
@@ -41,5 +41,5 @@ def compiled_with_helpers(function: FunctionType, made: dict[FunctionType, Any] 
 
 
 def _is_plain(value: Any) -> bool:
-    """Whether it is a function that numba has to be given compiled."""
+    """Return whether a value is a plain function that has to be compiled for numba."""
     return isinstance(value, FunctionType) and (value.__module__ or "").split(".")[0] not in _NUMBA_KNOWS

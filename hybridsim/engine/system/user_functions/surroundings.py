@@ -1,4 +1,4 @@
-"""What Python functions read besides their arguments, as it is now: compiled code keeps what it was."""
+"""Collect the globals and closures that Python functions read, because compiled code keeps their former values."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ _PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic)
 
 
 def surroundings(functions: Iterable[Callable[..., Any]]) -> tuple[Any, ...]:
-    """Names and values of the globals and closures of plain functions.
+    """Return names and values of the globals and closures of plain functions.
 
-    Numbers and texts, tuples and arrays of them, by what they say; everything else by which object it is. What numba
-    has been told to compile already (`numba.njit`) keeps what it read then, as numba has it.
+    Numbers, texts, tuples and arrays are compared by value, everything else by identity. Functions already compiled by
+    `numba.njit` keep the values they read then, as in numba itself.
     """
     return tuple(_surroundings(functions, []))
 
@@ -29,20 +29,20 @@ def _surroundings(
             yield "defaults", _told((function.__defaults__, tuple((function.__kwdefaults__ or {}).items())))
             for name, value in (*globals_of(function).items(), *closure_of(function).items()):
                 yield name, _told(value)
-                if isinstance(value, ModuleType):  # what of it the function may read
+                if isinstance(value, ModuleType):  # attributes of a module that the function may read
                     for part in sorted(_names(function.__code__) & vars(value).keys()):
                         yield f"{name}.{part}", _told(vars(value)[part])
-                yield from _surroundings([value], seen)  # what a plain function that it calls reads
+                yield from _surroundings([value], seen)  # values read by plain functions that it calls
 
 
 def globals_of(function: FunctionType) -> dict[str, Any]:
-    """Names and values of the globals that it may read."""
+    """Return names and values of the globals that a function may read."""
     known = function.__globals__
     return {name: known[name] for name in sorted(_names(function.__code__)) if name in known}
 
 
 def closure_of(function: FunctionType) -> dict[str, Any]:
-    """Names and values of its closure, without those that nothing has been put into so far."""
+    """Return names and values of its closure, without empty cells."""
     found = {}
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
         try:
