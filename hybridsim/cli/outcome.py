@@ -131,7 +131,9 @@ def deliver(solution: Solution, args: argparse.Namespace, session: Session, told
     begins = solution.message.startswith(solution.status)
     said = solution.message if begins else f"{solution.status}: {solution.message}"
     if solution.status in ("limit", "interrupted"):
-        said = said.removesuffix(", and sol.resume() goes on").removesuffix("; what was computed is kept")
+        said = said.removesuffix(", and sol.resume() continues the run").removesuffix(
+            "; the results so far are kept"
+        )
         resume = f"'hybridsim resume {args.save}' continues the run"
         said += f"; {resume if args.save else 'with --save FILE.hsol, hybridsim resume can continue the run'}"
     complain(said)

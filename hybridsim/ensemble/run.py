@@ -1,4 +1,4 @@
-"""The runs of a fleet, one after the other in compiled code: each from its start to the sums over its last period."""
+"""Run many parameter points one after the other in compiled code, and sum over the last period of each."""
 
 from __future__ import annotations
 
@@ -15,34 +15,34 @@ from hybridsim.engine.run.leap import AT_TARGET, FULL
 from hybridsim.engine.system.instant import two_sum
 from hybridsim.ensemble.start import plain_start, rests_for_ever
 
-SEGMENTS = 1024  # room for one leap
-# Where events follow each other ever faster a leap ends, for others to see whether they accumulate. A few intervals
-# that shrink by one factor are none of that yet: the run goes on, so often at most.
+SEGMENTS = 1024  # largest number of segments in one compiled call
+# A compiled call ends if events follow each other ever faster, because they may accumulate. A few shrinking intervals
+# are not an accumulation, so the run is resumed up to this many times.
 _RESUMED = 4
-_AT_ONCE = 8192  # segments, about: some milliseconds, after which whoever waits is asked
-NEXT, BEGUN, KEPT, RESUMED = range(4)  # of `Runs.at`
+_AT_ONCE = 8192  # approximate number of segments (some milliseconds) between checks for interruption
+NEXT, BEGUN, KEPT, RESUMED = range(4)  # indices of `Runs.at`
 
 
 class Runs(NamedTuple):
-    """What is to be run: addresses of tables (m,), vectors (m, P), rates (m, R), starts (m, n); ends, periods and the
+    """The m runs of a group, with their results.
     longest segments (m,). What is found: done (m,), and as in `hybridsim.engine.linear.stretch.Stretch` of each. at
     (4,): the run that is under way, whether it has begun, segments kept, and how often it was resumed.
     """
 
-    tables: np.ndarray
-    vectors: np.ndarray
-    rates: np.ndarray
-    starts: np.ndarray
-    ends: np.ndarray
-    periods: np.ndarray
-    longest: np.ndarray
-    done: np.ndarray
-    extremes: np.ndarray
+    tables: np.ndarray  # addresses (m,) of tables
+    vectors: np.ndarray  # run-time vectors (m, P)
+    rates: np.ndarray  # rates (m, R) of angles
+    starts: np.ndarray  # initial states (m, n)
+    ends: np.ndarray  # end times (m,)
+    periods: np.ndarray  # periods (m,)
+    longest: np.ndarray  # longest segments (m,)
+    done: np.ndarray  # whether each run (m,) is finished
+    extremes: np.ndarray  # results of each run as in `hybridsim.engine.linear.stretch.Stretch`
     integrals: np.ndarray
     sides: np.ndarray
     held: np.ndarray
     holding: np.ndarray
-    at: np.ndarray
+    at: np.ndarray  # (4,): current run, whether it has begun, segments kept, number of resumptions
 
 
 @kernel
@@ -65,11 +65,11 @@ def run_fleet(
     record: Any,
     found: Any,
 ) -> None:
-    """Run one after the other, from the one under way on, until all are done or some milliseconds have passed.
+    """Run one after the other, from the current one on, until all are done or some milliseconds have passed.
 
-    lin: tables of the type of all. places: where in p the origin, the phases and the pin are. hold: mode of each
-    component. rule: nodes and weights; slopes (3, n): room for `sum_up`.
-    record: room for twice as many segments as a leap has, late: its second half.
+    lin: tables of the common type. places: positions of the origin, the phases and the pin in p. hold: holding mode of
+    each component. rule: nodes and weights. slopes (3, n): scratch for `sum_up`. record: twice as many segments as one
+    compiled call has; late: its second half.
     """
     origin_at, phases_at, pin_at = places
     at, clock, target = runs.at, room.times[2:], room.times[:2]
@@ -122,7 +122,7 @@ def run_fleet(
 
 @inlined
 def _begin(record: Any, kept: int, count: int, since: float) -> tuple[int, float]:
-    """The segment in which an instant lies, and when in it; -1 if it is before all of them."""
+    """Return the segment that contains an instant, and the local time; -1 if it is before all segments."""
     first = SEGMENTS + count - 1
     while first >= SEGMENTS - kept:
         high, low = record.clocks[first, 0], record.clocks[first, 1]
@@ -135,7 +135,7 @@ def _begin(record: Any, kept: int, count: int, since: float) -> tuple[int, float
 
 @inlined
 def _make_room(record: Any, kept: int, count: int) -> None:
-    """Leave the last segments before the second half of a record, which is free again."""
+    """Move the last segments before the second half of a record, which is then free again."""
     for i in range(SEGMENTS - kept, SEGMENTS):
         record.ends[i], record.rows[i] = record.ends[i + count], record.rows[i + count]
         put(record.clocks[i + count], record.clocks[i])
@@ -156,7 +156,7 @@ def _clear(found: Any) -> None:
 
 @inlined
 def _take_rest(hold: Any, period: float, state: Any, found: Any) -> None:
-    """What a period holds in which nothing moves."""
+    """Write the results for a period in which nothing moves."""
     x, z = state.x, state.z
     for i in range(x.shape[0]):
         for side in range(2):

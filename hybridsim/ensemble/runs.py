@@ -1,8 +1,8 @@
-"""Many runs of one model that differ in the values of parameters and in their start: the last period of each.
+"""Run a model for many parameter values and starts, and return the last period of each run.
 
-A single run has its model checked, bound and decided on at its start in Python, which takes several times as long as a
-short run of linear modes itself. Here that is done for all runs together, or in compiled code. The runs are those of
-`hybridsim.integrators.closed_form.compiled_loop`; one that holds anything unusual is left to it.
+For a single run Python checks and binds the model and decides its start, which takes several times as long as a short
+run of linear modes. Here this is done for all runs together, or in compiled code. The runs are those of
+`hybridsim.integrators.closed_form.compiled_loop`; a run with an unusual event is left to it.
 """
 
 from __future__ import annotations
@@ -30,16 +30,17 @@ from hybridsim.ensemble.start import opposing
 from hybridsim.ensemble.tables import FleetTables, fleet_tables
 from hybridsim.integrators.closed_form.segments import Record, reach_leap, room_for
 
-_TOGETHER = 128  # runs whose tables are made at once: they stay in the processor's cache
-_TURNS = 100  # as in `hybridsim.engine.run.mode_loop`: the longest segment, in turns of the fastest angle
+_TOGETHER = 128  # runs whose tables are made together, so that they fit in the processor's cache
+_TURNS = 100  # longest segment in turns of the fastest angle, as in `hybridsim.engine.run.setup`
 _FULLY = 2.0 * math.pi
 
 _run, _opposing = Door(run_fleet), Door(opposing)
 
 
 class LastPeriods(NamedTuple):
-    """The last period of some runs: their numbers (m,), how long the periods are (m,), and what the states did, a row
-    of each array of a `Stretch` for each."""
+    """The last periods of some runs.
+    of each array of a `Stretch` for each.
+    """
 
     numbers: np.ndarray
     periods: np.ndarray
@@ -47,9 +48,9 @@ class LastPeriods(NamedTuple):
 
 
 def sails(system: System) -> bool:
-    """Whether runs of a model may go together: contacts alone, in modes that are linear at any values of parameters.
+    """Return whether runs of a model can be computed together: only contacts, in modes that are always linear.
 
-    What they hold has to be a number: what a state does that follows others is not read off here.
+    Held values must be constants, because states that follow others are not supported here.
     """
     model = system.model
     parts = model.monitors or model.inputs or model.schedules or model.discrete or system.ties
@@ -59,19 +60,19 @@ def sails(system: System) -> bool:
         and system.n > 0
         and not parts
         and all(a.has_surface and not (a.is_unique or a.is_unilateral) for a in system.automata)
-        and len(system.automata) <= MOST  # the shelf is complete from the beginning
+        and len(system.automata) <= MOST  # all tapes exist from the start
         and is_always_linear(system)
         and holds_constants(system)
     )
 
 
 class Fleet:
-    """Runs of one system from t = 0, each over a number of periods of its forcing; for one thread.
+    """Runs of one system from t = 0, each over a number of periods of its forcing; for use in one thread.
 
     Parameters
     ----------
-    system : one for which `sails` holds, at any values of its parameters.
-    goes_on : asked every few milliseconds; no more is run where it says no.
+    system : one for which `sails` is true at all values of its parameters.
+    goes_on : called every few milliseconds; if it returns False, no more runs are started.
     """
 
     def __init__(self, system: System, goes_on: Callable[[], bool]) -> None:
@@ -93,9 +94,10 @@ class Fleet:
         self.hold = np.array([a.hold for a in system.automata], dtype=np.int64)
 
     def runs(self, parameters: np.ndarray, starts: np.ndarray, periods: int) -> Iterator[LastPeriods]:
-        """The last period of each run, some together, in any order; a run that is missing is not for a fleet.
+        """Yield the last period of each run, some together, in any order. Unsupported runs are missing.
 
-        parameters (N, P), in the order of the model; starts (N, n). It ends early where it is not to go on.
+        parameters (N, P), in the order of the model; starts (N, n). The iteration ends early if `goes_on` returns
+        False.
         """
         for first in range(0, len(parameters), _TOGETHER):
             here = slice(first, first + _TOGETHER)
@@ -144,7 +146,7 @@ class Fleet:
             )
 
     def _sail(self, group: FleetTables, runs: Runs) -> None:
-        """Run all of them, as long as it is to go on."""
+        """Run all of them, unless `goes_on` returns False."""
         spare: deque[Any] = self.system.code.shared(f"scratch of fleets for {group.form}", deque)
         try:
             ship = spare.pop()
@@ -161,7 +163,7 @@ class Fleet:
         spare.append(ship)
 
     def _may_begin(self, starts: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-        """Where each contact opposes its own velocity (N,); a run with one that does not is refused by itself."""
+        """Return a mask (N,) of runs in which each contact opposes its own velocity; the others must be refused."""
         found = np.empty(len(starts), dtype=np.bool_)
         room = np.zeros(len(self.system.surface_of))
         _opposing(self.system.address("effects"), starts, vectors, self.first, room, found)
@@ -169,12 +171,12 @@ class Fleet:
 
 
 def _period(rates: np.ndarray) -> float:
-    """Of everything that turns at such rates; NaN where it does not repeat."""
+    """Return the common period of angles with these rates, or NaN."""
     return common_multiple((_FULLY / abs(rates[rates != 0.0])).tolist()) or math.nan
 
 
 class _Ship:
-    """Scratch arrays for runs whose tables are of one form, and their packs in the order in which they are taken."""
+    """Scratch arrays for runs with tables of one form, and their packs in order."""
 
     def __init__(self, fleet: Fleet, tables: Any, p: np.ndarray) -> None:
         system = fleet.system

@@ -1,7 +1,6 @@
-"""How a run starts, in compiled code: contacts that are to find their modes by themselves, as far as that is plain.
+"""Start a run in compiled code: determine the modes of contacts, if the outcome is certain.
 
-The rules are those of `hybridsim.engine.events.resolve`, which settles what is not plain and can say what is the
-matter.
+The rules are those of `hybridsim.engine.events.resolve`, which resolves the other cases and reports problems.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from hybridsim.engine.run.leap import set_origin
 from hybridsim.engine.series.bounded import UNIT, run_series
 from hybridsim.engine.system.programs.modes_index import find_modes
 
-_UNKNOWN = -1  # in place of a mode
+_UNKNOWN = -1  # mode not determined yet
 
 
 @kernel
@@ -35,11 +34,11 @@ def plain_start(
     state: Any,
     work: Any,
 ) -> bool:
-    """Decide all modes at t0 from the state, whose p holds parameters; False where that is not plain.
+    """Decide all modes at t0 from the state, whose p holds the parameters. Return False if the outcome is uncertain.
 
-    none: empty tables, so that guards are judged by the tape. places: rates, then where in p the origin, the phases and
-    the pin are. surfaces: of the tape of the first modes constant rows, rows, registers of the rates and of the
-    surfaces, and the component of each surface.
+    none: empty tables, so that guards are judged by the tape. places: rates, and the positions of the origin, the
+    phases and the pin in p. surfaces: from the tape of the first modes, the constant rows, the rows, the registers of
+    the rates and of the surfaces, and the component of each surface.
     """
     rates, origin_at, phases_at, pin_at = places
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
@@ -70,10 +69,10 @@ def plain_start(
 
 @merged
 def _take_sides(automata: Any, inputs: Any, surfaces: Any, pin_at: int, state: Any, work: Any) -> bool:
-    """The mode of the side that each is on, _UNKNOWN on the surface; False where there is no number."""
+    """Set each component to the mode of its side, or to _UNKNOWN on its surface. Return False if a value is NaN."""
     constant, rows, derivatives, registers, owners = surfaces
     V, E, z, p = work.V, work.E, state.z, state.p
-    p[pin_at] = 0.0  # the states as they are, not as a holding mode would have them
+    p[pin_at] = 0.0  # the states as they are, not projected by a holding mode
     run_series(constant, rows, inputs, derivatives, 0.0, 0.0, state.x, state.x_error, p, V, E)
     p[pin_at] = 1.0
     for j in range(registers.shape[0]):
@@ -92,7 +91,7 @@ def _take_sides(automata: Any, inputs: Any, surfaces: Any, pin_at: int, state: A
 def _decide_cluster(
     automata: Any, tapes: Any, inputs: Any, none: Any, state: Any, first: int, work: Any
 ) -> bool:
-    """The one motion that `choose` prefers, of those that a component on its surface may begin with the others."""
+    """Set the one motion that `choose` prefers for a component on its surface. Return whether it is certain."""
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     members, candidates, current, holds = work.members, work.candidates, work.current, work.holds
     verdicts, trial, y = work.verdicts, work.trial, work.y
@@ -130,7 +129,7 @@ def _decide_cluster(
         verdicts[number] = call_apart(
             judge_candidate, (automata, tapes, inputs, none, state, work, -1, False, first, number)
         )
-        if verdicts[number] < -1:  # modes that are not on the shelf
+        if verdicts[number] < -1:  # modes without tapes
             return False
     number = choose(candidates[:total, :count], verdicts[:total], current[:count], holds[:count])
     if number < 0 or verdicts[number] != FINE:
@@ -142,10 +141,10 @@ def _decide_cluster(
 
 @kernel
 def rests_for_ever(tapes: Any, lin: Any, state: Any, work: Any, c: Any) -> bool:
-    """Whether nothing moves from here on: all states stand still, and no guard of a wave ever goes beyond zero.
+    """Return whether nothing moves from here on: all states are constant, and no guard ever passes zero.
 
-    A guard that comes to zero and turns back there, to within its rounding, leaves the mode as it is. Functions of time
-    are taken at the origin of the state; c: room for modal coordinates.
+    A guard that reaches zero and turns back there, within its rounding, leaves the mode unchanged. Functions of time
+    are taken at the origin of the state. c: scratch for modal coordinates.
     """
     x, z, p = state.x, state.z, state.p
     k = find_modes(tapes, z)
@@ -156,7 +155,7 @@ def rests_for_ever(tapes: Any, lin: Any, state: Any, work: Any, c: Any) -> bool:
         for q in range(lin.slopes.shape[1]):
             for i in range(LANES):
                 if lin.slopes[k, q, m, i] != 0.0 and (m >= x.shape[0] or x[m] != 0.0):
-                    return False  # it moves, or is driven
+                    return False  # the state moves or is forced
     to_modal(lin, k, x, work.w, c)
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         g = tapes.active[i]
@@ -166,7 +165,7 @@ def rests_for_ever(tapes: Any, lin: Any, state: Any, work: Any, c: Any) -> bool:
             size += lin.sizes[k, g, j] * (abs(c[j].real) + abs(c[j].imag))
             if j != turning:
                 if lin.sizes[k, g, j] != 0.0 and lin.values[k, j] != 0.0:
-                    return False  # neither a constant nor the one wave
+                    return False  # neither constant nor one sine wave
                 level += lin.terms[k, g, j, 0, 0] * c[j].real - lin.terms[k, g, j, 1, 0] * c[j].imag
         radius = 0.0
         if turning >= 0:
@@ -181,7 +180,7 @@ def rests_for_ever(tapes: Any, lin: Any, state: Any, work: Any, c: Any) -> bool:
 
 @kernel
 def opposing(effects: Any, x: Any, p: Any, z: Any, room: Any, out: Any) -> None:
-    """Whether in each of N starts x (N, n), p (N, P) every contact opposes its own velocity: out (N,); room (C,)."""
+    """Write to out (N,) whether every contact opposes its own velocity at starts x (N, n), p (N, P); room (C,)."""
     for i in range(x.shape[0]):
         call(effects, 0.0, x[i], p[i], z, room)
         out[i] = True

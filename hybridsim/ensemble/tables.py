@@ -1,4 +1,4 @@
-"""Tables of linear modes for many values of the parameters: made together, in arrays that lie one behind the other."""
+"""Compute tables of linear modes for many parameter values together, in contiguous arrays."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from hybridsim.engine.linear.tables import (
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.system.system import System
 
-_COMPUTED = ("rates", "offsets", "weights")  # of the atoms: what depends on the values of parameters
+_COMPUTED = ("rates", "offsets", "weights")  # fields of the atoms that depend on the parameters
 
 
 class FleetTables:
-    """What `hybridsim.engine.linear.tables.tables_of` gives for one point, for all points of a group.
+    """The tables of `hybridsim.engine.linear.tables.tables_of` for all points of a group.
 
     Parameters
     ----------
     numbers : of the points (m,).
-    fields : of the tables, by name, where they differ from point to point one behind the other.
-    modes : how many vectors of modes they are for.
+    fields : the fields of the tables by name; those that differ between points are stacked along the first axis.
+    modes : the number of vectors of modes.
 
     Attributes
     ----------
-    first : the tables of the first point, for kernels; its type is that of all.
-    addresses : of the packs of all points (m,).
+    first : the tables of the first point, whose type is that of all points, for kernels.
+    addresses : addresses (m,) of the packed tables of all points.
     """
 
     def __init__(self, numbers: np.ndarray, fields: dict[str, np.ndarray], modes: int) -> None:
@@ -41,7 +41,7 @@ class FleetTables:
         self.form = len(fields["kinds"]), len(fields["factors"]), modes, fields["values"].shape[1]
         counts = {name: modes if name not in _COMPUTED else 1 for name in LinearTables._fields}
         shared = {name for name in LinearTables._fields if _is_shared(name)}
-        self._arrays = fields  # the packs hold addresses alone
+        self._arrays = fields  # keep the arrays alive, because the packs hold only addresses
         self.first: Any = packed(
             LinearTables(
                 **{
@@ -71,10 +71,10 @@ def _is_shared(name: str) -> bool:
 def fleet_tables(
     system: System, modes: np.ndarray, parameters: np.ndarray, horizons: np.ndarray
 ) -> list[FleetTables]:
-    """Tables of these vectors of modes (K, components) at many points: parameters (N, P), horizons (N,).
+    """Return tables of these vectors of modes (K, components) at many points: parameters (N, P), horizons (N,).
 
-    One group for each order of magnitude of the horizon and each plan. Points whose tables hold no finite numbers are
-    in none of them.
+    There is one group for each order of magnitude of the horizon and each plan. Points with tables that are not finite
+    are left out.
     """
     classes = np.array([horizon_class(float(h)) for h in horizons])
     groups, left = [], np.arange(len(parameters))
@@ -103,7 +103,7 @@ def _group(
     if not len(numbers):
         return None
     modes = A.shape[1]
-    A, rows = (part.reshape(-1, *part.shape[2:]) for part in (A, rows))  # one behind the other
+    A, rows = (part.reshape(-1, *part.shape[2:]) for part in (A, rows))  # stacked along the first axis
     of_modes = unknown(of_matrices(A, rows, system.n, horizon), is_finite.ravel())
     fields = plan.atoms(registers) | {"phases": angles_of(system)} | of_modes
     return FleetTables(numbers, {name: np.ascontiguousarray(a) for name, a in fields.items()}, modes)

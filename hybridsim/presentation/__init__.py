@@ -1,1 +1,1 @@
-"""This folder gives results their form: tables, readable text, colours, and HTML for notebooks."""
+"""This folder presents results: tables, readable text, colours, and HTML for notebooks."""

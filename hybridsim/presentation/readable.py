@@ -1,4 +1,4 @@
-"""How answers show themselves: `Readable` gives a notebook the same text that `print` shows."""
+"""Show results as text: `Readable` gives a notebook the same text that `print` shows."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from html import escape
 
 
 class Readable:
-    """An answer whose `repr` is a text of several lines; notebooks show it with its columns aligned."""
+    """A result whose `repr` is a text of several lines; notebooks show it with its columns aligned."""
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(repr(self))}</pre>"

@@ -1,4 +1,4 @@
-"""This folder computes independent truths, in closed form and multiple precision, without code of the engine.
+"""This folder computes independent reference solutions in closed form and multiple precision, without the engine.
 
-Start with `trajectory`, what an exact motion consists of.
+Start with `trajectory`, the data of an exact motion.
 """

@@ -1,4 +1,4 @@
-"""This folder holds what a run leaves behind: segments with dense output, events, counters and checkpoints.
+"""This folder stores the results of a run: segments with dense output, events, counters and checkpoints.
 
-Start with `segments` and `trajectory`. The files `*_block` hold many segments or events in arrays.
+Start with `segments` and `trajectory`. The files `*_block` store many segments or events in arrays.
 """

@@ -1,6 +1,6 @@
-"""Checks of arrays that were read from a file: their types, their shapes and the indices that they hold.
+"""Check arrays that were read from a file: their types, shapes, and the indices in them.
 
-A kernel goes by the indices that it is given. In a file that somebody made they may be anything.
+Kernels do not check indices, and those in a file may be arbitrary.
 """
 
 from __future__ import annotations
@@ -11,20 +11,18 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 Arrays = Mapping[str, np.ndarray]
-Form = tuple[
-    type, tuple[int | str, ...]
-]  # of an array: what it holds, and its lengths; "N+1" is one more than "N"
+Form = tuple[type, tuple[int | str, ...]]  # type of an array, and its lengths; "N+1" is one more than "N"
 
 
 def check_forms(
     title: str, arrays: Arrays, forms: Mapping[str, Form], sizes: Mapping[str, int]
 ) -> dict[str, int]:
-    """Refuse arrays of other types or lengths; return the sizes, with those that only the arrays say.
+    """Refuse arrays with wrong types or lengths. Return the sizes, including those found in the arrays.
 
     Raises
     ------
     ValueError
-        It names the array.
+        With the name of the array.
     """
     known = dict(sizes)
     for name, (kind, lengths) in forms.items():
@@ -46,39 +44,39 @@ def check_forms(
 
 
 def check_range(what: str, array: np.ndarray, low: float, high: float) -> None:
-    """Refuse numbers outside of what they may be; NaN is outside of everything."""
+    """Refuse numbers outside a range; NaN is outside."""
     if array.size and not (array.min() >= low and array.max() <= high):
         raise ValueError(f"{what} is not within {low} to {high}")
 
 
 def check_finite(what: str, *arrays: np.ndarray) -> None:
-    """Refuse what is not a finite number."""
+    """Refuse numbers that are not finite."""
     if not all(np.isfinite(array).all() for array in arrays):
         raise ValueError(f"{what} is not finite")
 
 
 def check_ascending(what: str, array: np.ndarray, *, strictly: bool = False) -> None:
-    """Refuse numbers that fall, or stand still."""
+    """Refuse numbers that decrease, or with strictly=True do not increase."""
     steps = np.diff(array)
     if not ((steps > 0).all() if strictly else (steps >= 0).all()):
         raise ValueError(f"{what} is not in ascending order")
 
 
 def check_modes(what: str, modes: np.ndarray, counts: Sequence[int], lowest: int = 0) -> None:
-    """Refuse numbers (..., C) of modes that the components, with so many each, do not have."""
+    """Refuse mode numbers (..., C) that the components do not have; counts (C,): number of modes of each."""
     if not ((modes >= lowest) & (modes < np.asarray(counts, dtype=np.int64))).all():
         raise ValueError(f"{what} is not a mode of its component")
 
 
 def check_instant(what: str, instant: object) -> tuple[float, float]:
-    """A time as the sum of two finite doubles; anything else is refused."""
+    """Return a time given as two finite doubles; refuse anything else."""
     if not isinstance(instant, list | tuple) or len(instant) != 2:
         raise ValueError(f"{what} is not a time")
     return check_number(what, instant[0]), check_number(what, instant[1])
 
 
 def check_number(what: str, value: object, low: float = -math.inf, *, is_finite: bool = True) -> float:
-    """A number from a text, not below `low`; anything else is refused."""
+    """Return a number not below `low`; refuse anything else."""
     if type(value) not in (int, float):
         raise ValueError(f"{what} is {value!r}")
     found = float(value)  # type: ignore[arg-type]  # it is a number
@@ -88,7 +86,7 @@ def check_number(what: str, value: object, low: float = -math.inf, *, is_finite:
 
 
 def check_count(what: str, value: object, most: float = 2**62) -> int:
-    """A whole number that is not negative; anything else is refused."""
+    """Return a whole number that is not negative; refuse anything else."""
     if type(value) is not int or not 0 <= value <= most:
         raise ValueError(f"{what} is {value!r}")
     return value

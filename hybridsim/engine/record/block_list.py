@@ -1,4 +1,4 @@
-"""All segments and all occurrences of a run, in blocks, and how much of them is kept."""
+"""Store all segments and all events of a run in blocks, and discard old ones."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hybridsim.engine.system.system import System
 
 Item = TypeVar("Item")
 
-_LOOSE = 16  # items in a list that is forgotten as a whole
+_LOOSE = 16  # items in a list that is discarded as a whole
 
 
 class Chain(Sequence[Item]):
@@ -24,19 +24,20 @@ class Chain(Sequence[Item]):
 
     Parameters
     ----------
-    loose : makes an empty list for items that come one by one; it is a block as well.
-    window : how long back, in the unit of t, items are kept: what is older is forgotten as newer blocks come. The last
-        block stays in any case; with None nothing is kept at all but the `least`.
-    least : so many of the last items are kept however old they are.
+    loose : makes an empty list for single items; such a list is a block as well.
+    window : how long back, in the unit of t, items are kept. Older blocks are discarded as newer ones arrive, except
+    the
+        last block. With None nothing is kept except the `least`.
+    least : number of last items that are kept regardless of their age.
     """
 
     def __init__(self, loose: Callable[[], Any], window: float | None = math.inf, least: int = 0) -> None:
         self.blocks: list[Any] = []
         self._loose, self.window, self._least = loose, window, least
-        self.forgotten = 0  # blocks
+        self.forgotten = 0  # number of discarded blocks
 
     def append(self, item: Item) -> None:
-        """One more item."""
+        """Add one item."""
         if self.window is None and not self._least:
             return
         limit = math.inf if self.window == math.inf else max(_LOOSE, self._least // 4)
@@ -47,19 +48,19 @@ class Chain(Sequence[Item]):
         self._forget()
 
     def extend(self, items: Iterable[Item]) -> None:
-        """More items."""
+        """Add items."""
         for item in items:
             self.append(item)
 
     def add(self, block: Block[Item]) -> None:
-        """A whole block."""
+        """Add a whole block."""
         if (self.window is not None or self._least) and len(block):
             self.blocks.append(block)
             if len(self.blocks) > 1:
                 self._forget()
 
     def _forget(self) -> None:
-        """Let go of the blocks that lie further back than the window."""
+        """Discard the blocks that are older than the window."""
         if self.window == math.inf or len(self.blocks) == 1:
             return
         now, window, spare = self.blocks[-1].until, self.window or 0.0, len(self) - self._least
@@ -71,38 +72,38 @@ class Chain(Sequence[Item]):
             self.forgotten += 1
 
     def keep_only(self, item: Item) -> None:
-        """This item in place of all."""
+        """Replace all items by this one."""
         self.forgotten += len(self.blocks)
         last = self._loose()
         last.append(item)
         self.blocks = [last]
 
     def drop(self, count: int) -> None:
-        """Let go of the first items."""
+        """Discard the first items."""
         while self.blocks and count >= len(self.blocks[0]):
             count -= len(self.blocks.pop(0))
         if count:
             self.blocks[0] = self.blocks[0].since(count)
 
     def mark(self) -> tuple[int, int]:
-        """A place after the last item, for `since_mark`."""
+        """Return a position after the last item, for `since_mark`."""
         blocks = self.blocks
         return self.forgotten + len(blocks), len(blocks[-1]) if blocks else 0
 
     def since_mark(self, mark: tuple[int, int]) -> int:
-        """How many items came after a mark."""
+        """Return the number of items added after a mark."""
         number, length = mark[0] - self.forgotten, mark[1]
         rest = len(self.blocks[number - 1]) - length if number > 0 else 0
         return rest + sum(map(len, self.blocks[max(number, 0) :]))
 
     def without_last(self, count: int) -> list[Any]:
-        """The blocks without so many items at the end, to go on with."""
+        """Return the blocks without the last `count` items, to continue from there."""
         blocks = list(self.blocks)
         while blocks and count >= len(blocks[-1]):
             count -= len(blocks.pop())
         if (
             blocks and count and not isinstance(blocks[-1], list)
-        ):  # a run goes on where a block in arrays ends
+        ):  # a run can continue only at the end of a block of arrays
             raise damaged("the number of stored items")
         if blocks and isinstance(blocks[-1], list):
             last = self._loose()
@@ -111,11 +112,11 @@ class Chain(Sequence[Item]):
         return blocks
 
     def starts(self) -> np.ndarray:
-        """Number of the first item of each block, and of all items."""
+        """Return the number of the first item of each block, and the total number."""
         return np.cumsum([0, *map(len, self.blocks)])
 
     def __bool__(self) -> bool:
-        return bool(self.blocks)  # none is empty
+        return bool(self.blocks)  # no block is empty
 
     def __len__(self) -> int:
         return sum(map(len, self.blocks))
@@ -150,31 +151,31 @@ class SegmentChain(Chain[Segment]):
         self._shape = (system.n, len(system.automata))
 
     def origins(self) -> np.ndarray:
-        """Origins of local time (N, 2)."""
+        """Return origins of local time (N, 2)."""
         return _joined([block.origins for block in self.blocks])
 
     def spans(self) -> np.ndarray:
-        """First and last local times (N, 2)."""
+        """Return first and last local times (N, 2)."""
         return _joined([block.spans for block in self.blocks])
 
     def modes(self) -> np.ndarray:
-        """Modes (N, C)."""
+        """Return modes (N, C)."""
         none = np.empty((0, self._shape[1]), dtype=np.int64)
         return np.concatenate([none, *(block.modes for block in self.blocks)])
 
     @property
     def is_end_alone(self) -> bool:
-        """Whether nothing is wanted but where the run ends."""
+        """Return whether only the end of the run is kept."""
         return self.window == 0.0
 
     def keep_end(self) -> None:
-        """Where the last segment ends in place of all, unless that is all there is."""
+        """Replace all segments by the end of the last one, unless that is already the case."""
         last = self.blocks[-1]
         if len(self.blocks) > 1 or len(last) > 1 or not isinstance(last, list) or len(last[0].s) > 1:
             self.keep_only(last.at_end())
 
     def cut(self, instant: Instant) -> None:
-        """Let go of all that lies before an instant; the segment that holds it begins there from now on."""
+        """Discard everything before an instant. The segment that contains it starts there from now on."""
         origins, spans = self.origins(), self.spans()
         moved = (origins[:, 0] - instant.high) + (origins[:, 1] - instant.low) + spans[:, 0]
         sign = 1.0 if spans[-1, 1] >= spans[-1, 0] else -1.0
@@ -192,7 +193,7 @@ class SegmentChain(Chain[Segment]):
         self.blocks.insert(0, head)
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """States (k, n) in the segments of these numbers, at local times (k,)."""
+        """Return states (k, n) in the segments of these numbers, at local times (k,)."""
         if len(self.blocks) == 1:
             return self.blocks[0].states(index, s)
         starts = self.starts()
@@ -204,7 +205,7 @@ class SegmentChain(Chain[Segment]):
         return out
 
     def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The run's own steps: numbers of segments (m,), local times (m,), states (m, n)."""
+        """Return the steps of the run: numbers of segments (m,), local times (m,), states (m, n)."""
         index, s, x = [np.empty(0, dtype=np.int64)], [np.empty(0)], [np.empty((0, self._shape[0]))]
         for block, start in zip(self.blocks, self.starts().tolist(), strict=False):
             numbers, times, states = block.knots()
@@ -215,5 +216,5 @@ class SegmentChain(Chain[Segment]):
 
 
 def _joined(pairs: list[np.ndarray]) -> np.ndarray:
-    """Pairs of all blocks (N, 2); those of a single one as they are."""
+    """Return the pairs of all blocks (N, 2), without a copy for a single block."""
     return pairs[0] if len(pairs) == 1 else np.concatenate([np.empty((0, 2)), *pairs])

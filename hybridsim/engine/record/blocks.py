@@ -1,8 +1,7 @@
-"""What a run leaves behind, in blocks: items that came one by one, and whole stretches that stand in arrays.
+"""Store segments and events of a run in blocks: lists of single items, and arrays of many items.
 
-A compiled loop goes over hundreds of events in the time in which Python makes a few objects. It commits one block of
-segments and one of occurrences for each of its calls, holding the arrays that it wrote; the objects are made when
-somebody asks for them.
+A compiled loop passes hundreds of events in the time in which Python makes a few objects. It commits one block of
+segments and one of events for each of its calls, with the arrays that it wrote. Objects are made on demand.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ Item = TypeVar("Item", covariant=True)
 
 
 class Block(Protocol[Item]):
-    """Consecutive items of a run; an index is from 0 to below the length."""
+    """Consecutive items of a run, with indices from 0 to the length minus one."""
 
     def __len__(self) -> int: ...
     def __getitem__(self, i: int, /) -> Item: ...
@@ -29,21 +28,21 @@ class Block(Protocol[Item]):
 
     @property
     def until(self) -> Instant:
-        """The instant of the last item: the end of a segment, the time of an event."""
+        """Return the instant of the last item: the end of a segment, or the time of an event."""
 
     def since(self, first: int) -> Block[Item]:
-        """The same without the items before the first one."""
+        """Return a block without the items before this number."""
 
 
 class SegmentBlock(Block[Segment], Protocol):
     """N consecutive segments. `hybridsim.engine.record.series_block` is an example.
 
-    1. origins (N, 2): the instant (high, low) from which the local time of each is counted.
-    2. spans (N, 2): the local times at which it begins and ends; forward in time the first is below the second.
-    3. modes (N, C): the mode of each component.
-    4. ``block[i]`` is the i-th one as a `Segment`, its knots' states with held ones on their constraints.
-    5. Times and states are those that the run went by: the states at both ends of a segment are to the last bit the
-       x+ and x- of the events there.
+    1. origins (N, 2): the instant (high, low) from which the local time of each segment is counted. 2. spans (N, 2):
+    first and last local time of each segment; forward in time the first is below the second. 3. modes (N, C): the mode
+    of each component. 4. ``block[i]`` is the i-th segment as a `Segment`, with held states at its knots on their
+    constraints. 5. Times and states are those that the run used. The states at both ends of a segment are bit for bit
+    the x+ and x- of
+       the events there.
     """
 
     @property
@@ -54,45 +53,45 @@ class SegmentBlock(Block[Segment], Protocol):
     def modes(self) -> np.ndarray: ...
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """States (k, n) in the segments of these numbers (k,), at local times (k,) within their spans.
+        """Return states (k, n) in the segments of these numbers (k,), at local times (k,) within their spans.
 
-        Held states are on their constraints. All in one compiled call: there may be thousands.
+        Held states are on their constraints. One compiled call computes all states, because there may be thousands.
         """
 
     def at_end(self) -> Segment:
-        """The end of the last one, as a segment of no length, in arrays of its own."""
+        """Return the end of the last segment as a segment of zero length, in its own arrays."""
 
     def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Knots (m + 1,), states where the steps begin (m or more, n), run-time vector and modes of one of them."""
+        """Return knots (m + 1,), states at starts of steps (m or more, n), run-time vector and modes of a segment."""
 
     def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The run's own steps: numbers of segments (m,) ascending, local times (m,), states (m, n); ends included."""
+        """Return all steps: ascending numbers of segments (m,), local times (m,), states (m, n), with ends."""
 
     def since(self, first: int) -> SegmentBlock:
-        """The same without the segments before the first one."""
+        """Return a block without the segments before this number."""
 
 
 class OccurrenceBlock(Block[Occurrence], Protocol):
-    """Consecutive occurrences. `hybridsim.engine.record.event_block` serves every compiled loop."""
+    """Consecutive events. `hybridsim.engine.record.event_block` serves every compiled loop."""
 
     @property
     def times(self) -> np.ndarray:
-        """Their times, rounded to doubles."""
+        """Return the times, rounded to doubles."""
 
     def times_of(self, component: str, kind: str | None) -> np.ndarray:
-        """Times of those of a component, and of one kind if that is given."""
+        """Return the times of the events of a component and kind."""
 
     def states_of(self, component: str, kind: str | None, side: int) -> np.ndarray:
-        """States (k, n) at the same, before (side 0) or after (1) them, in an array of their own."""
+        """Return states (k, n) at these events, before (side 0) or after (1) them, in a new array."""
 
     def kinds(self) -> Counter[str]:
-        """How many there are of each kind."""
+        """Return the number of events of each kind."""
 
     def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
-        """Instants (k, 2) and states x-, x+ (k, 2, n) of those that are transitions, from that number on."""
+        """Return instants (k, 2) and states x-, x+ (k, 2, n) of the transitions from this number on."""
 
     def since(self, first: int) -> OccurrenceBlock:
-        """The same without the items before the first one."""
+        """Return the events from this number on."""
 
 
 class SegmentList(list[Segment]):
@@ -104,26 +103,26 @@ class SegmentList(list[Segment]):
 
     @property
     def until(self) -> Instant:
-        """End of the last one."""
+        """Return the end of the last segment."""
         return self[-1].end
 
     @property
     def origins(self) -> np.ndarray:
-        """Origins of local time (N, 2)."""
+        """Return origins of local time (N, 2)."""
         return np.array([segment.origin for segment in self]).reshape(-1, 2)
 
     @property
     def spans(self) -> np.ndarray:
-        """First and last local time (N, 2)."""
+        """Return first and last local times (N, 2)."""
         return np.array([(segment.s[0], segment.s[-1]) for segment in self]).reshape(-1, 2)
 
     @property
     def modes(self) -> np.ndarray:
-        """Modes (N, C)."""
+        """Return modes (N, C)."""
         return np.array([segment.z for segment in self], dtype=np.int64).reshape(len(self), -1)
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """States (k, n) at local times (k,) of some of them; at knots those that the run went by."""
+        """Return states (k, n) of some segments at local times (k,); at knots those that the run used."""
         system = self._system
         out = np.empty((len(s), system.n))
         for i in np.unique(index):
@@ -140,45 +139,45 @@ class SegmentList(list[Segment]):
         return out
 
     def at_end(self) -> Segment:
-        """The end of the last one."""
+        """Return the end of the last segment."""
         last = self[-1]
         return end_point(last.end, last.z, last.p, last.x[-1])
 
     def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Knots, states, run-time vector and modes of one of them."""
+        """Return knots, states, run-time vector and modes of one segment."""
         segment = self[i]
         return segment.s, segment.x, segment.p, segment.z
 
     def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Numbers of segments, local times, states of all steps."""
+        """Return numbers of segments, local times, and states of all steps."""
         index = np.repeat(np.arange(len(self)), [len(segment.s) for segment in self])
         s, x = [segment.s for segment in self], [segment.x for segment in self]
         return index, np.concatenate(s), np.concatenate(x)
 
     def since(self, first: int) -> SegmentList:
-        """Those from the first on."""
+        """Return the segments from this number on."""
         return SegmentList(self._system, self[first:])
 
 
 class OccurrenceList(list[Occurrence]):
-    """Occurrences as objects; see `OccurrenceBlock`."""
+    """Events as objects; see `OccurrenceBlock`."""
 
     @property
     def until(self) -> Instant:
-        """Time of the last one."""
+        """Return the time of the last event."""
         return self[-1].instant
 
     @property
     def times(self) -> np.ndarray:
-        """Times rounded to doubles."""
+        """Return the times, rounded to doubles."""
         return np.array([float(o.instant) for o in self])
 
     def times_of(self, component: str, kind: str | None) -> np.ndarray:
-        """Times of those of a component and kind."""
+        """Return the times of the events of a component and kind."""
         return np.array([float(o.instant) for o in self._of(component, kind)])
 
     def states_of(self, component: str, kind: str | None, side: int) -> np.ndarray:
-        """States (k, n) at the same, before (side 0) or after (1) them."""
+        """Return states (k, n) at these events, before (side 0) or after (1) them."""
         found = [(o.x_minus, o.x_plus)[side] for o in self._of(component, kind)]
         return np.array(found) if found else np.empty((0, 0))
 
@@ -186,16 +185,16 @@ class OccurrenceList(list[Occurrence]):
         return [o for o in self if o.component == component and kind in (None, o.kind)]
 
     def kinds(self) -> Counter[str]:
-        """How many there are of each kind."""
+        """Return the number of events of each kind."""
         return Counter(o.kind for o in self)
 
     def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
-        """Instants and states of those that are transitions, from that number on."""
+        """Return instants (k, 2) and states (k, 2, n) of the transitions from this number on."""
         chosen = [o for o in self[first:] if o.kind == "transition"]
         if not chosen:
             return np.empty((0, 2)), np.empty((0, 2, 0))
         return np.array([o.instant for o in chosen]), np.array([(o.x_minus, o.x_plus) for o in chosen])
 
     def since(self, first: int) -> OccurrenceList:
-        """Those from the first on."""
+        """Return the events from this number on."""
         return OccurrenceList(self[first:])

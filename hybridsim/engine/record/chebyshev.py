@@ -1,8 +1,8 @@
-"""Dense output as Chebyshev series: what any interpolant becomes that is to be kept in arrays.
+"""Convert dense output to Chebyshev series, so that any interpolant can be stored in arrays.
 
-The series through the values at the Chebyshev points of a step is as good as its last coefficients are small; the
-degree is doubled until they are at rounding (J. P. Boyd, Chebyshev and Fourier Spectral Methods, 2nd ed., Dover 2001,
-chapter 2). An interpolant that is a polynomial comes out to rounding.
+The series through the values at the Chebyshev points of a step is as accurate as its last coefficients are small. The
+degree is doubled until they are at rounding level (J. P. Boyd, Chebyshev and Fourier Spectral Methods, 2nd ed., Dover
+2001, chapter 2). A polynomial interpolant is reproduced to rounding.
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ from numpy.polynomial import chebyshev
 from hybridsim.engine.record.segments import Dense
 
 _DEGREES = (9, 18, 36, 72, 144, 288, 576, 1152)
-_NEGLIGIBLE = 2.0**-50  # of a state's size
-_TAIL = 3  # coefficients that have to be: one or two may be small by symmetry
+_NEGLIGIBLE = 2.0**-50  # relative to the size of a state
+_TAIL = 3  # last coefficients that must be negligible; one or two may be small by symmetry
 
 
 @dataclass(frozen=True)
 class ChebyshevPieces:
-    """One series for each step: knots (m + 1,), coefficients (d, n) of each of the m steps."""
+    """Dense output with one series per step: knots (m + 1,), coefficients (d, n) of each of the m steps."""
 
     knots: np.ndarray
     coefficients: tuple[np.ndarray, ...]
 
     def __call__(self, s: np.ndarray) -> np.ndarray:
-        """States (k, n) at local times (k,)."""
+        """Return states (k, n) at local times (k,)."""
         ascending = self.knots[-1] >= self.knots[0]
         inner = self.knots[1:-1] if ascending else -self.knots[1:-1]
         index = np.searchsorted(inner, s if ascending else -s, side="right")
@@ -40,7 +40,7 @@ class ChebyshevPieces:
 
 
 def chebyshev_series(dense: Dense, a: float, b: float, sizes: np.ndarray) -> np.ndarray:
-    """Coefficients (d, n) of a dense output between local times a and b; sizes (n,) of the states, for rounding."""
+    """Return coefficients (d, n) of dense output between local times a and b; sizes (n,): of the states."""
     middle, half = 0.5 * (a + b), 0.5 * (b - a)
     for degree in _DEGREES:
         points = chebyshev.chebpts1(degree + 1)

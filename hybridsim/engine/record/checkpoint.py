@@ -1,4 +1,4 @@
-"""The state of a run just after an event: all that it needs to go on from there, to the last bit."""
+"""The state of a run just after an event, with all data to continue from there bit for bit."""
 
 from __future__ import annotations
 
@@ -12,20 +12,15 @@ from hybridsim.errors import UsageError
 
 
 class Pace(NamedTuple):
-    """How the events of one component follow each other, as the watch over accumulations knows it.
+    """The intervals between the events of one component, as the detection of accumulations stores them."""
 
-    last : the last event.
-    intervals : before it.
-    longest : interval since which they shrink.
-    forecast : limit of the series so far, and how far ahead it is.
-    steadiest : by how much that limit moved last; the least that one moved, and that one.
-    """
-
-    last: Instant | None
-    intervals: tuple[float, ...]
-    longest: float
-    forecast: tuple[float, float] | None = None
-    steadiest: tuple[float, float, float] | None = None
+    last: Instant | None  # the last event
+    intervals: tuple[float, ...]  # intervals before it
+    longest: float  # the interval since which they shrink
+    forecast: tuple[float, float] | None = None  # limit of the series so far, and its distance
+    steadiest: tuple[float, float, float] | None = (
+        None  # last change of the forecast, least change, its forecast
+    )
 
 
 BEGINNING = Pace(None, (), 0.0)
@@ -33,27 +28,18 @@ BEGINNING = Pace(None, (), 0.0)
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A place that a run passed and can go on from.
-
-    Parameters
-    ----------
-    instant : where it is.
-    arrays : what holds there, by names that the loop gives them.
-    settled : the last appointment that was kept.
-    paces : how the events of each component followed each other.
-    segments, occurrences : how many the run has recorded since; they are recorded anew.
-    """
+    """A point of a run from which it can continue."""
 
     instant: Instant
-    arrays: dict[str, np.ndarray]
-    settled: Instant | None
-    paces: dict[int, Pace]
-    segments: int = 0
-    occurrences: int = 0
+    arrays: dict[str, np.ndarray]  # the state there, by names that the loop chooses
+    settled: Instant | None  # the last completed appointment
+    paces: dict[int, Pace]  # intervals between the events of each component
+    segments: int = 0  # segments recorded since, which are recorded again
+    occurrences: int = 0  # events recorded since, which are recorded again
 
 
 def damaged(what: str) -> UsageError:
-    """What is raised where a run cannot go on from a place that came from a file."""
+    """Return the error for a run that cannot continue from a damaged file."""
     return UsageError(
         f"the run cannot be resumed: its file is damaged in {what}",
         remedy="start a new run from sol.y[:, -1]",

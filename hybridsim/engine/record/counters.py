@@ -1,4 +1,4 @@
-"""Counters of the work that a run has cost."""
+"""Counters of the work of a run."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass
 class Counters:
-    """What a run has cost, summed over all restarts."""
+    """The work of a run, summed over all restarts."""
 
     steps: int = 0
     rejected: int = 0

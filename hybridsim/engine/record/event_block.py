@@ -1,4 +1,4 @@
-"""The ordinary events of a compiled loop, as it wrote them down: one guard of one component fires at each."""
+"""The ordinary events of a compiled loop, in which one guard of one component fires."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 def _taking_part(
     fired: Any, before: Any, after: Any, owner: Any, has_surface: Any, places: Any
 ) -> tuple[int, bool]:
-    """How many changes of mode there are, and resets that change none; whether there is one at each event.
+    """Return the number of mode changes and resets without one, and whether each event has exactly one.
 
-    places (2, m): of which event and component each is, as far as there is room.
+    places (2, m): receives event and component of each, up to its length.
     """
     count, is_plain = 0, True
     for e in range(fired.shape[0]):
@@ -38,7 +38,7 @@ def _taking_part(
 
 @kernel
 def _times_at(instants: Any, places: Any, first: int, component: int, times: Any) -> int:
-    """Times of the occurrences of a component, from that number on, and how many there are."""
+    """Write the times of the events of a component from a number on, and return how many there are."""
     count = 0
     for i in range(first, places.shape[1]):
         if places[1, i] == component:
@@ -50,7 +50,7 @@ def _times_at(instants: Any, places: Any, first: int, component: int, times: Any
 
 @kernel
 def _states_at(states: Any, places: Any, first: int, component: int, side: int, out: Any) -> int:
-    """States at the occurrences of a component, from that number on, on one side, and how many there are."""
+    """Write the states at the events of a component on one side, and return how many there are."""
     count = 0
     for i in range(first, places.shape[1]):
         if places[1, i] == component:
@@ -64,7 +64,7 @@ _take_part, _times_of_one = Door(_taking_part), Door(_times_at)
 
 
 class Crossings(Sequence[Occurrence]):
-    """E events in arrays; each is an occurrence for every component that changes its mode or is reset.
+    """E events in arrays. Each one is an event of every component that changes its mode or is reset.
 
     Parameters
     ----------
@@ -99,22 +99,22 @@ class Crossings(Sequence[Occurrence]):
 
     @property
     def _places(self) -> np.ndarray:
-        """Event and component (2, occurrences) of each occurrence."""
+        """Return event and component (2, events) of each recorded event."""
         return self._all_places[:, self._first :]
 
     @property
     def until(self) -> Instant:
-        """Time of the last one."""
+        """Return the time of the last event."""
         return Instant(*self._instants[-1].tolist())
 
     @property
     def times(self) -> np.ndarray:
-        """Times rounded to doubles."""
+        """Return the times, rounded to doubles."""
         times = self._instants[:, 0] + self._instants[:, 1]
         return times[self._first :] if self._is_plain else times[self._places[0]]
 
     def times_of(self, component: str, kind: str | None) -> np.ndarray:
-        """Times of those of a component; all are transitions, or changes of a corner's side."""
+        """Return the times of the events of a component; all are transitions or changes of a corner."""
         for c, automaton in enumerate(self._system.automata):
             if automaton.name == component and kind in (None, automaton.kind):
                 times = np.empty(len(self))
@@ -123,24 +123,24 @@ class Crossings(Sequence[Occurrence]):
         return np.empty(0)
 
     def states_of(self, component: str, kind: str | None, side: int) -> np.ndarray:
-        """States (k, n) at the same, before (side 0) or after (1) them, in an array of their own."""
+        """Return states (k, n) at these events, before (side 0) or after (1) them, in a new array."""
         for c, automaton in enumerate(self._system.automata):
             if automaton.name == component and kind in (None, automaton.kind):
                 states = np.empty((len(self), self._system.n))
-                # by no door: of some loops the states are a part of longer rows
+                # called directly, because the states of some loops are not contiguous
                 count = _states_at(self._states, self._all_places, self._first, c, side, states)
                 return states if count == len(states) else states[:count]
         return np.empty((0, self._system.n))
 
     def kinds(self) -> Counter[str]:
-        """How many there are of each kind."""
+        """Return the number of events of each kind."""
         found: Counter[str] = Counter()
         for automaton, count in zip(self._system.automata, np.bincount(self._places[1]).tolist()):
             found[automaton.kind] += count
         return +found
 
     def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
-        """Instants and states of those that are transitions, from that number on."""
+        """Return instants (k, 2) and states (k, 2, n) of the transitions from this number on."""
         has_corners = len(self._system.declared) < len(self._system.automata)
         if self._is_plain and not has_corners:
             return self._instants[self._first + first :], self._states[self._first + first :]
@@ -150,7 +150,7 @@ class Crossings(Sequence[Occurrence]):
         return self._instants[events], self._states[events]
 
     def since(self, first: int) -> Crossings:
-        """Those from the first on."""
+        """Return the events from this number on."""
         later = copy(self)
         later._first += first
         return later

@@ -1,4 +1,4 @@
-"""Stretches of fixed steps as blocks: the rows that a kernel wrote, made into segments and events when asked for."""
+"""Blocks of fixed steps: the rows that a kernel wrote, converted to segments and events on demand."""
 
 from __future__ import annotations
 
@@ -17,12 +17,14 @@ from hybridsim.engine.system.system import System
 
 
 class StepSegments(Sequence[Segment]):
-    """The segments of one stretch: a segment for each run of rows in the same modes.
+    """The segments of one series of fixed steps, one for each sequence of rows in the same modes.
 
     Parameters
     ----------
-    origin, p : instant from which local times count, run-time vector of the stretch.
-    s, x, z : (m + 1,), (m + 1, n), (m + 1, C): where each step begins and its modes; the last row is the end.
+    origin, p : instant from which local times count, and the run-time vector.
+    s, x, z : (m + 1,), (m + 1, n), (m + 1, C): local time, states and modes at the start of each step; the last row is
+    the
+        end.
     cuts : rows at which the modes change, ascending.
     """
 
@@ -44,7 +46,7 @@ class StepSegments(Sequence[Segment]):
         self._first, self._last = self._first[longer], self._last[longer]
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """All that it is made of; see `of_arrays`."""
+        """Return all its arrays by name; see `of_arrays`."""
         used = slice(int(self._first[0]), int(self._last[-1]) + 1)
         rows = {"s": self._s[used], "x": self._x[used], "z": self._z[used]}
         return rows | {
@@ -55,7 +57,7 @@ class StepSegments(Sequence[Segment]):
 
     @classmethod
     def of_arrays(cls, system: System, arrays: dict[str, np.ndarray]) -> StepSegments:
-        """The same again."""
+        """Return the block made from these arrays."""
         origin = Instant(*arrays["origin"].tolist())
         return cls(system, origin, *(arrays[name] for name in ("p", "s", "x", "z", "cuts")))
 
@@ -64,31 +66,31 @@ class StepSegments(Sequence[Segment]):
 
     @property
     def until(self) -> Instant:
-        """End of the last one."""
+        """Return the end of the last segment."""
         return self._origin.plus(float(self._s[self._last[-1]]))
 
     @property
     def origins(self) -> np.ndarray:
-        """Origins of local time (N, 2)."""
+        """Return origins of local time (N, 2)."""
         return np.tile(np.array(self._origin), (len(self), 1))
 
     @property
     def spans(self) -> np.ndarray:
-        """First and last local time (N, 2)."""
+        """Return first and last local times (N, 2)."""
         return np.stack([self._s[self._first], self._s[self._last]], axis=1)
 
     @property
     def modes(self) -> np.ndarray:
-        """Modes (N, C)."""
+        """Return modes (N, C)."""
         return self._z[self._first]
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """States (k, n) in the segments of these numbers, at local times (k,)."""
+        """Return states (k, n) in the segments of these numbers, at local times (k,)."""
         wanted, place = np.unique(index, return_inverse=True)
         return SegmentList(self._system, (self[i] for i in wanted.tolist())).states(place, s)
 
     def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Numbers of segments, local times, states of all steps; where segments meet, the row stands twice."""
+        """Return numbers of segments, local times and states of all steps; a row between two segments occurs twice."""
         counts = self._last - self._first + 1
         starts = np.cumsum(counts) - counts
         index = np.repeat(np.arange(len(self)), counts)
@@ -96,17 +98,17 @@ class StepSegments(Sequence[Segment]):
         return index, self._s[rows], self._x[rows]
 
     def at_end(self) -> Segment:
-        """The end of the last one."""
+        """Return the end of the last segment."""
         last = int(self._last[-1])
         return end_point(self.until, self._z[int(self._first[-1])], self._p, self._x[last])
 
     def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Knots, states, run-time vector and modes of one of them."""
+        """Return knots, states, run-time vector and modes of one segment."""
         first, last = int(self._first[i]), int(self._last[i])
         return self._s[first : last + 1], self._x[first : last + 1], self._p, self._z[first]
 
     def since(self, first: int) -> StepSegments:
-        """Those from the first on."""
+        """Return the segments from this number on."""
         later = copy(self)
         later._first, later._last = self._first[first:], self._last[first:]
         return later
@@ -121,13 +123,13 @@ class StepSegments(Sequence[Segment]):
 
 
 class StepOccurrences(Sequence[Occurrence]):
-    """The changes of mode in one stretch.
+    """The changes of mode in one series of fixed steps.
 
     Parameters
     ----------
-    rows, components : (E,) the row at which each happens, in order, and the component that changes.
-    changes : (E, 2) its modes before and after.
-    s, x : local times and states of all rows of the stretch.
+    rows, components : (E,) the row of each change, in order, and the component that changes.
+    changes : (E, 2) modes before and after.
+    s, x : local times and states of all rows.
     """
 
     def __init__(
@@ -149,20 +151,20 @@ class StepOccurrences(Sequence[Occurrence]):
 
     @property
     def until(self) -> Instant:
-        """Time of the last one."""
+        """Return the time of the last event."""
         return self._origin.plus(float(self._s[-1]))
 
     @property
     def times(self) -> np.ndarray:
-        """Times rounded to doubles."""
+        """Return the times, rounded to doubles."""
         return np.array([float(self._origin.plus(s)) for s in self._s.tolist()])
 
     def times_of(self, component: str, kind: str | None) -> np.ndarray:
-        """Times of those of a component; all are transitions."""
+        """Return the times of the events of a component; all are transitions."""
         return self.times[self._are_of(component, kind)]
 
     def states_of(self, component: str, kind: str | None, side: int) -> np.ndarray:
-        """States (k, n) at the same: nothing jumps."""
+        """Return states (k, n) at these events, the same on both sides."""
         return self._x[self._are_of(component, kind)]
 
     def _are_of(self, component: str, kind: str | None) -> np.ndarray:
@@ -172,17 +174,17 @@ class StepOccurrences(Sequence[Occurrence]):
         return self._components == names.index(component)
 
     def kinds(self) -> Counter[str]:
-        """How many there are of each kind: all are transitions."""
+        """Return the number of events of each kind; all are transitions."""
         return Counter({"transition": len(self)})
 
     def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
-        """Instants and states of those from that number on: nothing jumps."""
+        """Return instants and states of the events from this number on, the same on both sides."""
         instants = [self._origin.plus(s) for s in self._s[first:].tolist()]
         states = np.stack([self._x[first:]] * 2, axis=1)
         return np.array(instants).reshape(-1, 2), states
 
     def since(self, first: int) -> StepOccurrences:
-        """Those from the first on."""
+        """Return the events from this number on."""
         later = copy(self)
         later._components, later._changes = self._components[first:], self._changes[first:]
         later._s, later._x = self._s[first:], self._x[first:]

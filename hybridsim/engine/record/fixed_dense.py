@@ -1,4 +1,4 @@
-"""Dense output of fixed steps: cubic Hermite polynomials whose slopes are evaluated when they are asked for."""
+"""Dense output of fixed steps: cubic Hermite polynomials with slopes evaluated on demand."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class StepDense:
     x: np.ndarray
 
     def __call__(self, s: np.ndarray) -> np.ndarray:
-        """States (k, n) at local times (k,)."""
+        """Return states (k, n) at local times (k,)."""
         index = np.clip(np.searchsorted(self.s, s, side="right") - 1, 0, len(self.s) - 2)
         used, place = np.unique(index, return_inverse=True)
         left, right = self._slopes(used), self._slopes(used + 1)
@@ -28,7 +28,7 @@ class StepDense:
         theta = (s - self.s[index])[:, None] / h
         x0, x1, d0, d1 = self.x[index], self.x[index + 1], left[place] * h, right[place] * h
         rest = 1.0 - theta
-        # written from x0 on, so that what does not move stays where it is to the last bit
+        # relative to x0, so that constant states stay constant bit for bit
         return x0 + (x1 - x0) * theta**2 * (3.0 - 2.0 * theta) + d0 * rest**2 * theta - d1 * theta**2 * rest
 
     def _slopes(self, rows: np.ndarray) -> np.ndarray:

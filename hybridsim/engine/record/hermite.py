@@ -1,4 +1,4 @@
-"""Two-point Hermite interpolation: dense output from the derivatives at both ends of a step, of any order."""
+"""Two-point Hermite interpolation: dense output of any order from the derivatives at both ends of a step."""
 
 from __future__ import annotations
 
@@ -12,34 +12,34 @@ import numpy as np
 from hybridsim.engine.native.kernels import allocating_kernel, call, kernel
 from hybridsim.engine.record.segments import Dense
 
-_DEFECT = 100.0  # times the tolerance: by how much a step may miss the flow between its ends, over its length
+_DEFECT = 100.0  # largest defect between the ends of a step, integrated over its length, in tolerances
 
 
 @cache
 def right_system(count: int) -> np.ndarray:
-    """Inverse of the map from the coefficients of theta**count * q to the derivatives (over k!) at theta = 1."""
+    """Return the inverse of the map from coefficients of theta**count * q to derivatives (over k!) at theta = 1."""
     rows = [[comb(count + j, k) for j in range(count)] for k in range(count)]
     return np.linalg.inv(np.array(rows, dtype=float))
 
 
 @cache
 def shift_matrix(count: int) -> np.ndarray:
-    """Taylor shift by one: coefficients at theta = 0 to those at theta = 1."""
+    """Return the Taylor shift by one: from coefficients at theta = 0 to those at theta = 1."""
     return np.array([[comb(j, k) for k in range(count)] for j in range(count)], dtype=float)
 
 
 @cache
 def bernstein_weights(count: int) -> np.ndarray:
-    """From the Taylor coefficients at an end (in theta) to the `count` Bernstein coefficients of degree 2 K - 1 there.
+    """Return the matrix from Taylor coefficients at an end to `count` Bernstein coefficients of degree 2 K - 1 there.
 
-    On the right the signs of odd coefficients change, since theta runs backward from there.
+    At the right end the signs of odd coefficients change, because theta runs backward from there.
     """
     degree = 2 * count - 1
     return np.array([[comb(j, k) / comb(degree, k) for k in range(count)] for j in range(count)])
 
 
 class Hermite(NamedTuple):
-    """The matrices of one K: `shift_matrix`, `right_system`, `bernstein_weights`, `middle_weights`."""
+    """The matrices for one K: `shift_matrix`, `right_system`, `bernstein_weights`, `middle_weights`."""
 
     shift: np.ndarray
     inverse: np.ndarray
@@ -49,9 +49,9 @@ class Hermite(NamedTuple):
 
 @kernel
 def fit(left: Any, right: Any, h: float, shift: Any, inverse: Any, lack: Any, out: Any) -> None:
-    """Coefficients (n, 2 K) of the polynomial in theta: the left series, then theta**K times a correction.
+    """Write coefficients (n, 2 K) of the polynomial in theta: the left series, plus theta**K times a correction.
 
-    shift, inverse: `shift_matrix` and `right_system` of K; lack (K,) is room.
+    shift, inverse: `shift_matrix` and `right_system` of K. lack (K,): scratch.
     """
     n, count = left.shape
     for i in range(n):
@@ -72,7 +72,7 @@ def fit(left: Any, right: Any, h: float, shift: Any, inverse: Any, lack: Any, ou
 
 @kernel
 def fit_in_time(left: Any, right: Any, h: float, shift: Any, inverse: Any, lack: Any, out: Any) -> bool:
-    """The same in powers of the time from the left end; whether all coefficients are finite."""
+    """Write the same in powers of the time since the left end. Return whether all coefficients are finite."""
     fit(left, right, h, shift, inverse, lack, out)
     power, total = 1.0, 0.0
     for k in range(out.shape[1]):
@@ -85,9 +85,10 @@ def fit_in_time(left: Any, right: Any, h: float, shift: Any, inverse: Any, lack:
 
 @cache
 def middle_weights(count: int) -> np.ndarray:
-    """Of the terms of the left series at theta = 1 in the value of the polynomial at theta = 1/2, and in its slope.
+    """Return weights of the terms of the left series in the value and slope of the polynomial at theta = 1/2.
 
-    Terms of the right series, theta running backward from there, have the same weights; in the slope with other signs.
+    The terms of the right series, with theta backward from there, have the same weights, with opposite signs in the
+    slope.
     """
     found, lack = np.empty((2, count)), np.empty(count)
     for k in range(count):
@@ -112,11 +113,11 @@ def holds_between(
     x: Any,
     dx: Any,
 ) -> bool:
-    """Whether in the middle of a step the polynomial meets the flow as well as the tolerances ask for.
+    """Return whether the polynomial satisfies the flow within the tolerances in the middle of a step.
 
-    The ends tell nothing of that: where a step ends before a sharp bend of the flow, such as that of a friction
-    smoothed over a small velocity, its last derivatives are those of the bend, and the polynomial is far off between
-    ends that are right. tolerances: rtol, atol. weights: `middle_weights`. x, dx (n,): room.
+    The ends do not show this. If a step ends before a sharp bend of the flow, such as friction smoothed over a small
+    velocity, its last derivatives are those of the bend. The polynomial is then wrong between correct ends. tolerances:
+    rtol, atol. weights: `middle_weights`. x, dx (n,): scratch.
     """
     rtol, atol = tolerances
     n, count = left.shape
@@ -140,7 +141,7 @@ def holds_between(
 
 @allocating_kernel
 def fit_all(steps: Any, ends: Any, shift: Any, inverse: Any, out: Any) -> None:
-    """`fit_in_time` for many steps: steps (m, 2) with lengths last, ends (m, n, 2 K) left series and then right."""
+    """Apply `fit_in_time` to many steps: steps (m, 2) with lengths last, ends (m, n, 2 K) left and right series."""
     count = shift.shape[0]
     lack = np.empty(count)
     for i in range(ends.shape[0]):
@@ -151,7 +152,7 @@ def fit_all(steps: Any, ends: Any, shift: Any, inverse: Any, out: Any) -> None:
 def _evaluate(
     c: np.ndarray, s0: float, s1: float, left: np.ndarray, right: np.ndarray, s: np.ndarray
 ) -> np.ndarray:
-    """Values (k, n) at local times s (k,); the ends bit for bit."""
+    """Return values (k, n) at local times s (k,), with the ends bit for bit."""
     n, size = c.shape
     out = np.empty((s.shape[0], n))
     for m in range(s.shape[0]):
@@ -169,7 +170,7 @@ def _evaluate(
 
 
 def hermite(s0: float, s1: float, left: np.ndarray, right: np.ndarray) -> Dense:
-    """The polynomial of degree 2 K - 1 that has the K Taylor coefficients `left` at s0 and `right` at s1.
+    """Return the polynomial of degree 2 K - 1 with K Taylor coefficients `left` at s0 and `right` at s1.
 
     Parameters
     ----------

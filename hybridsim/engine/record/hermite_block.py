@@ -17,11 +17,11 @@ TERMS = 4  # coefficients of the flow at each end of a step: the dense output ha
 
 
 class HermiteBlock(SeriesBlock):
-    """Segments whose steps have the flow's series at both ends: series (steps, n, 2 K), left and then right."""
+    """Segments whose steps have the Taylor series of the flow at both ends: series (steps, n, 2 K), left then right."""
 
     @cached_property
     def polynomials(self) -> np.ndarray:
-        """The two-point Hermite polynomials, made when they are asked for."""
+        """Return the two-point Hermite polynomials, computed on demand."""
         out = np.empty_like(self.series)
         fit_all(self.steps, self.series, shift_matrix(TERMS), right_system(TERMS), out)
         return out

@@ -1,4 +1,4 @@
-"""Limits of a run: how much it may cost before it stops with what it has."""
+"""Limits on the cost of a run, at which it stops with its results so far."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from hybridsim.engine.record.counters import Counters
 
-_OFTEN = 64  # looks at the clock and the counters for one at the memory, which takes a call of the system
+_OFTEN = 64  # checks of the clock and the counters per check of the memory, which needs a system call
 
 
 class LimitReached(Exception):
-    """A run has cost what it may; the message says what."""
+    """A limit of the run is exceeded; the message names it."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """The most events, steps, seconds by the clock, and megabytes that the process grows by, in one call."""
+    """The limits of one call."""
 
     events: float = inf
     steps: float = inf
-    seconds: float = inf
-    megabytes: float = inf
+    seconds: float = inf  # wall-clock time
+    megabytes: float = inf  # growth of the process
 
 
 UNLIMITED = Limits()
 
 
 class Gauge:
-    """Holds one run against its limits."""
+    """Compares one run with its limits."""
 
     def __init__(self, limits: Limits, counters: Counters) -> None:
         self.limits, self.counters = limits, counters
@@ -42,7 +42,7 @@ class Gauge:
         self._looks = 0
 
     def check(self) -> None:
-        """Raise LimitReached where a limit is passed."""
+        """Raise LimitReached if a limit is exceeded."""
         limits, counters = self.limits, self.counters
         if counters.events - self._events >= limits.events:
             raise LimitReached(
@@ -64,7 +64,7 @@ class Gauge:
 
 
 def resident_megabytes() -> float:
-    """Memory of this process: what it holds where the system tells (Linux), else the most that it has held."""
+    """Return the memory of this process: the present one on Linux, else the peak."""
     try:
         with open("/proc/self/statm") as file:
             pages = int(file.read().split()[1])

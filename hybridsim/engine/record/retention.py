@@ -1,4 +1,4 @@
-"""How much of a run is kept once it is over."""
+"""How much of a run is kept after it ends."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 class Keep(NamedTuple):
-    """How far back from the end of a run, in the unit of t, its segments and its events are kept; None: not at all."""
+    """The time before the end of a run, in the unit of t, for which segments and events are kept; None: not at all."""
 
     segments: float | None = math.inf
     events: float | None = math.inf

@@ -1,4 +1,4 @@
-"""What a trajectory is made of: segments with dense output, and occurrences."""
+"""The parts of a trajectory: segments with dense output, and events."""
 
 from __future__ import annotations
 
@@ -15,35 +15,35 @@ Dense = Callable[[np.ndarray], np.ndarray]  # local times (k,) -> states (k, n)
 
 @dataclass(frozen=True)
 class Segment:
-    """One piece of trajectory in one z: knots at local times s (m+1,), states x (m+1, n), dense output between."""
+    """One segment of a trajectory in constant modes."""
 
-    origin: Instant
-    z: np.ndarray
-    p: np.ndarray
-    s: np.ndarray
-    x: np.ndarray
+    origin: Instant  # instant at local time zero
+    z: np.ndarray  # modes (C,)
+    p: np.ndarray  # run-time vector
+    s: np.ndarray  # local times (m + 1,) of the knots
+    x: np.ndarray  # states (m + 1, n) at the knots
     dense: Dense
 
     @property
     def start(self) -> Instant:
-        """Where it begins."""
+        """Return the instant at which it begins."""
         return self.origin.plus(float(self.s[0]))
 
     @property
     def end(self) -> Instant:
-        """Where it ends."""
+        """Return the instant at which it ends."""
         return self.origin.plus(float(self.s[-1]))
 
 
 @dataclass(frozen=True)
 class Pieces:
-    """Dense output made of one interpolant for each step."""
+    """Dense output with one interpolant for each step."""
 
     knots: np.ndarray
     interpolants: tuple[Dense, ...]
 
     def __call__(self, s: np.ndarray) -> np.ndarray:
-        """States (k, n) at local times (k,)."""
+        """Return states (k, n) at local times (k,)."""
         ascending = self.knots[-1] >= self.knots[0]
         inner = self.knots[1:-1] if ascending else -self.knots[1:-1]
         index = np.searchsorted(inner, s if ascending else -s, side="right")
@@ -57,7 +57,7 @@ class Pieces:
 
 
 class Occurrence(NamedTuple):
-    """An event as the engine records it; names are resolved by the solution."""
+    """An event as the engine records it; the solution resolves its names."""
 
     instant: Instant
     kind: str  # transition, monitor, scheduled, near-grazing
@@ -71,7 +71,7 @@ class Occurrence(NamedTuple):
 
 
 def end_point(origin: Instant, z: np.ndarray, p: np.ndarray, x: np.ndarray) -> Segment:
-    """A segment of no length: the state after an event with which a run ends."""
+    """Return a segment of zero length: the state after an event at which a run ends."""
     states = x[None].copy()
     return Segment(
         origin, z.copy(), p.copy(), np.zeros(1), states, lambda s: np.repeat(states, len(s), axis=0)

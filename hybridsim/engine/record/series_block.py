@@ -1,4 +1,4 @@
-"""Segments whose dense output is Taylor series, in the arrays that the compiled mode loop wrote them to."""
+"""Segments with Taylor series as dense output, in the arrays that the compiled mode loop wrote."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from hybridsim.engine.system.system import System
 
 @dataclass(frozen=True)
 class SeriesPieces:
-    """Dense output made of one Taylor series for each step: knots (m + 1,), coefficients (m, n, order + 1)."""
+    """Dense output with one Taylor series per step: knots (m + 1,), coefficients (m, n, order + 1)."""
 
     knots: np.ndarray
     coefficients: np.ndarray
 
     def __call__(self, s: np.ndarray) -> np.ndarray:
-        """States (k, n) at local times (k,)."""
+        """Return states (k, n) at local times (k,)."""
         s = np.asarray(s, dtype=float)
         index = np.searchsorted(self.knots[1:-1], s, side="right")
         out = np.empty((len(s), self.coefficients.shape[1]))
@@ -39,7 +39,7 @@ class SeriesPieces:
 
 @inlined
 def _step_at(steps: Any, first: int, last: int, s: float) -> int:
-    """Which of the steps of a segment, from the first to the last, holds a local time."""
+    """Return the step of a segment, between the first and the last, that contains a local time."""
     while first < last:
         middle = (first + last + 1) // 2
         if steps[middle, 0] <= s:
@@ -53,9 +53,9 @@ def _step_at(steps: Any, first: int, last: int, s: float) -> int:
 def series_states(
     project: Any, pinned: bool, index: Any, s: Any, ends: Any, steps: Any, series: Any, record: Any, out: Any
 ) -> None:
-    """States at local times s of the segments of these numbers; see `SeriesBlock`.
+    """Write the states at local times s of the segments of these numbers; see `SeriesBlock`.
 
-    Up to eight times that follow each other and lie in one step are taken at once.
+    Up to eight consecutive times in one step are evaluated together.
     """
     modes, vectors, jumps = record
     n, order = series.shape[1], series.shape[2] - 1
@@ -81,7 +81,7 @@ def series_states(
         for m in range(WIDTH):
             since[m] = s[k + min(m, count - 1)] - begin
         d = load(since, 0)
-        for j in range(0, n, 2):  # two at a time: neither waits for the other's sum
+        for j in range(0, n, 2):  # two states at a time, so that the sums are independent
             other = min(j + 1, n - 1)
             value, beside = splat(series[step, j, order]), splat(series[step, other, order])
             for m in range(order - 1, -1, -1):
@@ -102,7 +102,7 @@ def series_states(
 
 @kernel
 def _spans_of(ends: Any, steps: Any, spans: Any) -> None:
-    """First and last local times of segments."""
+    """Write first and last local times of segments."""
     for i in range(spans.shape[0]):
         last = ends[i + 1] - 1
         spans[i, 0], spans[i, 1] = steps[ends[i], 0], steps[last, 0] + steps[last, 1]
@@ -114,8 +114,8 @@ class SeriesBlock(Sequence[Segment]):
 
     Parameters
     ----------
-    ends : (N + 1,), rows of the steps at which each segment begins and the last one ends.
-    steps, series : (steps, 2) local time at which a step begins and its length; (steps, n, order + 1) coefficients.
+    ends : (N + 1,), rows of the steps at which each segment begins, and the end of the last one.
+    steps, series : (steps, 2) local time and length of each step; (steps, n, order + 1) coefficients.
     origins, modes, vectors : (N, 2), (N, C), (N, P) of each segment.
     jumps : (N, 2, n), x- and x+ at the end of each segment.
     """
@@ -134,25 +134,25 @@ class SeriesBlock(Sequence[Segment]):
 
     @property
     def polynomials(self) -> np.ndarray:
-        """Coefficients of the dense output in powers of the time since the step's start (steps, n, degree + 1)."""
+        """Return coefficients (steps, n, degree + 1) of the dense output in the time since each step's start."""
         return self.series
 
     @cached_property
     def spans(self) -> np.ndarray:
-        """Local times of start and end (N, 2)."""
+        """Return first and last local times (N, 2)."""
         spans = np.empty((len(self), 2))
         _spans_of(self.ends, self.steps, spans)
         return spans
 
     @property
     def until(self) -> Instant:
-        """End of the last segment."""
+        """Return the end of the last segment."""
         high, low = self.origins[-1].tolist()
         s, h = self.steps[self.ends[-1] - 1].tolist()
         return Instant(high, low).plus(s + h)
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """States (k, n) in the segments of these numbers, at local times (k,)."""
+        """Return states (k, n) in the segments of these numbers, at local times (k,)."""
         out, pinned = np.empty((len(s), self.system.n)), self.system.can_hold
         project = self.system.address("project" if pinned else "flow")
         record = (self.modes, self.vectors, self.jumps)
@@ -160,7 +160,7 @@ class SeriesBlock(Sequence[Segment]):
         return out
 
     def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Numbers of segments, local times and states where steps begin, and at the end of each segment."""
+        """Return numbers of segments, local times and states at starts of steps and at ends of segments."""
         count = len(self)
         index = np.repeat(np.arange(count), np.diff(self.ends) + 1)
         s = np.empty(len(index))
@@ -171,7 +171,7 @@ class SeriesBlock(Sequence[Segment]):
         return index, s, self.states(index, s)
 
     def since(self, first: int) -> SeriesBlock:
-        """Those from the first on."""
+        """Return the segments from this number on."""
         rows = (self.origins, self.modes, self.vectors, self.jumps)
         ends, gone = self.ends[first:], self.ends[first]
         steps, series = self.steps[gone:], self.series[gone:]
@@ -189,7 +189,7 @@ class SeriesBlock(Sequence[Segment]):
         return Segment(Instant(high, low), self.modes[i], self.vectors[i], s, x, dense)
 
     def _alone(self, i: int) -> SeriesBlock:
-        """A block of one segment."""
+        """Return a block of one segment."""
         first, last = self.ends[i], self.ends[i + 1]
         rows = (self.origins, self.modes, self.vectors, self.jumps)
         ends = np.array([0, last - first])
@@ -197,11 +197,11 @@ class SeriesBlock(Sequence[Segment]):
         return type(self)(self.system, ends, steps, series, *(r[i : i + 1] for r in rows))
 
     def at_end(self) -> Segment:
-        """The end of the last segment."""
+        """Return the end of the last segment."""
         return end_point(self.until, self.modes[-1], self.vectors[-1], self.jumps[-1, 0])
 
     def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Knots (m + 1,), states where steps begin (m, n), run-time vector and modes of a segment."""
+        """Return knots (m + 1,), states at starts of steps (m, n), run-time vector and modes of a segment."""
         steps, first, last = self.steps, self.ends[i], self.ends[i + 1]
         s = np.append(steps[first:last, 0], steps[last - 1, 0] + steps[last - 1, 1])
         return s, self.series[first:last, :, 0], self.vectors[i], self.modes[i]

@@ -1,4 +1,4 @@
-"""In which segment each of many times lies, and the local time there."""
+"""Find the segment and the local time of each of many times."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from hybridsim.engine.native.kernels import inlined, kernel
 
 
 class Frame(NamedTuple):
-    """Where the segments of a run lie, in the order in which it went.
+    """The times of the segments of a run, in order.
 
-    starts, ends (N,): times at which each starts and ends, to the last bit that at which the next one starts. origins,
-    spans (N, 2): the instants from which their local times are counted, and their first and last ones.
+    starts, ends (N,): times at which each segment starts and ends; an end equals the next start bit for bit. origins,
+    spans (N, 2): the instants from which local times are counted, and the first and last local times.
     """
 
     starts: np.ndarray
@@ -24,7 +24,7 @@ class Frame(NamedTuple):
 
     @classmethod
     def of(cls, origins: np.ndarray, spans: np.ndarray, t_end: float) -> Frame:
-        """Of segments, the last of which ends at that time."""
+        """Return the times of segments, the last of which ends at t_end."""
         starts, ends = np.empty(len(spans)), np.empty(len(spans))
         _lay_out(origins, spans, t_end, starts, ends)
         return cls(starts, ends, origins, spans)
@@ -32,7 +32,7 @@ class Frame(NamedTuple):
 
 @kernel
 def _lay_out(origins: Any, spans: Any, t_end: float, starts: Any, ends: Any) -> None:
-    """Sums of three numbers, rounded once."""
+    """Write the starts and ends of segments, each rounded once."""
     last = starts.shape[0] - 1
     for i in range(last + 1):
         high, low, s = origins[i, 0], origins[i, 1], spans[i, 0]
@@ -52,7 +52,7 @@ def _has_begun(start: float, t: float, sign: float, is_later: bool) -> bool:
 
 @inlined
 def _search(t: float, starts: Any, sign: float, is_later: bool) -> int:
-    """Number of the segment that holds a time."""
+    """Return the number of the segment that contains a time."""
     low, high = 0, starts.shape[0] - 1
     while low < high:
         middle = (low + high + 1) // 2
@@ -75,10 +75,11 @@ def find_places(
     index: Any,
     s: Any,
 ) -> None:
-    """Of times (m,) numbers of segments and local times, to index and s (m,).
+    """Write to index and s (m,) the numbers of segments and the local times of times (m,).
 
-    The next four: see `Frame`. sign: -1 backward in time. is_later: where one ends and the next one starts, it is the
-    next one. A time that is that of an event, rounded, means the event. Times in a row are found soonest.
+    starts, ends, origins, spans: see `Frame`. sign: -1 backward in time. is_later: whether a time at which one segment
+    ends and the next one starts belongs to the next one. A time equal to the rounded time of an event means the event.
+    Sorted times are fastest.
     """
     i, last, k = 0, starts.shape[0] - 1, 0
     while k < times.shape[0]:
@@ -90,7 +91,7 @@ def find_places(
         first, final = spans[i, 0], spans[i, 1]
         since = sign * start if i > 0 else -math.inf
         until = sign * starts[i + 1] if i < last else math.inf
-        while True:  # those in a row that it holds
+        while True:  # consecutive times in the same segment
             t = times[k]
             at = (t - high) - low
             if t == start or sign * at < sign * first:

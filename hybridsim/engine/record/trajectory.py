@@ -1,4 +1,4 @@
-"""What a run leaves behind: segments with dense output, events, and how it ended."""
+"""The record of a run: segments with dense output, events, and how it ended."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ from hybridsim.engine.record.segments import Occurrence, Pieces, Segment, end_po
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
 
-# Events that a run may look back on where bounces come to an end. What is shown of it must not change what is found.
+# Events that the search for the end of bounces may examine. They are stored even if fewer are shown.
 LOOKED_BACK_ON = 4096
 
-Made = Callable[[int, int], Checkpoint]  # of how many segments and occurrences were recorded since
+Made = Callable[[int, int], Checkpoint]  # (segments, events recorded since) -> checkpoint
 
 __all__ = ["LOOKED_BACK_ON", "Occurrence", "Pieces", "Segment", "Task", "Trajectory"]
 
@@ -32,37 +32,39 @@ __all__ = ["LOOKED_BACK_ON", "Occurrence", "Pieces", "Segment", "Task", "Traject
 class Trajectory:
     """The record of a run.
 
-    segments and occurrences are sequences of `Segment` and `Occurrence`: append objects to them, or add the blocks
-    (`hybridsim.engine.record.blocks`) that a compiled loop leaves behind. What is older than is to be kept is let go
-    on the way, so that a run of any length takes no more memory than what it keeps. taken_over: the stiff method that
-    went on from some time on, and that time.
+    segments and occurrences are sequences of `Segment` and `Occurrence`. Objects can be appended, and blocks
+    (`hybridsim.engine.record.blocks`) of a compiled loop added. Items that are not to be kept are discarded during the
+    run, so that its memory is bounded by what it keeps. taken_over: the name of the stiff method that took over, and
+    the time.
     """
 
     taken_over: tuple[str, float] | None = None
 
     def __init__(self, system: System, keep: Keep = ALL) -> None:
-        # the last segment is needed in any case: it says where a run ends
+        # the last segment is always needed, because it gives the end of the run
         self.segments = SegmentChain(system, 0.0 if keep.segments is None else keep.segments)
         self._may_bounce = system.may_bounce
         least = LOOKED_BACK_ON if self._may_bounce else 0
         self.occurrences: Chain[Occurrence] = Chain(OccurrenceList, keep.events, least)
-        self.hidden: list[Any] = []  # the blocks of occurrences before some were let go of, to go on with
+        self.hidden: list[Any] = []  # blocks of events before some were discarded, to continue from
         self.counters = Counters()
         self.status, self.message = "finished", ""
-        self.warnings_there: dict[str, int] = {}  # those up to the checkpoint
-        self.warnings: dict[str, int] = {}  # message -> how often
+        self.warnings_there: dict[str, int] = {}  # warnings up to the checkpoint
+        self.warnings: dict[str, int] = {}  # message -> count
         self._checkpoint: Checkpoint | Callable[[], Checkpoint] | None = None
         self._mark: tuple[Made, tuple[int, int], tuple[int, int], dict[str, int]] | None = None
 
     def stop_early(self, status: str, why: str, start: float) -> None:
-        """Say of a run that stopped before its end why, where its solution ends (begun at `start`), how it goes on."""
+        """Set status and message of a run that stopped before its end; start: time at which it began."""
         head = f"{why}; stopped" if why else "interrupted"
         reached = float(self.segments[-1].end) if self.segments else start
         self.status = status
-        self.message = f"{head} at t = {reached!r}; what was computed is kept, and sol.resume() goes on"
+        self.message = (
+            f"{head} at t = {reached!r}; the results so far are kept, and sol.resume() continues the run"
+        )
 
     def finish(self, instant: Instant, z: np.ndarray, p: np.ndarray, x: np.ndarray, discrete: slice) -> None:
-        """Keep the state after an event at the very end of the run, which no segment begins with."""
+        """Store the state after an event at the end of the run, because no segment begins there."""
         if self.segments:
             if float(self.segments.blocks[-1].until) != float(instant):
                 return
@@ -72,7 +74,7 @@ class Trajectory:
         self.segments.append(end_point(instant, z, p, x))
 
     def close(self, keep: Keep) -> None:
-        """Let go of everything that is not to be kept, to the exact time."""
+        """Discard everything that is not to be kept, at the exact times."""
         if keep == ALL or not self.segments:
             return
         if keep.segments is None:
@@ -92,17 +94,17 @@ class Trajectory:
             sign = 1.0 if forward else -1.0
             times = np.concatenate([np.empty(0), *(block.times for block in self.occurrences.blocks)])
             first = int(np.searchsorted(sign * times, sign * start.high))
-            # a double before it by less than an ulp
+            # the rounded instant may be less than an ulp before it
             while first < len(times) and sign * self.occurrences[first].instant.minus(start) < 0.0:
                 first += 1
             self.occurrences.drop(first)
 
     def mark(self, checkpoint: Made) -> None:
-        """Note where the run could go on; the last checkpoint is made when the run is over."""
+        """Store a function that makes a checkpoint here; the last one is called when the run is over."""
         self._mark = (checkpoint, self.segments.mark(), self.occurrences.mark(), dict(self.warnings))
 
     def seal(self) -> None:
-        """Make the last place that was noted the one to go on from: nothing more will be recorded."""
+        """Make the last mark the checkpoint, because nothing more will be recorded."""
         if self._mark is not None:
             checkpoint, segments, occurrences, self.warnings_there = self._mark
             since = self.segments.since_mark(segments), self.occurrences.since_mark(occurrences)
@@ -120,11 +122,11 @@ class Trajectory:
         self._checkpoint = checkpoint
 
     def forget_checkpoint(self) -> None:
-        """Leave no place from which the run could go on."""
+        """Remove the checkpoint."""
         self._checkpoint = self._mark = None
 
     def up_to_checkpoint(self, system: System) -> Trajectory:
-        """A copy that ends at the checkpoint, to go on with."""
+        """Return a copy that ends at the checkpoint, to continue from there."""
         assert self.checkpoint is not None
         earlier = Trajectory(system)
         for chain, others, count in (
@@ -141,41 +143,41 @@ class Trajectory:
         return earlier
 
     def warn(self, message: str) -> None:
-        """Count a warning; each message is kept once."""
+        """Count a warning; each message is stored once."""
         self.warnings[message] = self.warnings.get(message, 0) + 1
 
 
 def _before(end: Instant, length: float, forward: bool) -> Instant:
-    """So long before the end, at a double."""
+    """Return the instant at a distance before the end, rounded to a double."""
     return Instant(float(end.plus(-length if forward else length)))
 
 
 @dataclass(frozen=True)
 class Task:
-    """What to run: from t0 to t1 out of x0 and z0, how accurately, and what to keep of it."""
+    """The definition of a run: span, initial state and modes, accuracy, and what is kept."""
 
     t0: float
     t1: float
-    x0: np.ndarray
-    z0: np.ndarray
+    x0: np.ndarray  # initial states (n,)
+    z0: np.ndarray  # initial modes (C,), -1 for none
     tolerances: Any
-    discrete: np.ndarray
+    discrete: np.ndarray  # initial discrete states
     keep: Keep = ALL
     limits: Limits = UNLIMITED
-    record: Trajectory | None = None  # what to go on with, from its checkpoint
+    record: Trajectory | None = None  # record to continue, from its checkpoint
     successor: Any = None  # a stiff method (`hybridsim.engine.run.stepping.Method`), which may take over
 
     @cached_property
     def forward(self) -> bool:
-        """Whether time runs forward."""
+        """Return whether time runs forward."""
         return self.t1 >= self.t0
 
     @cached_property
     def plans(self) -> dict[str, Any]:
-        """What `hybridsim.engine.run.setup` keeps here."""
+        """Return the storage for `hybridsim.engine.run.setup`."""
         return {}
 
     @cached_property
     def beginning(self) -> tuple[Any, ...]:
-        """What the start depends on: equal where runs of one system begin alike."""
+        """Return a key for the start, equal for runs of one system that start alike."""
         return self.t0, self.forward, self.x0.tobytes(), self.z0.tobytes(), self.discrete.tobytes()

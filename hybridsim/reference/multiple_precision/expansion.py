@@ -11,7 +11,7 @@ from hybridsim.reference.multiple_precision.precision import Number, Precision
 
 Coefficients = Sequence[Number]
 
-# A step of 2 to the power of this stands for an unlimited one.
+# A step of two to this power means an unlimited step.
 _FOREVER = 1000.0
 
 
