@@ -24,10 +24,7 @@ NEXT, BEGUN, KEPT, RESUMED = range(4)  # indices of `Runs.at`
 
 
 class Runs(NamedTuple):
-    """The m runs of a group, with their results.
-    longest segments (m,). What is found: done (m,), and as in `hybridsim.engine.linear.stretch.Stretch` of each. at
-    (4,): the run that is under way, whether it has begun, segments kept, and how often it was resumed.
-    """
+    """The m runs of a group, with their results."""
 
     tables: np.ndarray  # addresses (m,) of tables
     vectors: np.ndarray  # run-time vectors (m, P)

@@ -38,13 +38,11 @@ _run, _opposing = Door(run_fleet), Door(opposing)
 
 
 class LastPeriods(NamedTuple):
-    """The last periods of some runs.
-    of each array of a `Stretch` for each.
-    """
+    """The last periods of some runs."""
 
-    numbers: np.ndarray
-    periods: np.ndarray
-    stretch: Stretch
+    numbers: np.ndarray  # numbers (m,) of the runs
+    periods: np.ndarray  # lengths (m,) of the periods
+    stretch: Stretch  # the motion over the period, one row of each array per run
 
 
 def sails(system: System) -> bool:

@@ -36,7 +36,7 @@ def past_zero(settling: Settling, cluster: tuple[int, ...]) -> set[int]:
     for c, value in zip(system.surface_of, series.surfaces[:, 0], strict=True):
         automaton, mode = system.automata[c], at.z[c]
         if automaton.is_unilateral:
-            continue  # there is no other side of a gap
+            continue  # a gap has no other side
         if value < 0.0 if mode == automaton.above else value > 0.0 and mode == automaton.below:
             found.add(c)
     return found & set(cluster)

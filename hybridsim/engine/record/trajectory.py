@@ -112,7 +112,7 @@ class Trajectory:
 
     @property
     def checkpoint(self) -> Checkpoint | None:
-        """The last place from which the run can go on; made when somebody asks for it."""
+        """Return the last checkpoint from which the run can continue, made on demand."""
         if callable(self._checkpoint):
             self._checkpoint = self._checkpoint()
         return self._checkpoint

@@ -50,34 +50,29 @@ LEAST = 64  # least number of steps in a part of a segment; with less space the 
 
 
 class Room(NamedTuple):
-    """Scratch arrays of the kernel.
-    ahead of them, powers of a step and sizes of guards over it, a polynomial, its Bernstein forms, a state, guards,
-    their largest values.
-    """
+    """Scratch arrays of the kernel, for R registers, order + 1 terms, and G guards."""
 
-    V: np.ndarray
-    W: np.ndarray
-    guard_series: np.ndarray
-    ahead: np.ndarray
-    sizes: np.ndarray
-    numbers: np.ndarray
-    a: np.ndarray
-    b: np.ndarray
-    stack: np.ndarray
-    scale: np.ndarray
-    sides: np.ndarray
-    orders: np.ndarray
-    floors: np.ndarray
-    watched: np.ndarray
-    everyone: np.ndarray
-    pace: np.ndarray
-    largest: np.ndarray
+    V: np.ndarray  # Taylor coefficients (R, order + 1) of all registers
+    W: np.ndarray  # the same for a check at the end of a step
+    guard_series: np.ndarray  # coefficients of active guards and of vanishing functions
+    ahead: np.ndarray  # guards ahead of the step
+    sizes: np.ndarray  # powers of a step, then sizes of guards over it
+    numbers: np.ndarray  # 0, 1, ... for the guards
+    a: np.ndarray  # coefficients (order + 1,) of a polynomial
+    b: np.ndarray  # the same
+    stack: np.ndarray  # its Bernstein forms
+    scale: np.ndarray  # largest states (n,) on the segment
+    sides: np.ndarray  # sides (G,) of the guards
+    orders: np.ndarray  # their leading orders (G,)
+    floors: np.ndarray  # their error bounds (G,)
+    watched: np.ndarray  # registers of the watched functions
+    everyone: np.ndarray  # 0, 1, ..., n - 1
+    pace: np.ndarray  # (3,), see `is_crowded`
+    largest: np.ndarray  # largest values (G,) of the guards on the segment
 
 
 class Record(NamedTuple):
-    """The committed results of a call: S steps, and one row for each segment.
-    its origin (2,), modes, run-time vector, the guard that fired (-1: none), and the states before and after (2, n).
-    """
+    """The committed results of a call: S steps, and one row for each segment."""
 
     steps: np.ndarray  # start and length (S, 2)
     series: np.ndarray  # Taylor coefficients (S, n, order + 1)

@@ -82,10 +82,11 @@ def may_end(
     """Return whether a series continues at the last event or may have ended before, and the number of intervals.
 
     In a series an interval is shorter than the one a turn before it, or negligible, many times in a row. The series has
-    not ended while the next interval, predicted by the last factor, exceeds the threshold. gaps (k,): intervals up to
-    the instant in `at` (2,), if is_begun. They are followed by those of the instants (E, 2) whose owner (E,) is the
-    component; `at` becomes the last instant. work (2, largest number of events in a turn): scratch. last (m,): receives
-    the last intervals, number i at index i % m.
+    not ended while the next interval, predicted by the last factor, exceeds the threshold.
+
+    gaps (k,): intervals up to the instant in `at` (2,), if is_begun. They are followed by those of the instants (E, 2)
+    whose owner (E,) is the component; `at` becomes the last instant. work (2, largest number of events in a turn):
+    scratch. last (m,): receives the last intervals, number i at index i % m.
     """
     longest, known, ended, i = 0.0, gaps.shape[0], False, 0
     high, low = at[0], at[1]

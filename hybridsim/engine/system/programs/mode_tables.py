@@ -33,14 +33,7 @@ _ALL = 27  # largest number of vectors of modes that are all present from the st
 
 
 class Automata(NamedTuple):
-    """The constant structure of a model: components, guards, clusters and choices. -1 stands for none.
-
-    guards_of (C, M, W); hold, above, surface (C,); pin (C, most): states
-    that a holding mode evaluates; owner, place (G,): component of a guard, index in its mode;
-    cluster_start (C + 1,), cluster (members): the cluster of each component; target, reset (C, M, W, T) of choices;
-    reset_start, reset_slot: what each reset sets, a state (its index) or a discrete state (n + its index);
-    is_corner, is_unique, is_unilateral (C,).
-    """
+    """The constant structure of a model: components, guards, clusters and choices. -1 stands for none."""
 
     guards_of: np.ndarray  # guard numbers (C, M, W) of component and mode
     hold: np.ndarray  # holding mode (C,)
@@ -61,14 +54,7 @@ class Automata(NamedTuple):
 
 
 class Tapes(NamedTuple):
-    """The tapes of K vectors of modes, one row or one slice each.
-    guards, registers. places: see `hybridsim.engine.system.programs.modes_index`.
-
-    computed: whether the rate of a state is worked out as time goes on, and is no constant and no other state. fading:
-    see `hybridsim.engine.system.programs.mode_code`.
-    bounds: addresses of code for short series of the guards with bounds, 0 where there is none; lacked: how often it
-    was missed.
-    """
+    """The tapes of K vectors of modes, one row or one slice each."""
 
     modes: np.ndarray  # modes (K, C)
     places: np.ndarray  # hash table: `hybridsim.engine.system.programs.modes_index`
