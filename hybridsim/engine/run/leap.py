@@ -53,7 +53,7 @@ class Room(NamedTuple):
     """Scratch arrays of the kernel, for R registers, order + 1 terms, and G guards."""
 
     V: np.ndarray  # Taylor coefficients (R, order + 1) of all registers
-    W: np.ndarray  # the same for a check at the end of a step
+    W: np.ndarray  # the same for values at other points, if the interpreter computes them
     guard_series: np.ndarray  # coefficients of active guards and of vanishing functions
     ahead: np.ndarray  # guards ahead of the step
     sizes: np.ndarray  # powers of a step, then sizes of guards over it
