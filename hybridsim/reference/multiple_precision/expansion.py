@@ -51,12 +51,12 @@ class Expansion:
 
     @property
     def watched(self) -> tuple[Watched, ...]:
-        """The quantities that a step must resolve in addition to the states."""
+        """Return the quantities that a step must resolve in addition to the states."""
         return (*(guard for row in self.guards for guard in row), *self.monitors)
 
     @cached_property
     def reach(self) -> Number:
-        """The reach of the series by their own terms."""
+        """Return the reach of the series by their own terms."""
         return self.reach_above([self.precision.context.zero] * len(self.states))
 
     def reach_above(self, sizes: Sequence[Number]) -> Number:

@@ -28,7 +28,7 @@ class Node:
 
     @property
     def delayed(self) -> tuple[Node, ...]:
-        """Nodes of which only lower coefficients are used, so that they need not be computed first."""
+        """Return nodes of which only lower coefficients are used, so that they need not be computed first."""
         return ()
 
     def coefficient(self, n: int) -> Number:

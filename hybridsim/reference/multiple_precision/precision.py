@@ -49,7 +49,7 @@ class Precision:
 
     @property
     def bits(self) -> float:
-        """The truncation error of a step, in bits below the size of the quantity."""
+        """Return the truncation error of a step, in bits below the size of the quantity."""
         return (self.digits + 2) * math.log2(10)
 
     def number(self, value: Any) -> Number:

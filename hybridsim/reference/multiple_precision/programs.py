@@ -39,7 +39,7 @@ class Programs:
 
     @property
     def first_modes(self) -> Modes:
-        """The modes before the first decision."""
+        """Return the modes before the first decision."""
         return tuple(component.initial or UNDECIDED for component in self.components)
 
     def decided(self, modes: Modes) -> Modes:

@@ -44,7 +44,7 @@ class Signal:
 
     @property
     def angular(self) -> bool:
-        """Whether the polynomial is an angle."""
+        """Return whether the polynomial is an angle."""
         return self.declared.kind == "chirp" or self.declared.shape == "sine"
 
     def node(self, reading: Reading, piece: Sequence[Held]) -> Node:
