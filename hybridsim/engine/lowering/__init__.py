@@ -1,4 +1,4 @@
-"""This package converts the expressions of a model to a program and to the tapes that kernels read.
+"""This folder converts the expressions of a model to a program and to the tapes that kernels read.
 
-Besides `expr` this is the only package that imports SymPy. Start with `program`, then `lower` and `emit`.
+Besides `expr` this is the only folder that imports SymPy. Start with `program`, then `lower` and `emit`.
 """

@@ -1,5 +1,5 @@
-"""This package compiles the kernels, caches them on disk and passes arrays to them.
+"""This folder compiles the kernels, caches them on disk and passes arrays to them.
 
-Only this package and `system/user_functions` import numba or llvmlite. Read `kernels` first, then
+Only this folder and `system/user_functions` import numba or llvmlite. Read `kernels` first, then
 `cache`.
 """

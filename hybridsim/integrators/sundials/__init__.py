@@ -1,1 +1,1 @@
-"""This package runs CVODE of SUNDIALS, restarted after every event."""
+"""This folder runs CVODE of SUNDIALS, restarted after every event."""

@@ -1,1 +1,1 @@
-"""This package contains the integrator `taylor`: Taylor series with an order that depends on the tolerance."""
+"""This folder contains the integrator `taylor`: Taylor series with an order that depends on the tolerance."""
