@@ -305,7 +305,7 @@ def test_a_full_disk_is_named(tmp_path: Path) -> None:
         done = found.run(cache=small)
         assert done.stdout == "-0.25\n", done.stderr
         assert f"cannot write to the cache {small}: No space left on device" in done.stderr
-        assert done.stderr.count("cannot be written") == 1
+        assert done.stderr.count("cannot write to the cache") == 1
     finally:
         subprocess.run(["umount", str(small)], check=True)
 
