@@ -93,7 +93,7 @@ def test_an_exception_in_the_run_is_told_with_the_name_of_the_function(integrato
 
 def test_a_rate_that_is_no_number_ends_the_run_and_names_the_states() -> None:
     sol = hs.simulate(ball(flow=lambda t, x, p: (x[1], math.nan)), (0, 1), integrator="dop853")
-    assert sol.status == "step-failure" and "derivative of w" in sol.message
+    assert sol.status == "step-failure" and "rate of w" in sol.message
 
 
 @pytest.mark.parametrize(
