@@ -100,7 +100,7 @@ def test_a_monitor_is_warned_of(name: str) -> None:
     sol = hs.simulate(falling, (0.0, 3.0), integrator=name)
     assert sol.status == "finished" and sol.y[0, -1] == pytest.approx(-2.0)
     assert sol.events[0].t == pytest.approx(1.0 - np.exp(-1.0), rel=1e-12)
-    assert any("monitor k is not a number on a part of the run" in text for text in sol.warnings)
+    assert any("monitor k is not a number during a part of the run" in text for text in sol.warnings)
 
 
 @pytest.mark.parametrize("guard", ["1/x", "tan(2*t + 0.1) + 5"])
@@ -127,7 +127,9 @@ def test_a_state_that_cannot_be_squared() -> None:
     [("dop853", {"max_step": 1e-300}, "max_step"), ("moreau", {"step": 1e-20}, "step")],
 )
 def test_steps_without_end_are_refused(name: str, given: dict[str, float], what: str) -> None:
-    with pytest.raises(hs.UsageError, match=rf"^{what} is 1e-\d+: from 0 to 1 it would take 1e\+\d+ steps"):
+    with pytest.raises(
+        hs.UsageError, match=rf"^{what} is 1e-\d+: a run from 0 to 1 would take 1e\+\d+ steps"
+    ):
         hs.simulate("dfcs", (0.0, 1.0), integrator=name, **given)
 
 
