@@ -107,7 +107,7 @@ class Integrator(metaclass=_IntegratorType):
 
     @property
     def rounding(self) -> float:
-        """Return the largest rounding error of steps, in roundings of the change of the states."""
+        """Return a bound of the rounding error of a step, in units of roundoff of the change of the states."""
         return 100.0
 
     def prepare(self, system: System) -> None:

@@ -157,7 +157,7 @@ def _check_series(title: str, system: System, arrays: Arrays, sizes: dict[str, i
     _check_rows(title, system, arrays)
     ends, steps = arrays["ends"], arrays["steps"]
     if ends[0] != 0 or ends[-1] != known["M"]:
-        raise ValueError(f"{title}: its steps are not those of its segments")
+        raise ValueError(f"{title}: the number of steps differs from the sum over the segments")
     check_ascending(f"{title}: the steps of its segments", ends, strictly=True)
     check_finite(f"{title}: a time", steps)
     if known["K"] < 1 or (columns and known["K"] != columns):

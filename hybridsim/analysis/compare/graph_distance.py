@@ -64,7 +64,7 @@ class CompletedGraph:
         )
 
     def distance_from(self, times: Array, states: Array, end: float) -> Array:
-        """Return the distances (k,) of points, in scaled states, from this graph up to the time `end`."""
+        """Return the distance of each point (k,) from this curve up to the time `end`, with states scaled."""
         return self._refined(times, states, self._bound(times, states, end), end)
 
     def _bound(self, times: Array, states: Array, end: float) -> Array:

@@ -476,7 +476,7 @@ def _refuse_what_ends(system: System, is_period_given: bool) -> None:
         if start >= evaluate(clock.period, system.values):
             raise UsageError(
                 f"{clock.name} of model {model.name} begins after its first period",
-                remedy="let it start within one period",
+                remedy="choose a start below the period of the clock",
             )
     tape = system.code.data["tape"]
     plain = tape is not None and any(source == system.layout.origin_at for _, source in tape["parameters"])

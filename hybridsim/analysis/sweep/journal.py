@@ -155,7 +155,7 @@ def _as_line(content: Any) -> bytes:
 
 
 def _piece(line: Any) -> tuple[list[int], list[Outcome]]:
-    """Return numbers of points and their outcomes.
+    """Return the indices of the points in a line, and their outcomes.
 
     Raises
     ------

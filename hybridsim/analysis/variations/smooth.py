@@ -80,7 +80,7 @@ def transition(slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: 
         raise UsageError(
             f"derivatives between t = {knots[0]:.9g} and {knots[-1]:.9g} (since the last event) oscillate over about "
             f"{turns:.1g} radians: following that takes minutes or longer",
-            remedy="take a shorter run, or slower parameters",
+            remedy="simulate a shorter time, or choose parameters for which the motion is slower",
         )
     pieces: list[tuple[np.ndarray, np.ndarray]] = []
     before = np.full(len(begins), np.inf)
@@ -156,7 +156,7 @@ def stiff_transition(
     raise UsageError(
         f"derivatives between t = {knots[0]:.9g} and {knots[-1]:.9g} (since the last event) are not resolved in {most} "
         "pieces",
-        remedy="take a shorter run, or slower parameters",
+        remedy="simulate a shorter time, or choose parameters for which the motion is slower",
     )
 
 

@@ -46,7 +46,7 @@ class StepSegments(Sequence[Segment]):
         self._first, self._last = self._first[longer], self._last[longer]
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Return all its arrays by name; see `of_arrays`."""
+        """Return all arrays of the block by name; see `of_arrays`."""
         used = slice(int(self._first[0]), int(self._last[-1]) + 1)
         rows = {"s": self._s[used], "x": self._x[used], "z": self._z[used]}
         return rows | {

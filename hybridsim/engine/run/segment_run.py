@@ -192,7 +192,7 @@ class SegmentRun:
         self.grazings = [grazing for grazing in self.grazings if grazing[1] <= s]
 
     def _check_shape(self, step: Step) -> None:
-        """Refuse dense output with a wrong shape. The number of test times differs from that of states."""
+        """Refuse dense output of a wrong shape, tested with a number of times that is not the number of states."""
         n = self.system.n
         times = np.linspace(step.s0, step.s1, 2 if n != 2 else 3)
         try:

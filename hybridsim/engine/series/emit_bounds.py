@@ -245,7 +245,7 @@ class _Bounded(Lines):
         )
 
     def _start(self, op: int, a: int, b: int) -> tuple[Term, ...]:
-        """Compute order 0 of an operation with a companion."""
+        """Compute order 0 of an operation that needs a second series, as the sine needs the cosine."""
         u, du = self.at(a, 0)
         if op != TANGENT:
             s, c = self.call("llvm.sin.f64", u), self.call("llvm.cos.f64", u)

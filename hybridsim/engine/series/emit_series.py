@@ -259,7 +259,7 @@ class _Expansion(Lines):
         return self.choice("oeq", root, ZERO, self.choice("oeq", rest, ZERO, ZERO, quotient), quotient)
 
     def _start(self, op: int, a: int, b: int) -> tuple[str, ...]:
-        """Compute order 0 of an operation with a companion."""
+        """Compute order 0 of an operation that needs a second series, as the sine needs the cosine."""
         u = self.at(a, 0)
         if op != TANGENT:
             return self.call("llvm.sin.f64", u), self.call("llvm.cos.f64", u)

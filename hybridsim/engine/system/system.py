@@ -66,7 +66,7 @@ class Automaton:
 
     @property
     def has_surface(self) -> bool:
-        """Return whether its mode is decided by admissibility at a surface."""
+        """Return whether the component has a switching surface, at which the admissible mode is taken."""
         return self.hold >= 0
 
 

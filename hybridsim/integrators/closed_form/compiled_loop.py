@@ -146,7 +146,7 @@ class ExactLeaper:
         return True
 
     def _sheet(self, tables: LinearTables) -> Sheet:
-        """Return the layout of the kernel's output; the trajectory keeps it, events longer than segments."""
+        """Return the arrays for the kernel's output; the trajectory keeps them, those of the events longest."""
         widest, system = tables.values.shape[1], self.system
 
         def made() -> Sheet:

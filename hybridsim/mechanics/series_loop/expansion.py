@@ -59,7 +59,7 @@ def gather(plant: Any, state: Any, room: Any, count: int, tau: float, top: int) 
 
 @kernel
 def whole(plant: Any, state: Any, room: Any, top: int) -> tuple[int, int]:
-    """Make the patch of all nodes, at the origin of the step."""
+    """List all coordinates as one group to expand, from the start of the step."""
     state.whole[FIRST] = -1
     if plant.offsets.shape[0] > 0:
         state.whole[FIRST] = 0

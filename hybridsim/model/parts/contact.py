@@ -246,7 +246,7 @@ class Contact(Declared):
         return {}
 
     def _form(self, template: str, **parts: Expression) -> Expression:
-        """Return an expression built from parts, with the place of the contact."""
+        """Fill a template with expressions; errors in the result point to the line of the contact."""
         return substitute(parse(template, self.velocity.place or self.place), parts)
 
     def values(

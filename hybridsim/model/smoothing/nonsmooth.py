@@ -69,7 +69,7 @@ def uses_conditions(model: Model) -> bool:
 
 
 def has_word(expr: Expression) -> bool:
-    """Return whether the expression contains a non-smooth primitive, without its definitions."""
+    """Return whether the expression itself contains a non-smooth function; definitions in it are not expanded."""
     return bool(_WORD.search(expr.text))
 
 

@@ -47,7 +47,7 @@ def is_struck(system: System, change: Change) -> bool:
 
 
 def errors_beside(stage: Stage, c: int) -> np.ndarray:
-    """Return rounding bounds of the states, infinite for states outside the contact's impulses."""
+    """Return rounding bounds of the states that impulses of the contact change, and infinity for the others."""
     system, at = stage.settling.system, stage.before
     cluster = next(cluster for cluster in system.clusters if c in cluster)
     _, changes, _ = system.impulses(at.s, at.x, at.p, np.maximum(at.z, 0))

@@ -42,7 +42,7 @@ def remarks(solution: Solution, occurrence: Occurrence, everything: Sequence[Occ
 
 
 def change_of_side(solution: Solution, occurrence: Occurrence) -> str:
-    """Describe why a corner changed its side, and the consequence for the model."""
+    """Say why the argument of a corner such as abs changed its sign, and what follows for the run."""
     system = solution._system
     sentence = _changed(system, occurrence, _modes_after(solution, float(occurrence.instant)))
     if next(a for a in system.automata if a.name == occurrence.component).is_step:

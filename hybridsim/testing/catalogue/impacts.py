@@ -63,7 +63,7 @@ def rests(*names: str) -> Any:
 
 
 def _bounce() -> Scene:
-    """Flights last E**n seconds after t = 0.5, and the ball rests at t = 1.5."""
+    """A ball bounces from t = 0.5 on; its n-th flight lasts E**n seconds, and it rests at t = 1.5."""
     states = (*((t, _height(t)) for t in (0.3, 0.8, 1.1, 1.3)), (END, (0.0, 0.0)))
     checks = (("", closes("p")), ("located", rests("p")), ("", equals(2.0, h=0.0, w=0.0)))
     return Scene(

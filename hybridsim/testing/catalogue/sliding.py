@@ -53,7 +53,7 @@ def stays(component: str, *terms: str, to_one: bool = False) -> Check:
 
 
 def _published() -> tuple[Scene, ...]:
-    """Return published cases of other tools, and cases that are also scenes with modes."""
+    """Return cases published with other tools, and cases that are declared a second time with modes."""
     exact: dict[str, Any] = {"tol_t": 1e-9, "tol_x": 1e-9}
     at_rest = (("", equals(1.0, x1=0.0, x2=0.0)),)
     crossings = CASES["SIC-filippov"]["expected"]["first_crossings"]

@@ -28,7 +28,7 @@ def verdicts_on(
     holds: np.ndarray,
     cluster: tuple[int, ...],
 ) -> tuple[np.ndarray, bool]:
-    """Return verdicts on joint candidates in the order of preference, and whether all of them were judged.
+    """Return whether each combination of modes is admissible, in order of preference, and whether all were tested.
 
     The search ends after the candidates that `choose` prefers as much as the first one it accepts. The others count as
     not admissible. If a member needs a unique motion, all candidates are judged.

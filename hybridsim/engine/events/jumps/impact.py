@@ -24,7 +24,7 @@ Failure = tuple[str, str]
 
 
 def strike(settling: Settling, open_: set[int]) -> Failure | None:
-    """Let the contacts among `open_` whose gaps close collide. Contacts left without a velocity stay in `open_`.
+    """Compute the collision of contacts in `open_` whose gaps close; contacts at rest after it stay in `open_`.
 
     A contact at zero gap with a velocity of separation is open from now on.
     """

@@ -67,7 +67,7 @@ class Truth:
         }
 
     def harmless(self, tol: float) -> float:
-        """Return the least stick fraction at which the error of the motion without stops exceeds `tol`."""
+        """Return the smallest share of stick at which the formula without stops is off by more than `tol`."""
         off = self.deviation(NO_STOPS)
         bad = (self.amplitude > 0.0) & ~(off <= tol)
         return float(self.stick[bad].min()) if bad.any() else 1.0
