@@ -212,7 +212,7 @@ def refuse_nonlinear(system: System) -> None:
     reason = what_is_not_linear(system)
     if reason is not None:
         raise UsageError(
-            f"exact cannot run {system.model.name}: it needs modes that are linear in the states, "
+            f"exact cannot run {system.model.name}: a closed form needs modes that are linear in the states, "
             f"but {reason}",
             remedy="use dop853" if system.has_corners else "use taylor or dop853",
         )

@@ -108,7 +108,9 @@ def scenes() -> tuple[Scene, ...]:
             "endless-cascade",
             "cascade",
             (0.0, 2.0),
-            Truth(None, ((0.5, (0.5,)),), status="cascade", end=1.0, checks=(("", says("over", "back")),)),
+            Truth(
+                None, ((0.5, (0.5,)),), status="cascade", end=1.0, checks=(("", says("mode.edge", "back")),)
+            ),
             needs("transitions"),
         ),
     )

@@ -15,7 +15,7 @@ X = hs.State("x", 0, "1")
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: hs.Model("a", states={"x": "v"}), "Model a: state x has no rate"),
+        (lambda: hs.Model("a", states={"x": "v"}), "Model a: states: x has no rate"),
         (lambda: hs.Model("a", states=5), "Model a: states contains 5"),
         (lambda: hs.Model("a", states=None), "Model a: states contains None"),
         (lambda: hs.Model(5, states=[X]), "Model: name is 5"),
