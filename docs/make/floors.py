@@ -127,7 +127,7 @@ def tables() -> dict[str, str]:
 
 
 def page() -> str:
-    """The page with its tables made anew."""
+    """Return the page with its tables generated again."""
     text = PAGE.read_text(encoding="utf-8")
     for name, table in tables().items():
         text, count = re.subn(

@@ -19,7 +19,7 @@ import numpy as np
 
 import hybridsim as hs
 
-LIMITS = {"steps": 60000, "events": 20000}  # a run that goes on for ever is held against another up to there
+LIMITS = {"steps": 60000, "events": 20000}  # a run without an end is compared with another up to here
 
 
 def bits(values: Any) -> str:

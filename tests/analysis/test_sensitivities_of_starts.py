@@ -13,7 +13,7 @@ METHODS = pytest.mark.parametrize("integrator", ["taylor", "exact", "dop853", "t
 
 
 def carried(start: str, velocity: str, integrator: str, rest: str = "", **options: object) -> np.ndarray:
-    """Derivatives of v(1) and w(1) by a, b and F of a block that a belt at 3/10 carries; v + w is kept but for F t."""
+    """Derivatives of v(1) and w(1) by a, b and F of a block that a belt at 3/10 carries; v + w changes by F t alone."""
     model = hs.Model.from_toml(
         f"""schema = 1
 name = "carried"

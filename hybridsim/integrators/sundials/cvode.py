@@ -148,21 +148,10 @@ class CvodeStepper:
         raise NotImplementedError("events of CVODE are located on its dense output")
 
 
-@dataclass(frozen=True)
-class CvodeBDF(Integrator):
-    """Backward differentiation formulas of orders 1 to 5, variable step, Newton iteration.
+class _Cvode(Integrator):
+    """The part that both formulas of CVODE share: how a smooth segment begins."""
 
-    When to choose it: stiff modes, such as regularised laws and laws with fast internal states. It restarts
-    at order 1 after each event. Events are located on its dense output, the two-point Hermite polynomial of
-    degree 7.
-    """
-
-    name: ClassVar[str] = "cvode-bdf"
-    title: ClassVar[str] = "SUNDIALS CVODE, BDF"
-    order: ClassVar[str] = "1 to 5"
-    reference: ClassVar[str] = "Hindmarsh et al. 2005, doi:10.1145/1089014.1089020"
-    when: ClassVar[str] = "stiff modes"
-    lacks: ClassVar[dict[str, str]] = _NOISE
+    formulas: ClassVar[str]
     dense_is_accurate: ClassVar[bool] = True
 
     def start(
@@ -181,12 +170,30 @@ class CvodeBDF(Integrator):
             s_bound,
             tolerances,
             watch,
-            lambda s, x: CvodeStepper("BDF", flow, x0, s_bound, tolerances, first_step, (s, x)),
+            lambda s, x: CvodeStepper(self.formulas, flow, x0, s_bound, tolerances, first_step, (s, x)),
         )
 
 
 @dataclass(frozen=True)
-class CvodeAdams(Integrator):
+class CvodeBDF(_Cvode):
+    """Backward differentiation formulas of orders 1 to 5, variable step, Newton iteration.
+
+    When to choose it: stiff modes, such as regularised laws and laws with fast internal states. It restarts
+    at order 1 after each event. Events are located on its dense output, the two-point Hermite polynomial of
+    degree 7.
+    """
+
+    name: ClassVar[str] = "cvode-bdf"
+    title: ClassVar[str] = "SUNDIALS CVODE, BDF"
+    order: ClassVar[str] = "1 to 5"
+    reference: ClassVar[str] = "Hindmarsh et al. 2005, doi:10.1145/1089014.1089020"
+    when: ClassVar[str] = "stiff modes"
+    lacks: ClassVar[dict[str, str]] = _NOISE
+    formulas: ClassVar[str] = "BDF"
+
+
+@dataclass(frozen=True)
+class CvodeAdams(_Cvode):
     """Adams-Moulton formulas of orders 1 to 12, variable step.
 
     When to choose it: long smooth segments between events at tight tolerances. Events are handled as by
@@ -202,23 +209,4 @@ class CvodeAdams(Integrator):
         **_NOISE,
         "stiff": "with stiff rates its iteration converges only with very short steps: use cvode-bdf",
     }
-    dense_is_accurate: ClassVar[bool] = True
-
-    def start(
-        self,
-        flow: Flow,
-        x0: np.ndarray,
-        s_bound: float,
-        tolerances: Tolerances,
-        first_step: float | None,
-        watch: Watch,
-    ) -> Stepper:
-        """Begin a smooth segment."""
-        return with_first_steps(
-            flow,
-            x0,
-            s_bound,
-            tolerances,
-            watch,
-            lambda s, x: CvodeStepper("Adams", flow, x0, s_bound, tolerances, first_step, (s, x)),
-        )
+    formulas: ClassVar[str] = "Adams"
