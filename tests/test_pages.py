@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import runpy
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -196,6 +197,41 @@ def test_figures_depend_on_what_their_commands_use() -> None:
     # what a package makes of what it imports, and not only what it hands on
     assert "testing/catalogue/impacts.py" in reached("cd tests && python -m conformance.table")
     assert "reference/closed_forms/affine.py" in reached("hybridsim compare --suite")
+
+
+def test_one_changed_coefficient_makes_the_pages_that_use_it_older(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The foot of a page names the folder that changed, and stays as it is for comments, docstrings and other code."""
+    for name in ("hybridsim", "docs/make", "docs/studies"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__", "*.png"))
+    for name in ("glossary.md", "figures.toml"):
+        shutil.copy(ROOT / "docs" / name, tmp_path / "docs" / name)
+    monkeypatch.syspath_prepend(tmp_path / "docs" / "make")
+    for module in ("source_keys", "used_sources"):
+        monkeypatch.delitem(sys.modules, module, raising=False)
+    figures = runpy.run_path(str(tmp_path / "docs" / "make" / "figures.py"))
+    for module in ("source_keys", "used_sources"):
+        del sys.modules[module]  # of the copy
+    monkeypatch.setitem(figures["note"].__globals__, "commit", lambda: "abcdef0123")
+    foot, page, rest = figures["footer"], "studies/speed.md", "studies/blade-damper.md"
+    for one in (page, rest):
+        figures["note"](one, 1.0)
+
+    def change(name: str, old: str, new: str) -> None:
+        path = tmp_path / "hybridsim" / name
+        text = path.read_text(encoding="utf-8")
+        assert old in text
+        path.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+    assert "commit abcdef0123" in foot(page) and foot(page).endswith("has not changed since.\n")
+    change("integrators/runge_kutta/tsit5.py", '"""', '"""A method with another docstring. ')
+    assert foot(page).endswith("has not changed since.\n")
+    change("analysis/steady/settling.py", "0.25 * duration", "0.26 * duration")
+    assert foot(page).endswith("has not changed since.\n")
+    assert foot(rest).endswith("This has changed since: `analysis/steady`.\n")
+    change("integrators/runge_kutta/tsit5.py", "0.161", "0.162")
+    assert foot(page).endswith("This has changed since: `integrators/runge_kutta`.\n")
 
 
 def test_a_key_of_sources_is_that_of_what_they_do() -> None:

@@ -1,12 +1,12 @@
-"""Of which sources the figures of the documentation are, and the commands that make them anew.
+"""Record which version of the code made the figures of each page, and run the commands that make them.
 
-    python docs/make/figures.py                    one line a page: present or older, when made, how long that took
-    python docs/make/figures.py --make [PAGE ...]  run the commands of these pages, of all older ones if none is named
-    python docs/make/figures.py --done PAGE ...    a person has brought these up to date with what the commands print
+    python docs/make/figures.py                    print one line per page: present or older, when, how many minutes
+    python docs/make/figures.py --make [PAGE ...]  run the commands of these pages, or of all older ones
+    python docs/make/figures.py --done PAGE ...    record that a person has updated these pages
 
-The pages and their commands stand in docs/figures.toml. What was made is noted in docs/figures.json with a key of
-those modules of the package that the commands can reach (`source_keys`), and of its data; the site says at the foot of
-each page whether they are those that it was built from.
+docs/figures.toml lists the pages and their commands. docs/figures.json holds a key of the code and data that the
+commands of a page can reach (`source_keys`), and a key for each folder of them. The foot of each page on the site
+gives the date and the commit of its figures, and names the folders that have changed since.
 """
 
 from __future__ import annotations
@@ -27,29 +27,50 @@ from source_keys import key
 from used_sources import modules_of
 
 ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = ROOT / "hybridsim"
 TABLE, NOTES = ROOT / "docs" / "figures.toml", ROOT / "docs" / "figures.json"
 OF_DATA = (".toml", ".json", ".csv", ".npz")  # kinds of files in the package that results depend on
 
 
+def used(page: str) -> list[Path]:
+    """List the modules that the commands of a page can reach, and the data of the package."""
+    modules = set().union(*map(modules_of, table()[page]["commands"]))
+    return sorted(modules | {path for path in PACKAGE.rglob("*") if path.suffix in OF_DATA})
+
+
 def sources(page: str) -> str:
-    """Key of what the commands of a page use of the package: equal where every figure would come out alike."""
-    used = set().union(*map(modules_of, table()[page]["commands"]))
-    data = sorted(path for path in (ROOT / "hybridsim").rglob("*") if path.suffix in OF_DATA)
-    return key((path.read_bytes() for path in used), (path.read_bytes() for path in data))
+    """Return the key of the code and data of a page: it is equal if every figure would be the same."""
+    return key_of(used(page))
+
+
+def folders(page: str) -> dict[str, str]:
+    """Return a key for each folder of the package that the commands of a page use."""
+    paths: dict[str, list[Path]] = {}
+    for path in used(page):
+        paths.setdefault("/".join(path.relative_to(PACKAGE).parts[:2]), []).append(path)
+    return {folder: key_of(inside) for folder, inside in paths.items()}
+
+
+def key_of(paths: list[Path]) -> str:
+    """Return one key of modules and files of data."""
+    return key(
+        (path.read_bytes() for path in paths if path.suffix not in OF_DATA),
+        (path.read_bytes() for path in paths if path.suffix in OF_DATA),
+    )
 
 
 def table() -> dict[str, dict[str, Any]]:
-    """Pages, relative to docs, with their commands."""
+    """Return the pages, relative to docs, with their commands."""
     return tomllib.loads(TABLE.read_text(encoding="utf-8"))
 
 
 def notes() -> dict[str, dict[str, Any]]:
-    """What was made of which sources."""
+    """Return what is recorded about each page."""
     return dict(json.loads(NOTES.read_text(encoding="utf-8"))) if NOTES.exists() else {}
 
 
 def commit() -> str:
-    """The commit that is checked out."""
+    """Return the commit that is checked out."""
     done = subprocess.run(
         ["git", "rev-parse", "--short=10", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=True
     )
@@ -57,11 +78,12 @@ def commit() -> str:
 
 
 def note(page: str, minutes: float | None) -> None:
-    """Write down that the figures of a page are of the present sources."""
+    """Record that the present code made the figures of a page."""
     noted = notes()
     before = noted.get(page, {}).get("minutes")
     noted[page] = {
         "sources": sources(page),
+        "folders": folders(page),
         "commit": commit(),
         "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
         "minutes": before if minutes is None else round(minutes, 1),
@@ -70,23 +92,31 @@ def note(page: str, minutes: float | None) -> None:
 
 
 def footer(page: str) -> str:
-    """What the site says under a page about its figures; nothing for a page that has none."""
+    """Return the foot of a page: when its figures were made, by which commands, and what has changed since."""
     entry = table().get(page)
     if entry is None:
         return ""
     commands = " and ".join(f"`{command}`" for command in entry["commands"])
     noted = notes().get(page)
     if noted is None:
-        return f"\n\n---\n\nFigures: {commands}, by sources from before they were noted.\n"
-    same = (
-        "those of this version" if noted["sources"] == sources(page) else "older than those of this version"
-    )
-    made = f"{commands}, {noted['date']}, at commit {noted['commit']}"
-    return f"\n\n---\n\nFigures: {made}; the package's sources are {same}.\n"
+        return f"\n\n---\n\nFigures made by {commands}. The version of the code was not recorded.\n"
+    made = f"Figures of {noted['date']}, commit {noted['commit']}, made by {commands}."
+    return f"\n\n---\n\n{made} {changes(page, noted)}\n"
+
+
+def changes(page: str, noted: dict[str, Any]) -> str:
+    """Return a sentence that names the folders with other code than when the figures of a page were made."""
+    if noted["sources"] == sources(page):
+        return "The code that they depend on has not changed since."
+    before, now = noted.get("folders"), folders(page)
+    if before is None:
+        return "The code that they depend on has changed since."
+    other = sorted(f"`{name}`" for name in before | now if before.get(name) != now.get(name))
+    return f"This has changed since: {', '.join(other)}."
 
 
 def make(page: str) -> None:
-    """Run the commands of a page; note it where that needs no person."""
+    """Run the commands of a page, and record it unless a person has to carry the figures over."""
     entry, began = table()[page], time.perf_counter()
     beside = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
     for command in entry["commands"]:
@@ -100,12 +130,12 @@ def make(page: str) -> None:
 
 
 def main() -> None:
-    """Say how things are, or make them."""
-    parser = argparse.ArgumentParser(description="Of which sources the figures of the documentation are.")
+    """Print the state of the pages, or make their figures."""
+    parser = argparse.ArgumentParser(description="Which version of the code made the figures of each page.")
     parser.add_argument(
         "--make", action="store_true", help="run the commands of the pages, or of all older ones"
     )
-    parser.add_argument("--done", action="store_true", help="note the pages as of the present sources")
+    parser.add_argument("--done", action="store_true", help="record the pages as made by the present code")
     parser.add_argument("pages", nargs="*", metavar="PAGE", help="as in docs/figures.toml")
     args = parser.parse_args()
     entries = table()
