@@ -18,9 +18,22 @@ GLOSSARY = Path(__file__).resolve().parents[1] / "glossary.md"
 
 @cache
 def new_names() -> Mapping[str, str]:
-    """Retired names and what stands in their place, as docs/glossary.md has them."""
+    """Retired names and what stands in their place, as docs/glossary.md has them.
+
+    One word may have several successors, and one successor several words: they all count as one name.
+    """
+    same: dict[str, str] = {}
+
+    def first(name: str) -> str:
+        while same.get(name, name) != name:
+            name = same[name]
+        return name
+
     rows = re.findall(r"^\| `(\w+)` \| `(\w+)` \|", GLOSSARY.read_text(encoding="utf-8"), re.MULTILINE)
-    return dict(rows)
+    for before, now in rows:
+        same.setdefault(now, now)
+        same[first(before)] = first(now)
+    return {name: first(name) for name in same}
 
 
 class _Bare(ast.NodeTransformer):

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.events.compiled.scratch import LEAP
-from hybridsim.engine.linear.stretch import sum_up
+from hybridsim.engine.linear.motion_summary import sum_up
 from hybridsim.engine.native.kernels import call_kernel, inlined, kernel
 from hybridsim.engine.native.loop_hints import fill, put
 from hybridsim.engine.native.struct_pack import pack_at
-from hybridsim.engine.run.leap import AT_TARGET, FULL
+from hybridsim.engine.run.event_loop import AT_TARGET, FULL
 from hybridsim.engine.system.instant import two_sum
 from hybridsim.ensemble.start import plain_start, rests_for_ever
 
@@ -34,7 +34,7 @@ class Runs(NamedTuple):
     periods: np.ndarray  # periods (m,)
     longest: np.ndarray  # longest segments (m,)
     done: np.ndarray  # whether each run (m,) is finished
-    extremes: np.ndarray  # results of each run as in `hybridsim.engine.linear.stretch.Stretch`
+    extremes: np.ndarray  # results of each run as in `hybridsim.engine.linear.motion_summary.Stretch`
     integrals: np.ndarray
     sides: np.ndarray
     held: np.ndarray

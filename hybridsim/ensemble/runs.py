@@ -17,11 +17,11 @@ import numpy as np
 from hybridsim.engine.events.compiled.scratch import MOST, work_space
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.linear.modes import holds_constants, is_always_linear
-from hybridsim.engine.linear.stretch import NODES, WEIGHTS, Stretch
+from hybridsim.engine.linear.motion_summary import NODES, WEIGHTS, Stretch
 from hybridsim.engine.native.kernels import ENABLED, Door
 from hybridsim.engine.native.struct_pack import packed
+from hybridsim.engine.run.call_arrays import Desk, laid_out
 from hybridsim.engine.run.compiled_loop import NOT_LINEAR
-from hybridsim.engine.run.desk import Desk, laid_out
 from hybridsim.engine.system.period import common_multiple
 from hybridsim.engine.system.programs.mode_tables import automata_of, shelf_of
 from hybridsim.engine.system.system import System

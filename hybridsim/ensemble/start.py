@@ -15,7 +15,7 @@ from hybridsim.engine.linear.motion import functions_of_time, to_modal
 from hybridsim.engine.native.kernels import call, call_apart, kernel, merged
 from hybridsim.engine.native.loop_hints import put
 from hybridsim.engine.native.simd_products import LANES
-from hybridsim.engine.run.leap import set_origin
+from hybridsim.engine.run.event_loop import set_origin
 from hybridsim.engine.series.bounded import UNIT, run_series
 from hybridsim.engine.system.programs.modes_index import find_modes
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.linear.plan import plan_of
+from hybridsim.engine.linear.matrix_template import plan_of
 from hybridsim.engine.linear.tables import (
     LinearTables,
     angles_of,

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from hybridsim.engine.record.trajectory import Task, Trajectory
-from hybridsim.engine.run.at_once import carried_out
+from hybridsim.engine.run.single_call import carried_out
 from hybridsim.engine.run.stepping import Flow, Leaps, Root, Step, Stepper, Watch
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.system import System

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.engine.native.kernels import seconds_compiling
-from hybridsim.engine.run.at_once import AtOnce
+from hybridsim.engine.run.single_call import AtOnce
 from hybridsim.engine.system.user_functions.code import PythonCode
 from hybridsim.errors import RunInterrupted
 from hybridsim.model.checks.denominators import denominators

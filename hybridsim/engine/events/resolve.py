@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from hybridsim.engine.events.choice.cancelled_guards import kept
 from hybridsim.engine.events.choice.candidates import all_verdicts, verdicts_on
 from hybridsim.engine.events.choice.guards_of_one_target import taken_at_once
-from hybridsim.engine.events.choice.kept_guards import kept
 from hybridsim.engine.events.choice.releases import Releases
 from hybridsim.engine.events.choice.surface_intersection import (
     can_hold,

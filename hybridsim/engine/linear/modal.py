@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.linear.faint_entries import with_faint_rows
+from hybridsim.engine.linear.small_entries import with_faint_rows
 from hybridsim.engine.native.kernels import kernel
 
 _CONDITION = 1e2  # largest condition of the basis: factor of rounding errors in a change of basis

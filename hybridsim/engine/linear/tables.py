@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.linear.guards import guard_series, modal_guards
+from hybridsim.engine.linear.matrix_template import plan_of
 from hybridsim.engine.linear.modal import modals
-from hybridsim.engine.linear.plan import plan_of
 from hybridsim.engine.native.constants import BOUND_TERMS
 from hybridsim.engine.native.simd_products import LANES, panels_of, rows_of
 from hybridsim.engine.native.struct_pack import packed

@@ -25,16 +25,16 @@ from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.series_block import SeriesBlock
 from hybridsim.engine.record.trajectory import Trajectory
 from hybridsim.engine.roots.defect_check import room_ahead
-from hybridsim.engine.run.desk import Desk, Laid, laid_out
+from hybridsim.engine.run.call_arrays import Desk, Laid, laid_out
+from hybridsim.engine.run.event_loop import LEAST, Record, Room, leap
 from hybridsim.engine.run.kernel_run import Leapt
-from hybridsim.engine.run.leap import LEAST, Record, Room, leap
 from hybridsim.engine.run.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Landing, Leaps
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.instant import Instant
-from hybridsim.engine.system.programs.code_shelf import CodeShelf
+from hybridsim.engine.system.programs.code_cache import CodeShelf
 from hybridsim.engine.system.programs.mode_code import most_fading
 from hybridsim.engine.system.programs.mode_tables import automata_of, shelf_of
-from hybridsim.engine.system.programs.series_shelf import SeriesShelf
+from hybridsim.engine.system.programs.series_code import SeriesShelf
 from hybridsim.engine.system.series_at import series_order
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances

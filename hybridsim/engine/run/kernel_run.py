@@ -10,14 +10,14 @@ import numpy as np
 
 from hybridsim.engine.record.event_block import Crossings
 from hybridsim.engine.record.segments import Segment, end_point
-from hybridsim.engine.run.leap import AT_TARGET, FULL
+from hybridsim.engine.run.event_loop import AT_TARGET, FULL
 from hybridsim.engine.system.instant import Instant
 
 if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Outcome
     from hybridsim.engine.native.struct_pack import Sheet
     from hybridsim.engine.record.counters import Counters
-    from hybridsim.engine.run.desk import Laid
+    from hybridsim.engine.run.call_arrays import Laid
     from hybridsim.engine.system.system import System
 
 

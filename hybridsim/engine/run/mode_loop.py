@@ -22,7 +22,9 @@ from hybridsim.engine.record.checkpoint import Checkpoint, damaged
 from hybridsim.engine.record.limits import UNLIMITED, Gauge, LimitReached
 from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.record.trajectory import Task, Trajectory
+from hybridsim.engine.run.appointment_events import on_new_pieces
 from hybridsim.engine.run.headway import Headway, NoHeadway, TakenOver
+from hybridsim.engine.run.lazy_state import Standing
 from hybridsim.engine.run.located import (
     Located,
     errors_when_due,
@@ -32,11 +34,9 @@ from hybridsim.engine.run.located import (
     without_fatal,
 )
 from hybridsim.engine.run.monitor_crossings import seen_on_the_way
-from hybridsim.engine.run.new_pieces import on_new_pieces
 from hybridsim.engine.run.notices import Notices
 from hybridsim.engine.run.segment_run import Arrival, SegmentRun
 from hybridsim.engine.run.setup import plan_of
-from hybridsim.engine.run.standing import Standing
 from hybridsim.engine.run.stepping import ARRIVED, PAUSED, Leaps, Method, Watch
 from hybridsim.engine.system.failures import Collapsed, StepFailure
 from hybridsim.engine.system.instant import Instant

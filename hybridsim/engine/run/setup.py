@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.engine.events.start import settled_start
-from hybridsim.engine.run.desk import Laid, laid_out
-from hybridsim.engine.run.standing import Standing
+from hybridsim.engine.run.call_arrays import Laid, laid_out
+from hybridsim.engine.run.lazy_state import Standing
 from hybridsim.engine.system.instant import Instant
 
 if TYPE_CHECKING:

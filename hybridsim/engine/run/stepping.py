@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Outcome
     from hybridsim.engine.record.blocks import SegmentBlock
     from hybridsim.engine.record.trajectory import Trajectory
-    from hybridsim.engine.run.desk import Laid
+    from hybridsim.engine.run.call_arrays import Laid
     from hybridsim.engine.run.kernel_run import Leapt
     from hybridsim.engine.system.instant import Instant
 

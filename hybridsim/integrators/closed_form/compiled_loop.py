@@ -17,7 +17,7 @@ from hybridsim.engine.record.array_forms import check_modes
 from hybridsim.engine.record.checkpoint import damaged
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.trajectory import Trajectory
-from hybridsim.engine.run.desk import Desk, Laid, laid_out
+from hybridsim.engine.run.call_arrays import Desk, Laid, laid_out
 from hybridsim.engine.run.kernel_run import Leapt
 from hybridsim.engine.run.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Landing
 from hybridsim.engine.system.instant import Instant

@@ -1,6 +1,6 @@
 """The compiled mode loop of linear modes, which goes from event to event in closed form without Python calls.
 
-It corresponds to `hybridsim.engine.run.leap`, with one closed form per segment instead of steps.
+It corresponds to `hybridsim.engine.run.event_loop`, with one closed form per segment instead of steps.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ from hybridsim.engine.native.loop_hints import put
 from hybridsim.engine.native.simd_products import dot, vector_of
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.roots.first_exit import FOUND, OPEN
-from hybridsim.engine.run.leap import AT_TARGET, FULL, STOPPED, holding, set_origin
+from hybridsim.engine.run.event_loop import AT_TARGET, FULL, STOPPED, holding, set_origin
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.programs.modes_index import find_modes
 

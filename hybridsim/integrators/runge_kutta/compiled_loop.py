@@ -18,7 +18,7 @@ from hybridsim.engine.record.hermite import (
 )
 from hybridsim.engine.record.hermite_block import TERMS, HermiteBlock
 from hybridsim.engine.run.compiled_loop import NOT_LINEAR, Leaper
-from hybridsim.engine.system.programs.ends_shelf import EndsShelf
+from hybridsim.engine.system.programs.ends_code import EndsShelf
 from hybridsim.engine.system.programs.guard_parts import GuardParts
 from hybridsim.engine.system.series_at import short_order
 from hybridsim.engine.system.system import System

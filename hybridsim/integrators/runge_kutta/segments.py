@@ -1,6 +1,6 @@
 """The compiled mode loop of explicit Runge-Kutta methods, which steps from event to event without Python calls.
 
-As in `hybridsim.engine.run.leap`, segments are committed one by one up to the target, or up to the first that
+As in `hybridsim.engine.run.event_loop`, segments are committed one by one up to the target, or up to the first that
 contains something unusual. The dense output of a step is the two-point Hermite polynomial on the Taylor
 coefficients of the flow at its ends; a step in which a guard becomes negative is repeated up to the event.
 """
@@ -25,7 +25,7 @@ from hybridsim.engine.native.time_grid import on_the_grid
 from hybridsim.engine.record.hermite import fit_in_time, holds_between
 from hybridsim.engine.roots.dense_guards import first_guard, first_linear_guard
 from hybridsim.engine.roots.first_exit import FOUND, OPEN
-from hybridsim.engine.run.leap import (
+from hybridsim.engine.run.event_loop import (
     AT_TARGET,
     FULL,
     LEAST,

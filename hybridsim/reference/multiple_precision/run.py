@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 from hybridsim.errors import UsageError
 from hybridsim.reference.multiple_precision.appointments import Appointments
-from hybridsim.reference.multiple_precision.crossings import crossings
 from hybridsim.reference.multiple_precision.expansion import Expansion, Watched, rate_at, value_at
 from hybridsim.reference.multiple_precision.motion import Motion, Piece
 from hybridsim.reference.multiple_precision.precision import Number, Precision
 from hybridsim.reference.multiple_precision.program import Point
 from hybridsim.reference.multiple_precision.programs import Programs
 from hybridsim.reference.multiple_precision.settling import Rules, Settled
+from hybridsim.reference.multiple_precision.sign_changes import crossings
 from hybridsim.reference.multiple_precision.signals import Signal
 from hybridsim.reference.trajectory import ExactEvent
 

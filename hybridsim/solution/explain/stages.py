@@ -13,8 +13,8 @@ from hybridsim.engine.events.input_jumps import surfaces_jump
 from hybridsim.engine.events.monitor_sides import MonitorSides
 from hybridsim.engine.events.outcome import Situation
 from hybridsim.engine.native.rows import evaluate_rows
+from hybridsim.engine.run.appointment_events import on_new_pieces
 from hybridsim.engine.run.located import Located, with_evaluated
-from hybridsim.engine.run.new_pieces import on_new_pieces
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.integrators.contract import Integrator
 from hybridsim.solution.explain.one_instant import LOCATED

@@ -22,8 +22,8 @@ from hybridsim.engine.series.emit_bounds import bounds_text, can_bound
 from hybridsim.engine.series.emit_series import ends_text, series_text
 from hybridsim.engine.series.interpreter import expand, measure
 from hybridsim.engine.system.instant import Instant
-from hybridsim.engine.system.programs import code_shelf, mode_tables
-from hybridsim.engine.system.programs.code_shelf import CodeShelf
+from hybridsim.engine.system.programs import code_cache, mode_tables
+from hybridsim.engine.system.programs.code_cache import CodeShelf
 from hybridsim.engine.system.programs.mode_code import constant_rows, given, mode_tape
 from hybridsim.engine.system.programs.mode_tables import shelf_of
 from hybridsim.engine.system.series_at import SeriesRun
@@ -250,7 +250,7 @@ def test_a_run_is_the_same_with_code_and_without(
     code = System(model).code
     with patch.dict(code._shared, clear=True):  # what other runs have left behind is code already
         for steps in (2**62, 1, 1):
-            for module in (code_shelf, mode_tables):
+            for module in (code_cache, mode_tables):
                 monkeypatch.setattr(module, "KNOWN", steps)
                 monkeypatch.setattr(module, "WORTH", steps)
             runs.append(hs.simulate(model, (0, 0.1), integrator=integrator))

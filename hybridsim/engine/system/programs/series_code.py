@@ -8,7 +8,7 @@ import numpy as np
 
 from hybridsim.engine.series.emit_bernstein import LEADING, bernstein_code
 from hybridsim.engine.series.emit_series import ModeTape, series_text
-from hybridsim.engine.system.programs.code_shelf import CodeShelf
+from hybridsim.engine.system.programs.code_cache import CodeShelf
 from hybridsim.engine.system.system import System
 
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridsim.engine.series.emit_series import ModeTape, ends_text
-from hybridsim.engine.system.programs.code_shelf import CodeShelf
+from hybridsim.engine.system.programs.code_cache import CodeShelf
 from hybridsim.engine.system.system import System
 
 

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.run.at_once import AtOnce
 from hybridsim.engine.run.compiled_loop import Leaper
 from hybridsim.engine.run.mode_loop import ModeLoop
 from hybridsim.engine.run.segment_run import SegmentRun
+from hybridsim.engine.run.single_call import AtOnce
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.errors import RunInterrupted
 from hybridsim.integrators.closed_form.compiled_loop import ExactLeaper
