@@ -13,7 +13,7 @@ from hybridsim.model import Model, load
 
 if TYPE_CHECKING:
     from hybridsim.engine.record.limits import Limits
-    from hybridsim.engine.record.retention import Keep
+    from hybridsim.engine.record.retention import Retention
     from hybridsim.engine.system.system import System
     from hybridsim.integrators.contract import Integrator
 
@@ -317,9 +317,9 @@ def initial_modes(system: System, z0: Any) -> np.ndarray:
     return z
 
 
-def kept(save: Any, system: System) -> Keep:
+def retention_of(save: Any, system: System) -> Retention:
     """Return the parts of the run to store, from a word or from a length of time before its end."""
-    from hybridsim.engine.record.retention import ALL, EVENTS, NOTHING, Keep
+    from hybridsim.engine.record.retention import ALL, EVENTS, NOTHING, Retention
 
     words = {"all": ALL, "events": EVENTS, "nothing": NOTHING}
     if isinstance(save, str) and save in words:
@@ -333,12 +333,12 @@ def kept(save: Any, system: System) -> Keep:
                 f"save is 'last-period', but model '{system.model.name}' has no forcing period",
                 remedy="use a length of time: save=1.5 stores the last 1.5 units of t",
             )
-        return Keep(length, length)
+        return Retention(length, length)
     remedy = "use 'all', 'events', 'last-period', 'nothing', or a length of time"
     length = number(save, "save", remedy)
     if not length > 0.0:
         raise UsageError(f"save is {save!r}", remedy=remedy)
-    return Keep(length, length)
+    return Retention(length, length)
 
 
 def run_limits(limits: Any) -> Limits:
@@ -364,12 +364,12 @@ def run_limits(limits: Any) -> Limits:
 
 
 def time_grid(
-    t_eval: Sequence[float] | None, span: tuple[float, float], keep: Keep, save: Any
+    t_eval: Sequence[float] | None, span: tuple[float, float], retention: Retention, save: Any
 ) -> np.ndarray | None:
     """Return the output times, which must lie in the stored part of the span."""
     if t_eval is None:
         return None
-    if keep.segments is None:
+    if retention.segments is None:
         raise UsageError(
             f"t_eval needs the states over time, which save={save!r} does not store",
             remedy="remove t_eval, or use save='all'",
@@ -382,9 +382,10 @@ def time_grid(
             f"t_eval contains {bad:.9g}, outside t_span ({span[0]:.9g}, {span[1]:.9g})",
             remedy="use times from t0 to t1",
         )
-    if keep.segments < math.inf and (np.abs(span[1] - grid) > keep.segments).any():
+    if retention.segments < math.inf and (np.abs(span[1] - grid) > retention.segments).any():
         raise UsageError(
-            f"t_eval contains times before the last {keep.segments:.9g} of the run, which save={save!r} does not store",
+            f"t_eval contains times before the last {retention.segments:.9g} of the run, which save={save!r} "
+            "does not store",
             remedy="use later times, or save='all'",
         )
     return grid

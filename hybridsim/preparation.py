@@ -71,7 +71,7 @@ def prepared(
         run = None if known is None else known.runs.get(question)
         if run is not None and type(run.method) is integrator_class(run.method.name):  # still registered
             span = run.task.t0, run.task.t1
-            return run.on_grid(arguments.time_grid(t_eval, span, run.task.keep, save)), 0.0
+            return run.on_grid(arguments.time_grid(t_eval, span, run.task.retention, save)), 0.0
     x0_states, model = arguments.start_values(model, x0)
     span = arguments.time_span(t_span)
     announce_compilation()
@@ -100,11 +100,11 @@ def prepared(
         longest,
         None if first_step is None else arguments.step_bound(first_step, "first_step"),
     )
-    keep = arguments.kept(save, system)
-    grid = arguments.time_grid(t_eval, span, keep, save)
+    retention = arguments.retention_of(save, system)
+    grid = arguments.time_grid(t_eval, span, retention, save)
     discrete = system.discrete_start
     task = Task(
-        *span, start, modes, tolerances, discrete, keep, arguments.run_limits(limits),
+        *span, start, modes, tolerances, discrete, retention, arguments.run_limits(limits),
         successor=successor_of(name, system) if reason else None,
     )  # fmt: skip
     refuse_driving(system, span[0], start, discrete, modes)

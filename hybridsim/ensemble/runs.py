@@ -20,7 +20,7 @@ from hybridsim.engine.linear.modes import holds_constants, is_always_linear
 from hybridsim.engine.linear.motion_summary import NODES, WEIGHTS, Stretch
 from hybridsim.engine.native.kernels import ENABLED, Door
 from hybridsim.engine.native.struct_pack import packed
-from hybridsim.engine.run.call_arrays import Desk, laid_out
+from hybridsim.engine.run.call_arrays import CallArrays, buffer_of
 from hybridsim.engine.run.compiled_loop import NOT_LINEAR
 from hybridsim.engine.system.period import common_multiple
 from hybridsim.engine.system.programs.mode_tables import automata_of, shelf_of
@@ -185,7 +185,7 @@ class _Ship:
             np.zeros(n), p.copy(), np.zeros(count, dtype=whole), np.ones(guards, dtype=whole),
             np.zeros(guards, dtype=whole), none, none, np.zeros(n), np.zeros(guards), np.zeros(0),
         )  # fmt: skip
-        desk = Desk.of(laid_out(blank, p), work, room_for(system, tables))
+        call_arrays = CallArrays.of(buffer_of(blank, p), work, room_for(system, tables))
         size = 2 * SEGMENTS
         record = Record(
             ends=np.empty(size),
@@ -205,6 +205,15 @@ class _Ship:
             holding=np.empty((2, count), dtype=np.bool_),
         )
         late = packed(Record(*(part[SEGMENTS:] for part in record)))
-        reach_leap(fleet.automata, fleet.tapes, fleet.inputs, tables, desk.as_packed, work, desk.room, late)
-        self.packs = desk.as_packed, work, desk.room, late, packed(record), packed(found)
+        reach_leap(
+            fleet.automata,
+            fleet.tapes,
+            fleet.inputs,
+            tables,
+            call_arrays.as_packed,
+            work,
+            call_arrays.room,
+            late,
+        )
+        self.packs = call_arrays.as_packed, work, call_arrays.room, late, packed(record), packed(found)
         self.slopes = np.zeros((3, n))

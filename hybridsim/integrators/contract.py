@@ -10,8 +10,8 @@ from typing import ClassVar
 import numpy as np
 
 from hybridsim.engine.record.trajectory import Task, Trajectory
-from hybridsim.engine.run.single_call import carried_out
-from hybridsim.engine.run.stepping import Flow, Leaps, Root, Step, Stepper, Watch
+from hybridsim.engine.run.single_call import run_task
+from hybridsim.engine.run.stepping import CompiledLoop, Flow, Root, Step, Stepper, Watch
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
@@ -98,7 +98,7 @@ class Integrator(metaclass=_IntegratorType):
     when: ClassVar[str]
     lacks: ClassVar[Mapping[str, str]] = MappingProxyType({})
     dense_is_accurate: ClassVar[bool] = False
-    leaps: ClassVar[bool] = False  # whether leaper() returns a compiled loop
+    has_compiled_loop: ClassVar[bool] = False  # whether compiled_loop() may return one
 
     @property
     def stable_to(self) -> float:
@@ -126,10 +126,10 @@ class Integrator(metaclass=_IntegratorType):
         """Begin a smooth segment."""
         raise NotImplementedError(f"{self.name} has no start(): it drives its runs itself")
 
-    def leaper(self, system: System, tolerances: Tolerances, longest: float) -> Leaps | None:
+    def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> CompiledLoop | None:
         """Return the compiled loop of this method for one run, or None if the model rules it out."""
         return None
 
     def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
         """Run a task; by default step by step through the engine's mode loop."""
-        return carried_out(system, self, task, progress)
+        return run_task(system, self, task, progress)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.engine.native.kernels import seconds_compiling
-from hybridsim.engine.run.single_call import AtOnce
+from hybridsim.engine.run.single_call import LazyTrajectory
 from hybridsim.engine.system.user_functions.code import PythonCode
 from hybridsim.errors import RunInterrupted
 from hybridsim.model.checks.denominators import denominators
@@ -58,7 +58,7 @@ class Run:
         trajectory = self.method.run(self.system, self.task, progress)
         within = seconds_compiling() - compiled  # compile time of kernels that were first needed in this run
         wall_time = time.perf_counter() - began - within
-        if isinstance(trajectory, AtOnce):
+        if isinstance(trajectory, LazyTrajectory):
             trajectory.then(self._close)
             if denominators(self.model):
                 trajectory.whole()
@@ -70,7 +70,7 @@ class Run:
             run = replace(self, task=replace(self.task, record=None))
         solution = Solution(run, trajectory, before + wall_time, compile_time + within)
         # A compiled loop that took the run from start to end was not interrupted.
-        if not isinstance(trajectory, AtOnce) and trajectory.status == "interrupted":
+        if not isinstance(trajectory, LazyTrajectory) and trajectory.status == "interrupted":
             raise RunInterrupted(solution)
         return solution
 
@@ -85,4 +85,4 @@ class Run:
             trajectory.warn(sentence)
         if self.task.t0 == self.task.t1:
             trajectory.warn(f"t_span begins and ends at {self.task.t0!r}: nothing was integrated")
-        trajectory.close(self.task.keep)
+        trajectory.close(self.task.retention)

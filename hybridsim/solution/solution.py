@@ -20,7 +20,7 @@ from hybridsim.solution.files.in_tables import InTables
 from hybridsim.solution.summary import in_html, in_words
 
 if TYPE_CHECKING:
-    from hybridsim.engine.record.block_list import SegmentChain
+    from hybridsim.engine.record.block_list import SegmentBlockList
     from hybridsim.engine.record.segments import Segment
     from hybridsim.engine.record.trajectory import Trajectory
     from hybridsim.model.parts.component import Component
@@ -108,7 +108,7 @@ class Solution(InTables):
         return self._segments.knots()
 
     @property
-    def _segments(self) -> SegmentChain:
+    def _segments(self) -> SegmentBlockList:
         return self._trajectory.segments
 
     @property

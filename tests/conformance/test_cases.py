@@ -40,7 +40,7 @@ def runs() -> list[Any]:
     found = []
     for number, scene in enumerate(SCENES):
         for name in INTEGRATORS:
-            if is_long(scene) and not integrator(name).leaps:
+            if is_long(scene) and not integrator(name).has_compiled_loop:
                 continue  # it steps from Python: hours
             is_slow = name in TURNS and (number + 2 * TURNS.index(name)) % (2 * len(TURNS)) != 0
             marks = [pytest.mark.slow] if is_slow else []

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.run.compiled_loop import Leaper
+from hybridsim.engine.run.compiled_loop import CompiledLoopBase
 from hybridsim.engine.run.mode_loop import ModeLoop
 from hybridsim.engine.run.segment_run import SegmentRun
-from hybridsim.engine.run.single_call import AtOnce
+from hybridsim.engine.run.single_call import LazyTrajectory
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.errors import RunInterrupted
-from hybridsim.integrators.closed_form.compiled_loop import ExactLeaper
+from hybridsim.integrators.closed_form.compiled_loop import ClosedFormLoop
 
 ENGINES = ["exact", "taylor", "dop853", "tsit5"]
 ENOUGH = {"seconds": 1e6}  # a run with limits goes through the mode loop from the first call on
@@ -65,7 +65,7 @@ def content(sol: hs.Solution, save: str) -> list[Any]:
 def is_at_once(sol: hs.Solution) -> bool:
     """Whether most of the record has still to be made."""
     record = sol._trajectory
-    return isinstance(record, AtOnce) and "warnings" not in vars(record)
+    return isinstance(record, LazyTrajectory) and "warnings" not in vars(record)
 
 
 @pytest.mark.parametrize("save", ["all", "events", "nothing"])
@@ -159,7 +159,7 @@ def test_who_breaks_off_while_it_is_made_asks_again(monkeypatch: pytest.MonkeyPa
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(ExactLeaper, "leap", broken)
+        patch.setattr(ClosedFormLoop, "advance", broken)
         with pytest.raises(KeyboardInterrupt):
             sol.warnings  # noqa: B018  # reading it is the test
     assert content(sol, "all") == wanted
@@ -205,7 +205,7 @@ def test_an_error_of_the_first_call_ends_the_run_as_ever(
     def broken(*_: Any) -> Any:
         raise error
 
-    monkeypatch.setattr(ExactLeaper if engine == "exact" else Leaper, "go", broken)
+    monkeypatch.setattr(ClosedFormLoop if engine == "exact" else CompiledLoopBase, "go", broken)
     try:
         sol = hs.simulate(model, (0, 60), integrator=engine)
     except RunInterrupted as stopped:

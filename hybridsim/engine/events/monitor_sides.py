@@ -28,7 +28,7 @@ class MonitorSides:
     leads : side (M,) to which the motion before leads a monitor that is at zero, if it changes; else 0.
     is_open : mask (M,) of monitors for which rounding hides the side and the direction.
     fired : monitors that have fired, with their directions.
-    told : the fired monitors that have been recorded.
+    recorded : the fired monitors that have been recorded.
     """
 
     monitors: Sequence[Monitor]
@@ -36,7 +36,7 @@ class MonitorSides:
     leads: np.ndarray
     is_open: np.ndarray
     fired: dict[int, int] = field(default_factory=dict)
-    told: set[int] = field(default_factory=set)
+    recorded: set[int] = field(default_factory=set)
 
     @classmethod
     def of(cls, monitors: Sequence[Monitor], before: np.ndarray) -> MonitorSides:

@@ -19,7 +19,7 @@ Item = TypeVar("Item")
 _LOOSE = 16  # items in a list that is discarded as a whole
 
 
-class Chain(Sequence[Item]):
+class BlockList(Sequence[Item]):
     """All items of a run in order, in blocks.
 
     Parameters
@@ -71,7 +71,7 @@ class Chain(Sequence[Item]):
             del self.blocks[0]
             self.forgotten += 1
 
-    def keep_only(self, item: Item) -> None:
+    def set_end(self, item: Item) -> None:
         """Replace all items by this one."""
         self.forgotten += len(self.blocks)
         last = self._loose()
@@ -143,7 +143,7 @@ class Chain(Sequence[Item]):
         raise AssertionError("the blocks hold fewer items than their lengths promise")
 
 
-class SegmentChain(Chain[Segment]):
+class SegmentBlockList(BlockList[Segment]):
     """All segments of a run."""
 
     def __init__(self, system: System, window: float | None = math.inf) -> None:
@@ -168,11 +168,11 @@ class SegmentChain(Chain[Segment]):
         """Return whether only the end of the run is kept."""
         return self.window == 0.0
 
-    def keep_end(self) -> None:
+    def drop_all_but_end(self) -> None:
         """Replace all segments by the end of the last one, unless that is already the case."""
         last = self.blocks[-1]
         if len(self.blocks) > 1 or len(last) > 1 or not isinstance(last, list) or len(last[0].s) > 1:
-            self.keep_only(last.at_end())
+            self.set_end(last.at_end())
 
     def cut(self, instant: Instant) -> None:
         """Discard everything before an instant. The segment that contains it starts there from now on."""

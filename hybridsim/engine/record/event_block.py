@@ -63,7 +63,7 @@ def _states_at(states: Any, places: Any, first: int, component: int, side: int, 
 _take_part, _times_of_one = Door(_taking_part), Door(_times_at)
 
 
-class Crossings(Sequence[Occurrence]):
+class EventBlock(Sequence[Occurrence]):
     """E events in arrays. Each one is an event of every component that changes its mode or is reset.
 
     Parameters
@@ -149,7 +149,7 @@ class Crossings(Sequence[Occurrence]):
             events = events[~self._system.is_corner[components]]
         return self._instants[events], self._states[events]
 
-    def since(self, first: int) -> Crossings:
+    def since(self, first: int) -> EventBlock:
         """Return the events from this number on."""
         later = copy(self)
         later._first += first

@@ -31,7 +31,7 @@ class Limits:
 UNLIMITED = Limits()
 
 
-class Gauge:
+class LimitMonitor:
     """Compares one run with its limits."""
 
     def __init__(self, limits: Limits, counters: Counters) -> None:

@@ -6,13 +6,13 @@ import math
 from typing import NamedTuple
 
 
-class Keep(NamedTuple):
+class Retention(NamedTuple):
     """The time before the end of a run, in the unit of t, for which segments and events are kept; None: not at all."""
 
     segments: float | None = math.inf
     events: float | None = math.inf
 
 
-ALL = Keep()
-EVENTS = Keep(segments=None)
-NOTHING = Keep(None, None)
+ALL = Retention()
+EVENTS = Retention(segments=None)
+NOTHING = Retention(None, None)

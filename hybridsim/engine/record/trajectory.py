@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.record.block_list import Chain, SegmentChain
+from hybridsim.engine.record.block_list import BlockList, SegmentBlockList
 from hybridsim.engine.record.blocks import OccurrenceList
 from hybridsim.engine.record.checkpoint import Checkpoint
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.limits import UNLIMITED, Limits
-from hybridsim.engine.record.retention import ALL, Keep
+from hybridsim.engine.record.retention import ALL, Retention
 from hybridsim.engine.record.segments import Occurrence, Pieces, Segment, end_point
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
@@ -40,12 +40,12 @@ class Trajectory:
 
     taken_over: tuple[str, float] | None = None
 
-    def __init__(self, system: System, keep: Keep = ALL) -> None:
+    def __init__(self, system: System, retention: Retention = ALL) -> None:
         # the last segment is always needed, because it gives the end of the run
-        self.segments = SegmentChain(system, 0.0 if keep.segments is None else keep.segments)
+        self.segments = SegmentBlockList(system, 0.0 if retention.segments is None else retention.segments)
         self._may_bounce = system.may_bounce
         least = LOOKED_BACK_ON if self._may_bounce else 0
-        self.occurrences: Chain[Occurrence] = Chain(OccurrenceList, keep.events, least)
+        self.occurrences: BlockList[Occurrence] = BlockList(OccurrenceList, retention.events, least)
         self.hidden: list[Any] = []  # blocks of events before some were discarded, to continue from
         self.counters = Counters()
         self.status, self.message = "finished", ""
@@ -73,24 +73,24 @@ class Trajectory:
                 return
         self.segments.append(end_point(instant, z, p, x))
 
-    def close(self, keep: Keep) -> None:
+    def close(self, retention: Retention) -> None:
         """Discard everything that is not to be kept, at the exact times."""
-        if keep == ALL or not self.segments:
+        if retention == ALL or not self.segments:
             return
-        if keep.segments is None:
-            self.segments.keep_end()
-        if keep.events != math.inf and self._may_bounce:
+        if retention.segments is None:
+            self.segments.drop_all_but_end()
+        if retention.events != math.inf and self._may_bounce:
             self.hidden = list(self.occurrences.blocks)
-        if keep.events is None:
+        if retention.events is None:
             self.occurrences.blocks = []
-        if keep.segments in (None, math.inf) and keep.events in (None, math.inf):
+        if retention.segments in (None, math.inf) and retention.events in (None, math.inf):
             return
         last = self.segments[-1]
         end, forward = last.end, last.s[-1] >= last.s[0]
-        if keep.segments is not None and keep.segments < math.inf:
-            self.segments.cut(_before(end, keep.segments, forward))
-        if keep.events is not None and keep.events < math.inf:
-            start = _before(end, keep.events, forward)
+        if retention.segments is not None and retention.segments < math.inf:
+            self.segments.cut(_before(end, retention.segments, forward))
+        if retention.events is not None and retention.events < math.inf:
+            start = _before(end, retention.events, forward)
             sign = 1.0 if forward else -1.0
             times = np.concatenate([np.empty(0), *(block.times for block in self.occurrences.blocks)])
             first = int(np.searchsorted(sign * times, sign * start.high))
@@ -129,13 +129,13 @@ class Trajectory:
         """Return a copy that ends at the checkpoint, to continue from there."""
         assert self.checkpoint is not None
         earlier = Trajectory(system)
-        for chain, others, count in (
+        for items, others, count in (
             (earlier.segments, self.segments, self.checkpoint.segments),
             (earlier.occurrences, self.occurrences, self.checkpoint.occurrences),
         ):
-            chain.window, chain.blocks = others.window, others.without_last(count)
+            items.window, items.blocks = others.window, others.without_last(count)
         if self.hidden:
-            whole: Chain[Occurrence] = Chain(OccurrenceList)
+            whole: BlockList[Occurrence] = BlockList(OccurrenceList)
             whole.blocks = self.hidden
             earlier.occurrences.blocks = whole.without_last(self.checkpoint.occurrences)
         earlier.counters, earlier.warnings = copy(self.counters), dict(self.warnings_there)
@@ -162,7 +162,7 @@ class Task:
     z0: np.ndarray  # initial modes (C,), -1 for none
     tolerances: Any
     discrete: np.ndarray  # initial discrete states
-    keep: Keep = ALL
+    retention: Retention = ALL
     limits: Limits = UNLIMITED
     record: Trajectory | None = None  # record to continue, from its checkpoint
     successor: Any = None  # a stiff method (`hybridsim.engine.run.stepping.Method`), which may take over
@@ -173,7 +173,7 @@ class Task:
         return self.t1 >= self.t0
 
     @cached_property
-    def plans(self) -> dict[str, Any]:
+    def setups(self) -> dict[str, Any]:
         """Return the storage for `hybridsim.engine.run.setup`."""
         return {}
 

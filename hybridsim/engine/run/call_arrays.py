@@ -16,7 +16,7 @@ _NONE, _NO_FLOORS = np.zeros(0, dtype=np.int64), np.zeros(0)  # compiled loops h
 _REAL, _WHOLE = ("x", "x_error", "p", "floors"), ("z", "sides", "orders")
 
 
-class Laid(NamedTuple):
+class StateBuffer(NamedTuple):
     """A state at an instant in the memory layout of compiled loops.
 
     All real arrays lie in `real` and all integer arrays in `whole`, each padded with zeros, so that two copies suffice.
@@ -30,9 +30,9 @@ class Laid(NamedTuple):
         """Return one of the arrays by name."""
         return (self.real if name in _REAL else self.whole)[self.slices[name]]
 
-    def copy(self) -> Laid:
+    def copy(self) -> StateBuffer:
         """Return a copy with its own arrays."""
-        return Laid(self.real.copy(), self.whole.copy(), self.slices)
+        return StateBuffer(self.real.copy(), self.whole.copy(), self.slices)
 
     def outcome(self) -> Outcome:
         """Return the state as an `Outcome` that shares the memory."""
@@ -40,7 +40,7 @@ class Laid(NamedTuple):
         return Outcome(x, p, z, sides, orders, _NONE, _NONE, x_error, floors, _NO_FLOORS)
 
 
-def laid_out(outcome: Outcome, p: np.ndarray) -> Laid:
+def buffer_of(outcome: Outcome, p: np.ndarray) -> StateBuffer:
     """Copy an outcome and the run-time vector p into the memory layout of compiled loops."""
     fields = {
         "x": outcome.x,
@@ -54,16 +54,16 @@ def laid_out(outcome: Outcome, p: np.ndarray) -> Laid:
     slices = {**_slices(fields, _REAL), **_slices(fields, _WHOLE)}
     real = np.zeros(sum(filled_up(len(fields[name])) for name in _REAL))
     whole = np.zeros(sum(filled_up(len(fields[name])) for name in _WHOLE), dtype=np.int64)
-    laid = Laid(real, whole, slices)
+    buffer = StateBuffer(real, whole, slices)
     for name, values in fields.items():
-        laid.part(name)[:] = values
-    return laid
+        buffer.part(name)[:] = values
+    return buffer
 
 
-class Desk(NamedTuple):
+class CallArrays(NamedTuple):
     """The arrays of a compiled loop during one call."""
 
-    laid: Laid  # the state
+    buffer: StateBuffer  # the state
     state: State  # named views of it
     as_packed: Any  # the same views as kernels receive them
     work: Any  # work space for events
@@ -72,19 +72,19 @@ class Desk(NamedTuple):
     target: np.ndarray  # target instant (2,)
 
     @classmethod
-    def of(cls, like: Laid, work: Any, room: Any) -> Desk:
+    def of(cls, like: StateBuffer, work: Any, room: Any) -> CallArrays:
         """Return arrays for states with this layout."""
-        laid = like.copy()
-        state = State(**{name: laid.part(name) for name in laid.slices})
-        return cls(laid, state, packed(state), work, room, *np.zeros((2, 2)))
+        buffer = like.copy()
+        state = State(**{name: buffer.part(name) for name in buffer.slices})
+        return cls(buffer, state, packed(state), work, room, *np.zeros((2, 2)))
 
-    def take_up(self, laid: Laid) -> None:
+    def set_state(self, buffer: StateBuffer) -> None:
         """Start from this state."""
-        self.laid.real[:], self.laid.whole[:] = laid.real, laid.whole
+        self.buffer.real[:], self.buffer.whole[:] = buffer.real, buffer.whole
 
-    def leave(self) -> Laid:
+    def final_state(self) -> StateBuffer:
         """Return a copy of the state at which the loop ended."""
-        return self.laid.copy()
+        return self.buffer.copy()
 
 
 def _slices(fields: dict[str, np.ndarray], names: tuple[str, ...]) -> dict[str, slice]:

@@ -25,10 +25,10 @@ from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.series_block import SeriesBlock
 from hybridsim.engine.record.trajectory import Trajectory
 from hybridsim.engine.roots.defect_check import room_ahead
-from hybridsim.engine.run.call_arrays import Desk, Laid, laid_out
+from hybridsim.engine.run.call_arrays import CallArrays, StateBuffer, buffer_of
 from hybridsim.engine.run.event_loop import LEAST, Record, Room, leap
-from hybridsim.engine.run.kernel_run import Leapt
-from hybridsim.engine.run.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Landing, Leaps
+from hybridsim.engine.run.kernel_run import KernelRun
+from hybridsim.engine.run.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, CompiledLoop, LoopResult
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.programs.code_cache import CodeShelf
@@ -46,17 +46,18 @@ _TIGHTEST = 1e-15
 NOT_LINEAR = no_tables()  # for kernels without tables of linear modes
 
 
-Maker = Callable[[System, Tolerances, float], Leaps]  # (system, tolerances, longest segment) -> compiled loop
+# (system, tolerances, longest segment) -> compiled loop
+Maker = Callable[[System, Tolerances, float], CompiledLoop]
 
 _compiled: list[Maker] = []
 
 
-def compile_leaps(system: System, make: Maker) -> None:
+def compile_loops(system: System, make: Maker) -> None:
     """Compile the functions of this system that compiled loops call, and once per process the loop itself."""
     functions_of(system)
     if make in _compiled or not system.n:
         return
-    leaper = make(system, Tolerances(1e-3, np.full(system.n, 1e-3)), math.inf)
+    compiled_loop = make(system, Tolerances(1e-3, np.full(system.n, 1e-3)), math.inf)
     nowhere, none = Instant(0.0), np.zeros(0, dtype=np.int64)
     guards, n = system.guard_count, system.n
     modes = np.zeros(len(system.automata), dtype=np.int64)
@@ -75,12 +76,12 @@ def compile_leaps(system: System, make: Maker) -> None:
     )
     # a rate may not be a number here; the run reports such an error itself
     with suppress(StepFailure):
-        leaper.leap(nowhere, still, p, nowhere, Trajectory(system))
+        compiled_loop.advance(nowhere, still, p, nowhere, Trajectory(system))
         leads_nowhere(np.empty((0, 2)), none, system.owner, len(system.automata), np.empty((2, MOST)))
         _compiled.append(make)
 
 
-class Leaper(ABC):
+class CompiledLoopBase(ABC):
     """A compiled loop for one run; subclasses define the kernel.
 
     Parameters
@@ -104,15 +105,15 @@ class Leaper(ABC):
             layout.phases_at,
         )
         self.spare: deque[Any] = system.code.shared(f"scratch for {kind}", deque)
-        self.leapt: Leapt | None = None  # a call made in advance, with which the next leap starts
+        self.kernel_run: KernelRun | None = None  # a call made beforehand, which `advance` takes first
         beside = (_SEGMENTS + 1) * (layout.size + 1) + ALIGNED
         # largest number of steps in one call
         self.steps = max((_ROOM - beside) // (system.n * columns + 2), LEAST)
         self._renew()
 
-    def anew(self) -> Leaps:
+    def fresh_copy(self) -> CompiledLoop:
         """Return a copy for another run."""
-        other: Leaps = object.__new__(type(self))
+        other: CompiledLoop = object.__new__(type(self))
         vars(other).update(vars(self))
         return other
 
@@ -192,35 +193,42 @@ class Leaper(ABC):
             self._renew()
         self.used = (rows, segments)
 
-    def go(self, origin: Instant, laid: Laid, target: Instant) -> Leapt:
+    def go(self, origin: Instant, buffer: StateBuffer, target: Instant) -> KernelRun:
         """Call the kernel."""
-        self.shelf.surround(laid.part("z"))
+        self.shelf.surround(buffer.part("z"))
         try:
-            desk = self.spare.pop()
+            call_arrays = self.spare.pop()
         except IndexError:
-            desk = Desk.of(laid, work_space(self.system), self._room())
+            call_arrays = CallArrays.of(buffer, work_space(self.system), self._room())
             reach_settling(
-                self.automata, self.shelf.tapes, self.inputs, NOT_LINEAR, desk.as_packed, desk.work
+                self.automata,
+                self.shelf.tapes,
+                self.inputs,
+                NOT_LINEAR,
+                call_arrays.as_packed,
+                call_arrays.work,
             )
-        desk.take_up(laid)
-        clock, to = desk.clock, desk.target
+        call_arrays.set_state(buffer)
+        clock, to = call_arrays.clock, call_arrays.target
         clock[0], clock[1] = origin
         to[0], to[1] = target
         # counted before the call, because another thread may add the modes that this call misses
         known = len(self.shelf.tapes.modes)
         rows, began = self._rows(), perf_counter()
-        code, steps, count = self._go(to, clock, desk.as_packed, desk.work, desk.room, rows)
+        code, steps, count = self._go(
+            to, clock, call_arrays.as_packed, call_arrays.work, call_arrays.room, rows
+        )
         seconds = perf_counter() - began
         self.shelf.look()
         self.codes.look(*self.taken)
-        cost = self._cost(desk.room)
-        end, at = desk.leave(), clock.tolist()
-        self.spare.append(desk)
+        cost = self._cost(call_arrays.room)
+        end, at = call_arrays.final_state(), clock.tolist()
+        self.spare.append(call_arrays)
         self.shelf.surround(end.part("z"))
         has_news = len(self.shelf.tapes.modes) != known
         assert self.memory is not None
         first_step, first = self.used
-        return Leapt(
+        return KernelRun(
             self.system,
             self.sheet,
             self.memory,
@@ -235,44 +243,44 @@ class Leaper(ABC):
             (first_step, cost),
         )
 
-    def leap(
+    def advance(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
-    ) -> Landing:
+    ) -> LoopResult:
         """Run until an event that is not ordinary, the target, or the end of the arrays, and commit the result."""
-        leapt, self.leapt = self.leapt or self.go(origin, laid_out(outcome, p), target), None
+        kernel_run, self.kernel_run = self.kernel_run or self.go(origin, buffer_of(outcome, p), target), None
         instants: list[np.ndarray] = []
         owners: list[np.ndarray] = []
         while True:
-            self.memory = leapt.memory
-            self.count(leapt, record.counters)
-            is_full = leapt.is_full
-            if leapt.count:
-                self._commit(leapt, record)
-                instants.append(leapt.instants)
-                owners.append(leapt.owners)
+            self.memory = kernel_run.memory
+            self.count(kernel_run, record.counters)
+            is_full = kernel_run.is_full
+            if kernel_run.count:
+                self._commit(kernel_run, record)
+                instants.append(kernel_run.instants)
+                owners.append(kernel_run.owners)
             if is_full:
                 self._renew()
-            if is_full or not leapt.has_news:
+            if is_full or not kernel_run.has_news:
                 break
-            leapt = self.go(Instant(*leapt.clock), leapt.end, target)
-        end = PAUSED if is_full else (ARRIVED if leapt.is_at_target else BEFORE_SOMETHING)
+            kernel_run = self.go(Instant(*kernel_run.clock), kernel_run.end, target)
+        end = PAUSED if is_full else (ARRIVED if kernel_run.is_at_target else BEFORE_SOMETHING)
         if len(instants) == 1:
-            return Landing(Instant(*leapt.clock), leapt.after, end, instants[0], owners[0])
+            return LoopResult(Instant(*kernel_run.clock), kernel_run.after, end, instants[0], owners[0])
         all_instants = np.concatenate([np.empty((0, 2)), *instants])
-        return Landing(
-            Instant(*leapt.clock), leapt.after, end, all_instants, np.concatenate([_NONE, *owners])
+        return LoopResult(
+            Instant(*kernel_run.clock), kernel_run.after, end, all_instants, np.concatenate([_NONE, *owners])
         )
 
-    def count(self, leapt: Leapt, counters: Counters) -> None:
+    def count(self, kernel_run: KernelRun, counters: Counters) -> None:
         """Add the cost of a call to the counters."""
-        leapt.count_in(counters)
-        self._count(counters, leapt.steps, leapt.beside[1])
+        kernel_run.count_in(counters)
+        self._count(counters, kernel_run.steps, kernel_run.beside[1])
 
-    def forget_segments(self, leapt: Leapt) -> bool:
+    def forget_segments(self, kernel_run: KernelRun) -> bool:
         """Release all segments except the end of the last one. Return False if their steps are needed."""
         if self.is_looked_at:
             return False
-        leapt.forget_segments()
+        kernel_run.forget_segments()
         self.memory = None
         return True
 
@@ -283,14 +291,17 @@ class Leaper(ABC):
             self.memory = self.sheet.blank()
         return self.sheet.packed(self.memory, (steps, steps, first + 1, *(first,) * 5))
 
-    def segments_of(self, leapt: Leapt) -> SegmentBlock:
+    def segments_of(self, kernel_run: KernelRun) -> SegmentBlock:
         """Return the segments of a call that has some and has not released them."""
-        first_step, first = leapt.beside[0], leapt.first
-        lengths, series, ends, origins, modes, vectors, _, jumps = leapt.rows
-        steps, begun = slice(first_step, first_step + leapt.steps), slice(first, first + leapt.count)
+        first_step, first = kernel_run.beside[0], kernel_run.first
+        lengths, series, ends, origins, modes, vectors, _, jumps = kernel_run.rows
+        steps, begun = (
+            slice(first_step, first_step + kernel_run.steps),
+            slice(first, first + kernel_run.count),
+        )
         ends[first] = 0
         return self._block(
-            ends[first : first + leapt.count + 1],
+            ends[first : first + kernel_run.count + 1],
             lengths[steps],
             series[steps],
             origins[begun],
@@ -299,21 +310,21 @@ class Leaper(ABC):
             jumps[begun],
         )
 
-    def _commit(self, leapt: Leapt, record: Trajectory) -> None:
+    def _commit(self, kernel_run: KernelRun, record: Trajectory) -> None:
         """Add the segments and events of one call to the trajectory."""
-        self.used = (leapt.beside[0] + leapt.steps, leapt.first + leapt.count + 1)
+        self.used = (kernel_run.beside[0] + kernel_run.steps, kernel_run.first + kernel_run.count + 1)
         if record.segments.is_end_alone and not self.is_looked_at:
-            record.segments.keep_only(leapt.last_end)
+            record.segments.set_end(kernel_run.last_end)
         else:
-            record.segments.add(self.segments_of(leapt))
-        if leapt.crossings is not None:
-            record.occurrences.add(leapt.crossings)
+            record.segments.add(self.segments_of(kernel_run))
+        if kernel_run.event_block is not None:
+            record.occurrences.add(kernel_run.event_block)
 
 
 _leap = Door(leap)
 
 
-class TaylorLeaper(Leaper):
+class TaylorLoop(CompiledLoopBase):
     """The compiled loop of Taylor series."""
 
     def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:

@@ -98,7 +98,7 @@ class Headway:
         if self._in_python * _STEP >= _WINDOW:
             self._judge(now, run)
 
-    def leapt(self, now: Instant) -> None:
+    def check_compiled(self, now: Instant) -> None:
         """Judge the pace after steps in compiled code."""
         if self._spent() >= _WINDOW:
             self._judge(now, None)

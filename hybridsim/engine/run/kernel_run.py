@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.engine.record.event_block import Crossings
+from hybridsim.engine.record.event_block import EventBlock
 from hybridsim.engine.record.segments import Segment, end_point
 from hybridsim.engine.run.event_loop import AT_TARGET, FULL
 from hybridsim.engine.system.instant import Instant
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Outcome
     from hybridsim.engine.native.struct_pack import Sheet
     from hybridsim.engine.record.counters import Counters
-    from hybridsim.engine.run.call_arrays import Laid
+    from hybridsim.engine.run.call_arrays import StateBuffer
     from hybridsim.engine.system.system import System
 
 
 @dataclass(eq=False)
-class Leapt:
+class KernelRun:
     """One call, before it is committed to a trajectory.
 
     Parameters
@@ -46,7 +46,7 @@ class Leapt:
     steps: int
     count: int
     clock: list[float]
-    end: Laid
+    end: StateBuffer
     has_news: bool
     seconds: float
     beside: Any
@@ -61,7 +61,7 @@ class Leapt:
             last = first + count  # the end of a segment is stored in the row of the next one
             rows.clocks[last], rows.modes[last] = self.clock, self.end.part("z")
             self.events = count if rows.fires[last - 1] >= 0 else count - 1
-        self._crossings: Crossings | None = None
+        self._event_block: EventBlock | None = None
 
     @cached_property
     def rows(self) -> Any:
@@ -99,12 +99,12 @@ class Leapt:
         return self._happened.fires[self._ended]
 
     @property
-    def crossings(self) -> Crossings | None:
+    def event_block(self) -> EventBlock | None:
         """Return the block of events, or None if there are none."""
-        if self._crossings is None and self.events:
+        if self._event_block is None and self.events:
             rows, ended = self._happened, self._ended
             after = slice(ended.start + 1, ended.stop + 1)
-            self._crossings = Crossings(
+            self._event_block = EventBlock(
                 self.system,
                 rows.clocks[after],
                 rows.fires[ended],
@@ -112,7 +112,7 @@ class Leapt:
                 rows.modes[after],
                 rows.jumps[ended, -2:],  # the states at its end, after the state at its start
             )
-        return self._crossings
+        return self._event_block
 
     @property
     def ends_in_event(self) -> bool:
@@ -124,7 +124,7 @@ class Leapt:
         counters.kernel_time += self.seconds
         counters.steps += self.steps
         counters.restarts += self.count
-        counters.events += len(self.crossings or ())
+        counters.events += len(self.event_block or ())
 
     @property
     def last_end(self) -> Segment:

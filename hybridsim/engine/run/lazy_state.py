@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from hybridsim.engine.system.system import System
 
 
-class Standing:
+class LazyState:
     """The outcome of the last event, and the run-time vector at an instant.
 
     Parameters

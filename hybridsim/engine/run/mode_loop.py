@@ -19,12 +19,12 @@ from hybridsim.engine.events.zeno.accumulation import NOBODY, Accumulation, Limi
 from hybridsim.engine.events.zeno.hidden_bounces import bounces_of, last_bounces, limit_of_hidden
 from hybridsim.engine.events.zeno.limits import behind, closed_now, holds_several
 from hybridsim.engine.record.checkpoint import Checkpoint, damaged
-from hybridsim.engine.record.limits import UNLIMITED, Gauge, LimitReached
+from hybridsim.engine.record.limits import UNLIMITED, LimitMonitor, LimitReached
 from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.record.trajectory import Task, Trajectory
 from hybridsim.engine.run.appointment_events import on_new_pieces
 from hybridsim.engine.run.headway import Headway, NoHeadway, TakenOver
-from hybridsim.engine.run.lazy_state import Standing
+from hybridsim.engine.run.lazy_state import LazyState
 from hybridsim.engine.run.located import (
     Located,
     errors_when_due,
@@ -36,8 +36,8 @@ from hybridsim.engine.run.located import (
 from hybridsim.engine.run.monitor_crossings import seen_on_the_way
 from hybridsim.engine.run.notices import Notices
 from hybridsim.engine.run.segment_run import Arrival, SegmentRun
-from hybridsim.engine.run.setup import plan_of
-from hybridsim.engine.run.stepping import ARRIVED, PAUSED, Leaps, Method, Watch
+from hybridsim.engine.run.setup import setup_of
+from hybridsim.engine.run.stepping import ARRIVED, PAUSED, CompiledLoop, Method, Watch
 from hybridsim.engine.system.failures import Collapsed, StepFailure
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
@@ -47,7 +47,7 @@ _NEAR = 1e-6  # relative to a time
 
 
 class ModeLoop:
-    """One run of a system with one stepping method. leaper: a compiled loop that was called in advance."""
+    """One run of a system with one stepping method. compiled_loop: a compiled loop that was called in advance."""
 
     def __init__(
         self,
@@ -55,45 +55,47 @@ class ModeLoop:
         method: Method,
         task: Task,
         progress: Callable[[float], None] | None = None,
-        leaper: Leaps | None = None,
+        compiled_loop: CompiledLoop | None = None,
     ) -> None:
         self.system, self.method, self.task = system, method, task
         self.forward = task.forward
-        self.record = task.record or Trajectory(system, task.keep)
-        self.gauge = None if task.limits is UNLIMITED else Gauge(task.limits, self.record.counters)
-        self.plan = plan = plan_of(system, method, task)
-        self.origin, self.end, self.renewal = plan.origin, plan.end, plan.renewal
+        self.record = task.record or Trajectory(system, task.retention)
+        self.limit_monitor = (
+            None if task.limits is UNLIMITED else LimitMonitor(task.limits, self.record.counters)
+        )
+        self.setup = setup = setup_of(system, method, task)
+        self.origin, self.end, self.renewal = setup.origin, setup.end, setup.renewal
         self.timetable = Timetable(system, self.end)
         self.adopted: Instant | None = None  # instant of the last resolved event
-        self.standing: Standing  # state at the origin
+        self.lazy_state: LazyState  # state at the origin
         self.accumulation = Accumulation(forward=self.forward)
         self.last_limits: dict[int, float] = {}  # component -> time
         self.headway = Headway(system, self.record.counters, self.origin, self.end)
-        self.leaper = leaper or plan.leaper()
+        self.compiled_loop = compiled_loop or setup.compiled_loop()
         self._led = set(system.led)
         watched = self.headway if task.successor is not None and method is not task.successor else None
-        self.notices = Notices(system, method, task, self.record, watched, self.leaper is not None)
-        self._told = progress
+        self.notices = Notices(system, method, task, self.record, watched, self.compiled_loop is not None)
+        self._on_progress = progress
 
     @property
     def outcome(self) -> Outcome:
         """Return the outcome at the origin."""
-        return self.standing.outcome
+        return self.lazy_state.outcome
 
     @property
     def p(self) -> np.ndarray:
         """Return the run-time vector at the origin."""
-        return self.standing.p
+        return self.lazy_state.p
 
-    def _stand(self, instant: Instant, make: Callable[[], Outcome]) -> None:
+    def _set_state(self, instant: Instant, make: Callable[[], Outcome]) -> None:
         """Set the state at an instant, which is made on demand."""
-        self.standing = Standing(self.system, instant, self.forward, make)
+        self.lazy_state = LazyState(self.system, instant, self.forward, make)
 
     def _progress(self, instant: Instant) -> None:
         """Report the progress and check the limits; raises LimitReached."""
         self._tell(instant)
-        if self.gauge is not None:
-            self.gauge.check()
+        if self.limit_monitor is not None:
+            self.limit_monitor.check()
 
     def _stepped(self, instant: Instant, run: SegmentRun) -> None:
         """Do the same after a step in Python; raises NoHeadway and TakenOver as well."""
@@ -106,13 +108,13 @@ class ModeLoop:
         """Continue with the stiff method."""
         assert self.task.successor is not None
         self.method = self.notices.method = self.task.successor
-        self.leaper, self.notices.takes_over = None, False
+        self.compiled_loop, self.notices.takes_over = None, False
         if self.record.taken_over is None:
             self.record.taken_over = (self.task.successor.name, float(self.origin))
 
     def _tell(self, instant: Instant) -> None:
-        if self._told is not None:
-            self._told((float(instant) - self.task.t0) / (self.task.t1 - self.task.t0))
+        if self._on_progress is not None:
+            self._on_progress((float(instant) - self.task.t0) / (self.task.t1 - self.task.t0))
 
     def run(self) -> Trajectory:
         """Integrate to the end, or until the run stops. Results computed so far are kept in every case."""
@@ -148,29 +150,29 @@ class ModeLoop:
         else:
             due = self.timetable.due_at_start(self.origin) if self.forward else ()
             self.timetable.kept(self.origin)
-            self.standing, self.adopted, stop = self.plan.start(task, due), self.origin, False
-            if not self.plan.begins_silently:
+            self.lazy_state, self.adopted, stop = self.setup.start(task, due), self.origin, False
+            if not self.setup.begins_silently:
                 stop = self._adopt(self.origin, self.outcome, task.x0.copy(), due)
             step_size = task.tolerances.first_step
         while not stop and self.origin != self.end:
             self._mark(step_size)
             appointment = self.timetable.next(self.origin, self.forward)
             target = appointment.instant if appointment else self.end
-            if self.leaper is not None and not self.accumulation.is_closing_in(float(self.origin)):
+            if self.compiled_loop is not None and not self.accumulation.is_closing_in(float(self.origin)):
                 before = self.origin
-                arrived, stop = self._leap(self.leaper, target, appointment)
+                arrived, stop = self._run_compiled(self.compiled_loop, target, appointment)
                 if not (arrived or stop or self.notices.takes_over) and self._reach() == self.renewal:
                     # the limit on segment length may be the only reason why compiled code stopped
                     nearer, renewal = self._no_farther(target, appointment)
                     if nearer != target:
-                        arrived, stop = self._leap(self.leaper, nearer, renewal)
+                        arrived, stop = self._run_compiled(self.compiled_loop, nearer, renewal)
                 if stop:
                     continue
                 if self.origin != before:
                     step_size = None
                     self._mark(None)
                 self._progress(self.origin)
-                self.headway.leapt(self.origin)
+                self.headway.check_compiled(self.origin)
                 if self.notices.takes_over:
                     self._take_over()
                 if arrived:
@@ -230,14 +232,14 @@ class ModeLoop:
         """Store a checkpoint from which the run can continue, just after an event."""
         if self.adopted != self.origin:
             return
-        standing, origin = self.standing, self.origin
+        lazy_state, origin = self.lazy_state, self.origin
         settled, paces = self.timetable.settled, dict(self.accumulation.paces)
         headway, taken_over = self.headway.place, self.record.taken_over
-        place = None if self.leaper is None else self.leaper.place
+        place = None if self.compiled_loop is None else self.compiled_loop.place
 
         def checkpoint(segments: int, occurrences: int) -> Checkpoint:
             size = math.nan if step_size is None else step_size
-            arrays = standing.outcome.arrays() | {"step_size": np.array(size), "headway": headway}
+            arrays = lazy_state.outcome.arrays() | {"step_size": np.array(size), "headway": headway}
             if taken_over is not None:
                 arrays["taken_over"] = np.array(taken_over[1])
             if place is not None:
@@ -255,9 +257,9 @@ class ModeLoop:
         if checkpoint.settled is not None:
             self.timetable.kept(checkpoint.settled)
         self.accumulation.go_on(checkpoint.paces)
-        self._stand(self.origin, lambda: Outcome.of_arrays(arrays))
-        if self.leaper is not None and "place" in arrays:
-            self.leaper.place = arrays["place"]
+        self._set_state(self.origin, lambda: Outcome.of_arrays(arrays))
+        if self.compiled_loop is not None and "place" in arrays:
+            self.compiled_loop.place = arrays["place"]
         if "headway" in arrays:
             self.headway.go_on(arrays["headway"])
         if "taken_over" in arrays and self.task.successor is not None:
@@ -266,29 +268,31 @@ class ModeLoop:
         step_size = float(arrays["step_size"])
         return None if math.isnan(step_size) else step_size
 
-    def _leap(self, leaper: Leaps, target: Instant, appointment: Appointment | None) -> tuple[bool, bool]:
+    def _run_compiled(
+        self, compiled_loop: CompiledLoop, target: Instant, appointment: Appointment | None
+    ) -> tuple[bool, bool]:
         """Run over ordinary events in compiled code. Return whether the target was reached, and whether to stop."""
-        steps, x_before = self.record.counters.steps, self.standing.read()[0].x.copy()
+        steps, x_before = self.record.counters.steps, self.lazy_state.read()[0].x.copy()
         while True:
-            landing = leaper.leap(self.origin, *self.standing.read(), target, self.record)
-            self.origin = landing.origin
-            self._stand(self.origin, landing.outcome)
+            result = compiled_loop.advance(self.origin, *self.lazy_state.read(), target, self.record)
+            self.origin = result.origin
+            self._set_state(self.origin, result.outcome)
             self.notices.look()
-            arrived = landing.end == ARRIVED
-            if len(landing.instants):
-                self.adopted = Instant(*landing.instants[-1].tolist())
-            limit = self.accumulation.limit_of_all(landing.instants, landing.owners)
-            if limit is None and len(landing.owners) and not self.system.has_surface[landing.owners[-1]]:
+            arrived = result.end == ARRIVED
+            if len(result.instants):
+                self.adopted = Instant(*result.instants[-1].tolist())
+            limit = self.accumulation.limit_of_all(result.instants, result.owners)
+            if limit is None and len(result.owners) and not self.system.has_surface[result.owners[-1]]:
                 blocks = self.record.occurrences.blocks
                 last = last_bounces(self.system, blocks[-1] if blocks else ())
                 limit = limit_of_hidden(self.system, self.outcome, last, self.record)
             if self._ends_at(limit):
                 return arrived, True
-            if landing.end != PAUSED or self.notices.takes_over:
+            if result.end != PAUSED or self.notices.takes_over:
                 break
             self._mark(None)
             self._progress(self.origin)
-            self.headway.leapt(self.origin)
+            self.headway.check_compiled(self.origin)
         if not arrived:
             return False, False
         if appointment is None:
@@ -566,7 +570,7 @@ class ModeLoop:
         """
         system, record = self.system, self.record
         self.origin = self.adopted = instant
-        self._stand(instant, lambda: outcome)
+        self._set_state(instant, lambda: outcome)
         for warning in outcome.warnings:
             record.warn(warning)
         for change in outcome.changes:
@@ -622,9 +626,9 @@ class ModeLoop:
         ended = []
         for k, direction in sorted(monitors.fired.items()):
             monitor = monitors.monitors[k]
-            if k in monitors.told or not (is_last or monitor.action == "reset"):
+            if k in monitors.recorded or not (is_last or monitor.action == "reset"):
                 continue
-            monitors.told.add(k)
+            monitors.recorded.add(k)
             self._occur(instant, "monitor", monitor.name, "", "", "", direction, x_minus, outcome.x)
             ended += [monitor.name] if monitor.action == "terminate" else []
         return ended

@@ -16,28 +16,28 @@ import numpy as np
 from hybridsim.engine.events.zeno.accumulation import MOST, leads_nowhere
 from hybridsim.engine.events.zeno.hidden_bounces import may_be_hidden
 from hybridsim.engine.native.kernels import Door
-from hybridsim.engine.record.block_list import Chain, SegmentChain
+from hybridsim.engine.record.block_list import BlockList, SegmentBlockList
 from hybridsim.engine.record.blocks import OccurrenceList
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.limits import UNLIMITED
 from hybridsim.engine.record.trajectory import Task, Trajectory
 from hybridsim.engine.run.mode_loop import ModeLoop
-from hybridsim.engine.run.setup import plan_of
-from hybridsim.engine.run.stepping import Leaps, Method
+from hybridsim.engine.run.setup import setup_of
+from hybridsim.engine.run.stepping import CompiledLoop, Method
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.system import System
 
 if TYPE_CHECKING:
     from hybridsim.engine.record.segments import Occurrence
-    from hybridsim.engine.run.kernel_run import Leapt
+    from hybridsim.engine.run.kernel_run import KernelRun
 
 
-class AtOnce(Trajectory):
+class LazyTrajectory(Trajectory):
     """The record of a finished run. Only its segments, events and cost exist before the full record is requested.
 
     Parameters
     ----------
-    leapt : the kernel call that was the whole run.
+    kernel_run : the kernel call that was the whole run.
     segments : makes the segments; None if they need the full record.
     count : makes the counters.
     make : makes the full record.
@@ -45,13 +45,13 @@ class AtOnce(Trajectory):
 
     def __init__(
         self,
-        leapt: Leapt,
-        segments: Callable[[], SegmentChain] | None,
+        kernel_run: KernelRun,
+        segments: Callable[[], SegmentBlockList] | None,
         count: Callable[[], Counters],
         make: Callable[[], Trajectory],
     ) -> None:
         self.status, self.message = "finished", ""
-        self._leapt, self._segments, self._count, self._make = leapt, segments, count, make
+        self._kernel_run, self._segments, self._count, self._make = kernel_run, segments, count, make
 
     def then(self, last: Callable[[Trajectory], None]) -> None:
         """Register a function to be applied to the full record once it is made."""
@@ -74,8 +74,8 @@ class AtOnce(Trajectory):
         if name == "counters":
             self.counters = self._count()
         elif name == "occurrences":
-            happened = self._leapt.crossings
-            found: Chain[Occurrence] = Chain(OccurrenceList)
+            happened = self._kernel_run.event_block
+            found: BlockList[Occurrence] = BlockList(OccurrenceList)
             if happened is not None:
                 found.add(happened)
             self.occurrences = found  # assigned when complete, because another thread may read it
@@ -86,15 +86,15 @@ class AtOnce(Trajectory):
         return getattr(self, name)
 
 
-class _BrokenOff:
+class _FailedCall:
     """A stand-in for a compiled loop whose first call raised an error, so that the mode loop handles the error."""
 
-    leapt = None
+    kernel_run = None
 
     def __init__(self, place: tuple[np.ndarray, ...], error: BaseException) -> None:
         self.place, self._error = place, error
 
-    def leap(self, *_: Any) -> Any:
+    def advance(self, *_: Any) -> Any:
         """Raise the error."""
         raise self._error
 
@@ -102,44 +102,52 @@ class _BrokenOff:
 _leads_nowhere = Door(leads_nowhere)
 
 
-def _is_over(system: System, leapt: Leapt) -> bool:
+def _is_over(system: System, kernel_run: KernelRun) -> bool:
     """Return whether the call is certainly the whole run: its events have no limit and hide no bounces."""
-    if not leapt.is_at_target or leapt.has_news or not leapt.count:
+    if not kernel_run.is_at_target or kernel_run.has_news or not kernel_run.count:
         return False
-    if leapt.events == 0:
+    if kernel_run.events == 0:
         return True
-    fires = leapt.fires
+    fires = kernel_run.fires
     last = system.owner[fires[-1]]
-    if not system.has_surface[last] and may_be_hidden(system, leapt.after(), leapt.crossings or ()):
+    if not system.has_surface[last] and may_be_hidden(
+        system, kernel_run.after(), kernel_run.event_block or ()
+    ):
         return False
     work = np.empty((2, MOST))
-    return bool(_leads_nowhere(leapt.instants, fires, system.owner, len(system.automata), work))
+    return bool(_leads_nowhere(kernel_run.instants, fires, system.owner, len(system.automata), work))
 
 
-def carried_out(
+def run_task(
     system: System, method: Method, task: Task, progress: Callable[[float], None] | None
 ) -> Trajectory:
     """Run a task with its compiled loop if possible, and with the mode loop for the rest."""
-    plan, keep = plan_of(system, method, task), task.keep
-    start = plan.silent_start
+    setup, retention = setup_of(system, method, task), task.retention
+    start = setup.silent_start
     is_plain = progress is None and task.record is None and task.limits is UNLIMITED
     # with limited retention the record must be small, but the arrays of the loop are not
-    is_kept = keep.events == math.inf and keep.segments in (None, math.inf)
-    if start is None or not is_plain or not is_kept:
+    keeps_all = retention.events == math.inf and retention.segments in (None, math.inf)
+    if start is None or not is_plain or not keeps_all:
         return ModeLoop(system, method, task, progress).run()
-    leaper = plan.leaper()
-    assert leaper is not None
+    compiled_loop = setup.compiled_loop()
+    assert compiled_loop is not None
     try:
-        leapt = leaper.leapt = leaper.go(plan.origin, start, plan.end)
+        kernel_run = compiled_loop.kernel_run = compiled_loop.go(setup.origin, start, setup.end)
     except (KeyboardInterrupt, StepFailure) as error:
-        return ModeLoop(system, method, task, None, cast("Leaps", _BrokenOff(leaper.place, error))).run()
-    if leapt is None or not _is_over(system, leapt) or not (keep.segments or leaper.forget_segments(leapt)):
-        return ModeLoop(system, method, task, None, leaper).run()
+        return ModeLoop(
+            system, method, task, None, cast("CompiledLoop", _FailedCall(compiled_loop.place, error))
+        ).run()
+    if (
+        kernel_run is None
+        or not _is_over(system, kernel_run)
+        or not (retention.segments or compiled_loop.forget_segments(kernel_run))
+    ):
+        return ModeLoop(system, method, task, None, compiled_loop).run()
 
     def made() -> Trajectory:
-        again = plan.leaper()
+        again = setup.compiled_loop()
         assert again is not None
-        again.leapt = leapt
+        again.kernel_run = kernel_run
         record = ModeLoop(system, method, task, None, again).run()
         if record.status == "interrupted":  # the run itself is finished; only the access is interrupted
             raise KeyboardInterrupt
@@ -147,12 +155,14 @@ def carried_out(
 
     def counted() -> Counters:
         counters = Counters()
-        leaper.count(leapt, counters)
+        compiled_loop.count(kernel_run, counters)
         return counters
 
-    def between() -> SegmentChain:
-        found = SegmentChain(system)
-        found.add(leaper.segments_of(leapt))
+    def between() -> SegmentBlockList:
+        found = SegmentBlockList(system)
+        found.add(compiled_loop.segments_of(kernel_run))
         return found
 
-    return AtOnce(leapt, None if leapt.ends_in_event or not keep.segments else between, counted, made)
+    return LazyTrajectory(
+        kernel_run, None if kernel_run.ends_in_event or not retention.segments else between, counted, made
+    )

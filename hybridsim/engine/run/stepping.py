@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Outcome
     from hybridsim.engine.record.blocks import SegmentBlock
     from hybridsim.engine.record.trajectory import Trajectory
-    from hybridsim.engine.run.call_arrays import Laid
-    from hybridsim.engine.run.kernel_run import Leapt
+    from hybridsim.engine.run.call_arrays import StateBuffer
+    from hybridsim.engine.run.kernel_run import KernelRun
     from hybridsim.engine.system.instant import Instant
 
 
@@ -154,7 +154,7 @@ class Stepper(Protocol):
 ARRIVED, PAUSED, BEFORE_SOMETHING = 0, 1, 2  # why a compiled call ended
 
 
-class Landing(NamedTuple):
+class LoopResult(NamedTuple):
     """The end of a compiled call: the origin of the next segment, the state there, and why it ended.
 
     end: ARRIVED at the target, PAUSED because the arrays are full, or BEFORE_SOMETHING that is not ordinary. instants
@@ -168,14 +168,14 @@ class Landing(NamedTuple):
     owners: np.ndarray
 
 
-class Leaps(Protocol):
+class CompiledLoop(Protocol):
     """A compiled mode loop of one run, which integrates whole segments with their ordinary events.
 
-    It adds them to the record as blocks (`hybridsim.engine.record.blocks`) and updates its counters. leapt: a kernel
-    call that `go` made in advance, with which the next leap starts.
+    It adds them to the record as blocks (`hybridsim.engine.record.blocks`) and updates its counters. kernel_run: a
+    kernel call that `go` made in advance, with which `advance` starts.
     """
 
-    leapt: Leapt | None
+    kernel_run: KernelRun | None
 
     @property
     def place(self) -> tuple[np.ndarray, ...]:
@@ -185,27 +185,27 @@ class Leaps(Protocol):
     def place(self, place: np.ndarray) -> None:
         """Restore that state from one concatenated array."""
 
-    def anew(self) -> Leaps:
+    def fresh_copy(self) -> CompiledLoop:
         """Return a fresh copy for another run; this object must not have been used."""
 
-    def leap(
+    def advance(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
-    ) -> Landing:
+    ) -> LoopResult:
         """Run until an event that is not ordinary, the target, or the end of the arrays, and commit the result."""
 
-    def go(self, origin: Instant, laid: Laid, target: Instant) -> Leapt | None:
+    def go(self, origin: Instant, buffer: StateBuffer, target: Instant) -> KernelRun | None:
         """Call the kernel without committing the result; None if it cannot be called."""
 
-    def count(self, leapt: Leapt, counters: Counters) -> None:
+    def count(self, kernel_run: KernelRun, counters: Counters) -> None:
         """Add the cost of a call to the counters."""
 
-    def segments_of(self, leapt: Leapt) -> SegmentBlock:
+    def segments_of(self, kernel_run: KernelRun) -> SegmentBlock:
         """Return the segments of a call that has some and has not released them."""
 
-    def forget_segments(self, leapt: Leapt) -> bool:
+    def forget_segments(self, kernel_run: KernelRun) -> bool:
         """Release the memory of segments except the end of the last one. Return False if it is needed.
 
-        No further leap may follow.
+        `advance` must not be called afterwards.
         """
 
 
@@ -225,7 +225,7 @@ class Method(Protocol):
         """Return whether the dense output is as accurate as the method."""
 
     @property
-    def leaps(self) -> bool:
+    def has_compiled_loop(self) -> bool:
         """Return whether it has a compiled loop."""
 
     @property
@@ -236,7 +236,7 @@ class Method(Protocol):
     def rounding(self) -> float:
         """Return the largest rounding error of its steps, in units of rounding of the distance moved."""
 
-    def leaper(self, system: System, tolerances: Tolerances, longest: float) -> Leaps | None:
+    def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> CompiledLoop | None:
         """Return its compiled loop for one run with segments up to `longest`, or None if the model rules it out."""
 
     def start(

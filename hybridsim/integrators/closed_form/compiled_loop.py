@@ -17,9 +17,9 @@ from hybridsim.engine.record.array_forms import check_modes
 from hybridsim.engine.record.checkpoint import damaged
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.trajectory import Trajectory
-from hybridsim.engine.run.call_arrays import Desk, Laid, laid_out
-from hybridsim.engine.run.kernel_run import Leapt
-from hybridsim.engine.run.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, Landing
+from hybridsim.engine.run.call_arrays import CallArrays, StateBuffer, buffer_of
+from hybridsim.engine.run.kernel_run import KernelRun
+from hybridsim.engine.run.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, LoopResult
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.programs.mode_tables import automata_of, shelf_of
 from hybridsim.engine.system.system import System
@@ -32,7 +32,7 @@ _NONE = np.zeros(0, dtype=np.int64)
 _leap = Door(leap_at_address)
 
 
-class ExactLeaper:
+class ClosedFormLoop:
     """The compiled loop of one run."""
 
     def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
@@ -43,11 +43,11 @@ class ExactLeaper:
         self.shelf, self.automata = shelf_of(system), automata_of(system)
         self.tables: LinearTables | None = None  # tables for which the sheet was made
         self.sheet: Sheet
-        self.leapt: Leapt | None = None  # a call made in advance, whose results the next leap takes first
+        self.kernel_run: KernelRun | None = None  # a call made beforehand, which `advance` takes first
 
-    def anew(self) -> ExactLeaper:
+    def fresh_copy(self) -> ClosedFormLoop:
         """Return the same loop for another run."""
-        other: ExactLeaper = object.__new__(type(self))
+        other: ClosedFormLoop = object.__new__(type(self))
         vars(other).update(vars(self))
         return other
 
@@ -84,13 +84,13 @@ class ExactLeaper:
         self.hints = np.zeros((max(rows.tolist(), default=-1) + 1, guards))
         self.hints[rows] = hints[is_known]
 
-    def go(self, origin: Instant, laid: Laid, target: Instant) -> Leapt | None:
+    def go(self, origin: Instant, buffer: StateBuffer, target: Instant) -> KernelRun | None:
         """Call the kernel; return None without tables."""
         system, shelf = self.system, self.shelf
-        shelf.surround(laid.part("z"))
+        shelf.surround(buffer.part("z"))
         tapes, inputs = shelf.tapes, system.registers.inputs
         horizon = max(self.horizon, min(target.minus(origin), self.longest))
-        found = tables_of(system, tapes.modes, laid.part("p"), horizon)
+        found = tables_of(system, tapes.modes, buffer.part("p"), horizon)
         if found is None:
             self.horizon = horizon
             return None
@@ -100,49 +100,57 @@ class ExactLeaper:
         memory = self.sheet.blank()
         rows = self.sheet.packed(memory)
         try:
-            desk = spare.pop()
+            call_arrays = spare.pop()
         except IndexError:
             work = work_space(system, len(tables.kinds), len(tables.factors))
-            desk = Desk.of(laid, work, room_for(system, tables))
-            reach_leap(self.automata, tapes, inputs, tables, desk.as_packed, work, desk.room, rows)
-        desk.take_up(laid)
-        room = desk.room
+            call_arrays = CallArrays.of(buffer, work, room_for(system, tables))
+            reach_leap(
+                self.automata, tapes, inputs, tables, call_arrays.as_packed, work, call_arrays.room, rows
+            )
+        call_arrays.set_state(buffer)
+        room = call_arrays.room
         room.rates[:], room.longest[0] = system.rates, self.longest
         room.times[:] = *target, *origin
         hints, known = room.hints, len(self.hints)
         hints[:known], hints[known:] = self.hints, 0.0
         began = perf_counter()
-        code = _leap(self.automata, tapes, inputs, tables, desk.as_packed, desk.work, room, rows)
+        code = _leap(
+            self.automata, tapes, inputs, tables, call_arrays.as_packed, call_arrays.work, room, rows
+        )
         seconds = perf_counter() - began
-        end, clock, count = desk.leave(), room.times[2:].tolist(), int(room.committed[0])
+        end, clock, count = call_arrays.final_state(), room.times[2:].tolist(), int(room.committed[0])
         beside = (tables, horizon, hints.copy())
-        spare.append(desk)
+        spare.append(call_arrays)
         shelf.surround(end.part("z"))
         has_news = count > 0 and len(shelf.tapes.modes) != len(tapes.modes)
-        return Leapt(system, self.sheet, memory, 0, code, count, count, clock, end, has_news, seconds, beside)
+        return KernelRun(
+            system, self.sheet, memory, 0, code, count, count, clock, end, has_news, seconds, beside
+        )
 
-    def leap(
+    def advance(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
-    ) -> Landing:
+    ) -> LoopResult:
         """Advance through ordinary events as far as the buffers last."""
-        leapt, self.leapt = self.leapt or self.go(origin, laid_out(outcome, p), target), None
-        if leapt is None:
-            return Landing(origin, outcome.copy, BEFORE_SOMETHING, np.zeros((0, 2)), _NONE)
-        _, self.horizon, self.hints = leapt.beside
-        self.count(leapt, record.counters)
-        if leapt.count:
-            self._commit(leapt, record)
-        goes_on = leapt.is_full or leapt.has_news
-        end = ARRIVED if leapt.is_at_target else (PAUSED if goes_on else BEFORE_SOMETHING)
-        return Landing(Instant(*leapt.clock), leapt.after, end, leapt.instants, leapt.owners)
+        kernel_run, self.kernel_run = self.kernel_run or self.go(origin, buffer_of(outcome, p), target), None
+        if kernel_run is None:
+            return LoopResult(origin, outcome.copy, BEFORE_SOMETHING, np.zeros((0, 2)), _NONE)
+        _, self.horizon, self.hints = kernel_run.beside
+        self.count(kernel_run, record.counters)
+        if kernel_run.count:
+            self._commit(kernel_run, record)
+        goes_on = kernel_run.is_full or kernel_run.has_news
+        end = ARRIVED if kernel_run.is_at_target else (PAUSED if goes_on else BEFORE_SOMETHING)
+        return LoopResult(
+            Instant(*kernel_run.clock), kernel_run.after, end, kernel_run.instants, kernel_run.owners
+        )
 
-    def count(self, leapt: Leapt, counters: Counters) -> None:
+    def count(self, kernel_run: KernelRun, counters: Counters) -> None:
         """Add the cost of a call to the counters."""
-        leapt.count_in(counters)
+        kernel_run.count_in(counters)
 
-    def forget_segments(self, leapt: Leapt) -> bool:
+    def forget_segments(self, kernel_run: KernelRun) -> bool:
         """Release all segments except the end of the last one."""
-        leapt.forget_segments()
+        kernel_run.forget_segments()
         return True
 
     def _sheet(self, tables: LinearTables) -> Sheet:
@@ -168,10 +176,10 @@ class ExactLeaper:
         sheet: Sheet = system.code.shared(f"sheet for {widest} modal coordinates", made)
         return sheet
 
-    def segments_of(self, leapt: Leapt) -> ClosedFormBlock:
+    def segments_of(self, kernel_run: KernelRun) -> ClosedFormBlock:
         """Return the segments of a call that has some and has released none."""
-        ends, origins, numbers, modes, vectors, coordinates, _, jumps = leapt.rows
-        begun, tables = slice(0, leapt.count), leapt.beside[0]
+        ends, origins, numbers, modes, vectors, coordinates, _, jumps = kernel_run.rows
+        begun, tables = slice(0, kernel_run.count), kernel_run.beside[0]
         return ClosedFormBlock(
             self.system,
             tables,
@@ -184,11 +192,11 @@ class ExactLeaper:
             jumps[begun],
         )
 
-    def _commit(self, leapt: Leapt, record: Trajectory) -> None:
+    def _commit(self, kernel_run: KernelRun, record: Trajectory) -> None:
         """Transfer the segments and the events to the trajectory."""
         if record.segments.is_end_alone:
-            record.segments.keep_only(leapt.last_end)
+            record.segments.set_end(kernel_run.last_end)
         else:
-            record.segments.add(self.segments_of(leapt))
-        if leapt.crossings is not None:
-            record.occurrences.add(leapt.crossings)
+            record.segments.add(self.segments_of(kernel_run))
+        if kernel_run.event_block is not None:
+            record.occurrences.add(kernel_run.event_block)

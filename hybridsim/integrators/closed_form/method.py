@@ -9,11 +9,11 @@ from typing import ClassVar
 import numpy as np
 
 from hybridsim.engine.linear.modes import refuse_nonlinear
-from hybridsim.engine.run.compiled_loop import compile_leaps
+from hybridsim.engine.run.compiled_loop import compile_loops
 from hybridsim.engine.run.stepping import Flow, Stepper, Watch
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
-from hybridsim.integrators.closed_form.compiled_loop import ExactLeaper
+from hybridsim.integrators.closed_form.compiled_loop import ClosedFormLoop
 from hybridsim.integrators.contract import NEEDS_TAPE, Integrator
 from hybridsim.integrators.taylor.method import TaylorStepper
 
@@ -47,16 +47,16 @@ class Exact(Integrator):
         "functions": NEEDS_TAPE,
     }
     dense_is_accurate: ClassVar[bool] = True
-    leaps: ClassVar[bool] = True
+    has_compiled_loop: ClassVar[bool] = True
 
     def prepare(self, system: System) -> None:
         """Compile the mode loop; refuse a model that is not piecewise linear."""
         refuse_nonlinear(system)
-        compile_leaps(system, ExactLeaper)
+        compile_loops(system, ClosedFormLoop)
 
-    def leaper(self, system: System, tolerances: Tolerances, longest: float) -> ExactLeaper | None:
+    def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> ClosedFormLoop | None:
         """Return the compiled mode loop, or None if max_step is set, because the loop has no steps."""
-        return ExactLeaper(system, tolerances, longest) if math.isinf(tolerances.max_step) else None
+        return ClosedFormLoop(system, tolerances, longest) if math.isinf(tolerances.max_step) else None
 
     def start(
         self,

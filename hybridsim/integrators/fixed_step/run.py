@@ -17,7 +17,7 @@ from hybridsim.engine.events.resolve import Settling
 from hybridsim.engine.events.zeno.accumulation import Accumulation, accumulated
 from hybridsim.engine.record.checkpoint import Checkpoint, damaged
 from hybridsim.engine.record.fixed_blocks import StepOccurrences, StepSegments
-from hybridsim.engine.record.limits import Gauge, LimitReached
+from hybridsim.engine.record.limits import LimitMonitor, LimitReached
 from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.record.trajectory import Task, Trajectory
 from hybridsim.engine.series.bounded import UNIT
@@ -104,8 +104,8 @@ class FixedStepRun:
     ) -> None:
         refuse_endless(march.step, (task.t0, task.t1), "step")
         self.system, self.task, self.march, self.progress = system, task, march, progress
-        self.record = task.record or Trajectory(system, task.keep)
-        self.gauge = Gauge(task.limits, self.record.counters)
+        self.record = task.record or Trajectory(system, task.retention)
+        self.limit_monitor = LimitMonitor(task.limits, self.record.counters)
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
         self.timetable = Timetable(system, self.end)
         self.x, self.z, self.discrete = task.x0.copy(), np.maximum(task.z0, 0), task.discrete.copy()
@@ -158,7 +158,7 @@ class FixedStepRun:
             if self.progress:
                 self.progress((float(self.origin) - self.task.t0) / (self.task.t1 - self.task.t0))
             if self.origin != self.end:
-                self.gauge.check()
+                self.limit_monitor.check()
 
     def _go_on_from(self, checkpoint: Checkpoint) -> None:
         if not checkpoint.arrays.keys() >= {*_STATE}:

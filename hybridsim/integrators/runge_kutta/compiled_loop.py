@@ -17,7 +17,7 @@ from hybridsim.engine.record.hermite import (
     shift_matrix,
 )
 from hybridsim.engine.record.hermite_block import TERMS, HermiteBlock
-from hybridsim.engine.run.compiled_loop import NOT_LINEAR, Leaper
+from hybridsim.engine.run.compiled_loop import NOT_LINEAR, CompiledLoopBase
 from hybridsim.engine.system.programs.ends_code import EndsShelf
 from hybridsim.engine.system.programs.guard_parts import GuardParts
 from hybridsim.engine.system.series_at import short_order
@@ -73,7 +73,7 @@ class Room(NamedTuple):
 _leap = Door(rk_leap)
 
 
-class RungeKuttaLeaper(Leaper):
+class RungeKuttaLoop(CompiledLoopBase):
     """The compiled loop of an explicit Runge-Kutta method."""
 
     is_looked_at: ClassVar[bool] = True  # whether stiffness is monitored
@@ -98,9 +98,9 @@ class RungeKuttaLeaper(Leaper):
             given,
         )
 
-    def anew(self) -> RungeKuttaLeaper:
+    def fresh_copy(self) -> RungeKuttaLoop:
         """Return the same loop for another run, which determines its own first step."""
-        other = cast("RungeKuttaLeaper", super().anew())
+        other = cast("RungeKuttaLoop", super().fresh_copy())
         *rest, given = self.control
         other.control = (*rest, given.copy())
         return other

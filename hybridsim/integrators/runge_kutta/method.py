@@ -9,13 +9,13 @@ import numpy as np
 
 from hybridsim.engine.record.hermite import hermite, holds_between, middle_weights
 from hybridsim.engine.record.segments import Dense
-from hybridsim.engine.run.compiled_loop import compile_leaps
+from hybridsim.engine.run.compiled_loop import compile_loops
 from hybridsim.engine.run.stepping import Flow, Stepper, Watch
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.integrators.contract import Integrator
 from hybridsim.integrators.one_step import OneStepStepper, Point, Trial
-from hybridsim.integrators.runge_kutta.compiled_loop import RungeKuttaLeaper
+from hybridsim.integrators.runge_kutta.compiled_loop import RungeKuttaLoop
 from hybridsim.integrators.runge_kutta.step import Tableau, attempt
 
 __all__ = ["RungeKuttaIntegrator", "RungeKuttaStepper", "Tableau"]
@@ -91,7 +91,7 @@ class RungeKuttaIntegrator(Integrator):
 
     tableau: ClassVar[Tableau]
     lacks: ClassVar[dict[str, str]] = {"stiff": "it is explicit: the fastest rate limits its step"}
-    leaps: ClassVar[bool] = True
+    has_compiled_loop: ClassVar[bool] = True
 
     @property
     def stable_to(self) -> float:
@@ -104,18 +104,18 @@ class RungeKuttaIntegrator(Integrator):
         return self.tableau.rounding
 
     @classmethod
-    def _leaper(cls, system: System, tolerances: Tolerances, longest: float) -> RungeKuttaLeaper:
-        return RungeKuttaLeaper(system, tolerances, longest, cls.tableau)
+    def _compiled_loop(cls, system: System, tolerances: Tolerances, longest: float) -> RungeKuttaLoop:
+        return RungeKuttaLoop(system, tolerances, longest, cls.tableau)
 
     def prepare(self, system: System) -> None:
         """Compile the mode loop."""
         if system.has_tape and not system.has_corners:
-            compile_leaps(system, self._leaper)
+            compile_loops(system, self._compiled_loop)
 
-    def leaper(self, system: System, tolerances: Tolerances, longest: float) -> RungeKuttaLeaper | None:
+    def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> RungeKuttaLoop | None:
         """Return the compiled mode loop; None for a model with corners or Python functions."""
-        leaps = system.has_tape and not system.has_corners
-        return self._leaper(system, tolerances, longest) if leaps else None
+        has_compiled_loop = system.has_tape and not system.has_corners
+        return self._compiled_loop(system, tolerances, longest) if has_compiled_loop else None
 
     def start(
         self,

@@ -12,7 +12,7 @@ from hybridsim.engine.native.time_grid import on_the_grid
 from hybridsim.engine.record.segments import Dense
 from hybridsim.engine.roots.defect_check import BETWEEN
 from hybridsim.engine.roots.vanishing_terms import PIECES, where_it_ends
-from hybridsim.engine.run.compiled_loop import TaylorLeaper, compile_leaps
+from hybridsim.engine.run.compiled_loop import TaylorLoop, compile_loops
 from hybridsim.engine.run.stepping import Flow, Step, Stepper, Watch
 from hybridsim.engine.series.interpreter import polynomials
 from hybridsim.engine.series.vanishing_kinds import KINDS, power_of, register_of
@@ -173,15 +173,15 @@ class Taylor(Integrator):
         "functions": NEEDS_TAPE,
     }
     dense_is_accurate: ClassVar[bool] = True
-    leaps: ClassVar[bool] = True
+    has_compiled_loop: ClassVar[bool] = True
 
     def prepare(self, system: System) -> None:
         """Compile the mode loop."""
-        compile_leaps(system, TaylorLeaper)
+        compile_loops(system, TaylorLoop)
 
-    def leaper(self, system: System, tolerances: Tolerances, longest: float) -> TaylorLeaper:
+    def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> TaylorLoop:
         """Return the compiled mode loop."""
-        return TaylorLeaper(system, tolerances, longest)
+        return TaylorLoop(system, tolerances, longest)
 
     def start(
         self,

@@ -14,7 +14,7 @@ from hybridsim.engine.native.kernels import ENABLED, call_kernel, kernel, kernel
 from hybridsim.engine.native.simd_vectors import WIDTH, room_for
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.record.counters import Counters
-from hybridsim.engine.record.limits import UNLIMITED, Gauge, LimitReached, Limits
+from hybridsim.engine.record.limits import UNLIMITED, LimitMonitor, LimitReached, Limits
 from hybridsim.engine.series.emit_bernstein import LEADING, bernstein_code
 from hybridsim.engine.system.instant import phase_of
 from hybridsim.engine.system.series_at import series_order
@@ -99,7 +99,7 @@ class MechanicalRun:
         plant, laws = packed(self.built.plant), packed(self.built.laws)
         state, room = packed(self.state), packed(self.room)
         began, compiled = perf_counter(), seconds_compiling()
-        gauge = Gauge(self.limits, self.counters)
+        limit_monitor = LimitMonitor(self.limits, self.counters)
         reach_kernels(self.state, plant, laws, state, room)
         if ENABLED:
             self.state.kernels[BERNSTEIN:], self._code = bernstein_code(self.order - 1)
@@ -119,7 +119,7 @@ class MechanicalRun:
                 progress((self.time - self.span[0]) / (self.span[1] - self.span[0]))
             self._count()
             try:
-                gauge.check()
+                limit_monitor.check()
             except LimitReached as reached:
                 self.code, self.limit_message = LIMITED, str(reached)
         self.compile_time = seconds_compiling() - compiled

@@ -13,7 +13,7 @@ from hybridsim.engine.native.kernels import seconds_compiling
 from hybridsim.engine.native.simd_vectors import WIDTH, room_for
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.record.counters import Counters
-from hybridsim.engine.record.limits import UNLIMITED, Gauge, LimitReached, Limits
+from hybridsim.engine.record.limits import UNLIMITED, LimitMonitor, LimitReached, Limits
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.errors import UsageError
 from hybridsim.mechanics.series_loop.mechanical_arrays import rates_of
@@ -72,7 +72,7 @@ class SteppedRun:
         packs = [packed(a) for a in (self.plant, self.laws, state, self.room)]
         began, compiled, m = perf_counter(), seconds_compiling(), len(state.mode)
         rows = max(_ROOM // (2 * system.n + m), 16)
-        gauge = Gauge(self.limits, self.counters)
+        limit_monitor = LimitMonitor(self.limits, self.counters)
         while self.done < self.count:
             wanted = min(rows, self.count - self.done)
             kept = Kept(
@@ -94,7 +94,7 @@ class SteppedRun:
             self.counters.steps, self.counters.events = self.done, self.counters.events + int(kept.used[1])
             if self.done < self.count:
                 try:
-                    gauge.check()
+                    limit_monitor.check()
                 except LimitReached as reached:
                     self.status, self.limit_message = "limit", str(reached)
                     break

@@ -244,7 +244,7 @@ def _without_guards(solution: Solution, event: Event, together: list[Occurrence]
         return f"{', '.join(due)} was due at this instant; the modes that hold were found again just after it"
     if event.guard and any(o.kind == "monitor" for o in together):
         return "a reset at this instant led there: no guard was located at zero"
-    if solution.model.inputs and solution._run.method.leaps:
+    if solution.model.inputs and solution._run.method.has_compiled_loop:
         names = ", ".join(declared.name for declared in solution.model.inputs)
         return f"no guard reached zero: an input has a knot here (of {names}), and the modes were found again"
     return "the integrator decided this by its own rule: no guard was located at zero"

@@ -86,7 +86,7 @@ def _stored(solution: Solution) -> dict[str, np.ndarray]:
         "method": {"name": run.method.name, "options": vars(run.method)},
         "span": [task.t0, task.t1],
         "tolerances": {n: getattr(task.tolerances, n) for n in ("rtol", "max_step", "first_step")},
-        "keep": list(task.keep),
+        "keep": list(task.retention),
         "save": run.save,
         "reason": run.reason,
         "kinds": kinds,
@@ -189,7 +189,7 @@ def _put_together(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Solu
 
     check_header(header)
     run = _run(header, arrays)
-    trajectory = Trajectory(run.system, run.task.keep)
+    trajectory = Trajectory(run.system, run.task.retention)
     stored = ((kind, _below(arrays, f"segments/{k}/")) for k, kind in enumerate(header["kinds"]))
     trajectory.segments.blocks = put_together(run.system, stored)
     events = _below(arrays, "events/")
@@ -215,7 +215,7 @@ def _put_together(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Solu
 
 
 def _run(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Run:
-    from hybridsim.engine.record.retention import Keep
+    from hybridsim.engine.record.retention import Retention
     from hybridsim.engine.record.trajectory import Task
     from hybridsim.engine.system.system_cache import system_of
     from hybridsim.engine.system.tolerances import Tolerances
@@ -228,9 +228,11 @@ def _run(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Run:
     system = system_of(model)
     check_task(header, arrays, system)
     tolerances = Tolerances(atol=arrays["atol"], **header["tolerances"])
-    (t0, t1), keep = header["span"], Keep(*header["keep"])
+    (t0, t1), retention = header["span"], Retention(*header["keep"])
     successor = successor_of(header["method"]["name"], system) if header["reason"] else None
-    task = Task(t0, t1, arrays["x0"], arrays["z0"], tolerances, arrays["discrete"], keep, successor=successor)
+    task = Task(
+        t0, t1, arrays["x0"], arrays["z0"], tolerances, arrays["discrete"], retention, successor=successor
+    )
     method = make_integrator(header["method"]["name"], header["method"]["options"])
     return Run(model, system, method, task, arrays.get("grid"), header["save"], header["reason"])
 

@@ -61,7 +61,7 @@ class Configuration:
     @property
     def is_compiled(self) -> bool:
         """Whether long runs are cheap, because the loop over the steps is compiled."""
-        return self.method.leaps or self.method.start is Integrator.start
+        return self.method.has_compiled_loop or self.method.start is Integrator.start
 
     @property
     def form(self) -> str:

@@ -11,9 +11,9 @@ import pytest
 
 import hybridsim as hs
 from hybridsim.engine.events.zeno.accumulation import NOBODY, Accumulation, Limit, accumulated
-from hybridsim.engine.record.block_list import Chain
+from hybridsim.engine.record.block_list import BlockList
 from hybridsim.engine.record.blocks import OccurrenceList, SegmentList
-from hybridsim.engine.record.event_block import Crossings
+from hybridsim.engine.record.event_block import EventBlock
 from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.record.series_block import SeriesBlock
 from hybridsim.engine.system.instant import Instant
@@ -28,62 +28,62 @@ def occurrence(t: float, component: str = "c", kind: str = "transition") -> Occu
 # -- chains -----------------------------------------------------------------------------------------------------
 
 
-def mixed() -> tuple[Chain[Occurrence], list[Occurrence]]:
+def mixed() -> tuple[BlockList[Occurrence], list[Occurrence]]:
     """Items one by one, then a block, then one by one again."""
     items = [occurrence(float(k), f"c{k % 2}") for k in range(9)]
-    chain: Chain[Occurrence] = Chain(OccurrenceList)
-    chain.extend(items[:3])
-    chain.add(OccurrenceList(items[3:7]))
-    chain.add(OccurrenceList())
-    chain.append(items[7])
-    chain.append(items[8])
-    return chain, items
+    block_list: BlockList[Occurrence] = BlockList(OccurrenceList)
+    block_list.extend(items[:3])
+    block_list.add(OccurrenceList(items[3:7]))
+    block_list.add(OccurrenceList())
+    block_list.append(items[7])
+    block_list.append(items[8])
+    return block_list, items
 
 
 def test_a_chain_is_a_sequence() -> None:
-    chain, items = mixed()
-    assert len(chain) == len(items)
-    assert [a is b for a, b in zip(chain, items, strict=True)] == [True] * 9
-    assert [chain[k] for k in range(-9, 9)] == items + items
+    block_list, items = mixed()
+    assert len(block_list) == len(items)
+    assert [a is b for a, b in zip(block_list, items, strict=True)] == [True] * 9
+    assert [block_list[k] for k in range(-9, 9)] == items + items
     for chosen in (slice(2, 5), slice(None, None, -2), slice(-3, None)):
-        assert chain[chosen] == items[chosen]
-    assert list(reversed(chain)) == items[::-1]
+        assert block_list[chosen] == items[chosen]
+    assert list(reversed(block_list)) == items[::-1]
     for beyond in (9, -10):
         with pytest.raises(IndexError):
-            chain[beyond]
+            block_list[beyond]
 
 
 def test_the_first_items_can_be_dropped() -> None:
     for count in range(10):
-        chain, items = mixed()
-        chain.drop(count)
-        assert list(chain) == items[count:]
+        block_list, items = mixed()
+        block_list.drop(count)
+        assert list(block_list) == items[count:]
 
 
 def test_a_window_keeps_what_lies_in_it_and_little_more() -> None:
-    chain: Chain[Occurrence] = Chain(OccurrenceList, 5.0)
+    block_list: BlockList[Occurrence] = BlockList(OccurrenceList, 5.0)
     for k in range(4000):
         if k % 100 < 50:
-            chain.append(occurrence(0.1 * k))
+            block_list.append(occurrence(0.1 * k))
         else:
-            chain.add(OccurrenceList([occurrence(0.1 * k)]))
-        assert [o.instant.high for o in chain][-1] == 0.1 * k
-        assert float(chain[0].instant) <= max(0.1 * k - 5.0, 0.0) + 0.1
-        assert len(chain) <= 51 + 16
+            block_list.add(OccurrenceList([occurrence(0.1 * k)]))
+        assert [o.instant.high for o in block_list][-1] == 0.1 * k
+        assert float(block_list[0].instant) <= max(0.1 * k - 5.0, 0.0) + 0.1
+        assert len(block_list) <= 51 + 16
 
 
 def test_a_window_of_none_keeps_nothing() -> None:
-    chain: Chain[Occurrence] = Chain(OccurrenceList, None)
-    chain.append(occurrence(0.0))
-    chain.add(OccurrenceList([occurrence(1.0)]))
-    assert len(chain) == 0
+    block_list: BlockList[Occurrence] = BlockList(OccurrenceList, None)
+    block_list.append(occurrence(0.0))
+    block_list.add(OccurrenceList([occurrence(1.0)]))
+    assert len(block_list) == 0
 
 
 # -- what a compiled loop leaves behind -----------------------------------------------------------------------------
 
 
 def stirred() -> hs.Model:
-    """The reference model with a clock: leaps, and events that are settled the general way, in turn."""
+    """The reference model with a clock: compiled calls, and events that are settled the general way, in turn."""
     model = hs.load("dfcs")
     return hs.Model(
         "stirred",
@@ -109,7 +109,7 @@ def run(request: pytest.FixtureRequest) -> hs.Solution:
     return hs.simulate(model, span, integrator=method, rtol=1e-11)
 
 
-def test_leaps_leave_blocks(run: hs.Solution) -> None:
+def test_compiled_calls_leave_blocks(run: hs.Solution) -> None:
     kinds = {type(block) for block in run._trajectory.segments.blocks}
     assert any(issubclass(kind, SeriesBlock) for kind in kinds)
     assert (SegmentList in kinds) == (run.model.name == "stirred") or len(run._trajectory.segments) > 1
@@ -191,7 +191,7 @@ def test_the_rest_of_a_block(run: hs.Solution) -> None:
 def test_events_out_of_arrays(run: hs.Solution) -> None:
     """Counted, one by one, in a row, by component: always the same."""
     for block in run._trajectory.occurrences.blocks:
-        if not isinstance(block, Crossings):
+        if not isinstance(block, EventBlock):
             continue
         every = list(block)
         assert len(every) == len(block)

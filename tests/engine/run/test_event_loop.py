@@ -1,4 +1,4 @@
-"""The compiled mode loop: first exits of polynomials against known roots, leaps against the general way."""
+"""The compiled mode loop: first exits of polynomials against known roots, compiled runs against the general way."""
 
 from __future__ import annotations
 
@@ -114,29 +114,29 @@ def general(monkeypatch: pytest.MonkeyPatch):
 
     def run(*args, **options):
         with monkeypatch.context() as patch:
-            patch.setattr(Taylor, "leaps", False)
+            patch.setattr(Taylor, "has_compiled_loop", False)
             return hs.simulate(*args, **options, integrator="taylor")
 
     return run
 
 
 @pytest.mark.parametrize("scene", SAME_TO_ROUNDING, ids=lambda scene: scene.name)
-def test_leaps_and_the_general_way(scene: Scene, general) -> None:
+def test_the_compiled_loop_and_the_general_way(scene: Scene, general) -> None:
     """The same events to the order, times and states to rounding."""
     settings = {"params": dict(scene.params), "x0": dict(scene.start), "rtol": 1e-10, **scene.options}
-    leapt = hs.simulate(load(scene), scene.span, integrator="taylor", **settings)
+    kernel_run = hs.simulate(load(scene), scene.span, integrator="taylor", **settings)
     stepped = general(load(scene), scene.span, **settings)
-    assert leapt.status == stepped.status
-    assert [(e.kind, e.component, e.guard, e.source, e.target) for e in leapt.events] == [
+    assert kernel_run.status == stepped.status
+    assert [(e.kind, e.component, e.guard, e.source, e.target) for e in kernel_run.events] == [
         (e.kind, e.component, e.guard, e.source, e.target) for e in stepped.events
     ]
-    times = [[e.t for e in sol.events] for sol in (leapt, stepped)]
+    times = [[e.t for e in sol.events] for sol in (kernel_run, stepped)]
     assert times[0] == pytest.approx(times[1], rel=1e-9, abs=1e-9 * scene.unit)
-    grid = np.linspace(*sorted((scene.span[0], min(leapt.t_end, stepped.t_end))), 201)
+    grid = np.linspace(*sorted((scene.span[0], min(kernel_run.t_end, stepped.t_end))), 201)
     size = np.max(np.abs(stepped(grid)), axis=1, initial=0.0)[:, None]
-    assert np.max(np.abs(leapt(grid) - stepped(grid)) / (size + 1e-300), initial=0.0) < 1e-7
-    assert list(leapt.modes) == list(stepped.modes)
-    assert [i.mode for c in leapt.modes.values() for i in c] == [
+    assert np.max(np.abs(kernel_run(grid) - stepped(grid)) / (size + 1e-300), initial=0.0) < 1e-7
+    assert list(kernel_run.modes) == list(stepped.modes)
+    assert [i.mode for c in kernel_run.modes.values() for i in c] == [
         i.mode for c in stepped.modes.values() for i in c
     ]
 
@@ -169,7 +169,7 @@ def test_a_motion_that_settles_is_no_series_that_accumulates(
 
 
 def test_more_steps_and_segments_than_there_is_room_for() -> None:
-    """Leaps follow each other where the room of one is full."""
+    """Calls follow each other where the arrays of one are full."""
     sol = hs.simulate("dfcs", (0, 600 * PERIOD), integrator="taylor", rtol=1e-12)
     assert len(sol.events) == 2401
     times = np.array([e.t for e in sol.events[-400:]])

@@ -1,4 +1,4 @@
-"""The compiled mode loop of Runge-Kutta methods: its parts against closed forms, leaps against the general way."""
+"""The compiled mode loop of Runge-Kutta methods: its parts against closed forms, runs against the general way."""
 
 from __future__ import annotations
 
@@ -121,27 +121,29 @@ def test_steps_that_shrink_are_foreseen() -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("scene", SAME_TO_ROUNDING, ids=lambda scene: scene.name)
-def test_leaps_and_the_general_way(scene: Scene, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_compiled_loop_and_the_general_way(
+    scene: Scene, method: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The same events to the order, times and states to the tolerance."""
     settings = {"params": dict(scene.params), "x0": dict(scene.start), "rtol": 1e-10, **scene.options}
-    leapt = hs.simulate(load(scene), scene.span, integrator=method, **settings)
+    kernel_run = hs.simulate(load(scene), scene.span, integrator=method, **settings)
     with monkeypatch.context() as patch:
-        patch.setattr(integrator_class(method), "leaps", False)
+        patch.setattr(integrator_class(method), "has_compiled_loop", False)
         stepped = hs.simulate(load(scene), scene.span, integrator=method, **settings)
-    assert leapt.status == stepped.status
-    assert [(e.kind, e.component, e.guard, e.source, e.target) for e in leapt.events] == [
+    assert kernel_run.status == stepped.status
+    assert [(e.kind, e.component, e.guard, e.source, e.target) for e in kernel_run.events] == [
         (e.kind, e.component, e.guard, e.source, e.target) for e in stepped.events
     ]
-    times = [[e.t for e in sol.events] for sol in (leapt, stepped)]
+    times = [[e.t for e in sol.events] for sol in (kernel_run, stepped)]
     assert times[0] == pytest.approx(times[1], rel=1e-8, abs=1e-8 * scene.unit)
-    grid = np.linspace(*sorted((scene.span[0], min(leapt.t_end, stepped.t_end))), 201)
+    grid = np.linspace(*sorted((scene.span[0], min(kernel_run.t_end, stepped.t_end))), 201)
     # closer to an event than times are compared, an instant may be before it in one run and behind it in the other;
     # and the potential of `exponential-neuron` rises there by 2e10 per unit of time
     near = 1e-8 * max(scene.unit, *map(abs, scene.span))
     grid = grid[[all(abs(t - at) > near for at in times[0]) for t in grid]]
     size = np.max(np.abs(stepped(grid)), axis=1, initial=0.0)[:, None]
-    assert np.max(np.abs(leapt(grid) - stepped(grid)) / (size + 1e-300), initial=0.0) < 1e-6
-    assert [i.mode for c in leapt.modes.values() for i in c] == [
+    assert np.max(np.abs(kernel_run(grid) - stepped(grid)) / (size + 1e-300), initial=0.0) < 1e-6
+    assert [i.mode for c in kernel_run.modes.values() for i in c] == [
         i.mode for c in stepped.modes.values() for i in c
     ]
 
