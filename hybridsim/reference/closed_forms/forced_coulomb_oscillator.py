@@ -59,10 +59,10 @@ class ForcedCoulombOscillator:
         x, v = float(x0), float(v0)
         mode = self._at_rest(x, clock.angle) if v == 0 else SLIP_FORWARD if v > 0 else SLIP_BACKWARD
         acceleration = self._acceleration(mode, x, v, clock.angle)
-        pieces: list[_Piece] = []
+        segments: list[_Segment] = []
         while clock.time <= t1:
             if mode == STICK:
-                pieces.append(_Piece(mode, clock.time, x))
+                segments.append(_Segment(mode, clock.time, x))
                 release = self._release(x, clock.angle)
                 if release is None:
                     break
@@ -72,7 +72,7 @@ class ForcedCoulombOscillator:
                 acceleration = _DIRECTION[mode] * (self.stick_limit - self.slip_force) / self.mass
             else:
                 slip = self._slip(_DIRECTION[mode], clock.angle, x, v, acceleration)
-                pieces.append(_Piece(mode, clock.time, x, slip))
+                segments.append(_Segment(mode, clock.time, x, slip))
                 duration = slip.time_to_rest(t1 - clock.time)
                 if duration is None:
                     break
@@ -80,7 +80,7 @@ class ForcedCoulombOscillator:
                 x, v = float(slip.derivative(0, duration)), 0.0
                 mode = self._at_rest(x, clock.angle)
                 acceleration = self._acceleration(mode, x, v, clock.angle)
-        return Motion(self, tuple(pieces), (t0, t1))
+        return Motion(self, tuple(segments), (t0, t1))
 
     def _slip(self, direction: float, angle: float, x: float, v: float, acceleration: float) -> SlipPhase:
         return SlipPhase(
@@ -150,7 +150,7 @@ class _Clock:
 
 
 @dataclass(frozen=True)
-class _Piece:
+class _Segment:
     """One phase: its mode, its start time and position, and its motion if it slips."""
 
     mode: str
@@ -174,18 +174,18 @@ class Motion:
     """The exact motion over t_span: its changes of mode, and its states at any time."""
 
     system: ForcedCoulombOscillator
-    pieces: tuple[_Piece, ...]
+    segments: tuple[_Segment, ...]
     t_span: tuple[float, float]
 
     @property
     def first_mode(self) -> str:
-        return self.pieces[0].mode
+        return self.segments[0].mode
 
     @property
     def changes(self) -> tuple[Change, ...]:
         return tuple(
             Change(after.start, before.mode, after.mode, after.x)
-            for before, after in itertools.pairwise(self.pieces)
+            for before, after in itertools.pairwise(self.segments)
             if before.mode != after.mode
         )
 
@@ -193,12 +193,12 @@ class Motion:
         """Return position and velocity at the times t, shape (2, ...)."""
         t = np.asarray(t, dtype=float)
         states = np.zeros((2, *t.shape))
-        index = np.searchsorted([piece.start for piece in self.pieces[1:]], t, side="right")
+        index = np.searchsorted([segment.start for segment in self.segments[1:]], t, side="right")
         for i in np.unique(index):
-            piece, here = self.pieces[i], index == i
-            if piece.slip is None:
-                states[0, here] = piece.x
+            segment, here = self.segments[i], index == i
+            if segment.slip is None:
+                states[0, here] = segment.x
             else:
                 for n in (0, 1):
-                    states[n, here] = piece.slip.derivative(n, t[here] - piece.start)
+                    states[n, here] = segment.slip.derivative(n, t[here] - segment.start)
         return states

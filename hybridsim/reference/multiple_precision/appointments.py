@@ -43,7 +43,7 @@ class Appointments:
                 clock.count += 1
 
     def next(self, t: Number) -> Appointment:
-        """Return the next appointment after t, at last the end of the run; `keep` marks its schedules as done."""
+        """Return the next appointment after t, at last the end of the run; `mark_done` marks its schedules as done."""
         ahead = [(time, k) for k, clock in enumerate(self._clocks) if (time := clock.next) is not None]
         nearest = min((time for time, _ in ahead), default=self._t1)
         knots = [knot for signal in self._signals if (knot := signal.next_knot(t)) is not None]
@@ -56,7 +56,7 @@ class Appointments:
         )
         return Appointment(nearest, due)
 
-    def keep(self, appointment: Appointment) -> None:
+    def mark_done(self, appointment: Appointment) -> None:
         """Mark the schedules of an appointment as done."""
         for k in appointment.schedules:
             self._clocks[k].count += 1

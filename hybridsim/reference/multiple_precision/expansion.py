@@ -6,7 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from hybridsim.reference.multiple_precision.nodes import Given, Negative, Node, Product, Quotient, Sum
+from hybridsim.reference.multiple_precision.nodes import (
+    ExternalSeries,
+    Negative,
+    Node,
+    Product,
+    Quotient,
+    Sum,
+)
 from hybridsim.reference.multiple_precision.precision import Number, Precision
 
 Coefficients = Sequence[Number]
@@ -25,7 +32,7 @@ class Term:
 
 
 @dataclass(frozen=True)
-class Watched:
+class QuantitySeries:
     """The series of a state, guard, monitor or surface, and the terms of its sum."""
 
     c: Coefficients
@@ -42,15 +49,15 @@ class Expansion:
     """
 
     precision: Precision
-    states: tuple[Watched, ...]
-    guards: tuple[tuple[Watched, ...], ...]
-    monitors: tuple[Watched, ...]
-    surfaces: tuple[Watched, ...]
+    states: tuple[QuantitySeries, ...]
+    guards: tuple[tuple[QuantitySeries, ...], ...]
+    monitors: tuple[QuantitySeries, ...]
+    surfaces: tuple[QuantitySeries, ...]
     longest: Number
     _logs: dict[int, list[tuple[int, int]]] = field(default_factory=dict)
 
     @property
-    def watched(self) -> tuple[Watched, ...]:
+    def quantities(self) -> tuple[QuantitySeries, ...]:
         """Return the quantities that a step must resolve in addition to the states."""
         return (*(guard for row in self.guards for guard in row), *self.monitors)
 
@@ -62,7 +69,9 @@ class Expansion:
     def reach_above(self, sizes: Sequence[Number]) -> Number:
         """Return the reach: the last two terms are below 10^-digits of the largest term, or of a state's size."""
         log2_reach = [self._log2_reach(state.c, size) for state, size in zip(self.states, sizes, strict=True)]
-        log2_reach += [self._log2_reach(watched.c, self.precision.context.zero) for watched in self.watched]
+        log2_reach += [
+            self._log2_reach(quantity.c, self.precision.context.zero) for quantity in self.quantities
+        ]
         reach = min(log2_reach, default=_FOREVER)
         whole = int(reach // 1)
         return min(
@@ -88,28 +97,28 @@ class Expansion:
             self._logs[id(c)] = [(n, self.precision.log2(value)) for n, value in enumerate(c) if value != 0]
         return self._logs[id(c)]
 
-    def side_after(self, watched: Watched) -> tuple[int, int]:
+    def side_after(self, quantity: QuantitySeries) -> tuple[int, int]:
         """Return the sign just after the start, and the order of the first non-zero coefficient (0: all are zero).
 
         A coefficient counts as zero if it is below 10^-20 (for 32 digits) of the terms of its sum.
         """
-        scale, power = self.scale(watched), self.precision.context.one
-        for n, value in enumerate(watched.c):
+        scale, power = self.scale(quantity), self.precision.context.one
+        for n, value in enumerate(quantity.c):
             if abs(value) * power > self.precision.zero * scale:
                 return (1 if value > 0 else -1), n
             power = power * self.reach
         return 0, 0
 
-    def is_zero(self, watched: Watched) -> bool:
+    def is_zero(self, quantity: QuantitySeries) -> bool:
         """Return whether it is zero at the start."""
-        return bool(abs(watched.c[0]) <= self.precision.zero * self.scale(watched))
+        return bool(abs(quantity.c[0]) <= self.precision.zero * self.scale(quantity))
 
-    def scale(self, watched: Watched) -> Number:
+    def scale(self, quantity: QuantitySeries) -> Number:
         """Return the size of the largest of its terms within reach, to the next power of two."""
         log2_reach = self.precision.log2(self.reach)
         sizes = [
             max(log + n * log2_reach for n, log in logs) + term.log2_factor + log2_reach * term.late
-            for term in watched.terms
+            for term in quantity.terms
             if (logs := self._log2(term.c))
         ]
         return self.precision.context.ldexp(1, max(sizes)) if sizes else self.precision.context.zero
@@ -133,7 +142,7 @@ def terms_of(node: Node, rates: Mapping[int, Node]) -> tuple[Term, ...]:
             )
         else:
             found.append(Term(factor, part.c, late))
-            if isinstance(part, Given) and id(part) in rates and not late:
+            if isinstance(part, ExternalSeries) and id(part) in rates and not late:
                 open_.append((rates[id(part)], factor, True))
     return tuple(found)
 

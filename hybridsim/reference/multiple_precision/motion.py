@@ -1,4 +1,4 @@
-"""This module stores a multiple-precision run: pieces of Taylor series, evaluated in double or full precision."""
+"""This module stores a multiple-precision run: segments of Taylor series, evaluated in double or full precision."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hybridsim.reference.multiple_precision.precision import Number, Precision
 
 
 @dataclass(frozen=True)
-class Piece:
+class Segment:
     """The states over [t, t + h] as series in the time since t."""
 
     t: Number
@@ -31,21 +31,21 @@ class Motion:
     """
 
     precision: Precision
-    pieces: list[Piece] = field(default_factory=list)
+    segments: list[Segment] = field(default_factory=list)
     last: tuple[Number, ...] = ()
 
     def __call__(self, times: NDArray[np.float64], side: str = "+") -> NDArray[np.float64]:
         """Return states (n, k) at times (k,); at an event, "+" gives the state after it and "-" the state before.
 
-        The piece is chosen by times rounded to doubles, like the times of the events.
+        The segment is chosen by times rounded to doubles, like the times of the events.
         """
         times = np.asarray(times, dtype=float)
         states = np.empty((len(self.last), len(times)))
         index = np.searchsorted(self._starts, times, side="right" if side == "+" else "left") - 1
         for i in np.unique(index):
             here = index == i
-            piece = self.pieces[max(int(i), 0)]
-            states[:, here] = self._values(piece, times[here])
+            segment = self.segments[max(int(i), 0)]
+            states[:, here] = self._values(segment, times[here])
         if side == "+":
             states[:, times >= self._end] = np.array([float(value) for value in self.last])[:, None]
         return states
@@ -53,33 +53,33 @@ class Motion:
     def state(self, t: float | Number, side: str = "+") -> tuple[Number, ...]:
         """Return the states at a time in full precision."""
         t = self.precision.number(t)
-        past = [piece for piece in self.pieces if (piece.t <= t if side == "+" else piece.t < t)]
-        if side == "+" and t >= self.pieces[-1].t + self.pieces[-1].h:
+        past = [segment for segment in self.segments if (segment.t <= t if side == "+" else segment.t < t)]
+        if side == "+" and t >= self.segments[-1].t + self.segments[-1].h:
             return self.last
-        piece = past[-1] if past else self.pieces[0]
-        return tuple(value_at(c, t - piece.t) for c in piece.states)
+        segment = past[-1] if past else self.segments[0]
+        return tuple(value_at(c, t - segment.t) for c in segment.states)
 
     @cached_property
     def _starts(self) -> NDArray[np.float64]:
-        return np.array([float(piece.t) for piece in self.pieces])
+        return np.array([float(segment.t) for segment in self.segments])
 
     @cached_property
     def _end(self) -> float:
-        return float(self.pieces[-1].t + self.pieces[-1].h)
+        return float(self.segments[-1].t + self.segments[-1].h)
 
-    def _values(self, piece: Piece, times: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Evaluate a piece by Horner's scheme in doubles, in the fraction of the step; the error is a few ulps."""
-        high = float(piece.t)
-        low = float(piece.t - high)
-        fraction = np.clip(((times - high) - low) / float(piece.h), 0.0, 1.0) if piece.h else 0.0 * times
+    def _values(self, segment: Segment, times: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Evaluate a segment by Horner's scheme in doubles, in the fraction of the step; the error is a few ulps."""
+        high = float(segment.t)
+        low = float(segment.t - high)
+        fraction = np.clip(((times - high) - low) / float(segment.h), 0.0, 1.0) if segment.h else 0.0 * times
         rows = []
-        for c in piece.states:
+        for c in segment.states:
             scaled, power = [], self.precision.context.one
             for value in c:
                 scaled.append(float(value * power))
-                power = power * piece.h
+                power = power * segment.h
             total = np.full(len(times), scaled[-1])
             for value in reversed(scaled[:-1]):
                 total = total * fraction + value
             rows.append(total)
-        return np.array(rows).reshape(len(piece.states), len(times))
+        return np.array(rows).reshape(len(segment.states), len(times))

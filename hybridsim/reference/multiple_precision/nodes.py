@@ -57,7 +57,7 @@ class Held(Node):
         self.c.append(self.value)
 
 
-class Given(Node):
+class ExternalSeries(Node):
     """A series that is set from outside: a state, an unknown force, the time, an input."""
 
     __slots__ = ()
@@ -202,15 +202,15 @@ class Pointwise(Node):
         self.c.append(self.function(*(node.c[0] for node in self.operands)))
 
 
-def in_order(wanted: Sequence[Node]) -> list[Node]:
-    """Return all nodes that the wanted ones depend on, operands first.
+def in_order(targets: Sequence[Node]) -> list[Node]:
+    """Return all nodes on which the targets depend, operands first.
 
     A cycle is an error, unless it passes a node of which only lower coefficients are used.
     """
     order: list[Node] = []
     done: set[int] = set()
     open_: set[int] = set()
-    roots = list(wanted)
+    roots = list(targets)
     while roots:
         stack = [(roots.pop(0), False)]
         while stack:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from hybridsim.errors import UsageError
-from hybridsim.reference.multiple_precision.expansion import Expansion, Watched, terms_of
+from hybridsim.reference.multiple_precision.expansion import Expansion, QuantitySeries, terms_of
 from hybridsim.reference.multiple_precision.holding import Holding
 from hybridsim.reference.multiple_precision.nodes import Node, in_order
 from hybridsim.reference.multiple_precision.precision import Number, Precision
@@ -27,12 +27,12 @@ _LINEAR = 20
 
 @dataclass(frozen=True)
 class Point:
-    """The start of a series: time, states, discrete states, and the current pieces of the inputs."""
+    """The start of a series: time, states, discrete states, and the current coefficients of the inputs."""
 
     t: Number
     x: tuple[Number, ...]
     discrete: tuple[Number, ...]
-    pieces: tuple[tuple[Number, ...], ...]
+    input_coefficients: tuple[tuple[Number, ...], ...]
 
 
 class Program:
@@ -45,9 +45,9 @@ class Program:
         self.states = list(reading.states.values())
         self.unknowns = list(reading.unknowns.values())
         self.holding = Holding(reading, self.context) if reading.unknowns else None
-        watched = [node for guards in reading.guards for node in guards] + reading.monitors
-        wanted = [*reading.rates, *watched, *reading.surfaces.values()]
-        nodes = in_order(wanted)
+        quantities = [node for guards in reading.guards for node in guards] + reading.monitors
+        targets = [*reading.rates, *quantities, *reading.surfaces.values()]
+        nodes = in_order(targets)
         self.constants = [node for node in nodes if node.constant]
         self.nodes = [node for node in nodes if not node.constant]
         self.forced = _depending(self.nodes, self.unknowns)
@@ -58,7 +58,7 @@ class Program:
         reading = self.reading
         for held, value in zip(reading.discrete.values(), point.discrete, strict=True):
             held.value = value
-        for piece, values in zip(reading.pieces, point.pieces, strict=True):
+        for piece, values in zip(reading.input_coefficients, point.input_coefficients, strict=True):
             for held, value in zip(piece, values, strict=True):
                 held.value = value
         for node in (*self.constants, *self.nodes, reading.time, *self.states, *self.unknowns):
@@ -88,15 +88,15 @@ class Program:
         reading = self.reading
         rates = dict(zip(map(id, self.states), reading.rates, strict=True))
 
-        def watched(node: Node) -> Watched:
-            return Watched(node.c, terms_of(node, rates))
+        def series_of(node: Node) -> QuantitySeries:
+            return QuantitySeries(node.c, terms_of(node, rates))
 
         return Expansion(
             self.precision,
-            tuple(map(watched, self.states)),
-            tuple(tuple(map(watched, row)) for row in reading.guards),
-            tuple(map(watched, reading.monitors)),
-            tuple(map(watched, reading.surfaces.values())),
+            tuple(map(series_of, self.states)),
+            tuple(tuple(map(series_of, row)) for row in reading.guards),
+            tuple(map(series_of, reading.monitors)),
+            tuple(map(series_of, reading.surfaces.values())),
             self.longest,
         )
 

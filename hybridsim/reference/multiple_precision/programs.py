@@ -55,18 +55,18 @@ class Programs:
             changed[c] = surface.hold
         return tuple(changed)
 
-    def given(self, point: Point, modes: Modes) -> Modes:
+    def modes_by_side(self, point: Point, modes: Modes) -> Modes:
         """Return the modes with undecided components on the side of their state, or holding if on neither."""
         if UNDECIDED not in modes:
             return modes
         decided = self.decided(modes)
         expansion, changed = self.expand(point, decided), list(decided)
         owners = [c for c, component in enumerate(self.components) if component.surface]
-        for c, watched in zip(owners, expansion.surfaces, strict=True):
+        for c, quantity in zip(owners, expansion.surfaces, strict=True):
             surface = self.components[c].surface
             assert surface is not None and surface.below is not None  # models with impacts are refused
-            if modes[c] == UNDECIDED and not expansion.is_zero(watched):
-                changed[c] = surface.above if watched.c[0] > 0 else surface.below
+            if modes[c] == UNDECIDED and not expansion.is_zero(quantity):
+                changed[c] = surface.above if quantity.c[0] > 0 else surface.below
         return tuple(changed)
 
     def program(self, modes: Modes) -> Program:

@@ -10,7 +10,7 @@ from hybridsim.errors import UsageError
 from hybridsim.expr.grammar import CONSTANTS, MAX_POWER, TIME
 from hybridsim.reference.multiple_precision.functions import Functions
 from hybridsim.reference.multiple_precision.nodes import (
-    Given,
+    ExternalSeries,
     Held,
     Negative,
     Node,
@@ -46,12 +46,12 @@ class Reading:
         self.modes = tuple(modes)
         self.context = precision.context
         self.functions = Functions(self.context)
-        self.time = Given(self.context)
-        self.states = {state.name: Given(self.context) for state in model.states}
+        self.time = ExternalSeries(self.context)
+        self.states = {state.name: ExternalSeries(self.context) for state in model.states}
         self.discrete = {part.name: Held(self.context, 0) for part in model.discrete}
-        self.unknowns: dict[str, Given] = {}
+        self.unknowns: dict[str, ExternalSeries] = {}
         self.surfaces: dict[str, Node] = {}
-        self.pieces: list[list[Held]] = []
+        self.input_coefficients: list[list[Held]] = []
         self._shared: dict[Any, Node] = {}
         self._names: dict[str, Node] = {TIME: self.time, **self.states, **self.discrete}
         self._texts: dict[str, Expression] = dict(model.definitions)
@@ -65,10 +65,10 @@ class Reading:
             self._rates.update(mode.der)
             self._texts.update(mode.set)
             if surface and surface.hold == mode_name:
-                self._names[surface.unknown] = self.unknowns[component.name] = Given(self.context)
+                self._names[surface.unknown] = self.unknowns[component.name] = ExternalSeries(self.context)
         for signal in signals:
-            self.pieces.append([Held(self.context, 0) for _ in range(5)])
-            self._names[signal.name] = signal.node(self, self.pieces[-1])
+            self.input_coefficients.append([Held(self.context, 0) for _ in range(5)])
+            self._names[signal.name] = signal.node(self, self.input_coefficients[-1])
         for component, _ in components:
             if component.surface:
                 self.surfaces[component.name] = self.node(component.surface.function)

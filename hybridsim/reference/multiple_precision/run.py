@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 from hybridsim.errors import UsageError
 from hybridsim.reference.multiple_precision.appointments import Appointments
-from hybridsim.reference.multiple_precision.expansion import Expansion, Watched, rate_at, value_at
-from hybridsim.reference.multiple_precision.motion import Motion, Piece
+from hybridsim.reference.multiple_precision.expansion import Expansion, QuantitySeries, rate_at, value_at
+from hybridsim.reference.multiple_precision.motion import Motion, Segment
 from hybridsim.reference.multiple_precision.precision import Number, Precision
 from hybridsim.reference.multiple_precision.program import Point
 from hybridsim.reference.multiple_precision.programs import Programs
 from hybridsim.reference.multiple_precision.settling import Rules, Settled
-from hybridsim.reference.multiple_precision.sign_changes import crossings
+from hybridsim.reference.multiple_precision.sign_changes import sign_changes
 from hybridsim.reference.multiple_precision.signals import Signal
 from hybridsim.reference.trajectory import ExactEvent
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from hybridsim.model import Model
     from hybridsim.model.parts.schedule import Schedule
 
-_WANTED = {"up": (1,), "down": (-1,), "both": (1, -1)}
+_SIDES_BY_DIRECTION = {"up": (1,), "down": (-1,), "both": (1, -1)}
 # The defect at the end of a step may exceed the terms that determined the step by this factor.
 _DEFECT = 2.0**12
 # This many events within this fraction of the span count as an accumulation, which cannot be passed event by
@@ -56,12 +56,12 @@ class Run:
             self.t0,
             tuple(number(value) for value in model.start_values().values()),
             tuple(number(value) for value in model.discrete_values().values()),
-            self._pieces(self.t0),
+            self._input_coefficients(self.t0),
         )
         self._event_times: list[Number] = []
         due = [model.schedules[k] for k in self.appointments.due_at_start]
         resets = [schedule.reset for schedule in due]
-        self.now = self.rules.settle(start, self.programs.first_modes, (), resets)
+        self.now = self.rules.resolve_event(start, self.programs.first_modes, (), resets)
         self.sides = self._sides(self.now.expansion)
         self.sizes = [abs(state.c[0]) for state in self.now.expansion.states]
         self._adopt(self.now)
@@ -86,7 +86,7 @@ class Run:
         bound = appointment.t - point.t
         fired, s = self._first_departure(expansion, self._length(expansion, bound))
         acting, s = self._pass_monitors(expansion, point.t, s, arriving=bool(fired) or s == bound)
-        self.motion.pieces.append(Piece(point.t, s, tuple(state.c for state in expansion.states)))
+        self.motion.segments.append(Segment(point.t, s, tuple(state.c for state in expansion.states)))
         x = tuple(value_at(state.c, s) for state in expansion.states)
         self.sizes = [max(size, abs(value)) for size, value in zip(self.sizes, x, strict=True)]
         arrived = s == bound and not acting
@@ -96,12 +96,12 @@ class Run:
             self._act(acting, point)
         elif fired and (self.rules.sides.others(fired) or not arrived):
             self._crowd(point.t)
-            self._adopt(self.rules.settle(point, self.now.modes, fired), is_last=not arrived)
+            self._adopt(self.rules.resolve_event(point, self.now.modes, fired), is_last=not arrived)
         else:
             self._go_on(point, arrived)
         if arrived:
-            self.appointments.keep(appointment)
-            self._keep_schedules(appointment.schedules)
+            self.appointments.mark_done(appointment)
+            self._process_schedules(appointment.schedules)
 
     def _go_on(self, point: Point, arrived: bool) -> None:
         """Begin the next step if nothing was located; a guard may be zero at exactly this instant.
@@ -112,7 +112,7 @@ class Run:
         leaving = self.programs.leaving(expansion)
         if self.rules.sides.others(leaving) or (leaving and not arrived):
             self._crowd(point.t)
-            settled = self.rules.settle(point, self.now.modes, leaving)
+            settled = self.rules.resolve_event(point, self.now.modes, leaving)
         else:
             settled = Settled(point, self.now.modes, expansion)
         self._adopt(settled, is_last=not arrived)
@@ -141,16 +141,16 @@ class Run:
             if defect > small * max(size, abs(value), expansion.scale(state)):
                 return False
         nodes = [*(node for row in reading.guards for node in row), *reading.monitors]
-        for watched, node in zip(expansion.watched, nodes, strict=True):
-            defect = abs(value_at(watched.c, h) - node.coefficient(0))
-            if defect > small * expansion.scale(watched):
+        for quantity, node in zip(expansion.quantities, nodes, strict=True):
+            defect = abs(value_at(quantity.c, h) - node.coefficient(0))
+            if defect > small * expansion.scale(quantity):
                 return False
         return True
 
-    def _changes(self, expansion: Expansion, watched: Watched, h: Number) -> tuple[int, list[Number]]:
+    def _changes(self, expansion: Expansion, quantity: QuantitySeries, h: Number) -> tuple[int, list[Number]]:
         """Return the side just after the start of a step, and the times in (0, h] at which it changes."""
-        side, order = expansion.side_after(watched)
-        return side, crossings(watched.c[order:], h, self.precision) if side else []
+        side, order = expansion.side_after(quantity)
+        return side, sign_changes(quantity.c[order:], h, self.precision) if side else []
 
     def _first_departure(self, expansion: Expansion, h: Number) -> tuple[list[tuple[int, int]], Number]:
         """Return the guard that becomes negative first, and its time; no guard and h if none does."""
@@ -176,15 +176,17 @@ class Run:
         crossed = [
             k
             for k, (side, after) in enumerate(zip(before, self.sides, strict=True))
-            if side not in (0, after) and -side in _WANTED[self.model.monitors[k].direction]
+            if side not in (0, after) and -side in _SIDES_BY_DIRECTION[self.model.monitors[k].direction]
         ]
         resets = self._record_monitors(crossed, settled.point.t)
         if resets:
-            self._adopt(self.rules.settle(settled.point, settled.modes, (), resets))
+            self._adopt(self.rules.resolve_event(settled.point, settled.modes, (), resets))
 
     def _act(self, monitors: Sequence[int], point: Point) -> None:
         """Process the monitors, located at a point, that reset or end the run."""
-        settled = self.rules.settle(point, self.now.modes, (), self._record_monitors(monitors, point.t))
+        settled = self.rules.resolve_event(
+            point, self.now.modes, (), self._record_monitors(monitors, point.t)
+        )
         after = self._sides(settled.expansion)
         self.sides = [after[k] if k in monitors else side for k, side in enumerate(self.sides)]
         self._adopt(settled)
@@ -202,8 +204,8 @@ class Run:
         """Record the monitors that change their side before s; return those that act there first, and the time."""
         seen: list[tuple[Number, int, int]] = []
         tolerance = self.precision.zero * s
-        for k, watched in enumerate(expansion.monitors):
-            side, changes = self._changes(expansion, watched, s)
+        for k, quantity in enumerate(expansion.monitors):
+            side, changes = self._changes(expansion, quantity, s)
             for change in changes:
                 side = -side
                 if change < s - tolerance or not arriving:  # at an event the two sides are compared instead
@@ -214,7 +216,7 @@ class Run:
             if acting and change > s + tolerance:
                 break
             monitor = self.model.monitors[k]
-            fires = side in _WANTED[monitor.direction]
+            fires = side in _SIDES_BY_DIRECTION[monitor.direction]
             if fires and monitor.action != "record":
                 acting, s = [*acting, k], min(s, change)
             else:
@@ -224,28 +226,28 @@ class Run:
         return acting, s
 
     def _sides(self, expansion: Expansion) -> list[int]:
-        return [expansion.side_after(watched)[0] for watched in expansion.monitors]
+        return [expansion.side_after(quantity)[0] for quantity in expansion.monitors]
 
-    def _keep_schedules(self, due: tuple[int, ...]) -> None:
-        """Process the schedules due at an instant, with the inputs on their next pieces."""
-        point = replace(self.now.point, pieces=self._pieces(self.now.point.t))
+    def _process_schedules(self, due: tuple[int, ...]) -> None:
+        """Process the schedules due at an instant, with the next coefficients of the inputs."""
+        point = replace(self.now.point, input_coefficients=self._input_coefficients(self.now.point.t))
         schedules = [self.model.schedules[k] for k in due]
         self._record_schedules(schedules)
-        self._adopt(self.rules.settle(point, self.now.modes, (), [one.reset for one in schedules]))
+        self._adopt(self.rules.resolve_event(point, self.now.modes, (), [one.reset for one in schedules]))
 
     def _record_schedules(self, schedules: Sequence[Schedule]) -> None:
         t = float(self.now.point.t)
         self.events += [ExactEvent(t, schedule.name, "", "", kind="scheduled") for schedule in schedules]
         self.finished = self.finished or any(schedule.terminate for schedule in schedules)
 
-    def _pieces(self, t: Number) -> tuple[tuple[Number, ...], ...]:
+    def _input_coefficients(self, t: Number) -> tuple[tuple[Number, ...], ...]:
         return tuple(signal.piece(t) for signal in self.signals)
 
     def _crowd(self, t: Number) -> None:
         """Refuse events that accumulate."""
         self._event_times.append(t)
-        recent = self._event_times[-_CROWD:]
-        if len(recent) == _CROWD and t - recent[0] <= _CROWDED * (self.t1 - self.t0):
+        last_times = self._event_times[-_CROWD:]
+        if len(last_times) == _CROWD and t - last_times[0] <= _CROWDED * (self.t1 - self.t0):
             raise UsageError(
                 f"events accumulate at t = {float(t)!r}: the multiple-precision run cannot continue past it",
                 remedy="declare the mode that they lead to",

@@ -73,7 +73,7 @@ class Rules:
         self.programs, self.components = programs, programs.components
         self.transitions, self.sides = Transitions(programs), Sides(programs)
 
-    def settle(
+    def resolve_event(
         self,
         point: Point,
         modes: Modes,
@@ -88,7 +88,7 @@ class Rules:
         if fired:
             leaving = self._leaving(point, now)
             fired = leaving if now != modes else self.sides.others(fired) | leaving
-            fired -= self._kept(point, now, fired)
+            fired -= self._cancelled(point, now, fired)
         modes, due, is_located = now, list(resets), bool(fired)
         for _ in range(_MOST_ROUNDS):
             names = {
@@ -99,7 +99,7 @@ class Rules:
             point, modes = self._leave_in_any_case(point, modes, moves)
             modes, open_ = self._take_sides(point, modes, moves)
             open_ |= {c for c in names if self.components[c].surface}
-            point, modes = self._decide(point, modes, open_, names, moves)
+            point, modes = self._choose_jointly(point, modes, open_, names, moves)
             modes = self.sides.taken(point, modes, moves)
             fired, due, is_located = self._leaving(point, modes), [], False
             if not fired:
@@ -115,13 +115,13 @@ class Rules:
         """Return the guards that are negative just after, except those of corners and loads."""
         return self.sides.others(self.programs.leaving(self.programs.expand(point, modes)))
 
-    def _kept(self, point: Point, modes: Modes, fired: set[tuple[int, int]]) -> set[tuple[int, int]]:
+    def _cancelled(self, point: Point, modes: Modes, fired: set[tuple[int, int]]) -> set[tuple[int, int]]:
         """Return the located guards that are not negative just after if contacts are decided first."""
         open_ = {c for c, _ in fired if self.components[c].surface}
         if not open_ or all(c in open_ for c, _ in fired):
             return set()
         try:
-            point, modes = self._decide(point, modes, set(open_), {}, [])
+            point, modes = self._choose_jointly(point, modes, set(open_), {}, [])
         except SimulationError:
             return set()
         leaving = self._leaving(point, self.sides.taken(point, modes, []))
@@ -147,21 +147,21 @@ class Rules:
             return modes, set()
         expansion = self.programs.expand(point, self.programs.decided(modes))
         after, open_ = list(modes), set()
-        for c, watched in zip(order, expansion.surfaces, strict=True):
+        for c, quantity in zip(order, expansion.surfaces, strict=True):
             surface = self.components[c].surface
             assert surface is not None and surface.below is not None  # models with impacts are refused
-            if expansion.is_zero(watched):
+            if expansion.is_zero(quantity):
                 if modes[c] == UNDECIDED:
                     open_.add(c)
                 continue
-            side = surface.above if watched.c[0] > 0 else surface.below
+            side = surface.above if quantity.c[0] > 0 else surface.below
             if after[c] != side:
                 if after[c] != UNDECIDED:
                     moves.append(Move(c, after[c], side, "reset"))
                 after[c] = side
         return tuple(after), open_
 
-    def _decide(
+    def _choose_jointly(
         self, point: Point, modes: Modes, open_: set[int], names: Mapping[int, str], moves: list[Move]
     ) -> tuple[Point, Modes]:
         """Decide the open components on their surfaces, each with those on which its force acts."""
@@ -216,9 +216,9 @@ class Rules:
             trial = self.sides.along(point, tuple(candidate))
             expansion = self.programs.expand(point, trial)
             if all(expansion.side_after(guard)[0] >= 0 for c in chosen for guard in expansion.guards[c]):
-                kept = [c for c in chosen if trial[c] == modes[c]]
+                unchanged = [c for c in chosen if trial[c] == modes[c]]
                 held = sum(self._holds(c, trial) for c in chosen)
-                scores.setdefault((len(set(kept) - deciding), len(kept), held), []).append(trial)
+                scores.setdefault((len(set(unchanged) - deciding), len(unchanged), held), []).append(trial)
         best = scores[max(scores)] if scores else []
         if len(best) != 1:
             what = "several motions are" if best else "no motion is"

@@ -42,10 +42,10 @@ class Sides:
             expansion = self.programs.expand(point, self.programs.decided(modes))
             after = list(modes)
             for c in self.led:
-                for guard, watched in zip(
+                for guard, quantity in zip(
                     self.components[c].mode(modes[c]).guards, expansion.guards[c], strict=True
                 ):
-                    side, order = expansion.side_after(watched)
+                    side, order = expansion.side_after(quantity)
                     if side < 0 and (has_flow or order == 0):
                         after[c] = guard.then[0].to
                         break
@@ -75,19 +75,19 @@ class Sides:
         """
         if not self._owners:
             return set()
-        given = list(self.programs.given(point, modes))
+        trial = list(self.programs.modes_by_side(point, modes))
         surfaces = [c for c, component in enumerate(self.components) if component.surface]
-        watched = self.programs.expand(point, tuple(given))
-        zero = [c for c, one in zip(surfaces, watched.surfaces, strict=True) if watched.is_zero(one)]
+        expansion = self.programs.expand(point, tuple(trial))
+        zero = [c for c, one in zip(surfaces, expansion.surfaces, strict=True) if expansion.is_zero(one)]
         if len(zero) > _MOST_AT_REST:
-            negative = self._negative(point, tuple(given), by_value=True)
-            return {(c, j) for c, j in negative if self._is_free(c, given[c], j)}
+            negative = self._negative(point, tuple(trial), by_value=True)
+            return {(c, j) for c, j in negative if self._is_free(c, trial[c], j)}
         found: set[tuple[int, int]] = set()
         combinations = itertools.product(*([mode.name for mode in self.components[c].modes] for c in zero))
         for number, combination in enumerate(combinations):
             for c, mode in zip(zero, combination, strict=True):
-                given[c] = mode
-            negative = self._negative(point, self.along(point, tuple(given)))
+                trial[c] = mode
+            negative = self._negative(point, self.along(point, tuple(trial)))
             found = found & negative if number else negative
             if not found:
                 break

@@ -26,7 +26,7 @@ _DEEPEST = 40
 _SURE = 1e-13
 
 
-def crossings(c: Coefficients, h: Number, precision: Precision) -> list[Number]:
+def sign_changes(c: Coefficients, h: Number, precision: Precision) -> list[Number]:
     """Return the times in (0, h] at which a series changes its sign.
 
     Parameters

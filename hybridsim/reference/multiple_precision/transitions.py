@@ -47,7 +47,7 @@ class Transitions:
 
         is_located: the guards reached zero together, so that no guard of a component precedes another.
         """
-        after, modes = list(modes), self.programs.given(point, modes)
+        after, modes = list(modes), self.programs.modes_by_side(point, modes)
         ways: dict[int, list[tuple[str, Mapping[str, Expression]]]] = {}
         for c, j in sorted(fired):
             component = self.programs.components[c]
