@@ -98,11 +98,7 @@ class _Rows:
 
     def __init__(self, fields: dict[str, np.ndarray]) -> None:
         self.count, self._fields = len(fields["counts"]), fields
-
-    @property
-    def size(self) -> int:
-        """Return the size in bytes."""
-        return sum(field.nbytes for field in self._fields.values())
+        self.size = sum(field.nbytes for field in fields.values())  # bytes
 
     def first(self, count: int) -> dict[str, np.ndarray]:
         """Return the first rows of each field."""

@@ -44,11 +44,16 @@ class Registers:
         self.inputs = packed(
             Inputs(constants, values, parameters, sources, phases, np.array([time], dtype=np.int64), states)
         )
+        self._rounded: tuple[bytes, Inputs] | None = None  # last values of parameters, and their inputs
 
     def with_roundoff(self, p: np.ndarray) -> Inputs:
         """Return the inputs with the roundoff of each number; parameters become constants that have an error."""
         known: Inputs = self.inputs
-        numbers = np.concatenate([known.values[:, 0], p[known.sources]])
+        values_now = p[known.sources]
+        key, last = values_now.tobytes(), self._rounded
+        if last is not None and last[0] == key:
+            return last[1]
+        numbers = np.concatenate([known.values[:, 0], values_now])
         errors = np.array([own_roundoff(number) for number in numbers.tolist()])
         errors[: len(known.constants)] = np.maximum(errors[: len(known.constants)], known.values[:, 1])
         none = np.zeros(0, dtype=np.int64)
@@ -63,4 +68,5 @@ class Registers:
                 known.states,
             )
         )
+        self._rounded = key, inputs
         return inputs
