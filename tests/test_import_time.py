@@ -25,7 +25,7 @@ def test_import_is_light() -> None:
 
 
 @pytest.mark.parametrize(
-    "argv", [["--help"], ["run", "--help"], ["--version"], ["models"], ["cache", "path"]]
+    "argv", [["--help"], ["run", "--help"], ["--version"], ["models"], ["schema"], ["cache", "path"]]
 )
 def test_light_commands_are_light(argv: list[str]) -> None:
     assert loaded_after(f"from hybridsim.cli import main\nassert main({argv}) == 0") == []

@@ -1,4 +1,4 @@
-"""Writes the JSON Schema of model files, by which editors complete and check them: docs/reference/model.schema.json.
+"""Writes the JSON Schema of model files, by which editors complete and check them, into the package.
 
 python docs/make/schema.py
 """
@@ -9,7 +9,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-PAGE = Path(__file__).parents[2] / "docs" / "reference" / "model.schema.json"
+FILE = Path(__file__).parents[2] / "hybridsim" / "model" / "toml" / "model.schema.json"
 
 Schema = dict[str, Any]
 
@@ -224,5 +224,5 @@ def text() -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(text(), encoding="utf-8")
-    print(PAGE)
+    FILE.write_text(text(), encoding="utf-8")
+    print(FILE)

@@ -28,6 +28,7 @@ from hybridsim.cli import (
     models,
     resume,
     run,
+    schema,
     steady,
     study,
     sweep,
@@ -52,6 +53,7 @@ COMMANDS: tuple[ModuleType, ...] = (
     atlas,
     check,
     models,
+    schema,
     integrators,
     cache,
 )

@@ -71,7 +71,7 @@ CASES = {
     "models": ["models"],
     "integrators": ["integrators", "cvode-bdf"],
 }
-WITHOUT_JSON = {"cache"}
+WITHOUT_JSON = {"cache", "schema"}  # the schema is JSON by itself
 FAULTY = {
     "run": ["run", "dfsc"],
     "resume": ["resume", "none.hsol"],

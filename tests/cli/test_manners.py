@@ -187,6 +187,7 @@ LINES = {
     "atlas": [],
     "check": ["dfcs"],
     "models": [],
+    "schema": [],
     "integrators": [],
     "cache": ["path"],
 }
@@ -202,4 +203,4 @@ def test_out_of_memory_names_options_that_the_command_has(
     assert found.code == 1 and found.err.startswith("hybridsim: out of memory")
     named = set(re.findall(r"--[a-z][a-z0-9-]*", found.err))
     assert named <= known
-    assert bool(named) == (command not in ("check", "models", "integrators", "cache"))
+    assert bool(named) == (command not in ("check", "models", "schema", "integrators", "cache"))

@@ -13,12 +13,13 @@ import jsonschema
 import pytest
 
 import hybridsim as hs
+from hybridsim.cli import main
 from hybridsim.model.toml.laws import read_laws
 from hybridsim.model.toml.read import open_text
 from hybridsim.model.toml.table import Table
 
 ROOT = Path(__file__).parents[3]
-SCHEMA = json.loads((ROOT / "docs" / "reference" / "model.schema.json").read_text(encoding="utf-8"))
+SCHEMA = json.loads((ROOT / "hybridsim" / "model" / "toml" / "model.schema.json").read_text(encoding="utf-8"))
 FILES = [*sorted((ROOT / "models").glob("*.toml")), *sorted((ROOT / "models" / "laws").glob("*.toml"))]
 SHOWN = [
     text
@@ -128,3 +129,8 @@ def test_what_the_reader_refuses_is_not_valid(text: str) -> None:
     assert not is_valid(tomllib.loads(text))
     with pytest.raises(hs.ModelError):
         hs.Model.from_toml(text)
+
+
+def test_the_command_prints_it(capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(["schema"]) == 0
+    assert json.loads(capfd.readouterr().out) == SCHEMA
