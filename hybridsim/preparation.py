@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim import arguments
-from hybridsim.engine.events.dissipation_check import refuse_driving
+from hybridsim.engine.events.dissipation_check import require_dissipation
 from hybridsim.engine.native.kernels import announce_compilation
 from hybridsim.engine.record.trajectory import Task
 from hybridsim.engine.system.instant import Instant
@@ -107,7 +107,7 @@ def prepared(
         *span, start, modes, tolerances, discrete, retention, arguments.run_limits(limits),
         successor=successor_of(name, system) if reason else None,
     )  # fmt: skip
-    refuse_driving(system, span[0], start, discrete, modes)
+    require_dissipation(system, span[0], start, discrete, modes)
     run = Run(model, system, method, task, None, save, reason)
     if question is not None and not isinstance(system.code, PythonCode):  # a Python function may change
         if len(system.runs) >= _MOST:
@@ -120,7 +120,7 @@ def _check_functions(method: Integrator, system: System, code: PythonCode, x0: n
     """Check that the method supports Python functions, and that they return values of the right shape."""
     reason, remedy = method.lacks.get("functions", ""), "write the model in expressions, or use dop853"
     if code.refused and not method.name.startswith("scipy-"):
-        reason, remedy = code.refused_in_words, "use scipy-dop853, which calls the functions in Python"
+        reason, remedy = code.refusal_message, "use scipy-dop853, which calls the functions in Python"
     if reason:
         raise UsageError(f"{method.name} cannot run model '{system.model.name}': {reason}", remedy=remedy)
     code.check(x0, system.vector(Instant(t0), system.discrete_start))

@@ -75,14 +75,14 @@ def _generated() -> dict[int, str]:
     from hybridsim.engine.native import kernels, llvm
 
     found: dict[int, str] = {}
-    make = llvm.ready
+    make = llvm.load_or_compile
 
-    def ready(kept: Path, names: Any, written: Any) -> Any:
+    def load_or_compile(kept: Path, names: Any, written: Any) -> Any:
         addresses, engine = make(kept, names, written)
         found.update(zip(addresses, (f"generated {name}" for name in names), strict=True))
         return addresses, engine
 
-    llvm.ready = kernels.ready = ready  # type: ignore[attr-defined, assignment]  # to hear of each
+    llvm.load_or_compile = kernels.load_or_compile = load_or_compile  # type: ignore[attr-defined, assignment]  # to hear of each
     return found
 
 

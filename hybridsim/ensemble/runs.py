@@ -18,7 +18,7 @@ from hybridsim.engine.events.compiled.scratch import MOST, work_space
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.linear.modes import holds_constants, is_always_linear
 from hybridsim.engine.linear.motion_summary import NODES, WEIGHTS, Stretch
-from hybridsim.engine.native.kernels import ENABLED, Door
+from hybridsim.engine.native.kernels import ENABLED, Precompiled
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.run.call_arrays import CallArrays, buffer_of
 from hybridsim.engine.run.compiled_loop import NOT_LINEAR
@@ -27,14 +27,14 @@ from hybridsim.engine.system.programs.mode_tables import automata_of, shelf_of
 from hybridsim.engine.system.system import System
 from hybridsim.ensemble.run import NEXT, SEGMENTS, Runs, run_fleet
 from hybridsim.ensemble.start import opposing
-from hybridsim.ensemble.tables import FleetTables, fleet_tables
+from hybridsim.ensemble.tables import EnsembleTables, ensemble_tables
 from hybridsim.integrators.closed_form.segments import Record, reach_leap, room_for
 
 _TOGETHER = 128  # runs whose tables are made together, so that they fit in the processor's cache
-_TURNS = 100  # longest segment in turns of the fastest angle, as in `hybridsim.engine.run.setup`
+_RENEWAL_TURNS = 100  # longest segment in turns of the fastest angle, as in `hybridsim.engine.run.setup`
 _FULLY = 2.0 * math.pi
 
-_run, _opposing = Door(run_fleet), Door(opposing)
+_run, _opposing = Precompiled(run_fleet), Precompiled(opposing)
 
 
 class LastPeriods(NamedTuple):
@@ -45,13 +45,13 @@ class LastPeriods(NamedTuple):
     stretch: Stretch  # the motion over the period, one row of each array per run
 
 
-def sails(system: System) -> bool:
+def can_run_together(system: System) -> bool:
     """Return whether runs of a model can be computed together: only contacts, in modes that are always linear.
 
     Held values must be constants, because states that follow others are not supported here.
     """
     model = system.model
-    parts = model.monitors or model.inputs or model.schedules or model.discrete or system.ties
+    parts = model.monitors or model.inputs or model.schedules or model.discrete or system.stop_couplings
     return (
         ENABLED
         and system.has_tape
@@ -64,28 +64,28 @@ def sails(system: System) -> bool:
     )
 
 
-class Fleet:
+class Ensemble:
     """Runs of one system from t = 0, each over a number of periods of its forcing; for use in one thread.
 
     Parameters
     ----------
-    system : one for which `sails` is true at all values of its parameters.
-    goes_on : called every few milliseconds; if it returns False, no more runs are started.
+    system : one for which `can_run_together` is true at all values of its parameters.
+    may_continue : called every few milliseconds; if it returns False, no more runs are started.
     """
 
-    def __init__(self, system: System, goes_on: Callable[[], bool]) -> None:
-        self.system, self.automata, self.goes_on = system, automata_of(system), goes_on
+    def __init__(self, system: System, may_continue: Callable[[], bool]) -> None:
+        self.system, self.automata, self.may_continue = system, automata_of(system), may_continue
         self.inputs = system.registers.inputs
         self.first = np.zeros(len(system.automata), dtype=np.int64)
         shelf = shelf_of(system)
         shelf.surround(self.first)
         self.tapes = shelf.tapes
-        lean, layout = system.lean_tape(self.first), system.layout
+        tape, layout = system.optimised_tape(self.first), system.layout
         self.surfaces = (
-            lean.constant_rows,
-            lean.rows,
-            lean.derivatives,
-            lean.surfaces,
+            tape.constant_rows,
+            tape.rows,
+            tape.derivatives,
+            tape.surfaces,
             np.array(system.surface_of, dtype=np.int64),
         )
         self.places = layout.origin_at, layout.phases_at, layout.pin_at
@@ -94,14 +94,14 @@ class Fleet:
     def runs(self, parameters: np.ndarray, starts: np.ndarray, periods: int) -> Iterator[LastPeriods]:
         """Yield the last period of each run, some together, in any order. Unsupported runs are missing.
 
-        parameters (N, P), in the order of the model; starts (N, n). The iteration ends early if `goes_on` returns
+        parameters (N, P), in the order of the model; starts (N, n). The iteration ends early if `may_continue` returns
         False.
         """
         for first in range(0, len(parameters), _TOGETHER):
             here = slice(first, first + _TOGETHER)
             for last in self._runs(parameters[here], starts[here], periods):
                 yield last._replace(numbers=first + last.numbers)
-            if not self.goes_on():
+            if not self.may_continue():
                 return
 
     def _runs(self, parameters: np.ndarray, starts: np.ndarray, periods: int) -> Iterator[LastPeriods]:
@@ -114,10 +114,12 @@ class Fleet:
         times = np.array([_period(row) for row in known])[which.reshape(-1)]
         fastest = np.abs(rates).max(axis=1, initial=0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            longest = _TURNS * _FULLY / fastest
+            longest = _RENEWAL_TURNS * _FULLY / fastest
             horizons = np.minimum(periods * times, longest)
         fit = np.flatnonzero(np.isfinite(times) & self._may_begin(starts, vectors))
-        groups = fleet_tables(system, self.tapes.modes, np.ascontiguousarray(parameters[fit]), horizons[fit])
+        groups = ensemble_tables(
+            system, self.tapes.modes, np.ascontiguousarray(parameters[fit]), horizons[fit]
+        )
         for group in groups:
             numbers = fit[group.numbers]
             m, n, count = len(numbers), system.n, len(self.hold)
@@ -137,34 +139,34 @@ class Fleet:
                 holding=np.empty((m, 2, count), dtype=np.bool_),
                 at=np.zeros(4, dtype=np.int64),
             )
-            self._sail(group, runs)
+            self._run_group(group, runs)
             stretch = Stretch(runs.extremes, runs.integrals, runs.sides, runs.held, runs.holding)
             yield LastPeriods(
                 numbers[runs.done], runs.periods[runs.done], Stretch(*(part[runs.done] for part in stretch))
             )
 
-    def _sail(self, group: FleetTables, runs: Runs) -> None:
-        """Run all of them, unless `goes_on` returns False."""
+    def _run_group(self, group: EnsembleTables, runs: Runs) -> None:
+        """Run all of them, unless `may_continue` returns False."""
         spare: deque[Any] = self.system.code.shared(f"scratch of fleets for {group.form}", deque)
         try:
-            ship = spare.pop()
+            group_scratch = spare.pop()
         except IndexError:
-            ship = _Ship(self, group.first, runs.vectors[0])
+            group_scratch = _GroupScratch(self, group.first, runs.vectors[0])
         under_way = packed(runs)
         while True:
             _run(
                 self.automata, self.tapes, self.inputs, NOT_LINEAR, group.first, self.places,
-                self.surfaces, self.hold, (NODES, WEIGHTS), under_way, ship.slopes, *ship.packs,
+                self.surfaces, self.hold, (NODES, WEIGHTS), under_way, group_scratch.slopes, *group_scratch.packs,
             )  # fmt: skip
-            if runs.at[NEXT] == len(runs.ends) or not self.goes_on():
+            if runs.at[NEXT] == len(runs.ends) or not self.may_continue():
                 break
-        spare.append(ship)
+        spare.append(group_scratch)
 
     def _may_begin(self, starts: np.ndarray, vectors: np.ndarray) -> np.ndarray:
         """Return a mask (N,) of runs in which each contact opposes its own velocity; the others must be refused."""
         found = np.empty(len(starts), dtype=np.bool_)
-        room = np.zeros(len(self.system.surface_of))
-        _opposing(self.system.address("effects"), starts, vectors, self.first, room, found)
+        scratch = np.zeros(len(self.system.surface_of))
+        _opposing(self.system.address("effects"), starts, vectors, self.first, scratch, found)
         return found
 
 
@@ -173,12 +175,12 @@ def _period(rates: np.ndarray) -> float:
     return common_multiple((_FULLY / abs(rates[rates != 0.0])).tolist()) or math.nan
 
 
-class _Ship:
+class _GroupScratch:
     """Scratch arrays for runs with tables of one form, and their packs in order."""
 
-    def __init__(self, fleet: Fleet, tables: Any, p: np.ndarray) -> None:
-        system = fleet.system
-        n, widest, count, whole = system.n, tables.values.shape[1], len(fleet.hold), np.int64
+    def __init__(self, ensemble: Ensemble, tables: Any, p: np.ndarray) -> None:
+        system = ensemble.system
+        n, widest, count, whole = system.n, tables.values.shape[1], len(ensemble.hold), np.int64
         work = work_space(system, len(tables.kinds), len(tables.factors))
         none, guards = np.zeros(0, dtype=whole), system.guard_count
         blank = Outcome(
@@ -206,9 +208,9 @@ class _Ship:
         )
         late = packed(Record(*(part[SEGMENTS:] for part in record)))
         reach_leap(
-            fleet.automata,
-            fleet.tapes,
-            fleet.inputs,
+            ensemble.automata,
+            ensemble.tapes,
+            ensemble.inputs,
             tables,
             call_arrays.as_packed,
             work,

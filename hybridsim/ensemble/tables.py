@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.linear.matrix_template import plan_of
+from hybridsim.engine.linear.matrix_template import template_of
 from hybridsim.engine.linear.tables import (
     LinearTables,
     angles_of,
@@ -21,7 +21,7 @@ from hybridsim.engine.system.system import System
 _COMPUTED = ("rates", "offsets", "weights")  # fields of the atoms that depend on the parameters
 
 
-class FleetTables:
+class EnsembleTables:
     """The tables of `hybridsim.engine.linear.tables.tables_of` for all points of a group.
 
     Parameters
@@ -68,23 +68,23 @@ def _is_shared(name: str) -> bool:
     return name in ("kinds", "term_start", "sources", "factors", "phases")
 
 
-def fleet_tables(
+def ensemble_tables(
     system: System, modes: np.ndarray, parameters: np.ndarray, horizons: np.ndarray
-) -> list[FleetTables]:
+) -> list[EnsembleTables]:
     """Return tables of these vectors of modes (K, components) at many points: parameters (N, P), horizons (N,).
 
-    There is one group for each order of magnitude of the horizon and each plan. Points with tables that are not finite
-    are left out.
+    There is one group for each order of magnitude of the horizon and each template. Points with tables that are not
+    finite are left out.
     """
     classes = np.array([horizon_class(float(h)) for h in horizons])
     groups, left = [], np.arange(len(parameters))
     while len(left):
-        plan, _ = plan_of(system, modes, parameters[left[0]])
-        registers, holds = plan.recipe.values_at(parameters[left])
+        template, _ = template_of(system, modes, parameters[left[0]])
+        registers, holds = template.recipe.values_at(parameters[left])
         chosen, registers = left[holds], registers[holds]
         for horizon in np.unique(classes[chosen]):
             among = classes[chosen] == horizon
-            made = _group(system, plan, chosen[among], registers[among], float(horizon))
+            made = _group(system, template, chosen[among], registers[among], float(horizon))
             if made is not None:
                 groups.append(made)
         left = left[~holds]
@@ -92,9 +92,9 @@ def fleet_tables(
 
 
 def _group(
-    system: System, plan: Any, numbers: np.ndarray, registers: np.ndarray, horizon: float
-) -> FleetTables | None:
-    A, rows = plan.matrices(registers)
+    system: System, template: Any, numbers: np.ndarray, registers: np.ndarray, horizon: float
+) -> EnsembleTables | None:
+    A, rows = template.matrices(registers)
     is_finite = leave_out(A, rows, system.n)
     known = is_finite.any(axis=1)
     numbers, registers, A, rows, is_finite = (
@@ -105,5 +105,5 @@ def _group(
     modes = A.shape[1]
     A, rows = (part.reshape(-1, *part.shape[2:]) for part in (A, rows))  # stacked along the first axis
     of_modes = unknown(of_matrices(A, rows, system.n, horizon), is_finite.ravel())
-    fields = plan.atoms(registers) | {"phases": angles_of(system)} | of_modes
-    return FleetTables(numbers, {name: np.ascontiguousarray(a) for name, a in fields.items()}, modes)
+    fields = template.atoms(registers) | {"phases": angles_of(system)} | of_modes
+    return EnsembleTables(numbers, {name: np.ascontiguousarray(a) for name, a in fields.items()}, modes)

@@ -46,14 +46,14 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
         return _for_functions(system, x0, z0, span)
     model = system.model
     is_small = system.n + system.guard_count <= _SMALL and span[1] >= span[0]
-    is_watched, rest = bool(model.monitors or model.inputs), ""
+    is_monitored, rest = bool(model.monitors or model.inputs), ""
     if is_small and what_is_not_linear(system) is None and is_linear_beside_corners(system):
-        if not is_watched:
+        if not is_monitored:
             return Choice("exact", "its modes are linear in the states")
         what = "monitors" if model.monitors else "inputs"
         rest = f" (exact was not chosen because the model has {what})"
     steps = _steps_for_stability(system, x0, z0, span)
-    in_python = is_watched or system.has_corners or span[1] < span[0]
+    in_python = is_monitored or system.has_corners or span[1] < span[0]
     if steps > _MANY or (steps > _MANY_IN_PYTHON and in_python and _is_apart(system, x0, z0, span[0])):
         return Choice("rodas5p", f"stability would hold an explicit method to {steps:.0e} steps")
     if system.has_corners:
@@ -127,12 +127,12 @@ def _eigenvalues(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> np.
 
 def _jacobian(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
     """Return d(dx/dt)/dx from the tape."""
-    n, inputs, lean = system.n, system.registers.inputs, system.lean_tape(z)
+    n, inputs, tape = system.n, system.registers.inputs, system.optimised_tape(z)
     V = np.zeros((system.registers.count, 2))
     V[inputs.constants, 0] = inputs.values[:, 0]
     V[inputs.parameters, 0] = p[inputs.sources]
-    advance(lean.constant_rows, V, 0)
+    advance(tape.constant_rows, V, 0)
     jacobian, rate = np.empty((n, n)), np.empty(n)
-    places = (int(inputs.time[0]), inputs.states, lean.derivatives)
-    linearise(lean.rows, places, 0.0, x, V, jacobian, rate)
+    flow_registers = (int(inputs.time[0]), inputs.states, tape.derivatives)
+    linearise(tape.rows, flow_registers, 0.0, x, V, jacobian, rate)
     return jacobian

@@ -13,7 +13,7 @@ import numpy as np
 
 from hybridsim.engine.native.time_grid import on_the_grid
 from hybridsim.engine.record.segments import Dense
-from hybridsim.engine.record.trajectory import Pieces
+from hybridsim.engine.record.trajectory import PiecewiseDense
 from hybridsim.engine.run.stepping import Flow, Step
 from hybridsim.engine.system.failures import Collapsed, StepFailure
 from hybridsim.engine.system.tolerances import Tolerances
@@ -48,7 +48,7 @@ class Trial:
 
     x: np.ndarray
     error: float
-    kept: Any = None
+    dense_data: Any = None
 
 
 class OneStepStepper(ABC):
@@ -153,7 +153,7 @@ class OneStepStepper(ABC):
         parts = tuple(
             self._dense(a, b, trial) for (a, b), trial in zip(pairwise(points), trials, strict=True)
         )
-        return Step(start.s, s, start.x, points[-1].x, Pieces(knots, parts))
+        return Step(start.s, s, start.x, points[-1].x, PiecewiseDense(knots, parts))
 
     def _first_step(self) -> float:
         """Return the starting step of Hairer, Norsett and Wanner 1993, section II.4."""

@@ -38,7 +38,7 @@ def options_of(cls: type[Any]) -> tuple[Option, ...]:
     return tuple(
         Option(
             f.name,
-            in_words(kinds[f.name]),
+            kind_description(kinds[f.name]),
             None if f.default is MISSING else f.default,
             texts.get(f.name, ""),
         )
@@ -77,17 +77,17 @@ def _is_small(value: Any, most: float) -> bool:
         return False
 
 
-def in_words(kind: Any) -> str:
+def kind_description(kind: Any) -> str:
     """Return an annotation in words."""
     if get_origin(kind) is Literal:
         return "one of " + ", ".join(map(str, get_args(kind)))
     if get_origin(kind) in (Union, UnionType):
-        return " or ".join(in_words(part) for part in get_args(kind))
-    words = {
+        return " or ".join(kind_description(part) for part in get_args(kind))
+    descriptions = {
         int: "a whole number",
         float: "a number",
         bool: "true or false",
         str: "a string",
         NoneType: "None",
     }
-    return words.get(kind, str(kind))
+    return descriptions.get(kind, str(kind))

@@ -12,7 +12,7 @@ from typing import Any, get_type_hints
 
 from hybridsim.errors import UsageError, near, nearest
 from hybridsim.integrators.contract import Integrator
-from hybridsim.integrators.options import LARGEST, fits, in_words
+from hybridsim.integrators.options import LARGEST, fits, kind_description
 
 ENTRY_POINT = "hybridsim.integrators"
 _OURS = (
@@ -160,6 +160,6 @@ def make_integrator(name: str, options: dict[str, Any], keywords: Iterable[str] 
     for option, value in options.items():
         if not fits(value, kinds[option]):
             is_large = isinstance(value, int) and value > LARGEST and fits(1, kinds[option])
-            remedy = f"use {in_words(kinds[option])}" + (f", at most {LARGEST}" if is_large else "")
+            remedy = f"use {kind_description(kinds[option])}" + (f", at most {LARGEST}" if is_large else "")
             raise UsageError(f"{name}: {option} is {value!r}", remedy=remedy)
     return cls(**options)

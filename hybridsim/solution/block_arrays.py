@@ -20,7 +20,7 @@ from hybridsim.engine.record.array_forms import (
     check_range,
 )
 from hybridsim.engine.record.blocks import SegmentList
-from hybridsim.engine.record.chebyshev import ChebyshevPieces, chebyshev_series
+from hybridsim.engine.record.chebyshev import ChebyshevDense, chebyshev_series
 from hybridsim.engine.record.fixed_blocks import StepSegments
 from hybridsim.engine.record.hermite_block import TERMS, HermiteBlock
 from hybridsim.engine.record.segments import Segment, end_point
@@ -263,5 +263,5 @@ def _segments(arrays: Arrays) -> Iterator[Segment]:
             yield end_point(origin, z, p, x[0])
         else:
             yield Segment(
-                origin, z, p, s, x, ChebyshevPieces(s, tuple(next(series) for _ in range(length - 1)))
+                origin, z, p, s, x, ChebyshevDense(s, tuple(next(series) for _ in range(length - 1)))
             )

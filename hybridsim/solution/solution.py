@@ -326,8 +326,8 @@ class Solution(InTables):
         self._require_events()
         if kind is not None:
             text(kind, "kind")
-        if not isinstance(component, str) or component not in self._system.heard:
-            known = list(self._system.heard)
+        if not isinstance(component, str) or component not in self._system.event_names:
+            known = list(self._system.event_names)
             raise UsageError(
                 f"the model has no component, monitor or schedule {component!r}",
                 remedy=nearest(str(component), known, kind="names"),

@@ -37,7 +37,7 @@ def test_an_allowance_is_looked_at_until_it_is_over() -> None:
 def test_compiling_that_takes_a_while_is_said_once(
     capsys: pytest.CaptureFixture[str], monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr(kernels, "_told", set())
+    monkeypatch.setattr(kernels, "_announced", set())
     monkeypatch.setattr(kernels, "_NOTICED", 0.0)
     numba = pytest.importorskip("numba")  # the compiler that is listened to
     for module in ("somebody.else", "hybridsim.engine.mine", "hybridsim.engine.mine"):

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybridsim.engine.events.jumps.impulse import Blow
+from hybridsim.engine.events.jumps.impulse import ImpactProblem
 
 
-def random_blow(rng: np.random.Generator, normal: int, tangential: int, common: bool = False) -> Blow:
+def random_blow(
+    rng: np.random.Generator, normal: int, tangential: int, common: bool = False
+) -> ImpactProblem:
     """Contacts of a mechanism with as many coordinates as contacts or more; none nearly follows from others."""
     m = normal + tangential
     n = m + int(rng.integers(0, 3))
@@ -24,4 +26,4 @@ def random_blow(rng: np.random.Generator, normal: int, tangential: int, common: 
     mu = np.zeros((tangential, normal))
     for t in range(tangential):
         mu[t, t % normal] = rng.random()
-    return Blow(effects, before, e, mu, mu)
+    return ImpactProblem(effects, before, e, mu, mu)

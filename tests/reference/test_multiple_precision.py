@@ -23,7 +23,7 @@ MP.dps = 60
 
 def times_of(trajectory: Trajectory) -> list[object]:
     """The instants at which the run was cut, in full precision."""
-    return [piece.t for piece in trajectory.states.pieces]
+    return [segment.t for segment in trajectory.states.segments]
 
 
 def nearest(instant: object, trajectory: Trajectory) -> object:

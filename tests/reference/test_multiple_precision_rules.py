@@ -13,7 +13,7 @@ import hybridsim as hs
 from hybridsim.errors import SimulationError, UsageError
 from hybridsim.reference.multiple_precision import multiple_precision_trajectory
 from hybridsim.reference.multiple_precision.functions import Functions
-from hybridsim.reference.multiple_precision.nodes import Given, in_order
+from hybridsim.reference.multiple_precision.nodes import ExternalSeries, in_order
 from hybridsim.reference.trajectory import Trajectory
 
 MP = mpmath.mp.clone()
@@ -36,7 +36,7 @@ def seen(trajectory: Trajectory) -> list[tuple[str, float]]:
 )
 def test_functions_have_the_series_that_differentiation_gives(name: str) -> None:
     inner = [MP.mpf(c) for c in ("0.3", "0.5", "-0.2", "0.1", "0.07", "-0.3", "0.02")]
-    u = Given(MP)
+    u = ExternalSeries(MP)
     u.c = list(inner)
     node = Functions(MP).build(name, u)
     for part in in_order([node]):

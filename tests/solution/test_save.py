@@ -11,7 +11,7 @@ import pytest
 
 import hybridsim as hs
 from hybridsim import UsageError
-from hybridsim.engine.native.buffer_pool import Lender
+from hybridsim.engine.native.buffer_pool import BufferPool
 from hybridsim.solution.block_arrays import put_together, taken_apart
 
 DFCS = hs.load("dfcs")
@@ -181,7 +181,9 @@ def test_memory_does_not_grow_with_the_run(
     integrator: str, save: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Eight times as many periods take as much memory, where the whole run would take eight times as much."""
-    monkeypatch.setattr(Lender, "block", lambda self: np.empty(self.size, np.uint8))  # none of former runs
+    monkeypatch.setattr(
+        BufferPool, "block", lambda self: np.empty(self.size, np.uint8)
+    )  # none of former runs
     periods = {"taylor": 600, "dop853": 600, "rk4-dichotomy": 25}[integrator]
 
     def peak(count: int, keep: str) -> int:

@@ -77,7 +77,7 @@ def test_a_model_that_nobody_has_seen_is_compiled_before_its_clock_starts(
     usual, compiled = modules.Compiled.address, []
 
     def noting(self: modules.Compiled, name: str) -> object:
-        compiled.extend([] if name in self._kept else [name])
+        compiled.extend([] if name in self._compiled else [name])
         return usual(self, name)
 
     monkeypatch.setattr(modules.Compiled, "address", noting)

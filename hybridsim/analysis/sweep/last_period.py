@@ -80,15 +80,15 @@ class LastPeriod:
         If the watch requests a stop, the outcomes are those of the first points, as far as they were run.
         """
         from hybridsim.engine.system.system_cache import system_of
-        from hybridsim.ensemble.runs import Fleet, sails
+        from hybridsim.ensemble.runs import Ensemble, can_run_together
 
         system = system_of(job.model)
         readers = [_reader(word, system) for word in self.words]
-        if not self._is_plain() or None in readers or not sails(system):
+        if not self._is_plain() or None in readers or not can_run_together(system):
             return None
         parameters, starts, sound = Setter(job.model, job.names, job.at).values(points)
         outcomes: list[Outcome | None] = [None] * len(points)
-        for last in Fleet(system, watch.goes_on).runs(parameters[sound], starts[sound], self.after):
+        for last in Ensemble(system, watch.goes_on).runs(parameters[sound], starts[sound], self.after):
             rows = np.array([read(last) for read in readers if read]).T.tolist()
             for number, row in zip(sound[last.numbers].tolist(), rows, strict=True):
                 outcomes[number] = _outcome(dict(zip(self.words, row, strict=True)))

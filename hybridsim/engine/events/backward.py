@@ -22,7 +22,7 @@ def held(system: System, z: np.ndarray) -> str:
     )
 
 
-def said_of_direction(t0: float, t1: float) -> str:
+def message_on_direction(t0: float, t1: float) -> str:
     """Return a note for a backward run that stopped early, in case t1 < t0 was a mistake."""
     return (
         f"; this run goes backward in time, from t = {t0!r} to {t1!r}: swap the ends of t_span to run forward"

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from hybridsim.engine.events.resolve import Settling
 
 
-def at_zero(settling: Settling, cluster: tuple[int, ...]) -> set[int]:
+def vanishing_surfaces(settling: Settling, cluster: tuple[int, ...]) -> set[int]:
     """Return the components of a cluster whose surfaces are zero within rounding.
 
     No step crosses a surface that stays at zero because another component keeps its function constant, such as a relay

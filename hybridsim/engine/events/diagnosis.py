@@ -57,7 +57,7 @@ def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Ins
             names = [system.names[i] for i in np.flatnonzero(~np.isfinite(ahead))]
             why = power_without_value(system, names, float(here) + step, x + step * rates)
             why = why or _of_function(system, s + step, x + step * rates, p, z)
-            return _said(system, "just after, the rate of", names, x, z) + why
+            return _sentence(system, "just after, the rate of", names, x, z) + why
         guards = system.rows(
             "guards", system.guard_count, np.array([s + step]), (x + step * rates)[None], p, z
         )[0]
@@ -66,7 +66,7 @@ def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Ins
             titles = [system.guard_title(int(g), z) for g in without]
             # a held state has the rate of its constraint; its declared rate enters the guards
             held = [system.names[i] for g in without for i in system.pins.get(int(system.owner[g]), ())]
-            return _said(system, "just after,", titles, x, z) + _cause(system, held, float(here), x)
+            return _sentence(system, "just after,", titles, x, z) + _cause(system, held, float(here), x)
     if power := _power_without_series(system, x, x + reach * rates):
         return power
     return _steep(system, record, s, x, p, z, rates, first, reach)
@@ -86,7 +86,7 @@ def rates_without_value(system: System, s: float, x: np.ndarray, p: np.ndarray, 
         return ""
     t = float(p[system.layout.origin_at]) + s
     why = _cause(system, names, t, x) or _of_function(system, s, x, p, z)
-    return _said(system, "the rate of", names, x, z) + why
+    return _sentence(system, "the rate of", names, x, z) + why
 
 
 def _cause(system: System, names: list[str], t: float, x: np.ndarray) -> str:
@@ -212,7 +212,7 @@ def _division_by_zero(system: System, names: list[str], x: np.ndarray) -> str:
     return ""
 
 
-def _said(system: System, head: str, names: list[str], x: np.ndarray, z: np.ndarray) -> str:
+def _sentence(system: System, head: str, names: list[str], x: np.ndarray, z: np.ndarray) -> str:
     """Return a sentence that names quantities that are not numbers, with the state and the modes."""
     state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(system.names, x, strict=True))
     modes = ", ".join(f"{a.name} {a.modes[m]}" for a, m in zip(system.declared, z, strict=False))
@@ -220,7 +220,7 @@ def _said(system: System, head: str, names: list[str], x: np.ndarray, z: np.ndar
     return f"{head} {', '.join(names)} is not a number (at {state}{where})"
 
 
-def reset_in_words(system: System, key: tuple[object, ...]) -> str:
+def reset_description(system: System, key: tuple[object, ...]) -> str:
     """Return the name of the reset with this key, for messages."""
     model = system.model
     if key[0] == "limit":

@@ -11,7 +11,9 @@ from hybridsim.errors import ModelError
 _MOST = 64  # starts that a system remembers to have been looked at
 
 
-def refuse_driving(system: System, t0: float, x: np.ndarray, discrete: np.ndarray, z: np.ndarray) -> None:
+def require_dissipation(
+    system: System, t0: float, x: np.ndarray, discrete: np.ndarray, z: np.ndarray
+) -> None:
     """Raise ModelError for a contact whose force drives its own relative velocity instead of opposing it."""
     start = (t0, x.tobytes(), discrete.tobytes(), z.tobytes())
     if start in system.opposed:

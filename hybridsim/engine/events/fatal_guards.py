@@ -13,7 +13,9 @@ if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Outcome
 
 
-def said_by_leaving(system: System, z: np.ndarray, leaving: Iterable[int], sides: np.ndarray) -> str | None:
+def message_of_leaving(
+    system: System, z: np.ndarray, leaving: Iterable[int], sides: np.ndarray
+) -> str | None:
     """Return the message of the first fatal guard through which one of these components leaves its mode."""
     for c in leaving:
         automaton, mode = system.automata[c], int(z[c])
@@ -29,7 +31,7 @@ def is_only_fatal(system: System, outcome: Outcome) -> bool:
     return bool(outcome.status) and any(message and message == outcome.message for message in messages)
 
 
-def said_by_located(system: System, z: np.ndarray, located: Iterable[int]) -> str | None:
+def message_of_located(system: System, z: np.ndarray, located: Iterable[int]) -> str | None:
     """Return the message of a fatal guard that was located at zero in the modes z before the event."""
     for automaton, mode in zip(system.automata, z.tolist()):
         if mode >= 0:
@@ -39,7 +41,7 @@ def said_by_located(system: System, z: np.ndarray, located: Iterable[int]) -> st
     return None
 
 
-def said_by_every_mode(system: System, components: Iterable[int], sides: np.ndarray) -> str | None:
+def message_of_every_mode(system: System, components: Iterable[int], sides: np.ndarray) -> str | None:
     """Return the message of the first component that has a negative fatal guard in each of its modes."""
     for c in components:
         automaton = system.automata[c]

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _MOST_FLOWS = 3**4  # combinations of modes examined at most; each costs a Taylor series
 
 
-def as_given(system: System, at: Situation, jumped: bool = False) -> Situation:
+def as_read_by_conditions(system: System, at: Situation, jumped: bool = False) -> Situation:
     """Return a situation with modes and run-time vector in which conditions and resets read the state as it is.
 
     At a start some components have no mode yet. They are read in the mode of the side of their surface, or in the
@@ -63,7 +63,7 @@ def certainly_leaving(settling: Settling) -> set[int]:
     owners = [c for c in settling.scope if not (system.has_surface[c] or c in system.led)]
     if not owners:
         return set()
-    z, on = _resting(settling)
+    z, on = _modes_on_sides(settling)
     modes = [range(len(system.automata[c].modes)) for c in on]
     if math.prod(map(len, modes)) > _MOST_FLOWS:
         free = system.code.shared("guards without forces", lambda: _without_forces(system))
@@ -82,7 +82,7 @@ def certainly_leaving(settling: Settling) -> set[int]:
     return {int(system.owner[g]) for g in negative}
 
 
-def _resting(settling: Settling) -> tuple[np.ndarray, list[int]]:
+def _modes_on_sides(settling: Settling) -> tuple[np.ndarray, list[int]]:
     """Return the modes with each surface off zero on its side, and the components whose surfaces are zero."""
     at, system = settling.at, settling.system
     p = at.p.copy()

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Outcome
     from hybridsim.model.parts.monitor import Monitor
 
-_WANTED = {"up": (1,), "down": (-1,), "both": (1, -1)}
+_SIDES_BY_DIRECTION = {"up": (1,), "down": (-1,), "both": (1, -1)}
 
 
 @dataclass
@@ -72,7 +72,7 @@ class MonitorSides:
             if k in self.fired or action not in ("", monitor.action):
                 continue
             way = self._left(k, outcome) if outcome is not None and known else int(self.leads[k])
-            if way in _WANTED[monitor.direction]:
+            if way in _SIDES_BY_DIRECTION[monitor.direction]:
                 self.fired[k] = way
                 due.append(k)
         return due
@@ -84,7 +84,7 @@ class MonitorSides:
             return 0
         return -before
 
-    def keep_open(self, outcome: Outcome) -> None:
+    def restore_hidden_sides(self, outcome: Outcome) -> None:
         """Keep the sides of monitors for which rounding hides whether they are at zero."""
-        kept = self.is_open & (outcome.monitor_sides == 0)
-        outcome.monitor_sides[kept] = self.before[kept]
+        hidden = self.is_open & (outcome.monitor_sides == 0)
+        outcome.monitor_sides[hidden] = self.before[hidden]

@@ -8,18 +8,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from hybridsim.engine.events.choice.cancelled_guards import kept
+from hybridsim.engine.events.choice.cancelled_guards import cancelled_by_surfaces
 from hybridsim.engine.events.choice.candidates import all_verdicts, verdicts_on
-from hybridsim.engine.events.choice.guards_of_one_target import taken_at_once
+from hybridsim.engine.events.choice.guards_of_one_target import guards_taken_together
 from hybridsim.engine.events.choice.releases import Releases
 from hybridsim.engine.events.choice.surface_intersection import (
     can_hold,
     is_one_motion,
     keeps_nothing,
+    message_on_cascade,
     on_its_side,
     refused,
     rivals,
-    words_on_cascade,
 )
 from hybridsim.engine.events.choice.uniqueness import other_outcomes, with_cause
 from hybridsim.engine.events.choice.verdict import (
@@ -34,12 +34,12 @@ from hybridsim.engine.events.choice.verdict import (
     side_after,
 )
 from hybridsim.engine.events.corner_sides import sides_along, take_corners
-from hybridsim.engine.events.corner_start import at_zero, cross, past_zero
+from hybridsim.engine.events.corner_start import cross, past_zero, vanishing_surfaces
 from hybridsim.engine.events.diagnosis import rates_without_value
-from hybridsim.engine.events.fatal_guards import said_by_leaving, said_by_located
-from hybridsim.engine.events.first_modes import as_given, certainly_leaving
+from hybridsim.engine.events.fatal_guards import message_of_leaving, message_of_located
+from hybridsim.engine.events.first_modes import as_read_by_conditions, certainly_leaving
 from hybridsim.engine.events.jumps.impact import strike
-from hybridsim.engine.events.jumps.resets import merged_resets
+from hybridsim.engine.events.jumps.resets import combine_resets
 from hybridsim.engine.events.outcome import Change, Outcome, Situation
 from hybridsim.engine.events.rest_at_stops import together, with_tied
 from hybridsim.engine.series.bounded import ORDER, UNIT
@@ -96,7 +96,7 @@ class Settling:
     def run(self, fired: Iterable[int] | Mapping[int, int], resets: Iterable[tuple[object, ...]]) -> Outcome:
         """Resolve the event with these guards located at zero, in order of time, and these resets that are due."""
         located = {int(g) for g in fired}
-        lost = said_by_located(self.system, self.at.z, located)
+        lost = message_of_located(self.system, self.at.z, located)
         self.rank = dict(fired) if isinstance(fired, Mapping) else {int(g): k for k, g in enumerate(fired)}
         self.fired[list(located)] = True
         self.releases.locate(located)
@@ -104,7 +104,7 @@ class Settling:
         open_ = self._past_corners({c for c, _, _ in self._fired_guards()})
         at_surfaces, leaving = self._at_surfaces(open_ & surfaces), open_ - surfaces
         if leaving and at_surfaces:
-            leaving -= kept(self, leaving, at_surfaces)
+            leaving -= cancelled_by_surfaces(self, leaving, at_surfaces)
         failure = self._transitions(leaving, list(resets)) or self._first_modes(surfaces)
         if failure:
             return self._stop(*failure)
@@ -112,18 +112,18 @@ class Settling:
         if surfaces and (self.jumped or (self.at.z < 0).any()):
             self.take_sides(open_)
         while self._begins_round():
-            failure = strike(self, open_) or self.decide(open_)
+            failure = strike(self, open_) or self.choose_jointly(open_)
             if failure:
                 return self._stop(*(("inconsistent", lost) if lost else failure))
             take_corners(self)
-            verdicts = self._judge_all()
+            verdicts = self._guard_verdicts()
             leaving = {c for c, v in verdicts.items() if v == LEAVES}
             for c, v in verdicts.items():
                 if v == UNDECIDED:
                     self._note_undecided(c)
             if not leaving:
                 return self._done()
-            fatal = said_by_leaving(self.system, self.at.z, leaving, self.sides)
+            fatal = message_of_leaving(self.system, self.at.z, leaving, self.sides)
             if fatal:
                 return self._stop("inconsistent", fatal)
             failure = self._transitions(leaving - surfaces - set(self.system.led), [])
@@ -151,7 +151,7 @@ class Settling:
         return (
             "cascade",
             f"transitions repeat without time advancing, {self.most_rounds} rounds without rest (modes {names}); "
-            f"guards that fire: {guards}{words_on_cascade(self)}",
+            f"guards that fire: {guards}{message_on_cascade(self)}",
         )
 
     def _past_corners(self, open_: set[int]) -> set[int]:
@@ -165,7 +165,7 @@ class Settling:
         decreed = self._decreed(self.at.z, continuous=False)
         staying = set()
         for c in others - self._surface_components():
-            if self._judge(self.at.z, self.at.x, decreed, [c]) != LEAVES:
+            if self._guard_verdict(self.at.z, self.at.x, decreed, [c]) != LEAVES:
                 staying.add(c)
                 self.fired[list(self.system.automata[c].guards[self.at.z[c]])] = False
         return others - staying
@@ -245,7 +245,9 @@ class Settling:
             self.series[key] = self.system.series(at.s, x, at.p, z, at.x_error, at.s_error, at.is_put)
         return self.series[key]
 
-    def _judge(self, z: np.ndarray, x: np.ndarray, decreed: np.ndarray, components: Iterable[int]) -> int:
+    def _guard_verdict(
+        self, z: np.ndarray, x: np.ndarray, decreed: np.ndarray, components: Iterable[int]
+    ) -> int:
         """Return the verdict on the guards of some components in the candidate modes z."""
         series = self.series_of(z, x)
         active = np.zeros(self.system.guard_count, dtype=np.bool_)
@@ -257,9 +259,9 @@ class Settling:
         self.sides[active], self.orders[active] = sides[active], orders[active]
         return int(verdict)
 
-    def _judge_all(self) -> dict[int, int]:
+    def _guard_verdicts(self) -> dict[int, int]:
         decreed = self._decreed(self.at.z, self._continuous(self.at.z, range(len(self.system.automata))))
-        return {c: self._judge(self.at.z, self.at.x, decreed, [c]) for c in sorted(self.scope)}
+        return {c: self._guard_verdict(self.at.z, self.at.x, decreed, [c]) for c in sorted(self.scope)}
 
     def _note_undecided(self, component: int) -> None:
         automaton = self.system.automata[component]
@@ -276,15 +278,15 @@ class Settling:
         x_plus, p_plus, z_plus = at.x.copy(), at.p.copy(), at.z.copy()
         x_error = at.x_error.copy()
         taken: list[tuple[int, str, int, int]] = []
-        given = as_given(system, at, self.jumped)
+        read_from = as_read_by_conditions(system, at, self.jumped)
         if self.inputs is not None:
-            given, self.inputs = replace(given, p=self.inputs), None
+            read_from, self.inputs = replace(read_from, p=self.inputs), None
         for c in sorted(components, key=lambda c: (self._place(c), c)):
             automaton, mode = system.automata[c], int(at.z[c])
             guards = automaton.guards[mode]
             leaving = [j for j, g in enumerate(guards) if self.fired[g] or self.sides[g] < 0]
             leaving.sort(key=lambda j: (self.rank.get(guards[j], len(self.rank)), j))
-            choices, failure = taken_at_once(self, given, c, leaving)
+            choices, failure = guards_taken_together(self, read_from, c, leaving)
             if failure:
                 return failure
             for j, number in choices:
@@ -296,7 +298,7 @@ class Settling:
                 self.rank.pop(g, None)
         if resets:
             self.fired[system.is_corner[system.owner]] = False
-        clash = merged_resets(system, given, resets, x_plus, p_plus, x_error)
+        clash = combine_resets(system, read_from, resets, x_plus, p_plus, x_error)
         if clash:
             return "inconsistent", clash
         at.is_put = at.is_put or not np.array_equal(x_plus, at.x)
@@ -312,21 +314,25 @@ class Settling:
 
     # -- decisions by admissibility at surfaces -------------------------------------------------------------
 
-    def decide(self, open_: set[int]) -> tuple[str, str] | None:
+    def choose_jointly(self, open_: set[int]) -> tuple[str, str] | None:
         """Decide the clusters that contain an open component: one that fired, leaves, or has no mode yet."""
         for cluster in self.system.clusters:
             if open_ & set(cluster):
-                failure = self._decide_cluster(cluster, open_)
+                failure = self._choose_cluster(cluster, open_)
                 if failure and failure[0] == "inconsistent" and (first := past_zero(self, cluster) - open_):
                     cross(self, first)
-                    failure = self._decide_cluster(cluster, open_)
-                if failure and failure[0] == "inconsistent" and (more := at_zero(self, cluster) - open_):
-                    failure = self._decide_cluster(cluster, open_ | more)
+                    failure = self._choose_cluster(cluster, open_)
+                if (
+                    failure
+                    and failure[0] == "inconsistent"
+                    and (more := vanishing_surfaces(self, cluster) - open_)
+                ):
+                    failure = self._choose_cluster(cluster, open_ | more)
                 if failure:
                     return failure
         return None
 
-    def _decide_cluster(self, cluster: tuple[int, ...], open_: set[int]) -> tuple[str, str] | None:
+    def _choose_cluster(self, cluster: tuple[int, ...], open_: set[int]) -> tuple[str, str] | None:
         at, automata = self.at, self.system.automata
         taking_part = with_tied(
             self.system, [c for c in cluster if c in open_ or at.z[c] == automata[c].hold]
@@ -422,7 +428,7 @@ class Settling:
         """Return whether the guards of some components admit the modes z just after the event."""
         components = list(components)
         decreed = self._decreed(z, self._continuous(z, components))
-        found = self._judge(z, self.at.x, decreed, components)
+        found = self._guard_verdict(z, self.at.x, decreed, components)
         return LEAVES if found == UNDECIDED and not can_hold(self, components, z) else found
 
     def _continuous(self, z: np.ndarray, components: Iterable[int]) -> bool:

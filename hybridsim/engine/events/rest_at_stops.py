@@ -9,7 +9,7 @@ from hybridsim.engine.system.system import System
 
 def with_tied(system: System, members: list[int]) -> list[int]:
     """Return components that are decided together, with the contacts along the gaps among them."""
-    tied = {along for gap, along, is_one in system.ties if is_one and gap in members}
+    tied = {along for gap, along, is_one in system.stop_couplings if is_one and gap in members}
     return sorted(tied.union(members))
 
 
@@ -18,9 +18,9 @@ def together(system: System, members: list[int], candidates: np.ndarray) -> np.n
 
     If their velocities differ (a stop beside a belt), candidates in which both hold are removed.
     """
-    keep = np.ones(len(candidates), dtype=np.bool_)
-    for gap, along, is_one in system.ties:
+    is_allowed = np.ones(len(candidates), dtype=np.bool_)
+    for gap, along, is_one in system.stop_couplings:
         if gap in members and along in members:
             a, b = (candidates[:, members.index(c)] == system.automata[c].hold for c in (gap, along))
-            keep &= (a == b) if is_one else ~(a & b)
-    return candidates[keep]
+            is_allowed &= (a == b) if is_one else ~(a & b)
+    return candidates[is_allowed]

@@ -68,15 +68,15 @@ def _contradictions(system: System, task: Task, p: np.ndarray, z: np.ndarray) ->
         automaton, mode = system.automata[c], task.z0[c]
         if mode < 0:
             continue
-        told = f"{automaton.name} begins in mode {automaton.modes[mode]}, as requested"
-        said = f"{told}, but the initial state "
-        wanted = {automaton.above: 1.0, automaton.below: -1.0}.get(int(mode), math.nan)
+        begins = f"{automaton.name} begins in mode {automaton.modes[mode]}, as requested"
+        message = f"{begins}, but the initial state "
+        expected_sign = {automaton.above: 1.0, automaton.below: -1.0}.get(int(mode), math.nan)
         if mode == automaton.hold:
             held = free.copy()
             held[c] = mode
             there = system.project(0.0, x, p, held)
             if (np.abs(there - x) > _CLOSE * np.maximum(np.abs(there), np.abs(x))).any():
                 how = f"has the surface value {value:.6g}" if abs(value) > near else "moves off its surface"
-                yield f"{said}{how}: the state was projected onto the surface"
-        elif value * wanted < -near:
-            yield f"{said}has the surface value {value:.6g}, which does not belong to that mode"
+                yield f"{message}{how}: the state was projected onto the surface"
+        elif value * expected_sign < -near:
+            yield f"{message}has the surface value {value:.6g}, which does not belong to that mode"

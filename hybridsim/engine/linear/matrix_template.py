@@ -1,4 +1,4 @@
-"""Plans that map a model's tape to the matrices of its linear modes, read once for all similar parameter values."""
+"""Templates that map a model's tape to the matrices of its linear modes, read once for all similar parameter values."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from hybridsim.engine.linear.recipe import Numbers, Recipe
 from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
 
-_MOST = 16  # most plans per structure and modes; plans differ in zeros or conditions
-_MOST_VECTORS = 64  # most sets of modes with cached plans
+_MAX_TEMPLATES = 16  # most templates per structure and modes; templates differ in zeros or conditions
+_MAX_MODE_SETS = 64  # most sets of modes with cached templates
 
 Entries = np.ndarray  # (2, entries): place of each entry, and the register of its value
 
 _lock = SharedLock()
 
 
-class LinearPlan:
+class MatrixTemplate:
     """Matrices of some mode vectors (K, components), as entries whose values are registers of a recipe.
 
-    begun: a plan of the first of these vectors, at values for which it holds; the other vectors are added to
+    begun: a template of the first of these vectors, at values for which it holds; the other vectors are added to
     it.
     """
 
     def __init__(
-        self, system: System, met: np.ndarray, p: np.ndarray, begun: LinearPlan | None = None
+        self, system: System, met: np.ndarray, p: np.ndarray, begun: MatrixTemplate | None = None
     ) -> None:
         if begun is None:
             self._numbers, self._atoms = Numbers(p[: system.layout.parameters].tolist()), Atoms()
@@ -49,7 +49,7 @@ class LinearPlan:
         motion = [(place[m], atoms.derivative(m)) for m in monomials]  # the same in all modes
 
         def entries(rows: Iterable[tuple[int, Form]]) -> Entries:
-            """Return places in a matrix of `size` columns, and registers."""
+            """Return positions in a matrix of `size` columns, and registers."""
             found = [(row * size + place[k], numbers.place(w)) for row, form in rows for k, w in form.items()]
             return np.array(found, dtype=np.int64).reshape(-1, 2).T.copy()
 
@@ -104,13 +104,13 @@ class LinearPlan:
         """
         lead = registers.shape[:-1]
         A, rows = (np.zeros(lead + shape) for shape in self._shapes)
-        for matrix, (places, sources) in ((A, self._flow), (rows, self._guards)):
-            matrix.reshape(*lead, -1)[..., places] = registers[..., sources]
+        for matrix, (positions, sources) in ((A, self._flow), (rows, self._guards)):
+            matrix.reshape(*lead, -1)[..., positions] = registers[..., sources]
         return A, rows
 
     def atoms(self, registers: np.ndarray) -> dict[str, np.ndarray]:
         """Return the atoms and monomials as arrays; registers as for `matrices`."""
-        return self._fixed | {name: registers[..., places] for name, places in self._computed.items()}
+        return self._fixed | {name: registers[..., positions] for name, positions in self._computed.items()}
 
 
 def _factors(monomials: Sequence[Sequence[int]], one: int) -> np.ndarray:
@@ -121,42 +121,48 @@ def _factors(monomials: Sequence[Sequence[int]], one: int) -> np.ndarray:
     return factors
 
 
-def plan_of(system: System, met: np.ndarray, p: np.ndarray) -> tuple[LinearPlan, np.ndarray]:
-    """Return the plan of these mode vectors that holds at the parameters in p, and its registers there."""
-    kept: dict[bytes, list[LinearPlan]] = system.code.shared("linear plans", dict)
+def template_of(system: System, met: np.ndarray, p: np.ndarray) -> tuple[MatrixTemplate, np.ndarray]:
+    """Return the template of these mode vectors that holds at the parameters in p, and its registers there."""
+    cached: dict[bytes, list[MatrixTemplate]] = system.code.shared("matrix templates", dict)
     inputs = p[: system.layout.parameters]
     with _lock:
-        while len(kept) >= _MOST_VECTORS and met.tobytes() not in kept:
-            del kept[next(iter(kept))]
-        plans = kept.setdefault(met.tobytes(), [])
-        found = _that_holds(plans, inputs)
+        while len(cached) >= _MAX_MODE_SETS and met.tobytes() not in cached:
+            del cached[next(iter(cached))]
+        templates = cached.setdefault(met.tobytes(), [])
+        found = _that_holds(templates, inputs)
         if found is None:
-            begun = _begun(kept, met, inputs)
-            found = _with_values(LinearPlan(system, met, p, begun), inputs)
-            if found is None:  # otherwise new entries would have the values of the earlier plan
-                found = _with_values(LinearPlan(system, met, p), inputs)
+            begun = _begun(cached, met, inputs)
+            found = _with_values(MatrixTemplate(system, met, p, begun), inputs)
+            if found is None:  # otherwise new entries would have the values of the earlier template
+                found = _with_values(MatrixTemplate(system, met, p), inputs)
                 assert found is not None  # its comparisons were recorded at these inputs
-            if len(plans) >= _MOST:
-                plans.clear()
-            plans.append(found[0])
+            if len(templates) >= _MAX_TEMPLATES:
+                templates.clear()
+            templates.append(found[0])
     return found
 
 
-def _with_values(plan: LinearPlan, inputs: np.ndarray) -> tuple[LinearPlan, np.ndarray] | None:
-    registers = plan.recipe.values(inputs)
-    return None if registers is None else (plan, registers)
+def _with_values(template: MatrixTemplate, inputs: np.ndarray) -> tuple[MatrixTemplate, np.ndarray] | None:
+    registers = template.recipe.values(inputs)
+    return None if registers is None else (template, registers)
 
 
-def _that_holds(plans: Iterable[LinearPlan], inputs: np.ndarray) -> tuple[LinearPlan, np.ndarray] | None:
-    """Return the first plan that holds at these inputs, and its registers there."""
-    return next((found for plan in plans if (found := _with_values(plan, inputs)) is not None), None)
+def _that_holds(
+    templates: Iterable[MatrixTemplate], inputs: np.ndarray
+) -> tuple[MatrixTemplate, np.ndarray] | None:
+    """Return the first template that holds at these inputs, and its registers there."""
+    return next(
+        (found for template in templates if (found := _with_values(template, inputs)) is not None), None
+    )
 
 
-def _begun(kept: dict[bytes, list[LinearPlan]], met: np.ndarray, inputs: np.ndarray) -> LinearPlan | None:
-    """Return the plan of as many leading vectors as possible; a run's vectors grow by a few at the end, many times."""
+def _begun(
+    cached: dict[bytes, list[MatrixTemplate]], met: np.ndarray, inputs: np.ndarray
+) -> MatrixTemplate | None:
+    """Return the template of as many leading vectors as possible, as a run's vectors grow by a few at the end."""
     whole = met.tobytes()
-    for key in sorted((key for key in kept if whole.startswith(key)), key=len, reverse=True):
-        found = _that_holds(kept[key], inputs)
+    for key in sorted((key for key in cached if whole.startswith(key)), key=len, reverse=True):
+        found = _that_holds(cached[key], inputs)
         if found is not None:
             return found[0]
     return None

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.linear.small_entries import with_faint_rows
+from hybridsim.engine.linear.small_entries import with_small_rows
 from hybridsim.engine.native.kernels import kernel
 
 _CONDITION = 1e2  # largest condition of the basis: factor of rounding errors in a change of basis
@@ -202,7 +202,7 @@ def _by_blocks(
     else:
         blocks = [found(c) for c in clusters]
     while not _condition(clusters, blocks) <= _CONDITION and not (len(clusters) == 1 and clusters[0].folded):
-        clusters = _merged(clusters, values)
+        clusters = _combined(clusters, values)
         blocks = [found(c) for c in clusters]
     return _joined(balanced, clusters, blocks, scale)
 
@@ -290,7 +290,7 @@ def _condition(clusters: list[_Cluster], blocks: list[_Block]) -> float:
     return float(np.linalg.cond(basis)) if basis.shape[0] == basis.shape[1] else np.inf
 
 
-def _merged(clusters: list[_Cluster], values: np.ndarray) -> list[_Cluster]:
+def _combined(clusters: list[_Cluster], values: np.ndarray) -> list[_Cluster]:
     """Merge the two closest clusters into one, or fold one that is closest to its own conjugate."""
     best, pair = np.inf, (0, 0)
     for i, a in enumerate(clusters):
@@ -336,11 +336,11 @@ def _block(A: np.ndarray, cluster: _Cluster, values: np.ndarray, partners: list[
 def _joined(A: np.ndarray, clusters: list[_Cluster], blocks: list[_Block], scale: np.ndarray) -> Modal:
     """Return all blocks as arrays, one for each conjugate pair."""
     inverse = np.linalg.inv(_columns(clusters, blocks))
-    kept = sum(len(b.triangular) for b in blocks)
-    values, ends = np.empty(kept, dtype=complex), np.empty(kept, dtype=np.int64)
-    upper = np.zeros((kept, kept), dtype=complex)
-    basis, rows = np.empty((len(scale), kept), dtype=complex), np.empty((kept, len(scale)), dtype=complex)
-    growth, speeds = np.empty(kept), np.empty(kept)
+    width = sum(len(b.triangular) for b in blocks)
+    values, ends = np.empty(width, dtype=complex), np.empty(width, dtype=np.int64)
+    upper = np.zeros((width, width), dtype=complex)
+    basis, rows = np.empty((len(scale), width), dtype=complex), np.empty((width, len(scale)), dtype=complex)
+    growth, speeds = np.empty(width), np.empty(width)
     at = source = 0
     for cluster, (block, vectors, rotation) in zip(clusters, blocks, strict=True):
         size = len(block)
@@ -357,8 +357,8 @@ def _joined(A: np.ndarray, clusters: list[_Cluster], blocks: list[_Block], scale
         else:
             columns, own = 2.0 * columns, 0.5 * (own - 1j * inverse[source : source + size])
             source += size
-        basis[:, here] = with_faint_rows(A, columns, block)
-        rows[here] = with_faint_rows(A.T, own.T, block.T).T
+        basis[:, here] = with_small_rows(A, columns, block)
+        rows[here] = with_small_rows(A.T, own.T, block.T).T
         growth[here] = np.linalg.eigvalsh(0.5 * (block + block.conj().T)).max()
         speeds[here] = np.linalg.norm(block, 2)
         at += size

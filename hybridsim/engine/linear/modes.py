@@ -13,7 +13,7 @@ from hybridsim.engine.system.system import System
 from hybridsim.errors import UsageError
 from hybridsim.model.toml.automata import SINGLE
 
-_KEPT = 64  # most cached answers per structure, one for each set of parameter values
+_MAX_CACHED = 64  # most cached answers per structure, one for each set of parameter values
 
 
 class LinearMode:
@@ -138,7 +138,7 @@ def what_is_not_linear(system: System) -> str | None:
     reason = known.get(values, "")
     if reason == "":  # not known yet
         reason = _first_reason(system, values)
-        if len(known) >= _KEPT:
+        if len(known) >= _MAX_CACHED:
             known.clear()
         known[values] = reason
     return reason
@@ -183,7 +183,7 @@ def is_linear_beside_corners(system: System) -> bool:
     known: dict[tuple[float, ...] | None, bool] = system.code.shared("is linear beside corners", dict)
     for p in (None, tuple(system.values.values())):
         if p not in known:
-            if len(known) >= _KEPT:
+            if len(known) >= _MAX_CACHED:
                 known.clear()
             known[p] = _is_linear_beside_corners(system, p)
         if known[p]:

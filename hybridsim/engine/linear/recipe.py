@@ -51,9 +51,11 @@ class Numbers:
 
     def operation(self, op: int, values: Sequence[float], b: int = 0, c: int = 0) -> tuple[Traced, Traced]:
         """Record an operation of the tape on numbers; b and c are flags if there is one operand."""
-        places, out = [self.place(value) for value in values], len(self.values)
-        self.rows.append((op, places[0], places[1] if len(places) > 1 else b, c, out))
-        self.values += computed(op, [self.values[i] for i in places], b, c)
+        operand_registers, out = [self.place(value) for value in values], len(self.values)
+        self.rows.append(
+            (op, operand_registers[0], operand_registers[1] if len(operand_registers) > 1 else b, c, out)
+        )
+        self.values += computed(op, [self.values[i] for i in operand_registers], b, c)
         return Traced(self.values[out], self, out), Traced(self.values[out + 1], self, out + 1)
 
     def equal(self, a: float, b: float) -> bool:

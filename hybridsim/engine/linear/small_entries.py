@@ -9,24 +9,24 @@ from __future__ import annotations
 
 import numpy as np
 
-_FAINT = 2.0**-10  # size of a small row relative to the largest row
+_SMALL = 2.0**-10  # size of a small row relative to the largest row
 _CLOSE = 1e-14  # largest change of a row relative to the largest row; a larger change is not rounding
 
 
-def with_faint_rows(A: np.ndarray, V: np.ndarray, T: np.ndarray) -> np.ndarray:
+def with_small_rows(A: np.ndarray, V: np.ndarray, T: np.ndarray) -> np.ndarray:
     """Correct the small rows of V (m, k) in A V = V T by A_ff V_f - V_f T = -A_fc V_c, recursively."""
     V, sizes = V.astype(complex), np.abs(V).max(axis=1, initial=0.0)
     largest = sizes.max(initial=0.0)
-    faint = sizes < _FAINT * largest
-    while faint.any():
-        rows, others = np.flatnonzero(faint)[:, None], np.flatnonzero(~faint)
+    small = sizes < _SMALL * largest
+    while small.any():
+        rows, others = np.flatnonzero(small)[:, None], np.flatnonzero(~small)
         known = A[rows, others] @ V[others]
         found = _solved(A[rows, rows.T], T, known) if known.any() else np.zeros_like(known)
-        if not (np.abs(found - V[faint]) <= _CLOSE * largest).all():
+        if not (np.abs(found - V[small]) <= _CLOSE * largest).all():
             break
-        V[faint] = found
+        V[small] = found
         sizes = np.abs(found).max(axis=1)
-        faint[rows[sizes >= _FAINT * sizes.max(), 0]] = False
+        small[rows[sizes >= _SMALL * sizes.max(), 0]] = False
         if not sizes.any():
             break
     return V

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.linear.guards import guard_series, modal_guards
-from hybridsim.engine.linear.matrix_template import plan_of
+from hybridsim.engine.linear.matrix_template import template_of
 from hybridsim.engine.linear.modal import modals
 from hybridsim.engine.native.constants import BOUND_TERMS
 from hybridsim.engine.native.simd_products import LANES, panels_of, rows_of
@@ -24,7 +24,7 @@ _PARTING = 2.0  # exponent by which coordinates of one block may grow apart
 # In units of the fastest rate: within this time of its start, a state that grows from zero is lost to cancellation in
 # modal coordinates, and the first terms of its series suffice.
 _NEAR, _SLOWEST = 0.125, 1e-300
-_KEPT = 64  # most tables per structure, one for each set of parameter values
+_MAX_CACHED = 64  # most tables per structure, one for each set of parameter values
 _MOST_BYTES = 1 << 28  # most bytes of all these tables except the last
 
 
@@ -111,7 +111,7 @@ class _Rows:
             rows = self
             if self.count != first or count > len(self._fields["counts"]):
                 rows = _Rows(
-                    {name: _with_room(field[:first], 2 * count) for name, field in self._fields.items()}
+                    {name: _extended(field[:first], 2 * count) for name, field in self._fields.items()}
                 )
             for name, field in rows._fields.items():
                 field[first:count] = new[name]
@@ -119,7 +119,7 @@ class _Rows:
         return rows
 
 
-def _with_room(field: np.ndarray, count: int) -> np.ndarray:
+def _extended(field: np.ndarray, count: int) -> np.ndarray:
     larger = np.zeros((count, *field.shape[1:]), dtype=field.dtype)
     larger[: len(field)] = field
     return larger
@@ -142,15 +142,15 @@ def linear_tables(
     begun: tables of the first of these vectors, which are reused as far as they agree. Return None if each
     mode has a rate or a guard with a coefficient that is not finite, or is too large to be squared.
     """
-    plan, registers = plan_of(system, met, p)
-    A, guards = plan.matrices(registers)
+    template, registers = template_of(system, met, p)
+    A, guards = template.matrices(registers)
     is_finite = leave_out(A, guards, system.n)
     if not is_finite.any():
         return None
     rows = None if begun is None else _gone_on_with(begun, A, guards, is_finite, system.n, horizon)
     rows = rows or _Rows(unknown(of_matrices(A, guards, system.n, horizon), is_finite))
     tables: LinearTables = packed(
-        LinearTables(**plan.atoms(registers), phases=angles_of(system), **rows.first(len(met)))
+        LinearTables(**template.atoms(registers), phases=angles_of(system), **rows.first(len(met)))
     )
     return Made(tables, A, guards, rows)
 
@@ -305,19 +305,19 @@ def _scratch(system: System, tables: LinearTables) -> deque[Any]:
 def _made(
     system: System, modes: np.ndarray, p: np.ndarray, horizon: float, begun: Made | None
 ) -> Made | None:
-    kept: dict[bytes, Made] = system.code.shared("linear", dict)
+    cached: dict[bytes, Made] = system.code.shared("linear", dict)
     key = p[: system.layout.parameters].tobytes() + modes.tobytes() + np.float64(horizon).tobytes()
-    found = kept.get(key)
+    found = cached.get(key)
     if found is None:
         found = linear_tables(system, modes, p, horizon, begun)
         if found is None:
             return None
         with _lock:
-            for other in [other for other, made in kept.items() if made is begun]:
-                del kept[other]  # tables of fewer modes at the same values
-            kept[key] = found
-            while len(kept) > _KEPT or (
-                len(kept) > 1 and sum(made.rows.size for made in kept.values()) > _MOST_BYTES
+            for other in [other for other, made in cached.items() if made is begun]:
+                del cached[other]  # tables of fewer modes at the same values
+            cached[key] = found
+            while len(cached) > _MAX_CACHED or (
+                len(cached) > 1 and sum(made.rows.size for made in cached.values()) > _MOST_BYTES
             ):
-                del kept[next(iter(kept))]
+                del cached[next(iter(cached))]
     return found

@@ -9,11 +9,11 @@ from typing import Any
 
 from hybridsim.engine.lowering.impulse_rows import gap_slopes, impulses, restitutions, speed_name
 from hybridsim.engine.lowering.lower import Lowering, Program
-from hybridsim.engine.lowering.program import Assign, Item, Switch, needed
+from hybridsim.engine.lowering.program import Assign, Item, Switch, items_for
 from hybridsim.engine.lowering.program_names import user
 from hybridsim.engine.lowering.reset_keys import added, amounts_of, is_added
 from hybridsim.engine.lowering.stepped_rows import stepped
-from hybridsim.engine.lowering.stop_coupling import told
+from hybridsim.engine.lowering.stop_coupling import reported_forces
 from hybridsim.engine.series.layout import SIGNAL_SLOTS
 from hybridsim.engine.series.tape import TapeBuilder
 from hybridsim.expr import parse
@@ -145,7 +145,7 @@ class Emitter:
     def quantities(self) -> list[tuple[str, Any]]:
         """Return every named quantity that is not a state: inputs, definitions, mode variables and outputs."""
         model, lowering = self.program.model, self.lowering
-        forces = told(lowering, lowering.ties)
+        forces = reported_forces(lowering, lowering.stop_couplings)
         result: dict[str, Any] = {i.name: user(i.name) for i in model.inputs}
         result |= {n: user(n) for n, _ in model.definitions}
         for component in self.program.components:
@@ -171,7 +171,7 @@ class Emitter:
         names: set[str] = set()
         for e in expressions:
             names |= {e} if isinstance(e, str) else {s.name for s in e.free_symbols}
-        items = needed(self.program.items, names)
+        items = items_for(self.program.items, names)
         lines: list[str] = []
         for item in items:
             lines += self._item(item)
@@ -220,7 +220,7 @@ class Emitter:
         program, n = self.program, len(self.program.model.states)
         lines = ["def tangent(t, x, p, z, out):"]
         moving = {f"raw_{i}": f"x[{n + i}]" for i in range(n)}
-        for item in needed(program.items, program.derivatives):
+        for item in items_for(program.items, program.derivatives):
             lines += self._item(item)
             branches = item.branches if isinstance(item, Switch) else ((item,),)
             changes = [self._changes(branch, moving) for branch in branches]
@@ -321,7 +321,7 @@ class Emitter:
             "pins": program.pins,
             "projected": program.projected,
             "clusters": tuple(tuple(g) for g in program.clusters),
-            "ties": tuple((tie.gap, tie.along, tie.is_one) for tie in program.ties),
+            "stop_couplings": tuple((tie.gap, tie.along, tie.is_one) for tie in program.stop_couplings),
             "rates": len(program.rates),
             "linear": program.linear,
             "quantities": tuple(n for n, _ in self.quantities()),
@@ -336,7 +336,7 @@ class Emitter:
         builder = TapeBuilder(self._fixed())
         shared: dict[Any, int] = {}
         parts: list[Any] = []
-        for item in needed(program.items, names):
+        for item in items_for(program.items, names):
             if isinstance(item, Assign):
                 parts.append((-1, (tuple(builder.rows([(item.name, item.expression)], shared)),)))
             else:

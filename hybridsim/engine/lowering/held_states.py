@@ -158,7 +158,7 @@ class HeldStates:
     def _may_share(self, one: Held, other: Held) -> bool:
         """Return whether two constraints never hold together or are equal: a gap's rate and a contact along it."""
         rates = {one, other}
-        tied = any(rates == {(tie.gap, 1), (tie.along, 0)} for tie in self.lowering.ties)
+        tied = any(rates == {(tie.gap, 1), (tie.along, 0)} for tie in self.lowering.stop_couplings)
         return tied or self._exclude(one[0], other[0])
 
     def _exclude(self, c: int, d: int) -> bool:

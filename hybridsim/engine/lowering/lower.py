@@ -15,8 +15,8 @@ from hybridsim.engine.lowering.products import Products
 from hybridsim.engine.lowering.program import Assign, Item, Switch, changed, ordered
 from hybridsim.engine.lowering.program_names import declared_name, user
 from hybridsim.engine.lowering.second_order import Partner, attraction, partners
-from hybridsim.engine.lowering.shared_rates import kept_rates, refuse_changed_rates
-from hybridsim.engine.lowering.stop_coupling import Tie, help_of_ties, ties, without_share
+from hybridsim.engine.lowering.shared_rates import refuse_changed_rates, shared_rates
+from hybridsim.engine.lowering.stop_coupling import StopCoupling, coupling_help, stop_couplings, without_share
 from hybridsim.engine.series.layout import SIGNAL_SLOTS, Layout
 from hybridsim.errors import ModelError, Place
 from hybridsim.expr.simplify import is_short, simplified, written_out
@@ -41,7 +41,7 @@ class Program:
     projected: dict[int, tuple[int, ...]]  # component -> indices of the states that its holding mode projects
     rates: list[Any]  # SymPy, parameters only
     clusters: list[list[int]]  # surface components whose unknowns act on each other's surface
-    ties: list[Tie]  # gaps with friction contacts along them
+    stop_couplings: list[StopCoupling]  # gaps with friction contacts along them
     jumps: list[tuple[int, Any, Any]]  # (component, jump above, jump below)
     linear: dict[str, tuple[bool, ...]]  # component -> whether the flow is linear in the states, by mode
     conditions: dict[tuple[int, int, int], tuple[Any, ...]] = field(default_factory=dict)
@@ -82,7 +82,7 @@ class Lowering:
         # components whose unknown does not act on the rate of their surface
         self.never_held: set[int] = set()
         self.partners: dict[int, Partner] = {}  # relays that the surface of their rate holds
-        self.ties: list[Tie] = []
+        self.stop_couplings: list[StopCoupling] = []
         self.effect: dict[tuple[int, int], Any] = {}  # effect of unknowns on the rates of held quantities
         self.angles = self._defined_angles()
 
@@ -166,7 +166,7 @@ class Lowering:
         }
         self._check_surfaces(surfaces)
         gap_rates = self._gap_rates(surfaces, der, definitions | signals)
-        self.ties = ties(self, surfaces, gap_rates)
+        self.stop_couplings = stop_couplings(self, surfaces, gap_rates)
         unknown_items, clusters = self._unknowns(surfaces | gap_rates, der, definitions)
         constraints = {(c, 0): s for c, s in surfaces.items() if c not in self.never_held}
         held = HeldStates(self, constraints | {(c, 1): rate for c, rate in gap_rates.items()})
@@ -190,7 +190,7 @@ class Lowering:
             held.by_component(held.projected),
             self.rates,
             clusters,
-            self.ties,
+            self.stop_couplings,
             [self._jump(c) for c in surfaces],
             affine_modes(self, der, definitions, surfaces),
             conditions,
@@ -373,7 +373,7 @@ class Lowering:
         matrix: dict[tuple[int, int], Any] = {}
         right: dict[int, Any] = {}
         for c in cluster:
-            given = {unknown[d]: 0 for d in cluster if (c, d) in loads}
+            zero_unknowns = {unknown[d]: 0 for d in cluster if (c, d) in loads}
             partner = self.partners.get(c)
             for d in cluster:
                 by_mode = loads.get((c, d), {})
@@ -385,14 +385,16 @@ class Lowering:
                 off = {m.name: -by_mode.get(m.name, sp.Integer(0)) for m in self.components[c].modes}
                 off = dict.fromkeys(off, sp.Integer(1)) if c == d else off
                 held = off[self.components[c].surface.hold] if c in self.never_held else entry
-                more, held = without_share(self, self.ties, c, d, held, sp.Integer(1 if c == d else 0))
+                more, held = without_share(
+                    self, self.stop_couplings, c, d, held, sp.Integer(1 if c == d else 0)
+                )
                 items += more
                 items.append(branches(c, name, held, off))
                 matrix[c, d] = sp.Symbol(name, real=True)
             hold = sp.Integer(0) if c in self.never_held or partner else -rate[c]
-            more, hold = without_share(self, self.ties, c, -1, hold, sp.Integer(0))
+            more, hold = without_share(self, self.stop_couplings, c, -1, hold, sp.Integer(0))
             items += more
-            items.append(branches(c, f"right_{c}", hold, without=given))
+            items.append(branches(c, f"right_{c}", hold, without=zero_unknowns))
             right[c] = sp.Symbol(f"right_{c}", real=True)
         return items + eliminated(cluster, unknown, matrix, right)
 
@@ -419,11 +421,11 @@ class Lowering:
         names = [f"d_{i}" for i in range(len(der))]
         for i, (name, e) in enumerate(zip(names, der, strict=True)):
             state = self.model.states[i].name
-            for c, rate in kept_rates(self, i, der, held):
-                component, kept = self.components[c], self.sp.Symbol(f"kept_{c}", real=True)
+            for c, rate in shared_rates(self, i, der, held):
+                component, replacement = self.components[c], self.sp.Symbol(f"kept_{c}", real=True)
                 branches = [rate if m.name == component.surface.hold else e for m in component.modes]
-                items.append(Switch(c, tuple((Assign(kept.name, value),) for value in branches)))
-                e = kept
+                items.append(Switch(c, tuple((Assign(replacement.name, value),) for value in branches)))
+                e = replacement
             overriding = [
                 c for c, comp in enumerate(self.components) if any(state in m.der for m in comp.modes)
             ]
@@ -457,7 +459,7 @@ class Lowering:
         conditions: dict[tuple[int, int, int], tuple[Any, ...]] = {}
         for c, component in enumerate(self.components):
             widest = max(len(m.guards) for m in component.modes)
-            helping, most = help_of_ties(self, self.ties, c, self.effect)
+            helping, most = coupling_help(self, self.stop_couplings, c, self.effect)
             items += helping
             for g in range(widest):
                 branches = []

@@ -45,20 +45,21 @@ class Products:
         slopes = {d: slope.free_symbols & self.number.keys() for d, slope in row.items() if d not in known}
         free = set().union(*slopes.values()) - {self.unknown[d] for d in known}
         self.pairs |= {(d, self.number[u]) for d, factors in slopes.items() for u in factors & free}
-        given = {u: self._given(self.number[u]) for u in free}
+        values_by_mode = {u: self._value_by_mode(self.number[u]) for u in free}
         effects = {
-            d: self.lowering.sp.Integer(0) if d in known else slope.subs(given) for d, slope in row.items()
+            d: self.lowering.sp.Integer(0) if d in known else slope.subs(values_by_mode)
+            for d, slope in row.items()
         }
         zero = {u: 0 for d, u in self.unknown.items() if d not in known}
-        rest = totals[c].subs(given).subs(zero)
-        return effects, rest - sum(value * effects[self.number[u]] for u, value in given.items())
+        rest = totals[c].subs(values_by_mode).subs(zero)
+        return effects, rest - sum(value * effects[self.number[u]] for u, value in values_by_mode.items())
 
     def items(self) -> list[Item]:
         """Return items for the values that modes give to unknowns, and for whether the modes hold."""
         found: list[Item] = []
         for d in sorted({d for pair in self.pairs for d in pair}):
             component = self.lowering.components[d]
-            found.append(self.lowering.in_modes(d, self._given(d).name, self.lowering.sp.Integer(0)))
+            found.append(self.lowering.in_modes(d, self._value_by_mode(d).name, self.lowering.sp.Integer(0)))
             holds = [self.lowering.sp.Integer(m.name == component.surface.hold) for m in component.modes]
             found.append(Switch(d, tuple((Assign(self._holds(d).name, value),) for value in holds)))
         return found
@@ -76,7 +77,7 @@ class Products:
             for d in sorted({e for p in self.pairs if c in p for e in p} - {c})
         )
 
-    def _given(self, d: int) -> Any:
+    def _value_by_mode(self, d: int) -> Any:
         return self.lowering.sp.Symbol(f"given_{d}", real=True)
 
     def _holds(self, d: int) -> Any:

@@ -65,27 +65,27 @@ def ordered(items: Iterable[Item]) -> list[Item]:
             pending[name] = pending.get(name, 0) + 1
     result: list[Item] = []
     while waiting:
-        ready = [i for i in waiting if not any(pending.get(n, 0) for n in used(i))]
-        if not ready:
+        independent = [i for i in waiting if not any(pending.get(n, 0) for n in used(i))]
+        if not independent:
             loop = sorted({n.removeprefix("v_") for i in waiting for n in assigned(i)})
             raise ModelError(
                 f"the quantities {', '.join(loop)} depend on each other in a circle",
                 remedy="write one of them without the others, or make it a state",
             )
-        for item in ready:
+        for item in independent:
             waiting.remove(item)
             for name in assigned(item):
                 pending[name] -= 1
-        result += ready
+        result += independent
     return result
 
 
-def needed(items: list[Item], names: Iterable[str]) -> list[Item]:
+def items_for(items: list[Item], names: Iterable[str]) -> list[Item]:
     """Return the items, in order, on which the given names depend."""
-    wanted = set(names)
-    kept: list[Item] = []
+    open_names = set(names)
+    selected: list[Item] = []
     for item in reversed(items):
-        if assigned(item) & wanted:
-            kept.append(item)
-            wanted |= used(item)
-    return kept[::-1]
+        if assigned(item) & open_names:
+            selected.append(item)
+            open_names |= used(item)
+    return selected[::-1]

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hybridsim.engine.lowering.lower import Lowering
 
 
-def kept_rates(lowering: Lowering, i: int, der: list[Any], held: HeldStates) -> Iterator[tuple[int, Any]]:
+def shared_rates(lowering: Lowering, i: int, der: list[Any], held: HeldStates) -> Iterator[tuple[int, Any]]:
     """Yield the relays that determine the rate of a state while they slide, each with the rate.
 
     The relay's held state must be evaluated from its surface and must be another state. Of the rates in ds/dt

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from hybridsim.engine.lowering.lower import Lowering
 
 
-class Tie(NamedTuple):
+class StopCoupling(NamedTuple):
     """A gap of a unilateral contact and a friction contact along it, given by their component numbers."""
 
     gap: int
@@ -28,7 +28,9 @@ class Tie(NamedTuple):
     is_one: bool  # the rate of the gap is zero when the contact sticks
 
 
-def ties(lowering: Lowering, surfaces: dict[int, Any], gap_rates: dict[int, Any]) -> list[Tie]:
+def stop_couplings(
+    lowering: Lowering, surfaces: dict[int, Any], gap_rates: dict[int, Any]
+) -> list[StopCoupling]:
     """Return all pairs of a gap and a contact whose velocities are proportional."""
     sp, found = lowering.sp, []
     for p, rate in gap_rates.items():
@@ -43,12 +45,12 @@ def ties(lowering: Lowering, surfaces: dict[int, Any], gap_rates: dict[int, Any]
             (factor,) = factors
             if factor.is_Number and factor != 0:
                 apart = simplified(rate - factor * velocity)
-                found.append(Tie(p, c, factor, apart == 0))
+                found.append(StopCoupling(p, c, factor, apart == 0))
     return found
 
 
 def without_share(
-    lowering: Lowering, pairs: list[Tie], c: int, d: int, entry: Any, of_held: Any
+    lowering: Lowering, pairs: list[StopCoupling], c: int, d: int, entry: Any, of_held: Any
 ) -> tuple[list[Item], Any]:
     """Return items and name of the entry in the row of contact c: `of_held` while a gap along it is closed."""
     items: list[Item] = []
@@ -63,8 +65,8 @@ def without_share(
     return items, entry
 
 
-def help_of_ties(
-    lowering: Lowering, pairs: list[Tie], p: int, effect: dict[tuple[int, int], Any]
+def coupling_help(
+    lowering: Lowering, pairs: list[StopCoupling], p: int, effect: dict[tuple[int, int], Any]
 ) -> tuple[list[Item], Any]:
     """Return items and value of the force that sticking friction adds to the force at which a closed gap opens."""
     sp, total = lowering.sp, lowering.sp.Integer(0)
@@ -93,7 +95,7 @@ def help_of_ties(
     return items, total
 
 
-def told(lowering: Lowering, pairs: list[Tie]) -> dict[Any, Any]:
+def reported_forces(lowering: Lowering, pairs: list[StopCoupling]) -> dict[Any, Any]:
     """Return the forces to report, by name: a stop does not pull, so that a pull is reported as friction."""
     sp, found = lowering.sp, {}
     for tie in pairs:

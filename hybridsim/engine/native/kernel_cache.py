@@ -20,7 +20,7 @@ from numba.core.serialize import dumps
 from hybridsim.engine.native.cache import _PACKAGE, engine_key, kernel_folder, load_whole, store_whole
 
 
-def keep_on_disk(dispatcher: Any, function: Any) -> None:
+def cache_on_disk(dispatcher: Any, function: Any) -> None:
     """Make a compiled function of numba, or a callback for C, load its code from the cache and store it there."""
     folder = kernel_folder()
     if folder is not None:

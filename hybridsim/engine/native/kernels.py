@@ -45,8 +45,14 @@ if ENABLED:
     from numba.extending import intrinsic
     from numba.np.arrayobj import populate_array
 
-    from hybridsim.engine.native.kernel_cache import keep_on_disk
-    from hybridsim.engine.native.llvm import compile_text, definition_in, functions_in, machine_name, ready
+    from hybridsim.engine.native.kernel_cache import cache_on_disk
+    from hybridsim.engine.native.llvm import (
+        compile_text,
+        definition_in,
+        functions_in,
+        load_or_compile,
+        machine_name,
+    )
 
     _DOUBLES = types.CPointer(types.float64)
     _LONGS = types.CPointer(types.int64)
@@ -78,7 +84,7 @@ if ENABLED:
                     _set(_ours())
                     if so_far > _NOTICED:  # a part that no earlier run needed, such as derivatives
                         _tell(
-                            f"hybridsim: compiling the engine for a new task (once, 10 to 30 s); {_kept()} ..."
+                            f"hybridsim: compiling the engine for a new task (once, 10 to 30 s); {_cache_state()} ..."
                         )
                 return
             if of.depth == 0:
@@ -152,7 +158,7 @@ if ENABLED:
         references, and no value would stay in a register across them.
         """
         made = numba.njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)
-        keep_on_disk(made, function)
+        cache_on_disk(made, function)
         return made
 
     def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -182,8 +188,8 @@ if ENABLED:
     def compile_model_function(module: Any, name: str) -> tuple[Any, Any]:
         """Compile one function of a generated module; return its address and the object that keeps it alive."""
         path = getattr(module, "__file__", None)  # None for a module that exists only in memory
-        kept = None if path is None else _of_this_machine(Path(path).with_suffix(f".{name}"))
-        return compile_text(module.__loader__.get_source(module.__name__), name, kept)
+        stored = None if path is None else _of_this_machine(Path(path).with_suffix(f".{name}"))
+        return compile_text(module.__loader__.get_source(module.__name__), name, stored)
 
     def texts_to_compile(module: Any) -> list[str]:
         """Return the source of the functions of a generated module that have no cached machine code."""
@@ -191,21 +197,21 @@ if ENABLED:
         return [
             definition_in(text, name)
             for name in functions_in(text)
-            if path is None or not is_kept(Path(path).with_suffix(f".{name}"))
+            if path is None or not is_stored(Path(path).with_suffix(f".{name}"))
         ]
 
     def compile_series(
-        kept: Path | None, names: Sequence[str], written: Callable[[], str]
+        stored: Path | None, names: Sequence[str], written: Callable[[], str]
     ) -> tuple[list[int], Any]:
         """Return the addresses of series functions, for `call_series`, and the object that keeps them alive."""
-        return ready(None if kept is None else _of_this_machine(kept), names, written)
+        return load_or_compile(None if stored is None else _of_this_machine(stored), names, written)
 
-    def is_kept(kept: Path | None) -> bool:
+    def is_stored(stored: Path | None) -> bool:
         """Return whether the compiled series functions are cached."""
-        return kept is not None and _of_this_machine(kept).exists()
+        return stored is not None and _of_this_machine(stored).exists()
 
-    def _of_this_machine(kept: Path) -> Path:
-        return kept.with_name(f"{kept.name}.{machine_name()}.o")
+    def _of_this_machine(stored: Path) -> Path:
+        return stored.with_name(f"{stored.name}.{machine_name()}.o")
 
     @intrinsic
     def fused(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
@@ -252,7 +258,7 @@ if ENABLED:
             try:
                 options = {"error_model": "numpy", "_nrt": False}
                 made = CFunc(function, (key, types.int64), locals={}, options=options)
-                keep_on_disk(made, function)
+                cache_on_disk(made, function)
                 made.compile()
             finally:
                 _set(others)
@@ -361,12 +367,12 @@ else:
         return function
 
     def compile_series(
-        kept: Path | None, names: Sequence[str], written: Callable[[], str]
+        stored: Path | None, names: Sequence[str], written: Callable[[], str]
     ) -> tuple[list[int], Any]:
         """Raise an error: without a compiler this is never called."""
         raise NotImplementedError
 
-    def is_kept(kept: Path | None) -> bool:
+    def is_stored(stored: Path | None) -> bool:
         """Return False, because nothing is cached."""
         return False
 
@@ -440,7 +446,7 @@ def kernel_address(function: Callable[..., int], *given: Any) -> int:
     return _addresses[function, key]
 
 
-class Door:
+class Precompiled:
     """A kernel whose argument types are the same at every call, so that they are resolved only once.
 
     Resolving the types of packs takes longer than a short run.
@@ -464,17 +470,17 @@ def announce_compilation() -> None:
     folder = kernel_folder() if ENABLED else None
     if ENABLED and (folder is None or not (folder / "announced").exists()):
         store(folder and folder / "announced", b"")
-        _tell(f"hybridsim: compiling the engine (once, about 30 s per integrator); {_kept()} ...")
+        _tell(f"hybridsim: compiling the engine (once, about 30 s per integrator); {_cache_state()} ...")
 
 
-def _kept() -> str:
+def _cache_state() -> str:
     return "not cached" if kernel_folder() is None else f"cached in {cache_root()}"
 
 
-_told: set[str] = set()  # once per process
+_announced: set[str] = set()  # once per process
 
 
 def _tell(text: str) -> None:
-    if not _told:
-        _told.add(text)
+    if not _announced:
+        _announced.add(text)
         print(text, file=sys.stderr, flush=True)

@@ -42,7 +42,7 @@ class Translator(ast.NodeVisitor):
         self.builder = ir.IRBuilder(function.append_basic_block("entry"))
         names = [argument.arg for argument in definition.args.args]
         self.arrays = dict(zip(names[1:], function.args[1:], strict=True))
-        self.places: dict[str, Any] = {}
+        self.slots: dict[str, Any] = {}
         self.values = {names[0]: function.args[0]}
         self.entry = function.entry_basic_block
         for statement in definition.body:
@@ -67,11 +67,11 @@ class Translator(ast.NodeVisitor):
 
     def _place(self, target: Any) -> Any:
         """Return the stack slot of a variable; the optimiser moves it to a register."""
-        if target.id not in self.places:
+        if target.id not in self.slots:
             with self.builder.goto_block(self.entry):
                 self.builder.position_at_start(self.entry)
-                self.places[target.id] = self.builder.alloca(_DOUBLE)
-        return self.places[target.id]
+                self.slots[target.id] = self.builder.alloca(_DOUBLE)
+        return self.slots[target.id]
 
     def _branch(self, node: ast.If) -> None:
         builder = self.builder
@@ -115,7 +115,7 @@ class Translator(ast.NodeVisitor):
             return self.values[node.id]
         if node.id in _NAMED:
             return ir.Constant(_DOUBLE, _NAMED[node.id])
-        return self.builder.load(self.places[node.id])
+        return self.builder.load(self.slots[node.id])
 
     def _element(self, node: ast.Subscript) -> Any:
         index = self.visit(node.slice)
@@ -201,10 +201,10 @@ class Translator(ast.NodeVisitor):
             ends.append((value, builder.block))
             builder.branch(after)
         builder.position_at_end(after)
-        merged = builder.phi(_DOUBLE)
+        joined = builder.phi(_DOUBLE)
         for value, block in ends:
-            merged.add_incoming(value, block)
-        return merged
+            joined.add_incoming(value, block)
+        return joined
 
     def visit_Call(self, node: ast.Call) -> Any:
         """Translate a call of a mathematical function."""
@@ -249,25 +249,27 @@ def _machine() -> Any:
     )
 
 
-def compile_text(text: str, name: str, kept: Path | None) -> tuple[int, Any]:
+def compile_text(text: str, name: str, stored: Path | None) -> tuple[int, Any]:
     """Compile a function of a generated module from the module's text; return its address and the object to keep alive.
 
-    kept: path of its cached machine code, if any; written at the first compilation.
+    stored: path of its cached machine code, if any; written at the first compilation.
     """
-    addresses, engine = ready(kept, (name,), lambda: _translated(text, name))
+    addresses, engine = load_or_compile(stored, (name,), lambda: _translated(text, name))
     return addresses[0], engine
 
 
-def ready(kept: Path | None, names: Sequence[str], written: Callable[[], str]) -> tuple[list[int], Any]:
+def load_or_compile(
+    stored: Path | None, names: Sequence[str], written: Callable[[], str]
+) -> tuple[list[int], Any]:
     """Return the addresses of functions of an LLVM module and the object that keeps them alive.
 
-    kept: path of the cached machine code, if any. If the file does not exist, the text that `written` returns
+    stored: path of the cached machine code, if any. If the file does not exist, the text that `written` returns
     is compiled and stored.
     """
-    code = load_whole(kept)
+    code = load_whole(stored)
     if code is None:
         code = _compiled(written())
-        store_whole(kept, code)
+        store_whole(stored, code)
     _prepare()
     engine = binding.create_mcjit_compiler(binding.parse_assembly(""), _machine())
     engine.add_object_file(binding.ObjectFileRef.from_data(code))

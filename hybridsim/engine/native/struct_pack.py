@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.engine.native.buffer_pool import Lender
+from hybridsim.engine.native.buffer_pool import BufferPool
 from hybridsim.engine.native.kernels import ENABLED, kernel
 
 _WORDS = 6  # words per array in the table: its address and up to five lengths
 ALIGNED = 64  # bytes; suitable for numbers of any kind
 _LARGE, LARGEST = 1 << 18, 1 << 21  # bytes of blocks that go through a pool
-_RETURNED = 2  # first blocks that a sheet keeps for reuse
+_RETURNED = 2  # first blocks that a layout keeps for reuse
 _REST = [(0,) * (_WORDS - 1 - dimensions) for dimensions in range(_WORDS)]
 
 if ENABLED:
@@ -150,7 +150,7 @@ def packed(arrays: Any) -> Any:
 
 @kernel
 def _lay_out(words: Any, steps: Any, owners: Any, skipped: Any, blocks: Any, table: Any) -> int:
-    """Fill the table of arrays that lie in some blocks and return its address; see `Sheet`."""
+    """Fill the table of arrays that lie in some blocks and return its address; see `ArrayLayout`."""
     for k in range(words.shape[0]):
         for i in range(words.shape[1]):
             table[k, i] = words[k, i] + skipped[k] * steps[k, i]
@@ -164,7 +164,7 @@ def _whole_numbers(numbers: tuple[int, ...]) -> np.ndarray:
     return np.array(numbers, dtype=np.int64)
 
 
-class Sheet:
+class ArrayLayout:
     """A layout of arrays of rows that lie one behind the other in a few blocks of memory.
 
     Offsets are computed once; a new block is a single allocation, and packing all arrays takes a few
@@ -192,7 +192,7 @@ class Sheet:
             self._words[k, : 1 + len(shape)] = offset, *shape
             self._steps[k, :2] = row, -1
             self._sizes[block] += -(-row * shape[0] // ALIGNED) * ALIGNED
-        self._lenders = [Lender(size) if _LARGE <= size <= LARGEST else None for size in self._sizes]
+        self._pools = [BufferPool(size) if _LARGE <= size <= LARGEST else None for size in self._sizes]
         form = tuple((dtype.char, len(shape)) for shape, dtype, *_ in self._places)
         self._type: Any = _type_of_arrays(kind, form) if ENABLED else None
         self._returned: list[np.ndarray] = []
@@ -207,11 +207,11 @@ class Sheet:
         return first, *map(self._block, range(1, len(self._sizes)))
 
     def _block(self, k: int) -> np.ndarray:
-        lender = self._lenders[k]
-        return np.empty(self._sizes[k], dtype=np.uint8) if lender is None else lender.block()
+        pool = self._pools[k]
+        return np.empty(self._sizes[k], dtype=np.uint8) if pool is None else pool.block()
 
     def take_back(self, block: np.ndarray) -> None:
-        """Return an unused first block to the sheet, which uses it again for the next call."""
+        """Return an unused first block to the layout, which uses it again for the next call."""
         if len(self._returned) < _RETURNED:
             self._returned.append(block)
 

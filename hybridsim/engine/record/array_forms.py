@@ -34,11 +34,11 @@ def check_forms(
                 f"{title}: '{name}' has the type {array.dtype} and {array.ndim} dimensions, instead of {kind} and "
                 f"{len(lengths)}"
             )
-        for length, wanted in zip(array.shape, lengths, strict=True):
-            if isinstance(wanted, str):
-                size, _, more = wanted.partition("+")
-                wanted = known.setdefault(size, length - int(more or 0)) + int(more or 0)
-            if length != wanted:
+        for length, expected in zip(array.shape, lengths, strict=True):
+            if isinstance(expected, str):
+                size, _, more = expected.partition("+")
+                expected = known.setdefault(size, length - int(more or 0)) + int(more or 0)
+            if length != expected:
                 raise ValueError(f"{title}: '{name}' has the wrong shape {array.shape}")
     return known
 

@@ -20,7 +20,7 @@ _TAIL = 3  # last coefficients that must be negligible; one or two may be small 
 
 
 @dataclass(frozen=True)
-class ChebyshevPieces:
+class ChebyshevDense:
     """Dense output with one series per step: knots (m + 1,), coefficients (d, n) of each of the m steps."""
 
     knots: np.ndarray

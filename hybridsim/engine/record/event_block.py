@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.engine.native.kernels import Door, kernel
+from hybridsim.engine.native.kernels import Precompiled, kernel
 from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.system.instant import Instant
 
@@ -60,7 +60,7 @@ def _states_at(states: Any, places: Any, first: int, component: int, side: int, 
     return count
 
 
-_take_part, _times_of_one = Door(_taking_part), Door(_times_at)
+_take_part, _times_of_one = Precompiled(_taking_part), Precompiled(_times_at)
 
 
 class EventBlock(Sequence[Occurrence]):

@@ -86,8 +86,8 @@ class StepSegments(Sequence[Segment]):
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
         """Return states (k, n) in the segments of these numbers, at local times (k,)."""
-        wanted, place = np.unique(index, return_inverse=True)
-        return SegmentList(self._system, (self[i] for i in wanted.tolist())).states(place, s)
+        distinct, place = np.unique(index, return_inverse=True)
+        return SegmentList(self._system, (self[i] for i in distinct.tolist())).states(place, s)
 
     def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return numbers of segments, local times and states of all steps; a row between two segments occurs twice."""

@@ -36,7 +36,7 @@ class Segment:
 
 
 @dataclass(frozen=True)
-class Pieces:
+class PiecewiseDense:
     """Dense output with one interpolant for each step."""
 
     knots: np.ndarray

@@ -18,7 +18,7 @@ from hybridsim.engine.system.system import System
 
 
 @dataclass(frozen=True)
-class SeriesPieces:
+class SeriesDense:
     """Dense output with one Taylor series per step: knots (m + 1,), coefficients (m, n, order + 1)."""
 
     knots: np.ndarray
@@ -185,7 +185,7 @@ class SeriesBlock(Sequence[Segment]):
         s, *_ = self.steps_of(i)
         x = one.states(np.zeros(len(s), dtype=np.int64), s)
         high, low = self.origins[i].tolist()
-        dense = SeriesPieces(s, one.polynomials)
+        dense = SeriesDense(s, one.polynomials)
         return Segment(Instant(high, low), self.modes[i], self.vectors[i], s, x, dense)
 
     def _alone(self, i: int) -> SeriesBlock:

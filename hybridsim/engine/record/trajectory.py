@@ -17,7 +17,7 @@ from hybridsim.engine.record.checkpoint import Checkpoint
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.limits import UNLIMITED, Limits
 from hybridsim.engine.record.retention import ALL, Retention
-from hybridsim.engine.record.segments import Occurrence, Pieces, Segment, end_point
+from hybridsim.engine.record.segments import Occurrence, PiecewiseDense, Segment, end_point
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
 
@@ -26,7 +26,7 @@ LOOKED_BACK_ON = 4096
 
 Made = Callable[[int, int], Checkpoint]  # (segments, events recorded since) -> checkpoint
 
-__all__ = ["LOOKED_BACK_ON", "Occurrence", "Pieces", "Segment", "Task", "Trajectory"]
+__all__ = ["LOOKED_BACK_ON", "Occurrence", "PiecewiseDense", "Segment", "Task", "Trajectory"]
 
 
 class Trajectory:

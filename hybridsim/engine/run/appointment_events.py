@@ -19,7 +19,7 @@ from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
 
 
-def on_new_pieces(
+def events_before_appointment(
     system: System, instant: Instant, found: Located, schedules: tuple[int, ...], forward: bool
 ) -> Located:
     """Return the located event at an appointment, restricted to what is resolved before the appointment.
@@ -28,7 +28,7 @@ def on_new_pieces(
     while conditions and resets read the inputs before a jump. A load at zero waits for schedules that are due.
     """
     if schedules:
-        waiting = _loads_at_zero(system, found)
+        waiting = _ending_components(system, found)
         fired = {g: n for g, n in found.fired.items() if system.owner[g] not in waiting}
         found = replace(found, fired=fired, waiting=waiting)
     if not system.signals:
@@ -54,7 +54,7 @@ def on_new_pieces(
     return replace(found, at=at, fired=fired, inputs=before)
 
 
-def _loads_at_zero(system: System, found: Located) -> frozenset[int]:
+def _ending_components(system: System, found: Located) -> frozenset[int]:
     """Return the components with a located guard that would end the run."""
     modes = zip(system.automata, found.at.z.tolist())
     ends = [

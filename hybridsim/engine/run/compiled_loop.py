@@ -17,8 +17,8 @@ from hybridsim.engine.events.compiled.scratch import functions_of, work_space
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.events.zeno.accumulation import MOST, leads_nowhere
 from hybridsim.engine.linear.tables import no_tables
-from hybridsim.engine.native.kernels import Door
-from hybridsim.engine.native.struct_pack import ALIGNED, LARGEST, Sheet, packed
+from hybridsim.engine.native.kernels import Precompiled
+from hybridsim.engine.native.struct_pack import ALIGNED, LARGEST, ArrayLayout, packed
 from hybridsim.engine.record.blocks import SegmentBlock
 from hybridsim.engine.record.checkpoint import damaged
 from hybridsim.engine.record.counters import Counters
@@ -148,17 +148,17 @@ class CompiledLoopBase(ABC):
     def _renew(self) -> None:
         """Allocate new arrays to write to; committed blocks keep the former ones."""
         self.used = (0, 0)  # used rows of steps, and of segments
-        self.sheet = self._sheet()
+        self.array_layout = self._array_layout()
         self.memory: tuple[np.ndarray, ...] | None = (
-            None  # memory with the layout of the sheet, allocated on first use
+            None  # memory with the layout of the record, allocated on first use
         )
 
-    def _sheet(self) -> Sheet:
+    def _array_layout(self) -> ArrayLayout:
         """Return the layout of the arrays that the kernel writes; the trajectory keeps events longer than steps."""
         system, steps, columns = self.system, self.steps, self.columns
 
-        def made() -> Sheet:
-            return Sheet(
+        def made() -> ArrayLayout:
+            return ArrayLayout(
                 Record,
                 (
                     (float, (steps, 2), 0),
@@ -173,8 +173,8 @@ class CompiledLoopBase(ABC):
                 ),
             )
 
-        sheet: Sheet = system.code.shared(f"sheet for {steps} steps of {columns} columns", made)
-        return sheet
+        array_layout: ArrayLayout = system.code.shared(f"record of {steps} steps of {columns} columns", made)
+        return array_layout
 
     @property
     def place(self) -> tuple[np.ndarray, ...]:
@@ -230,7 +230,7 @@ class CompiledLoopBase(ABC):
         first_step, first = self.used
         return KernelRun(
             self.system,
-            self.sheet,
+            self.array_layout,
             self.memory,
             first,
             code,
@@ -288,8 +288,8 @@ class CompiledLoopBase(ABC):
         """Return the rows that the next call writes."""
         steps, first = self.used
         if self.memory is None:
-            self.memory = self.sheet.blank()
-        return self.sheet.packed(self.memory, (steps, steps, first + 1, *(first,) * 5))
+            self.memory = self.array_layout.blank()
+        return self.array_layout.packed(self.memory, (steps, steps, first + 1, *(first,) * 5))
 
     def segments_of(self, kernel_run: KernelRun) -> SegmentBlock:
         """Return the segments of a call that has some and has not released them."""
@@ -321,7 +321,7 @@ class CompiledLoopBase(ABC):
             record.occurrences.add(kernel_run.event_block)
 
 
-_leap = Door(leap)
+_leap = Precompiled(leap)
 
 
 class TaylorLoop(CompiledLoopBase):

@@ -96,12 +96,12 @@ class Headway:
         """Count a step in Python, and judge the pace after each window."""
         self._in_python += 1
         if self._in_python * _STEP >= _WINDOW:
-            self._judge(now, run)
+            self._check_pace(now, run)
 
     def check_compiled(self, now: Instant) -> None:
         """Judge the pace after steps in compiled code."""
         if self._spent() >= _WINDOW:
-            self._judge(now, None)
+            self._check_pace(now, None)
 
     def is_sooner(self, now: Instant, h: float, compiled: bool) -> bool:
         """Return whether steps of length h to the end would take longer than a stiff method."""
@@ -112,7 +112,7 @@ class Headway:
         events = self.counters.events - self._events
         return cost(self._in_python, compiled, events)
 
-    def _judge(self, now: Instant, run: SegmentRun | None) -> None:
+    def _check_pace(self, now: Instant, run: SegmentRun | None) -> None:
         spent, before = self._spent(), self._since
         has_events = (self.counters.events - self._events) * _EVENT > 0.5 * spent
         pace, left = abs(now.minus(before)) / spent, abs(self.end.minus(now))

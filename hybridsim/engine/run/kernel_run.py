@@ -15,7 +15,7 @@ from hybridsim.engine.system.instant import Instant
 
 if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Outcome
-    from hybridsim.engine.native.struct_pack import Sheet
+    from hybridsim.engine.native.struct_pack import ArrayLayout
     from hybridsim.engine.record.counters import Counters
     from hybridsim.engine.run.call_arrays import StateBuffer
     from hybridsim.engine.system.system import System
@@ -27,7 +27,7 @@ class KernelRun:
 
     Parameters
     ----------
-    sheet, memory : layout of the record, and its two blocks of memory, for segments and for events. The block of
+    array_layout, memory : layout of the record, and its two blocks of memory, for segments and for events. The block of
     segments
         is None after they are released. The call wrote from row `first` on.
     code, steps, count : return values of the kernel: why it ended, and the numbers of steps and segments.
@@ -39,7 +39,7 @@ class KernelRun:
     """
 
     system: System
-    sheet: Sheet
+    array_layout: ArrayLayout
     memory: tuple[np.ndarray, ...] | None
     first: int
     code: int
@@ -54,7 +54,7 @@ class KernelRun:
 
     def __post_init__(self) -> None:
         assert self.memory is not None
-        self._happened = rows = self.sheet.rows((None, self.memory[1]))
+        self._happened = rows = self.array_layout.rows((None, self.memory[1]))
         first, count = self.first, self.count
         self.events = 0  # number of segments that an event ended: all, or all except the last
         if count:  # without segments there may be no row left
@@ -67,7 +67,7 @@ class KernelRun:
     def rows(self) -> Any:
         """Return all arrays of the record as a named tuple."""
         assert self.memory is not None
-        return self.sheet.rows(self.memory)
+        return self.array_layout.rows(self.memory)
 
     def after(self) -> Outcome:
         """Return the outcome at the end of the call."""
@@ -136,9 +136,9 @@ class KernelRun:
     def forget_segments(self) -> None:
         """Release the memory of the segments, except the end of the last one."""
         assert self.memory is not None
-        self.vector = self.sheet.row(self.memory, "vectors", self.first + self.count - 1)
+        self.vector = self.array_layout.row(self.memory, "vectors", self.first + self.count - 1)
         vars(self).pop("rows", None)
-        self.sheet.take_back(self.memory[0])
+        self.array_layout.take_back(self.memory[0])
         self.memory = None
 
     @property

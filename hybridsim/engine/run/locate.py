@@ -66,19 +66,19 @@ def polish(sample: Callable[[np.ndarray], np.ndarray], crossing: Crossing) -> fl
         left, right = crossing.left, crossing.right
         low, high = value(left), value(right)
     low = min(low, 0.0)  # the side at the start of a step is known, whatever the rounding of the value
-    kept = 0
+    same_end = 0
     for _ in range(_POLISH):
         if right - left <= math.ulp(right) or high == 0.0:
             break
         theta = left + (right - left) * (low / (low - high)) if low < high else math.nan
-        if not left < theta < right or kept > 2:
-            theta, kept = 0.5 * (left + right), 0
+        if not left < theta < right or same_end > 2:
+            theta, same_end = 0.5 * (left + right), 0
             if not left < theta < right:
                 break
         found = value(theta)
         if found > 0.0:
             right, high = theta, found
-            kept = kept + 1 if kept >= 0 else 0
+            same_end = same_end + 1 if same_end >= 0 else 0
             low *= 0.5  # Illinois method: halve the value at the end that stays
         elif found < 0.0:
             left, low = theta, found

@@ -168,8 +168,8 @@ def _as_due(
     slopes = np.abs(system.flow(at.s, at.x, at.p, at.z)) if system.n else 0.0
     wide = replace(at, x_error=at.x_error + known_at * slopes, s_error=at.s_error + known_at)
     known = system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
-    fewer = _number_at_zero(system, origin, at, arrival, series)
-    return (wide, known) if _number_at_zero(system, origin, wide, arrival, known) > fewer else (at, series)
+    fewer = _zero_count(system, origin, at, arrival, series)
+    return (wide, known) if _zero_count(system, origin, wide, arrival, known) > fewer else (at, series)
 
 
 def others_near(system: System, at: Situation, series: Any, arrival: Arrival, share: float) -> bool:
@@ -181,10 +181,10 @@ def others_near(system: System, at: Situation, series: Any, arrival: Arrival, sh
     return any(0.0 < bound < math.inf and abs(value) <= share * bound for value, bound in values)
 
 
-def _number_at_zero(system: System, origin: Instant, at: Situation, arrival: Arrival, series: Any) -> int:
+def _zero_count(system: System, origin: Instant, at: Situation, arrival: Arrival, series: Any) -> int:
     """Return the number of guards that leave at an event, plus that of monitors that are zero there."""
-    watched = zip(series.monitors, series.monitor_bounds, strict=True)
-    monitors = sum(abs(value[0]) <= bound[0] for value, bound in watched)
+    bounded_monitors = zip(series.monitors, series.monitor_bounds, strict=True)
+    monitors = sum(abs(value[0]) <= bound[0] for value, bound in bounded_monitors)
     return len(coincident(system, origin, at, arrival.fired, series)) + monitors
 
 
@@ -210,8 +210,8 @@ def _before_instant(series: Any, arrival: Arrival, segment: SegmentRun) -> np.nd
         ):  # it is still leaving the previous zero
             continue
         sides[k] = before
-        segment.sightings = [
-            seen for seen in segment.sightings if seen.number != k or abs(arrival.s - seen.s) > near
+        segment.passed_monitors = [
+            seen for seen in segment.passed_monitors if seen.number != k or abs(arrival.s - seen.s) > near
         ]
     return sides
 

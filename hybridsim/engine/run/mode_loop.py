@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hybridsim.engine.events.backward import cross_backward, has_no_past, held, said_of_direction
+from hybridsim.engine.events.backward import cross_backward, has_no_past, held, message_on_direction
 from hybridsim.engine.events.diagnosis import advice_on_sizes, in_the_way
 from hybridsim.engine.events.fatal_guards import is_only_fatal
 from hybridsim.engine.events.input_jumps import surfaces_jump
@@ -22,7 +22,7 @@ from hybridsim.engine.record.checkpoint import Checkpoint, damaged
 from hybridsim.engine.record.limits import UNLIMITED, LimitMonitor, LimitReached
 from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.record.trajectory import Task, Trajectory
-from hybridsim.engine.run.appointment_events import on_new_pieces
+from hybridsim.engine.run.appointment_events import events_before_appointment
 from hybridsim.engine.run.headway import Headway, NoHeadway, TakenOver
 from hybridsim.engine.run.lazy_state import LazyState
 from hybridsim.engine.run.located import (
@@ -33,7 +33,7 @@ from hybridsim.engine.run.located import (
     with_evaluated,
     without_fatal,
 )
-from hybridsim.engine.run.monitor_crossings import seen_on_the_way
+from hybridsim.engine.run.monitor_crossings import passed_events
 from hybridsim.engine.run.notices import Notices
 from hybridsim.engine.run.segment_run import Arrival, SegmentRun
 from hybridsim.engine.run.setup import setup_of
@@ -73,8 +73,12 @@ class ModeLoop:
         self.headway = Headway(system, self.record.counters, self.origin, self.end)
         self.compiled_loop = compiled_loop or setup.compiled_loop()
         self._led = set(system.led)
-        watched = self.headway if task.successor is not None and method is not task.successor else None
-        self.notices = Notices(system, method, task, self.record, watched, self.compiled_loop is not None)
+        stiffness_monitor = (
+            self.headway if task.successor is not None and method is not task.successor else None
+        )
+        self.notices = Notices(
+            system, method, task, self.record, stiffness_monitor, self.compiled_loop is not None
+        )
         self._on_progress = progress
 
     @property
@@ -134,7 +138,7 @@ class ModeLoop:
         except KeyboardInterrupt:
             self.record.stop_early("interrupted", "", self.task.t0)
         if not self.forward and self.record.status in ("backward-nonunique", "step-failure"):
-            self.record.message += said_of_direction(self.task.t0, self.task.t1)
+            self.record.message += message_on_direction(self.task.t0, self.task.t1)
         if self.adopted == self.origin:
             self.record.finish(
                 self.origin, self.outcome.z, self.p, self.outcome.x, self.system.layout.discrete_slice
@@ -149,7 +153,7 @@ class ModeLoop:
             stop, step_size = False, self._go_on_from(checkpoint)
         else:
             due = self.timetable.due_at_start(self.origin) if self.forward else ()
-            self.timetable.kept(self.origin)
+            self.timetable.mark_done(self.origin)
             self.lazy_state, self.adopted, stop = self.setup.start(task, due), self.origin, False
             if not self.setup.begins_silently:
                 stop = self._adopt(self.origin, self.outcome, task.x0.copy(), due)
@@ -199,10 +203,10 @@ class ModeLoop:
                         found = without_fatal(self.system, found)
                         found = found if self._is_event(found) else None
             finally:
-                self._keep(segment)
+                self._store(segment)
                 self.notices.look()
             instant = target if at_target else self.origin.plus(arrival.s)
-            stop = self._settle(instant, arrival, appointment if at_target else None, segment, found)
+            stop = self._resolve(instant, arrival, appointment if at_target else None, segment, found)
             step_size = segment.last_step if self.outcome.continuous else None
             if self.notices.takes_over:
                 self._take_over()
@@ -255,7 +259,7 @@ class ModeLoop:
             raise damaged("the checkpoint")
         self.origin = self.adopted = checkpoint.instant
         if checkpoint.settled is not None:
-            self.timetable.kept(checkpoint.settled)
+            self.timetable.mark_done(checkpoint.settled)
         self.accumulation.go_on(checkpoint.paces)
         self._set_state(self.origin, lambda: Outcome.of_arrays(arrays))
         if self.compiled_loop is not None and "place" in arrays:
@@ -300,11 +304,11 @@ class ModeLoop:
             return True, True
         x, error = self.outcome.x, self.outcome.x_error
         if not appointment.is_renewal:
-            self.timetable.kept(target)
+            self.timetable.mark_done(target)
             at, steps = self._at_target(target), self.record.counters.steps - steps
             errors = errors_when_due(self.system, target, at, steps, self.method.rounding, x_before)
             error = np.maximum(error, errors)
-        settled = self._settle_appointment(target, self.outcome, x, appointment.schedules, error)
+        settled = self._resolve_appointment(target, self.outcome, x, appointment.schedules, error)
         return True, self._adopt(target, settled, x, appointment.schedules)
 
     def _at_target(self, target: Instant) -> Situation:
@@ -348,12 +352,12 @@ class ModeLoop:
         run.flow.look = lambda s: progress(origin.plus(s))
         return run
 
-    def _keep(self, run: SegmentRun) -> None:
+    def _store(self, run: SegmentRun) -> None:
         """Append a segment, with the events that did not end it."""
         record = self.record
         if len(run.knots) > 1:
             record.segments.append(run.segment())
-        record.occurrences.extend(seen_on_the_way(self.system, self.origin, run, record))
+        record.occurrences.extend(passed_events(self.system, self.origin, run, record))
         for k in sorted(run.undefined):
             name = self.system.monitor_names[k]
             record.warn(
@@ -362,7 +366,7 @@ class ModeLoop:
 
     # -- events ---------------------------------------------------------------------------------------------
 
-    def _settle(
+    def _resolve(
         self,
         instant: Instant,
         arrival: Arrival,
@@ -391,7 +395,7 @@ class ModeLoop:
             found = located_backward(self.system, self.origin, arrival, segment)
         monitors, x_minus, error, s_error = found.monitors, found.at.x.copy(), segment.rounding(), 0.0
         if appointment and not appointment.is_renewal and (found.fired or monitors.leads.any()):
-            found = on_new_pieces(self.system, instant, found, schedules, self.forward)
+            found = events_before_appointment(self.system, instant, found, schedules, self.forward)
             monitors, s_error = found.monitors, math.ulp(float(instant))
         # corners need no decision: at a scheduled instant they take their sides together with it
         has_only_corners = appointment is not None and set(self.system.owner[list(found.fired)]) <= self._led
@@ -400,7 +404,7 @@ class ModeLoop:
         fired = {} if has_only_corners else found.fired
         resets = self._resets_of_monitors(instant, found, fired, appointment, error, s_error)
         if fired or resets or appointment is None:
-            outcome = self._settle_located(instant, found, fired, resets)
+            outcome = self._resolve_located(instant, found, fired, resets)
             # surfaces held together within rounding, just before their crossings accumulate
             is_early = appointment is None and holds_several(self.system, outcome)
             limit = self.accumulation.expected(instant) if is_early else None
@@ -414,9 +418,9 @@ class ModeLoop:
             x_minus, error = outcome.x, outcome.x_error
         if appointment:
             if not appointment.is_renewal:
-                self.timetable.kept(instant)
+                self.timetable.mark_done(instant)
             # located events come first, because they belong to the signals before the instant
-            outcome = self._settle_appointment(instant, self.outcome, x_minus, schedules, error, s_error)
+            outcome = self._resolve_appointment(instant, self.outcome, x_minus, schedules, error, s_error)
             outcome = self._apply_crossed(outcome, 0.0, monitors)
             return self._adopt(instant, outcome, x_minus, schedules, monitors)
         return self._accumulated(instant, found.at.x, arrival.fired)
@@ -439,14 +443,16 @@ class ModeLoop:
         if self.forward and (fired or appointment):
             if not acting:
                 return []
-            outcome = self._settle_located(instant, found, fired, []) if fired else self.outcome
+            outcome = self._resolve_located(instant, found, fired, []) if fired else self.outcome
             if appointment and not outcome.status:
                 x, error = (outcome.x, outcome.x_error) if fired else (found.at.x, error)
-                outcome = self._settle_appointment(instant, outcome, x, appointment.schedules, error, s_error)
+                outcome = self._resolve_appointment(
+                    instant, outcome, x, appointment.schedules, error, s_error
+                )
         firing = monitors.fire(outcome)
         return [("monitor", k) for k in firing if k in acting]
 
-    def _settle_located(
+    def _resolve_located(
         self, instant: Instant, found: Located, fired: dict[int, int], resets: list[tuple[object, ...]]
     ) -> Outcome:
         """Resolve the located guards and the resets of monitors on a copy of the state."""
@@ -471,7 +477,7 @@ class ModeLoop:
         outcome.changes = changes
         return outcome
 
-    def _settle_appointment(
+    def _resolve_appointment(
         self,
         instant: Instant,
         before: Outcome,
@@ -531,8 +537,10 @@ class ModeLoop:
             return None
         appointment = self.timetable.next(self.origin, self.forward)
         target = appointment.instant if appointment else self.end
-        room = target.minus(self.origin)
-        ahead = min(max(Instant(limit.time).minus(self.origin), 0.0), room)  # not beyond the next appointment
+        available = target.minus(self.origin)
+        ahead = min(
+            max(Instant(limit.time).minus(self.origin), 0.0), available
+        )  # not beyond the next appointment
         before = self.outcome
         if (after := behind(limit, self.system, before, self.p, ahead)) is None:
             return None
@@ -544,14 +552,14 @@ class ModeLoop:
         self.last_limits.update(dict.fromkeys(ended, limit.time))
         monitors = MonitorSides.of(self.system.model.monitors, before.monitor_sides)
         found = self._apply_crossed(found, ahead, monitors)
-        instant = target if ahead == room else self.origin.plus(ahead)
+        instant = target if ahead == available else self.origin.plus(ahead)
         stop = self._adopt(instant, found, before.x, (), monitors)
-        if stop or appointment is None or ahead < room:
+        if stop or appointment is None or ahead < available:
             return stop
-        self.timetable.kept(target)
+        self.timetable.mark_done(target)
         x, schedules = self.outcome.x, appointment.schedules
         monitors = replace(monitors, before=self.outcome.monitor_sides)
-        settled = self._settle_appointment(target, self.outcome, x, schedules, self.outcome.x_error)
+        settled = self._resolve_appointment(target, self.outcome, x, schedules, self.outcome.x_error)
         return self._adopt(target, settled, x, schedules, monitors)
 
     def _adopt(
@@ -622,7 +630,7 @@ class ModeLoop:
         is_last = is_last or bool(outcome.status)
         if is_last:
             monitors.fire(outcome)
-            monitors.keep_open(outcome)
+            monitors.restore_hidden_sides(outcome)
         ended = []
         for k, direction in sorted(monitors.fired.items()):
             monitor = monitors.monitors[k]

@@ -6,14 +6,14 @@ import numpy as np
 
 from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.record.trajectory import Trajectory
-from hybridsim.engine.run.segment_run import SegmentRun, Sighting
+from hybridsim.engine.run.segment_run import PassedMonitor, SegmentRun
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
 
 
-def seen_on_the_way(system: System, origin: Instant, run: SegmentRun, record: Trajectory) -> list[Occurrence]:
+def passed_events(system: System, origin: Instant, run: SegmentRun, record: Trajectory) -> list[Occurrence]:
     """Return these events in order of time, and add warnings for near-grazings to the record."""
-    passed = [(seen.s, _sighting(system, origin, seen)) for seen in run.sightings]
+    passed = [(seen.s, _passed_monitor(system, origin, seen)) for seen in run.passed_monitors]
     declared = [g for g in run.grazings if not system.is_corner[system.owner[g[0]]]]
     if declared:
         times = np.array([s for _, s, _ in declared])
@@ -25,7 +25,7 @@ def seen_on_the_way(system: System, origin: Instant, run: SegmentRun, record: Tr
     return [occurrence for _, occurrence in sorted(passed, key=lambda o: abs(o[0]))]
 
 
-def _sighting(system: System, origin: Instant, seen: Sighting) -> Occurrence:
+def _passed_monitor(system: System, origin: Instant, seen: PassedMonitor) -> Occurrence:
     name = system.monitor_names[seen.number]
     return Occurrence(origin.plus(seen.s), "monitor", name, "", "", "", seen.direction, seen.x, seen.x)
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridsim.engine.events.dissipation_check import refuse_driving
+from hybridsim.engine.events.dissipation_check import require_dissipation
 from hybridsim.engine.system.modules import Compiled, compiled
 from hybridsim.engine.system.system import System
 from hybridsim.model.smoothing.explicit_corners import smoothed
@@ -52,7 +52,7 @@ def describe(model: Model) -> Report:
     system = System(model, as_written=True)
     discrete = np.array(list(model.discrete_values().values()), dtype=float)
     modes = np.array([automaton.initial for automaton in system.automata], dtype=np.int64)
-    refuse_driving(system, 0.0, system.start_state({}), discrete, modes)
+    require_dissipation(system, 0.0, system.start_state({}), discrete, modes)
     code = compiled(model)
     assert isinstance(code, Compiled)  # models of Python functions are not described here
     data = code.data

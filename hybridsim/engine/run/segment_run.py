@@ -13,7 +13,7 @@ from hybridsim.engine.events.backward import Entry, entries
 from hybridsim.engine.events.choice.verdict import side_after, side_before
 from hybridsim.engine.native.constants import IN_A_ROW, STANDSTILL
 from hybridsim.engine.record.counters import Counters
-from hybridsim.engine.record.segments import Dense, Pieces, Segment
+from hybridsim.engine.record.segments import Dense, PiecewiseDense, Segment
 from hybridsim.engine.roots.roots import POINTS, find_roots
 from hybridsim.engine.run.locate import Findings, Hit, Locator, polish
 from hybridsim.engine.run.stepping import Flow, Method, Step, Stepper, Watch
@@ -30,7 +30,7 @@ _DIRECTIONS = {"up": 1, "down": -1, "both": 0}
 
 
 @dataclass(frozen=True)
-class Sighting:
+class PassedMonitor:
     """A crossing of a monitor that did not end the segment."""
 
     s: float  # local time
@@ -103,7 +103,7 @@ class SegmentRun:
         self.scale = np.abs(
             x
         )  # largest magnitude of each state on the segment, to which rounding is relative
-        self.sightings: list[Sighting] = []
+        self.passed_monitors: list[PassedMonitor] = []
         self.grazings: list[tuple[int, float, float]] = []  # guard, local time, distance
         self.undefined: set[int] = set()  # monitors that were not a number somewhere
         self.last_step: float | None = None
@@ -186,9 +186,9 @@ class SegmentRun:
 
     def _go_back(self, s: float) -> None:
         """Discard everything after the end of a step."""
-        kept = self.knots.index(s)
-        del self.knots[kept + 1 :], self.states[kept + 1 :], self.interpolants[kept:]
-        self.sightings = [seen for seen in self.sightings if seen.s <= s]
+        knot = self.knots.index(s)
+        del self.knots[knot + 1 :], self.states[knot + 1 :], self.interpolants[knot:]
+        self.passed_monitors = [seen for seen in self.passed_monitors if seen.s <= s]
         self.grazings = [grazing for grazing in self.grazings if grazing[1] <= s]
 
     def _check_shape(self, step: Step) -> None:
@@ -230,7 +230,9 @@ class SegmentRun:
         """Return the finished segment of the trajectory."""
         knots, flow = np.array(self.knots), self.flow
         states = flow.project(knots, np.array(self.states).reshape(len(knots), -1))
-        return Segment(self.origin, flow.z, flow.p, knots, states, Pieces(knots, tuple(self.interpolants)))
+        return Segment(
+            self.origin, flow.z, flow.p, knots, states, PiecewiseDense(knots, tuple(self.interpolants))
+        )
 
     def _start(self, bound: float, first_step: float | None) -> Stepper:
         if self.system.n == 0:
@@ -260,7 +262,9 @@ class SegmentRun:
                 return self._examine(stepper, ended)
             located.append(ended)
         for hit, ended in zip(passed, located, strict=False):
-            self.sightings.append(Sighting(ended.s1, self._projected(ended), hit.number, hit.direction))
+            self.passed_monitors.append(
+                PassedMonitor(ended.s1, self._projected(ended), hit.number, hit.direction)
+            )
         limit = first[0].theta if first else 1.0
         for theta, g in found.guard_gaps:
             if first is None or theta < limit:
@@ -301,7 +305,7 @@ class SegmentRun:
             f"write it so that it has a value on both sides of its zero"
         )
 
-    def _wanted(self, monitor: int, direction: int) -> bool:
+    def _fires_in(self, monitor: int, direction: int) -> bool:
         want = _DIRECTIONS[self.monitors[monitor].direction]
         return want in (0, direction)
 
@@ -309,14 +313,14 @@ class SegmentRun:
         """Return whether a monitor crossing is only to be recorded, before the first stop."""
         is_before = first is None or hit.theta < first[0].theta
         recorded = self.monitors[hit.number].action == "record"
-        return is_before and recorded and self._wanted(hit.number, hit.direction)
+        return is_before and recorded and self._fires_in(hit.number, hit.direction)
 
     def _first_stop(self, found: Findings) -> tuple[Hit, bool] | None:
         stops = [(hit, False) for hit in found.exits]
         stops += [
             (hit, True)
             for hit in found.crossings
-            if self.monitors[hit.number].action != "record" and self._wanted(hit.number, hit.direction)
+            if self.monitors[hit.number].action != "record" and self._fires_in(hit.number, hit.direction)
         ]
         return min(stops, key=lambda stop: stop[0].theta, default=None)
 
@@ -371,9 +375,9 @@ class SegmentRun:
                 locator.monitor_sides[k] = 0
             elif side == 0:
                 locator.monitor_sides[k] = before[k]
-            elif before[k] != 0 and side != before[k] and self._wanted(k, side):
+            elif before[k] != 0 and side != before[k] and self._fires_in(k, side):
                 if self.monitors[k].action == "record":
-                    self.sightings.append(Sighting(step.s1, x, k, side))
+                    self.passed_monitors.append(PassedMonitor(step.s1, x, k, side))
                 else:
                     stopping.append(k)
                     locator.monitor_sides[k] = before[k]  # this decides the recorded direction
@@ -479,14 +483,14 @@ class SegmentRun:
         for root in step.roots:
             if not root.is_monitor:
                 continue
-            wanted = self._wanted(root.number, root.direction)
-            if wanted and self.monitors[root.number].action != "record":
+            fires = self._fires_in(root.number, root.direction)
+            if fires and self.monitors[root.number].action != "record":
                 # its side before the event decides the recorded direction
                 stopping.append(root.number)
                 continue
             self.locator.monitor_sides[root.number] = root.direction
-            if wanted:
-                self.sightings.append(Sighting(step.s1, x, root.number, root.direction))
+            if fires:
+                self.passed_monitors.append(PassedMonitor(step.s1, x, root.number, root.direction))
         if fired or stopping:
             return Arrival(step.s1, x, fired, tuple(stopping))
         return None

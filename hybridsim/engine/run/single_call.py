@@ -15,7 +15,7 @@ import numpy as np
 
 from hybridsim.engine.events.zeno.accumulation import MOST, leads_nowhere
 from hybridsim.engine.events.zeno.hidden_bounces import may_be_hidden
-from hybridsim.engine.native.kernels import Door
+from hybridsim.engine.native.kernels import Precompiled
 from hybridsim.engine.record.block_list import BlockList, SegmentBlockList
 from hybridsim.engine.record.blocks import OccurrenceList
 from hybridsim.engine.record.counters import Counters
@@ -99,7 +99,7 @@ class _FailedCall:
         raise self._error
 
 
-_leads_nowhere = Door(leads_nowhere)
+_leads_nowhere = Precompiled(leads_nowhere)
 
 
 def _is_over(system: System, kernel_run: KernelRun) -> bool:

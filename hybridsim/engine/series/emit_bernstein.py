@@ -25,8 +25,8 @@ def bernstein_code(order: int) -> tuple[list[int], Any]:
     """
     names = [f"bernstein_{size}" for size in range(order + 1, order + 1 - LEADING, -1)]
     folder = model_folder()
-    kept = None if folder is None else folder / f"bernstein{order}"
-    return compile_series(kept, names, lambda: bernstein_text(order))
+    path = None if folder is None else folder / f"bernstein{order}"
+    return compile_series(path, names, lambda: bernstein_text(order))
 
 
 def bernstein_text(order: int) -> str:

@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from hybridsim.engine.native.llvm_text import DECLARATIONS, INF, NAN, ONE, ZERO, Lines, function, number
-from hybridsim.engine.series.emit_series import KNOWN, TWINS, ModeTape
+from hybridsim.engine.series.emit_series import KNOWN, WITH_COMPANION, ModeTape
 from hybridsim.engine.series.optimise import (
     ADD_CONSTANT,
     CONSTANT_SUB,
@@ -33,7 +33,7 @@ Term = tuple[str, str]  # a coefficient and the bound of its error
 
 
 @dataclass(frozen=True)
-class Given:
+class ConstantSources:
     """Sources of a tape's constants: numbers with their errors, places in p, and which of these are phases."""
 
     numbers: Mapping[int, tuple[float, float]]
@@ -44,9 +44,11 @@ class Given:
 class _Bounded(Lines):
     """The coefficients 0..ORDER of every register with their error bounds."""
 
-    def __init__(self, tape: ModeTape, constant_rows: Sequence[tuple[int, ...]], given: Given) -> None:
+    def __init__(
+        self, tape: ModeTape, constant_rows: Sequence[tuple[int, ...]], constant_sources: ConstantSources
+    ) -> None:
         super().__init__()
-        self.given = given
+        self.constant_sources = constant_sources
         self.series: dict[int, list[Term]] = {}
         for i, r in enumerate(tape.states):
             self.series[r] = [(self.load("%x", i), self.load("%g", i))]
@@ -55,7 +57,7 @@ class _Bounded(Lines):
         for row in constant_rows:
             self._run(row, 0)
         for row in constant_rows:  # their higher coefficients are zero
-            for r in (row[4], row[4] + 1) if row[0] in TWINS else (row[4],):
+            for r in (row[4], row[4] + 1) if row[0] in WITH_COMPANION else (row[4],):
                 self.series[r] += [(ZERO, ZERO)] * _ORDER
         for k in range(_ORDER + 1):
             for row in tape.rows:
@@ -79,10 +81,10 @@ class _Bounded(Lines):
             return self.series[r][k]
         if k > 0:
             return ZERO, ZERO
-        if r in self.given.sources:
-            value = self.load("%c", self.given.sources[r])
-            return value, self.share(2.0, value) if r in self.given.phases else ZERO
-        exact, off = self.given.numbers.get(r, (0.0, 0.0))
+        if r in self.constant_sources.sources:
+            value = self.load("%c", self.constant_sources.sources[r])
+            return value, self.share(2.0, value) if r in self.constant_sources.phases else ZERO
+        exact, off = self.constant_sources.numbers.get(r, (0.0, 0.0))
         return number(exact), number(off) if off else ZERO
 
     # -- arithmetic of non-negative bounds, without zero terms --------------------------------------------------
@@ -169,8 +171,8 @@ class _Bounded(Lines):
     # -- operations -------------------------------------------------------------------------------------------
 
     def _advance(self, op: int, a: int, b: int, c: int, out: int, k: int) -> tuple[Term, ...]:
-        if op in TWINS:
-            return self._start(op, a, b) if k == 0 else self._twins(op, a, b, out, k)
+        if op in WITH_COMPANION:
+            return self._start(op, a, b) if k == 0 else self._companions(op, a, b, out, k)
         u, du = self.at(a, k)
         if op == COPY:
             return ((u, du),)
@@ -265,7 +267,7 @@ class _Bounded(Lines):
             self.plus(dw, self.times(number(3.0 * _UNIT), self.op("fadd", ONE, square))),
         )
 
-    def _twins(self, op: int, a: int, b: int, out: int, k: int) -> tuple[Term, ...]:
+    def _companions(self, op: int, a: int, b: int, out: int, k: int) -> tuple[Term, ...]:
         """Compute order k >= 1 of an operation with a companion."""
         if op == SINCOS_LINEAR:
             (rate, e), part = self.at(a, 1), number(1.0 / k)
@@ -294,7 +296,7 @@ def can_bound(tape: ModeTape, constant_rows: Sequence[tuple[int, ...]]) -> bool:
 def bounds_text(
     tape: ModeTape,
     constant_rows: Sequence[tuple[int, ...]],
-    given: Given,
+    constant_sources: ConstantSources,
     numbers: Sequence[int],
     guards: int,
 ) -> str:
@@ -302,7 +304,7 @@ def bounds_text(
 
     Raise TooLong if it would take too long to compile.
     """
-    code, size = _Bounded(tape, constant_rows, given), _ORDER + 1
+    code, size = _Bounded(tape, constant_rows, constant_sources), _ORDER + 1
     for g, r in zip(numbers, tape.guards, strict=True):
         for k in range(size):
             value, bound = code.at(r, k)

@@ -42,7 +42,7 @@ from hybridsim.engine.series.optimise import (
     SCALE,
     SINCOS_LINEAR,
     SUB_CONSTANT,
-    needed_rows,
+    live_rows,
 )
 from hybridsim.engine.series.tape import (
     ADD,
@@ -59,8 +59,8 @@ from hybridsim.engine.series.tape import (
     TANGENT,
 )
 
-TWINS = (SINCOS, SINCOS_LINEAR, TANGENT)  # operations with a companion series in the next register
-_COSTLY = (*TWINS, EXP)  # order 0 of these takes as long as all other orders
+WITH_COMPANION = (SINCOS, SINCOS_LINEAR, TANGENT)  # operations with a companion series in the next register
+_COSTLY = (*WITH_COMPANION, EXP)  # order 0 of these takes as long as all other orders
 KNOWN = frozenset(
     (
         COPY, ADD, SUB, NEG, MUL, DIV, SQRT, EXP, SINCOS, TANGENT, SELECT, LESS,
@@ -71,7 +71,7 @@ KNOWN = frozenset(
 
 def _results(op: int) -> int:
     """Return the number of registers that an operation fills."""
-    return 2 if op in TWINS else 1
+    return 2 if op in WITH_COMPANION else 1
 
 
 @dataclass(frozen=True)
@@ -203,8 +203,8 @@ class _Expansion(Lines):
 
     def _advance(self, op: int, a: int, b: int, c: int, out: int, k: int) -> tuple[str, ...]:
         """Compute coefficient k of an operation, and of its companion."""
-        if op in TWINS:
-            return self._start(op, a, b) if k == 0 else self._twins(op, a, b, out, k)
+        if op in WITH_COMPANION:
+            return self._start(op, a, b) if k == 0 else self._companions(op, a, b, out, k)
         u = self.at(a, k)
         if op == COPY:
             return (u,)
@@ -267,7 +267,7 @@ class _Expansion(Lines):
         square = self.op("fmul", y, y)
         return y, self.op("fadd", ONE, square if b == 0 else self.negative(square))
 
-    def _twins(self, op: int, a: int, b: int, out: int, k: int) -> tuple[str, ...]:
+    def _companions(self, op: int, a: int, b: int, out: int, k: int) -> tuple[str, ...]:
         """Compute order k >= 1 of an operation with a companion."""
         if op == SINCOS_LINEAR:
             rate = self.op("fmul", self.at(a, 1), number(1.0 / k))
@@ -341,7 +341,7 @@ class _Ahead(_Expansion):
 
 def ahead_function(name: str, tape: ModeTape, order: int) -> str:
     """Return the function `ahead` for series of an order; see `hybridsim.engine.roots.defect_check`."""
-    return function(name, _kept_order(_Ahead(tape, order)).lines)
+    return function(name, _in_fixed_order(_Ahead(tape, order)).lines)
 
 
 class _Along(_Expansion):
@@ -355,7 +355,7 @@ class _Along(_Expansion):
             r: [self.load("%x", i * size + k) for k in range(size)] for i, r in enumerate(tape.states)
         }
         self._set_time("%s")
-        rows = needed_rows(list(tape.rows), set(tape.guards))
+        rows = live_rows(list(tape.rows), set(tape.guards))
         for k in range(size):
             self._run(rows, k)
 
@@ -382,10 +382,10 @@ def sizes_function(name: str, guards: int, order: int) -> str:
 
 def _start(tape: ModeTape, stride: int) -> _Expansion:
     """Return the code for order 0, whose costly values stay in their registers."""
-    return _kept_order(_Expansion(tape, 0, stride))
+    return _in_fixed_order(_Expansion(tape, 0, stride))
 
 
-def _kept_order(code: _Expansion) -> _Expansion:
+def _in_fixed_order(code: _Expansion) -> _Expansion:
     """Return the code with stores of the costly values of order 0."""
     tape, stride = code.tape, code.stride
     for op, *_, out in tape.rows:

@@ -1,9 +1,9 @@
-"""Rows for the high orders of a lean tape, in which the rates follow from shorter chains of operations.
+"""Rows for the high orders of an optimised tape, in which the rates follow from shorter chains of operations.
 
 A coefficient depends on the one before it through every operation between a state and its rate. With a
 compiled tape this latency is most of a step's time. Successive constants become one factor, a sum adds its
 latest term last, and the last factor of a rate includes the division by the order. The rounding differs from
-that of the lean tape's rows. Therefore the orders by which events are decided keep those rows, and so do
+that of the optimised tape's rows. Therefore the orders by which events are decided keep those rows, and so do
 guards at any order.
 """
 
@@ -22,7 +22,7 @@ from hybridsim.engine.series.optimise import (
     SINCOS_LINEAR,
     SUB_CONSTANT,
     arguments_of,
-    needed_rows,
+    live_rows,
 )
 from hybridsim.engine.series.tape import ADD, DIV, NEG, SQRT, SUB
 
@@ -53,44 +53,44 @@ class _Scaled:
 
     def row(self, kind: int, out: int) -> Row:
         """Return the row that computes the multiple."""
-        places, flags = [0, 0], NEGATIVE if self.is_negative else 0
+        operands, flags = [0, 0], NEGATIVE if self.is_negative else 0
         for i, (register, divides) in enumerate(self.constants):
-            places[i] = register
+            operands[i] = register
             flags |= (HAS_B, HAS_C)[i] | ((OVER_B, OVER_C)[i] if divides else 0)
         if kind == FACTOR and not self.constants:
             return (NEG if self.is_negative else ADD_CONSTANT, self.base, 0, 0, out)
-        return (kind + flags, self.base, *places, out)
+        return (kind + flags, self.base, *operands, out)
 
 
 def high_rows(
-    rows: Sequence[Row], states: Sequence[int], rates: Sequence[int], watched: Iterable[int]
+    rows: Sequence[Row], states: Sequence[int], rates: Sequence[int], guard_registers: Iterable[int]
 ) -> list[Row]:
-    """Return the rows that compute the states and the watched registers at high orders."""
-    made = _Rewriting(rows, states, rates, set(watched))
+    """Return the rows that compute the states and the registers of guards at high orders."""
+    made = _Rewriting(rows, states, rates, set(guard_registers))
     integrals = [made.scaled(rate).row(INTEGRATE, state) for state, rate in zip(states, rates, strict=True)]
-    return [*needed_rows(made.rows, made.watched | {row[1] for row in integrals}), *integrals]
+    return [*live_rows(made.rows, made.guard_registers | {row[1] for row in integrals}), *integrals]
 
 
 class _Rewriting:
-    """Rows with shortened chains, in `rows`; rows that watched registers need are unchanged."""
+    """Rows with shortened chains, in `rows`; rows that guards need are unchanged."""
 
     def __init__(
-        self, rows: Sequence[Row], states: Sequence[int], rates: Sequence[int], watched: set[int]
+        self, rows: Sequence[Row], states: Sequence[int], rates: Sequence[int], guard_registers: set[int]
     ) -> None:
-        self.watched = watched
+        self.guard_registers = guard_registers
         self._of = {row[4]: row for row in rows}
         self._states = set(states)
-        self._kept = set(needed_rows(list(rows), watched))
+        self._unchanged = set(live_rows(list(rows), guard_registers))
         self._readers = Counter([*(a for row in rows for a in arguments_of(row)), *rates])
         self._forms: dict[int, _Scaled] = {}
-        ready = self._ready_after(dict.fromkeys(states, 0))
-        ends = [ready.get(rate, _EARLY) for rate in rates]
+        cycles = self._cycles_after(dict.fromkeys(states, 0))
+        ends = [cycles.get(rate, _EARLY) for rate in rates]
         # some states have their coefficients before others
-        self._ready = self._ready_after({x: end - max(ends) for x, end in zip(states, ends, strict=True)})
-        self._lent: set[int] = set()  # registers of inner sums, available for reuse
+        self._cycles = self._cycles_after({x: end - max(ends) for x, end in zip(states, ends, strict=True)})
+        self._free_registers: set[int] = set()  # registers of inner sums, available for reuse
         self._sums: dict[int, tuple[list[tuple[int, bool]], list[int]]] = {}
         for row in reversed(rows):
-            if row[0] in (ADD, SUB) and row not in self._kept and row[4] not in self._lent:
+            if row[0] in (ADD, SUB) and row not in self._unchanged and row[4] not in self._free_registers:
                 self._take_apart(row)
         self.rows: list[Row] = []
         for row in rows:
@@ -100,15 +100,15 @@ class _Rewriting:
         """Return a register as a multiple of another."""
         return self._forms.get(register, _Scaled(register))
 
-    def _ready_after(self, ready: dict[int, int]) -> dict[int, int]:
+    def _cycles_after(self, cycles: dict[int, int]) -> dict[int, int]:
         """Return the cycle at which each register has its coefficient, with the states given at the start."""
         for row in self._of.values():
             op, out = row[0], row[4]
             wait = _EARLY if op == SINCOS_LINEAR else 0 if op in _SAME else _WAITS.get(op, _PRODUCT)
-            ready[out] = max([ready.get(a, _EARLY) for a in arguments_of(row)]) + wait
+            cycles[out] = max([cycles.get(a, _EARLY) for a in arguments_of(row)]) + wait
             if op in (*PAIRED, SINCOS_LINEAR):
-                ready[out + 1] = ready[out]
-        return ready
+                cycles[out + 1] = cycles[out]
+        return cycles
 
     def _rewrite(self, row: Row) -> None:
         op, a, b, _, out = row
@@ -120,12 +120,12 @@ class _Rewriting:
                 form = form if len(form.constants) < _MOST else _Scaled(a)
                 form = replace(form, constants=(*form.constants, (b, op == DIVIDE_BY)))
             self._forms[out] = form
-            self.rows.append(row if row in self._kept else form.row(FACTOR, out))
+            self.rows.append(row if row in self._unchanged else form.row(FACTOR, out))
         elif out in self._sums:
             self._sum(out, *self._sums[out])
-        elif op == DIV and row not in self._kept and a not in self._of and a not in self._states:
+        elif op == DIV and row not in self._unchanged and a not in self._of and a not in self._states:
             self.rows.append(self._reciprocal(b, out))
-        elif out not in self._lent:
+        elif out not in self._free_registers:
             self.rows.append(row)
 
     def _reciprocal(self, b: int, out: int) -> Row:
@@ -140,7 +140,7 @@ class _Rewriting:
 
     def _sum(self, out: int, terms: Sequence[tuple[int, bool]], inner: Sequence[int]) -> None:
         """Append rows of a sum that adds its latest term last; they reuse the registers of the inner sums."""
-        (total, is_negative), *others = sorted(terms, key=lambda term: self._ready.get(term[0], _EARLY))
+        (total, is_negative), *others = sorted(terms, key=lambda term: self._cycles.get(term[0], _EARLY))
         for (register, turns), to in zip(others, (*inner, out), strict=True):
             if turns == is_negative:
                 self.rows.append((ADD, total, register, 0, to))
@@ -170,7 +170,7 @@ class _Rewriting:
                 found.append((r, turns))
         if not all(is_negative for _, is_negative in found):
             self._sums[row[4]] = found, inner
-            self._lent.update(inner)
+            self._free_registers.update(inner)
 
     def _is_inner(self, register: int, operations: tuple[int, ...]) -> bool:
         """Return whether a register is the result of one of these operations and is read only once."""
@@ -178,6 +178,6 @@ class _Rewriting:
         return (
             row is not None
             and row[0] in operations
-            and row not in self._kept
+            and row not in self._unchanged
             and self._readers[register] == 1
         )

@@ -1,4 +1,4 @@
-"""The lean tape of one vector of modes, without copies and with its constants in time computed once.
+"""The optimised tape of one vector of modes, without copies and with its constants in time computed once.
 
 The rows of a tape (see `hybridsim.engine.series.tape`) are sorted by their operands. A row over constants has
 one coefficient and runs once. A product with a constant, and the sine of an angle that grows linearly, cost
@@ -34,7 +34,7 @@ from hybridsim.engine.series.tape import (
     TANGENT,
 )
 
-# Additional operations of the lean tape, on a series a and a constant b.
+# Additional operations of the optimised tape, on a series a and a constant b.
 ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB, SCALE, DIVIDE_BY, SINCOS_LINEAR = range(40, 46)
 
 CONSTANT, LINEAR, SERIES = range(3)  # dependence of a register on time
@@ -51,11 +51,11 @@ _ONE = (
     SINHCOSH,
     TANGENT,
 )  # operations on one register; the others use two
-_KEEP_LINEAR = (ADD, SUB, NEG)
+_LINEAR_OPERATIONS = (ADD, SUB, NEG)
 
 
 @dataclass(frozen=True)
-class LeanTape:
+class OptimisedTape:
     """Rows (operation, a, b, c, out) over the registers of the tape from which they are made.
 
     Parameters
@@ -74,7 +74,7 @@ class LeanTape:
     monitors: np.ndarray
 
 
-def twins_of(tape: dict[str, Any]) -> dict[int, int]:
+def separate_registers(tape: dict[str, Any]) -> dict[int, int]:
     """Return separate registers for values that are constant in some modes and vary in others.
 
     A compiled loop keeps its registers from mode to mode and writes only the leading coefficient of a
@@ -87,9 +87,9 @@ def twins_of(tape: dict[str, Any]) -> dict[int, int]:
         found: dict[int, list[tuple[int, int]]] = {}
         for branch in branches:
             below, above = dict(least), dict(most)
-            for op, *given, out in branch:
+            for op, *operands, out in branch:
                 for kind in (below, above):
-                    kind[out] = _kind(op, [kind.get(r, CONSTANT) for r in given[: _registers(op)]])
+                    kind[out] = _kind(op, [kind.get(r, CONSTANT) for r in operands[: _registers(op)]])
                     if op in PAIRED:
                         kind[out + 1] = kind[out]
                 if op in PAIRED:
@@ -98,29 +98,29 @@ def twins_of(tape: dict[str, Any]) -> dict[int, int]:
                     found.setdefault(r, []).append((below[r], above[r]))
         for out, seen in found.items():
             least[out], most[out] = min(low for low, _ in seen), max(high for _, high in seen)
-    twins: dict[int, int] = {}
+    separate: dict[int, int] = {}
     for out in sorted(most):
-        if most[out] != CONSTANT and least[out] == CONSTANT and out not in twins:
-            twins[out] = tape["registers"] + len(twins)
+        if most[out] != CONSTANT and least[out] == CONSTANT and out not in separate:
+            separate[out] = tape["registers"] + len(separate)
             if out in paired:
-                twins[out + 1] = tape["registers"] + len(twins)
-    return twins
+                separate[out + 1] = tape["registers"] + len(separate)
+    return separate
 
 
-def lean(
+def optimised(
     tape: dict[str, Any],
     rows: Iterable[tuple[int, ...]],
     active: Iterable[int],
-    twins: Mapping[int, int] = MappingProxyType({}),
-) -> LeanTape:
-    """Return the lean form of one mode vector's rows with its active guards; twins: see `twins_of`."""
+    separate: Mapping[int, int] = MappingProxyType({}),
+) -> OptimisedTape:
+    """Return the optimised form of one mode vector's rows and its active guards; separate: `separate_registers`."""
     kind = dict.fromkeys(tape["states"], SERIES) | {tape["time"]: LINEAR}
     same: dict[int, int] = {}  # copy -> original register
     constant_rows: list[tuple[int, ...]] = []
     series_rows: list[tuple[int, ...]] = []
-    for op, *given, out in rows:
+    for op, *operands, out in rows:
         count = _registers(op)
-        a, b, c = (same.get(r, r) if i < count else r for i, r in enumerate(given))
+        a, b, c = (same.get(r, r) if i < count else r for i, r in enumerate(operands))
         if op == COPY:
             same[out] = a
             continue
@@ -130,7 +130,7 @@ def lean(
             kind[out + 1] = kind[out]
         if kind[out] == CONSTANT:
             for r in (out, out + 1) if op in PAIRED else (out,):
-                same[r] = twins.get(r, r)
+                same[r] = separate.get(r, r)
                 kind[same[r]] = CONSTANT
             constant_rows.append((op, a, b, c, same[out]))
         else:
@@ -141,10 +141,12 @@ def lean(
 
     states, derivatives, guards = registers("states"), registers("derivatives"), registers("guards")
     surfaces, monitors = registers("surfaces"), registers("monitors")
-    wanted = {*derivatives, *surfaces, *monitors, *(guards[g] for g in active)}
-    needed = needed_rows(series_rows, wanted)
-    constants = needed_rows(constant_rows, wanted | {r for row in needed for r in row[1:4]})
-    return LeanTape(_array(constants), _array(needed), states, derivatives, guards, surfaces, monitors)
+    live = {*derivatives, *surfaces, *monitors, *(guards[g] for g in active)}
+    live_series_rows = live_rows(series_rows, live)
+    constants = live_rows(constant_rows, live | {r for row in live_series_rows for r in row[1:4]})
+    return OptimisedTape(
+        _array(constants), _array(live_series_rows), states, derivatives, guards, surfaces, monitors
+    )
 
 
 def has_corners(tape: dict[str, Any]) -> bool:
@@ -152,12 +154,12 @@ def has_corners(tape: dict[str, Any]) -> bool:
     kind = dict.fromkeys(tape["states"], SERIES) | {tape["time"]: LINEAR}
     agreeing = set()
     for _, branches in tape["parts"]:
-        for op, *given, out in (row for branch in branches for row in branch):
-            kinds = [kind.get(r, CONSTANT) for r in given[: _registers(op)]]
+        for op, *operands, out in (row for branch in branches for row in branch):
+            kinds = [kind.get(r, CONSTANT) for r in operands[: _registers(op)]]
             deciding = kinds[:1] if op == SELECT else kinds
-            if op == LESS and given[2] == AGREEING:
+            if op == LESS and operands[2] == AGREEING:
                 agreeing.add(out)
-            elif op == SELECT and given[0] in agreeing:
+            elif op == SELECT and operands[0] in agreeing:
                 pass
             elif op >= ABS and max(deciding) != CONSTANT:
                 return True
@@ -180,7 +182,7 @@ def _kind(op: int, kinds: list[int]) -> int:
     highest = max(kinds)
     if highest == LINEAR:
         scaled = (op == MUL and min(kinds) == CONSTANT) or (op == DIV and kinds[1] == CONSTANT)
-        return LINEAR if scaled or op in _KEEP_LINEAR else SERIES
+        return LINEAR if scaled or op in _LINEAR_OPERATIONS else SERIES
     return highest
 
 
@@ -202,13 +204,13 @@ def arguments_of(row: tuple[int, ...]) -> tuple[int, ...]:
     return row[1 : 2 if row[0] >= ADD_CONSTANT else 1 + _registers(row[0])]
 
 
-def needed_rows(rows: list[tuple[int, ...]], wanted: set[int]) -> list[tuple[int, ...]]:
-    """Return the rows on which the wanted registers depend, in order."""
-    wanted = set(wanted)
-    kept = []
+def live_rows(rows: list[tuple[int, ...]], live: set[int]) -> list[tuple[int, ...]]:
+    """Return the rows on which the live registers depend, in order."""
+    live = set(live)
+    selected = []
     for row in reversed(rows):
         out = row[4]
-        if out in wanted or (row[0] in (*PAIRED, SINCOS_LINEAR) and out + 1 in wanted):
-            kept.append(row)
-            wanted |= set(row[1:4])  # flags among them can only keep an unneeded row
-    return kept[::-1]
+        if out in live or (row[0] in (*PAIRED, SINCOS_LINEAR) and out + 1 in live):
+            selected.append(row)
+            live |= set(row[1:4])  # flags among them can only keep an unneeded row
+    return selected[::-1]

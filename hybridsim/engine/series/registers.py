@@ -8,7 +8,7 @@ import numpy as np
 
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.layout import Layout
-from hybridsim.engine.series.optimise import twins_of
+from hybridsim.engine.series.optimise import separate_registers
 from hybridsim.expr import own_roundoff
 
 
@@ -32,8 +32,8 @@ class Registers:
     """Registers of a tape's inputs, as index arrays for kernels."""
 
     def __init__(self, tape: dict[str, Any], layout: Layout) -> None:
-        self.twins = twins_of(tape)
-        self.count: int = tape["registers"] + len(self.twins)
+        self.separate = separate_registers(tape)
+        self.count: int = tape["registers"] + len(self.separate)
         time: int = tape["time"]
         constants = np.array([r for r, *_ in tape["constants"]], dtype=np.int64)
         values = np.array([v for _, *v in tape["constants"]], dtype=float).reshape(-1, 2)

@@ -1,4 +1,4 @@
-"""A function of a few arguments as a lean tape; each argument varies in time or is constant per instance."""
+"""A function of a few arguments as an optimised tape; each argument varies in time or is constant per instance."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.engine.series.optimise import lean
+from hybridsim.engine.series.optimise import optimised
 from hybridsim.engine.series.tape import ABS, ANGLE, EQUAL, INTEGRAL, TapeBuilder
 from hybridsim.errors import ModelError
 from hybridsim.expr.symbolic import to_sympy
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class ScalarTape:
-    """Rows of a lean tape (see `hybridsim.engine.series.optimise`) and the registers of its arguments and its value.
+    """Rows of an optimised tape (see `hybridsim.engine.series.optimise`), registers of its arguments and of its value.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def scalar_tape(
     _refuse_powers(expression, form, moving)
     builder = TapeBuilder()
     inputs = [builder.register(f"v_{name}") for name in moving]
-    given = [builder.register(f"v_{name}") for name in constants]
+    constant_registers = [builder.register(f"v_{name}") for name in constants]
     clock = builder.register("clock")
     rows = builder.rows([("value", form)], {})
     corners = [row for row in rows if ABS <= row[0] <= EQUAL or (row[0] == INTEGRAL and row[3] == ANGLE)]
@@ -78,28 +78,28 @@ def scalar_tape(
         "surfaces": [],
         "monitors": [builder.register("value")],
     }
-    form_lean = lean(tape, rows, [])
+    tape_form = optimised(tape, rows, [])
     return ScalarTape(
         builder.count,
-        form_lean.constant_rows,
-        form_lean.rows,
+        tape_form.constant_rows,
+        tape_form.rows,
         tuple(inputs),
-        tuple(given),
+        tuple(constant_registers),
         tuple((register, value) for (value, _), register in builder.constants.items()),
-        int(form_lean.monitors[0]),
+        int(tape_form.monitors[0]),
     )
 
 
 @lru_cache(maxsize=256)
-def is_same(first: Expression, second: Expression, at_zero: str) -> bool:
+def is_same(first: Expression, second: Expression, vanishing: str) -> bool:
     """Return whether two expressions agree algebraically when one of their arguments is zero."""
     import sympy as sp
 
     from hybridsim.expr.simplify import simplified
 
-    names = tuple(sorted(first.names | second.names | {at_zero}))
+    names = tuple(sorted(first.names | second.names | {vanishing}))
     difference = _form(first, names, "") - _form(second, names, "")
-    return bool(simplified(difference.subs(sp.Symbol(f"v_{at_zero}", real=True), 0)) == 0)
+    return bool(simplified(difference.subs(sp.Symbol(f"v_{vanishing}", real=True), 0)) == 0)
 
 
 def _form(expression: Expression, names: Sequence[str], positive: str) -> Any:

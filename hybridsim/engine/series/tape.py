@@ -88,7 +88,7 @@ class TapeBuilder:
             is_exact = e.is_Float or (e.is_Rational and math.isfinite(value) and sp.Rational(value) == e)
             return self._constant(value, 0.0 if is_exact else _UNIT * abs(value))
         if e.is_Add or e.is_Mul:
-            return self._emit_chain(e, known, rows)
+            return self._emit_sequence(e, known, rows)
         if e.is_Pow:
             return self._emit_power(e.base, e.exp, known, rows)
         if isinstance(e, sp.Piecewise):
@@ -96,7 +96,7 @@ class TapeBuilder:
         arguments = [self._emit(a, known, rows) for a in e.args]
         return self._emit_function(e, arguments, known, rows)
 
-    def _emit_chain(self, e: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
+    def _emit_sequence(self, e: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
         import sympy as sp
 
         if e.is_Mul:
@@ -159,8 +159,8 @@ class TapeBuilder:
     def _unless_zero(self, rows: list[tuple[int, ...]], power: int, base: int, exponent: int) -> int:
         """Emit a power that is 0 at a zero base if the exponent is positive; it has no series there."""
         nothing = self._constant(0.0)
-        at_zero = self._op(rows, SELECT, self._op(rows, LESS, nothing, exponent), nothing, power)
-        return self._op(rows, SELECT, self._op(rows, LESS, nothing, base), power, at_zero)
+        value_at_0 = self._op(rows, SELECT, self._op(rows, LESS, nothing, exponent), nothing, power)
+        return self._op(rows, SELECT, self._op(rows, LESS, nothing, base), power, value_at_0)
 
     def _over(self, base: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
         """Emit 1/(c + d e^u) and 1/cosh(u), which are 0 if the exponential is infinite, by q = e^-|u|."""

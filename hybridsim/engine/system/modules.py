@@ -29,7 +29,7 @@ class Compiled:
 
     module: ModuleType
     seconds: float  # time of lowering; 0 if the module was cached
-    _kept: dict[str, tuple[Any, Any]] = field(default_factory=dict)
+    _compiled: dict[str, tuple[Any, Any]] = field(default_factory=dict)
     _shared: dict[str, Any] = field(default_factory=dict)
 
     is_current = True  # expressions depend on nothing outside the model
@@ -56,12 +56,12 @@ class Compiled:
 
     def address(self, name: str) -> Any:
         """Return the address of a function: flow, tangent, project, guards, surfaces, monitors or quantities."""
-        if name not in self._kept:
+        if name not in self._compiled:
             from hybridsim.engine.native.kernels import compile_model_function
 
             # another thread may have been first; its code is in use and must be kept
-            self._kept.setdefault(name, compile_model_function(self.module, name))
-        return self._kept[name][0]
+            self._compiled.setdefault(name, compile_model_function(self.module, name))
+        return self._compiled[name][0]
 
 
 _loaded: dict[str, Compiled] = {}
@@ -120,9 +120,9 @@ def _load(model: Model, name: str) -> Compiled:
 
     start = time.perf_counter()
     text = emit(model)
-    is_kept = store(path, text.encode())
+    is_stored = store(path, text.encode())
     seconds = time.perf_counter() - start
-    loader = _FromDisk(name, str(path)) if is_kept else _FromMemory(name, text)
+    loader = _FromDisk(name, str(path)) if is_stored else _FromMemory(name, text)
     return Compiled(_import(loader), seconds)
 
 

@@ -1,4 +1,4 @@
-"""Expand Taylor series of one segment, with the lean tape of its modes and its constants."""
+"""Expand Taylor series of one segment, with the optimised tape of its modes and its constants."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class SeriesRun:
     """Expands the flow of fixed modes and inputs at one point after another."""
 
     def __init__(self, system: System, p: np.ndarray, z: np.ndarray, tolerances: Tolerances) -> None:
-        tape, self.lean = system.code.data["tape"], system.lean_tape(z)
+        tape, self.optimised = system.code.data["tape"], system.optimised_tape(z)
         self.rtol, self.atol = max(tolerances.rtol, _TIGHTEST), tolerances.atol
         self.high = np.array(system.high_rows(z), dtype=np.int64).reshape(-1, 5)
         self.order = series_order(self.rtol, system.is_linear)
@@ -54,11 +54,11 @@ class SeriesRun:
             self.V[register, 0] = value
         for register, source in tape["parameters"]:
             self.V[register, 0] = p[source]
-        advance(self.lean.constant_rows, self.V, 0)
+        advance(self.optimised.constant_rows, self.V, 0)
         self.states = np.array(tape["states"], dtype=np.int64)
-        self.places = (tape["time"], self.states, self.lean.derivatives)
-        self.guards = self.lean.guards[np.flatnonzero(system.active(z))]
-        self.watched = np.concatenate([self.guards, self.lean.monitors])
+        self.flow_registers = (tape["time"], self.states, self.optimised.derivatives)
+        self.guards = self.optimised.guards[np.flatnonzero(system.active(z))]
+        self.monitored_registers = np.concatenate([self.guards, self.optimised.monitors])
 
     def expand(self, s: float, x: np.ndarray, longest: float) -> tuple[float, np.ndarray]:
         """Return the reach of the series from (s, x), at most `longest`, and coefficients of the states (n, order + 1).
@@ -67,9 +67,9 @@ class SeriesRun:
         overflow.
         """
         with np.errstate(over="ignore", invalid="ignore"):  # in dropped terms, or in a reach that is NaN
-            expand(self.lean.rows, self.high, self.places, self.order, s, x, self.V)
+            expand(self.optimised.rows, self.high, self.flow_registers, self.order, s, x, self.V)
         order = self._representable()
-        h = self._reach(self.watched, order, longest)
+        h = self._reach(self.monitored_registers, order, longest)
         if not h > min(_LITTLE * abs(s), longest):  # a pole of a monitor must not stop the run
             h = self._reach(self.guards, order, longest)
         return float(h), self.V[self.states, : order + 1]
@@ -86,7 +86,9 @@ class SeriesRun:
         far = np.flatnonzero(lost.any(axis=0))
         return int(far[0]) - 1 if len(far) else self.order
 
-    def _reach(self, watched: np.ndarray, order: int, longest: float) -> float:
+    def _reach(self, monitored_registers: np.ndarray, order: int, longest: float) -> float:
         V = self.V
-        room = np.empty(order + 1), np.empty(len(watched))
-        return reach(0, V, self.states, V, watched, order, self.rtol, self.atol, SLACK, longest, *room)
+        scratch = np.empty(order + 1), np.empty(len(monitored_registers))
+        return reach(
+            0, V, self.states, V, monitored_registers, order, self.rtol, self.atol, SLACK, longest, *scratch
+        )

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.engine.native.kernels import Door
+from hybridsim.engine.native.kernels import Precompiled
 from hybridsim.engine.native.rows import evaluate, evaluate_rows
 from hybridsim.engine.series.bounded import ORDER, run_series
 from hybridsim.engine.series.high_orders import high_rows
 from hybridsim.engine.series.layout import SIGNAL_SLOTS, Layout
-from hybridsim.engine.series.optimise import LeanTape, has_corners, lean
+from hybridsim.engine.series.optimise import OptimisedTape, has_corners, optimised
 from hybridsim.engine.series.registers import Registers
 from hybridsim.engine.system.finite_differences import DifferenceSeries, run_differences, run_jacobian
 from hybridsim.engine.system.instant import Instant, phase_of
@@ -60,7 +60,7 @@ class Automaton:
         return CORNER if self.is_corner else "transition"
 
     @property
-    def resting(self) -> int:
+    def limit_mode(self) -> int:
         """Return the mode that it may take at the limit of its events, or -1."""
         return self.hold if self.has_surface else self.limit
 
@@ -76,7 +76,7 @@ class Series:
 
     V: np.ndarray
     E: np.ndarray
-    place: LeanTape
+    place: OptimisedTape
 
     @property
     def guards(self) -> np.ndarray:
@@ -177,7 +177,7 @@ class _Frame:
         return table
 
 
-_run_series = Door(run_series)
+_run_series = Precompiled(run_series)
 
 
 class System:
@@ -210,9 +210,9 @@ class System:
         self.guard_count: int = data["guard_count"]
         self.surface_of: tuple[int, ...] = data["surfaces"]  # component of each surface
         self.clusters: tuple[tuple[int, ...], ...] = data["clusters"]
-        self.ties: tuple[tuple[int, int, bool], ...] = data[
-            "ties"
-        ]  # see `hybridsim.engine.lowering.stop_coupling.Tie`
+        self.stop_couplings: tuple[tuple[int, int, bool], ...] = data[
+            "stop_couplings"
+        ]  # see `hybridsim.engine.lowering.stop_coupling.StopCoupling`
         self.pins: dict[int, tuple[int, ...]] = data["pins"]
         self.projected: dict[int, tuple[int, ...]] = data["projected"]
         self.linear: dict[str, tuple[bool, ...]] = data["linear"]
@@ -239,7 +239,7 @@ class System:
             self._registers: Registers = self.code.shared(
                 "registers", lambda: Registers(data["tape"], self.layout)
             )
-        self._lean: dict[bytes, LeanTape] = self.code.shared("lean", dict)
+        self._optimised: dict[bytes, OptimisedTape] = self.code.shared("optimised tapes", dict)
         self._high: dict[bytes, list[tuple[int, ...]]] = self.code.shared("high orders", dict)
 
     @property
@@ -253,7 +253,7 @@ class System:
         return all(all(modes) for modes in self.linear.values())
 
     @cached_property
-    def heard(self) -> tuple[str, ...]:
+    def event_names(self) -> tuple[str, ...]:
         """Return the names that events can have: components, monitors, schedules, inputs."""
         model = self.model
         named = (self.automata, model.monitors, model.schedules, model.inputs)
@@ -456,20 +456,22 @@ class System:
             rows += branches[0 if component < 0 else z[component]]
         return rows
 
-    def lean_tape(self, z: np.ndarray) -> LeanTape:
+    def optimised_tape(self, z: np.ndarray) -> OptimisedTape:
         """Return the tape of the modes z for series of any order."""
         key = z.tobytes()
-        if key not in self._lean:
+        if key not in self._optimised:
             active = np.flatnonzero(self.active(z))
-            self._lean[key] = lean(self.code.data["tape"], self.mode_rows(z), active, self._registers.twins)
-        return self._lean[key]
+            self._optimised[key] = optimised(
+                self.code.data["tape"], self.mode_rows(z), active, self._registers.separate
+            )
+        return self._optimised[key]
 
     def high_rows(self, z: np.ndarray) -> list[tuple[int, ...]]:
         """Return the rows of that tape for high orders of states, active guards and monitors."""
         key = z.tobytes()
         if key in self._high:
             return self._high[key]
-        tape = self.lean_tape(z)
+        tape = self.optimised_tape(z)
         watched = (*tape.guards[self.active(z)].tolist(), *tape.monitors.tolist())
         rows = list(map(tuple, tape.rows.tolist()))
         self._high[key] = high_rows(rows, tape.states.tolist(), tape.derivatives.tolist(), watched)
@@ -491,7 +493,7 @@ class System:
         """
         if not self.has_tape:
             return self._differences(s, x, p, z, x_error, s_error)
-        tape, count = self.lean_tape(z), self._registers.count
+        tape, count = self.optimised_tape(z), self._registers.count
         V, E = np.empty((count, ORDER + 1)), np.empty((count, ORDER + 1))
         x, x_error, p = (np.ascontiguousarray(array, dtype=float) for array in (x, x_error, p))
         inputs = self._registers.with_roundoff(p) if with_numbers else self._registers.inputs
@@ -509,7 +511,7 @@ class System:
         C, G, E = np.empty((self.n, ORDER + 1)), np.empty(shape), np.empty(shape)
         p = self._probing(p)
         run_differences(
-            self.address("flow"), self.address("watched"), s, float(p[self.layout.origin_at]) + s, s_error,
+            self.address("flow"), self.address("guards_and_monitors"), s, float(p[self.layout.origin_at]) + s, s_error,
             np.ascontiguousarray(x, dtype=float), x_error, p, z, C, G, E,
         )  # fmt: skip
         return DifferenceSeries(C, G[:guards], E[:guards], G[guards:], E[guards:])

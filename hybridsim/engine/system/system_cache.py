@@ -12,14 +12,14 @@ if TYPE_CHECKING:
 
 _MOST = 16  # largest number of cached systems, enough for loops over several models
 
-_kept: dict[int, System] = {}
+_systems: dict[int, System] = {}
 _lock = SharedLock()
 
 
 def known_system(model: Model) -> System | None:
     """Return the cached system of a model, or None."""
     # a system keeps its model alive, so no other object has the same id
-    return _kept.get(id(model))
+    return _systems.get(id(model))
 
 
 def system_of(model: Model) -> System:
@@ -35,7 +35,7 @@ def system_of(model: Model) -> System:
         return system
     system = System(model.validate())
     with _lock:
-        while len(_kept) >= _MOST:
-            del _kept[next(iter(_kept))]
-        _kept[id(model)] = system
+        while len(_systems) >= _MOST:
+            del _systems[next(iter(_systems))]
+        _systems[id(model)] = system
     return system

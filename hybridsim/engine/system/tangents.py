@@ -19,7 +19,7 @@ from hybridsim.engine.series.optimise import (
     SCALE,
     SINCOS_LINEAR,
     SUB_CONSTANT,
-    needed_rows,
+    live_rows,
 )
 from hybridsim.engine.series.tape import (
     ABS,
@@ -174,8 +174,8 @@ class TangentTape:
         monitors: tuple[int, ...] = (),
         surfaces: tuple[int, ...] = (),
     ) -> None:
-        tape = system.lean_tape(z)
-        self._wanted = np.concatenate(
+        tape = system.optimised_tape(z)
+        self._outputs = np.concatenate(
             [
                 tape.derivatives,
                 tape.guards[list(guards)],
@@ -184,19 +184,19 @@ class TangentTape:
             ]
         ).astype(np.int64)
         rows = [tuple(row) for row in np.concatenate([tape.constant_rows, tape.rows]).tolist()]
-        self._rows = np.array(needed_rows(rows, set(self._wanted.tolist())), dtype=np.int64).reshape(-1, 5)
+        self._rows = np.array(live_rows(rows, set(self._outputs.tolist())), dtype=np.int64).reshape(-1, 5)
         self._registers = system.registers
 
     def is_same(self, other: TangentTape) -> bool:
         """Return whether another tape computes the same quantities by the same operations."""
-        return np.array_equal(self._rows, other._rows) and np.array_equal(self._wanted, other._wanted)
+        return np.array_equal(self._rows, other._rows) and np.array_equal(self._outputs, other._outputs)
 
     def __call__(self, s: np.ndarray, x: np.ndarray, p: np.ndarray, seeds: np.ndarray) -> Tangents:
         """Evaluate at local times s (m,) and states x (m, n), along the directions seeds (n + 1 + len(p), D)."""
-        count, wanted, directions = self._registers.count, len(self._wanted), seeds.shape[1]
+        count, wanted, directions = self._registers.count, len(self._outputs), seeds.shape[1]
         values, slopes = np.empty((len(s), wanted)), np.empty((len(s), wanted, directions))
         run_tangents(
-            self._rows, self._registers.inputs, np.ascontiguousarray(seeds), self._wanted,
+            self._rows, self._registers.inputs, np.ascontiguousarray(seeds), self._outputs,
             np.ascontiguousarray(s, dtype=float), np.ascontiguousarray(x, dtype=float), p,
             np.zeros((count, 1)), np.zeros((count, directions)), values, slopes,
         )  # fmt: skip

@@ -42,7 +42,7 @@ class Timetable:
             count = 1 if schedule.start is not None and schedule.period is None else schedule.count
             self._schedules.append((times, start, period, count))
 
-    def kept(self, instant: Instant) -> None:
+    def mark_done(self, instant: Instant) -> None:
         """Mark an instant as done, so that times within rounding of it are not due again."""
         self.settled = instant
 

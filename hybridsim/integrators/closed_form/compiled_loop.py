@@ -11,8 +11,8 @@ from hybridsim.engine.events.compiled.scratch import work_space
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.linear.closed_form_block import ClosedFormBlock
 from hybridsim.engine.linear.tables import LinearTables, tables_of
-from hybridsim.engine.native.kernels import Door
-from hybridsim.engine.native.struct_pack import Sheet
+from hybridsim.engine.native.kernels import Precompiled
+from hybridsim.engine.native.struct_pack import ArrayLayout
 from hybridsim.engine.record.array_forms import check_modes
 from hybridsim.engine.record.checkpoint import damaged
 from hybridsim.engine.record.counters import Counters
@@ -29,7 +29,7 @@ from hybridsim.integrators.closed_form.segments import Record, leap_at_address, 
 _SEGMENTS = 1024  # most segments of one call
 _NONE = np.zeros(0, dtype=np.int64)
 
-_leap = Door(leap_at_address)
+_leap = Precompiled(leap_at_address)
 
 
 class ClosedFormLoop:
@@ -41,8 +41,8 @@ class ClosedFormLoop:
         # as in `Room.hints` after the last call
         self.hints = np.zeros((0, system.guard_count))
         self.shelf, self.automata = shelf_of(system), automata_of(system)
-        self.tables: LinearTables | None = None  # tables for which the sheet was made
-        self.sheet: Sheet
+        self.tables: LinearTables | None = None  # tables for which the layout was made
+        self.array_layout: ArrayLayout
         self.kernel_run: KernelRun | None = None  # a call made beforehand, which `advance` takes first
 
     def fresh_copy(self) -> ClosedFormLoop:
@@ -96,9 +96,9 @@ class ClosedFormLoop:
             return None
         tables, spare = found
         if tables is not self.tables:
-            self.tables, self.sheet = tables, self._sheet(tables)
-        memory = self.sheet.blank()
-        rows = self.sheet.packed(memory)
+            self.tables, self.array_layout = tables, self._array_layout(tables)
+        memory = self.array_layout.blank()
+        rows = self.array_layout.packed(memory)
         try:
             call_arrays = spare.pop()
         except IndexError:
@@ -124,7 +124,7 @@ class ClosedFormLoop:
         shelf.surround(end.part("z"))
         has_news = count > 0 and len(shelf.tapes.modes) != len(tapes.modes)
         return KernelRun(
-            system, self.sheet, memory, 0, code, count, count, clock, end, has_news, seconds, beside
+            system, self.array_layout, memory, 0, code, count, count, clock, end, has_news, seconds, beside
         )
 
     def advance(
@@ -153,12 +153,12 @@ class ClosedFormLoop:
         kernel_run.forget_segments()
         return True
 
-    def _sheet(self, tables: LinearTables) -> Sheet:
+    def _array_layout(self, tables: LinearTables) -> ArrayLayout:
         """Return the arrays for the kernel's output; the trajectory keeps them, those of the events longest."""
         widest, system = tables.values.shape[1], self.system
 
-        def made() -> Sheet:
-            return Sheet(
+        def made() -> ArrayLayout:
+            return ArrayLayout(
                 Record,
                 (
                     (float, (_SEGMENTS,), 0),
@@ -173,8 +173,8 @@ class ClosedFormLoop:
                 ),
             )
 
-        sheet: Sheet = system.code.shared(f"sheet for {widest} modal coordinates", made)
-        return sheet
+        array_layout: ArrayLayout = system.code.shared(f"record of {widest} modal coordinates", made)
+        return array_layout
 
     def segments_of(self, kernel_run: KernelRun) -> ClosedFormBlock:
         """Return the segments of a call that has some and has released none."""

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from hybridsim.engine.events.jumps.impact import restitution_in_words
+from hybridsim.engine.events.jumps.impact import message_on_restitution
 from hybridsim.engine.record.trajectory import Task, Trajectory
 from hybridsim.engine.system.system import System
 from hybridsim.errors import UsageError
@@ -176,7 +176,7 @@ class MoreauMarch:
             e = float(room.restitution[k])
             if not -ROUNDING <= e <= 1.0 + ROUNDING:
                 name = system.automata[self._table[k, 0]].name
-                return restitution_in_words(name, e, float(room.approach[system.n + k]))
+                return message_on_restitution(name, e, float(room.approach[system.n + k]))
         return ""
 
     def warnings(self) -> list[str]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridsim.engine.events.choice.verdict import side_after, side_before
 from hybridsim.engine.events.diagnosis import power_without_value
-from hybridsim.engine.events.first_modes import as_given
+from hybridsim.engine.events.first_modes import as_read_by_conditions
 from hybridsim.engine.events.input_jumps import surfaces_jump
 from hybridsim.engine.events.outcome import Situation
 from hybridsim.engine.events.resolve import Settling
@@ -141,10 +141,10 @@ class FixedStepRun:
             self._go_on_from(checkpoint)
         else:
             due = self.timetable.due_at_start(self.origin)
-            self.timetable.kept(self.origin)
+            self.timetable.mark_done(self.origin)
             if self._overlaps(range(len(self.z))):
                 return
-            if (self.declared or due) and self._settle(
+            if (self.declared or due) and self._resolve(
                 self.origin, (), due, self.task.x0.copy(), starting=True
             ):
                 return
@@ -153,7 +153,7 @@ class FixedStepRun:
             settled, paces = self.timetable.settled, dict(self.accumulation.paces)
             self.record.mark(partial(Checkpoint, self.origin, arrays, settled, paces))
             appointment = self.timetable.next(self.origin, forward=True)
-            if self._stretch(appointment, appointment.instant if appointment else self.end):
+            if self._run_kernel(appointment, appointment.instant if appointment else self.end):
                 return
             if self.progress:
                 self.progress((float(self.origin) - self.task.t0) / (self.task.t1 - self.task.t0))
@@ -165,7 +165,7 @@ class FixedStepRun:
             raise damaged("the place at which it continues")
         self.origin = checkpoint.instant
         if checkpoint.settled is not None:
-            self.timetable.kept(checkpoint.settled)
+            self.timetable.mark_done(checkpoint.settled)
         self.accumulation.go_on(checkpoint.paces)
         state = {name: checkpoint.arrays[name].copy() for name in _STATE}
         self.x, self.z, self.discrete, self.scale, self.fresh = (state[name] for name in _STATE[:-1])
@@ -176,7 +176,7 @@ class FixedStepRun:
         p[self.system.layout.pin_at] = 1.0 if self.march.pinned else 0.0
         return p
 
-    def _stretch(self, appointment: Appointment | None, target: Instant) -> bool:
+    def _run_kernel(self, appointment: Appointment | None, target: Instant) -> bool:
         """Call the kernel once and resolve its end; return True if the run stops."""
         system = self.system
         p, bound = self._vector(), target.minus(self.origin)
@@ -198,7 +198,7 @@ class FixedStepRun:
         if count < _ROWS:  # do not keep large buffers for few rows
             times, states, modes = times[:count].copy(), states[:count].copy(), modes[:count].copy()
         self.scale = np.abs(states).max(axis=0)
-        self._keep(p, times, states, modes, start_z)
+        self._store(p, times, states, modes, start_z)
         s, x = float(times[count - 1]), states[count - 1]
         self.x, self.z = x.copy(), modes[count - 1].copy()
         instant = target if why == BOUND else self.origin.plus(s)
@@ -224,10 +224,12 @@ class FixedStepRun:
         if why == BOUND:
             self.origin = instant
             schedules = appointment.schedules if appointment else ()
-            self.timetable.kept(instant)
+            self.timetable.mark_done(instant)
             self.turned = bool(system.signals)
-            at_zero = bool(self.declared) and bool((self._guards(s, x, p)[self._watched()] == 0.0).any())
-            return (bool(schedules) or at_zero) and self._settle(instant, (), schedules, x)
+            is_zero = bool(self.declared) and bool(
+                (self._guards(s, x, p)[self._declared_guards()] == 0.0).any()
+            )
+            return (bool(schedules) or is_zero) and self._resolve(instant, (), schedules, x)
         return self._declared_event(s, p, why)
 
     def _sides_taken(self) -> np.ndarray:
@@ -268,7 +270,7 @@ class FixedStepRun:
     def _declared_event(self, s: float, p: np.ndarray, why: int) -> bool:
         """Locate a sign change of a guard or monitor by bisection of the step, then resolve it."""
         x, z = self.x, self.z
-        watched = self._watched()
+        declared_guards = self._declared_guards()
         before = self._monitors(s, x, p)
         low, high, best = 0.0, self.march.step, x
         for _ in range(self.march.halvings):
@@ -278,14 +280,14 @@ class FixedStepRun:
                 beyond = bool(_left(before, self._monitors(s + tau, trial, p)).any())
             else:
                 guards = self._guards(s + tau, trial, p)
-                beyond = bool((guards[watched] < 0.0).any())
+                beyond = bool((guards[declared_guards] < 0.0).any())
             if beyond:
                 high = tau
             else:
                 low = tau
         tau = high
         best = self._trial(s, tau, p)
-        self._keep(p, np.array([s, s + tau]), np.array([x, best]), np.array([z, z]), z)
+        self._store(p, np.array([s, s + tau]), np.array([x, best]), np.array([z, z]), z)
         instant = self.origin.plus(s + tau)
         if why == MONITOR:
             self.x, self.origin = best, instant
@@ -297,12 +299,14 @@ class FixedStepRun:
         first, last = self._guards(s, x, p), self._guards(s + tau, best, p)
         self.x = best
         shares = {
-            g: first[g] / (first[g] - last[g]) if first[g] > 0.0 else 0.0 for g in watched if last[g] < 0.0
+            g: first[g] / (first[g] - last[g]) if first[g] > 0.0 else 0.0
+            for g in declared_guards
+            if last[g] < 0.0
         }
         fired = sorted(shares, key=shares.__getitem__)
-        return self._settle(instant, tuple(fired), (), best)
+        return self._resolve(instant, tuple(fired), (), best)
 
-    def _watched(self) -> list[int]:
+    def _declared_guards(self) -> list[int]:
         """Return the guards of the components without a surface, in their present modes."""
         if not self.declared:
             return []
@@ -346,7 +350,7 @@ class FixedStepRun:
                 self.record.message = f"ended by {monitor.name} at t = {float(instant)!r}"
                 stop = True
         if resetting:  # all resets of one instant read the same state
-            return self._settle(instant, (), (), x, monitors=tuple(resetting), seen=seen) or stop
+            return self._resolve(instant, (), (), x, monitors=tuple(resetting), seen=seen) or stop
         self._record_monitors(instant, seen, x, x)
         return stop
 
@@ -357,7 +361,7 @@ class FixedStepRun:
             occurrence = Occurrence(instant, "monitor", name, "", "", "", direction, x_minus, x_plus)
             self.record.occurrences.append(occurrence)
 
-    def _settle(
+    def _resolve(
         self,
         instant: Instant,
         fired: tuple[int, ...],
@@ -385,7 +389,7 @@ class FixedStepRun:
         at = Situation(0.0, self.x.copy(), p, self.z.copy(), x_error, s_error, bool(starting))
         if starting:  # resets read contacts on their present sides
             at.z[system.has_surface] = self.task.z0[system.has_surface]
-            at.z = as_given(system, at).z
+            at.z = as_read_by_conditions(system, at).z
         resets: list[tuple[object, ...]] = [("schedule", k) for k in schedules]
         resets += [("monitor", k) for k in monitors]
         settling = Settling(system, at, before, forward=True, scope=self.declared)
@@ -444,7 +448,7 @@ class FixedStepRun:
 
     # -- the record -----------------------------------------------------------------------------------------
 
-    def _keep(self, p: np.ndarray, s: np.ndarray, x: np.ndarray, z: np.ndarray, before: np.ndarray) -> None:
+    def _store(self, p: np.ndarray, s: np.ndarray, x: np.ndarray, z: np.ndarray, before: np.ndarray) -> None:
         """Store the rows of one kernel call as segments of constant modes with the mode changes between them."""
         record = self.record
         record.counters.steps += len(s) - 1

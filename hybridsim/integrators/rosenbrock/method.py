@@ -70,13 +70,13 @@ class RosenbrockStepper(OneStepStepper):
     ) -> None:
         self.tableau, system, n = tableau, flow.system, flow.n
         self._address = system.address("flow")
-        lean = system.lean_tape(flow.z)
+        tape = system.optimised_tape(flow.z)
         inputs = system.registers.inputs
-        self._rows, self._places = lean.rows, (int(inputs.time[0]), inputs.states, lean.derivatives)
+        self._rows, self._flow_registers = tape.rows, (int(inputs.time[0]), inputs.states, tape.derivatives)
         self._V = np.zeros((system.registers.count, 2))
         self._V[inputs.constants, 0] = inputs.values[:, 0]
         self._V[inputs.parameters, 0] = flow.p[inputs.sources]
-        advance(lean.constant_rows, self._V, 0)
+        advance(tape.constant_rows, self._V, 0)
         self._room = (np.empty((n, n)), np.empty(n, dtype=np.int64), np.empty(n))
         super().__init__(flow, x0, bound, tolerances, first_step, tableau.order, tableau.error_order)
 
@@ -87,7 +87,7 @@ class RosenbrockStepper(OneStepStepper):
         n = self.flow.n
         jacobian, rate = np.empty((n, n)), np.empty(n)
         self.flow.counters.rhs_evaluations += n + 1
-        linearise(self._rows, self._places, s, x, self._V, jacobian, rate)
+        linearise(self._rows, self._flow_registers, s, x, self._V, jacobian, rate)
         return jacobian, rate
 
     def _attempt(self, start: Point, h: float) -> Trial:
@@ -129,7 +129,7 @@ class RosenbrockStepper(OneStepStepper):
         return not (np.abs(missed) > tableau.gamma * _DEFECT * (atol + rtol * size)).any()
 
     def _dense(self, start: Point, end: Point, trial: Trial) -> StageDense:
-        return StageDense(start.s, end.s, start.x, end.x, self.tableau.dense @ trial.kept)
+        return StageDense(start.s, end.s, start.x, end.x, self.tableau.dense @ trial.dense_data)
 
 
 class RosenbrockPoint(Point):

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, NamedTuple, cast
 
 import numpy as np
 
-from hybridsim.engine.native.kernels import Door
+from hybridsim.engine.native.kernels import Precompiled
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.hermite import (
@@ -70,7 +70,7 @@ class Room(NamedTuple):
     counts: np.ndarray
 
 
-_leap = Door(rk_leap)
+_leap = Precompiled(rk_leap)
 
 
 class RungeKuttaLoop(CompiledLoopBase):
@@ -88,21 +88,21 @@ class RungeKuttaLoop(CompiledLoopBase):
         shape = (TERMS, first, self.order)
         self.codes: EndsShelf = system.code.shared(f"ends of {shape}", lambda: EndsShelf(system, *shape))
         self.method = (tableau.packed, leading, tableau.error_order, _HERMITE)
-        given = np.array([tolerances.first_step or 0.0])
+        declared_step = np.array([tolerances.first_step or 0.0])
         self.control: tuple[Any, ...] = (
             rtol,
             tolerances.atol,
             self.order,
             tolerances.max_step,
             longest,
-            given,
+            declared_step,
         )
 
     def fresh_copy(self) -> RungeKuttaLoop:
         """Return the same loop for another run, which determines its own first step."""
         other = cast("RungeKuttaLoop", super().fresh_copy())
-        *rest, given = self.control
-        other.control = (*rest, given.copy())
+        *rest, declared_step = self.control
+        other.control = (*rest, declared_step.copy())
         return other
 
     def _room(self) -> Room:

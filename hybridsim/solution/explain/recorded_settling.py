@@ -100,10 +100,10 @@ class Watched(Settling):
         super().__init__(*arguments)
         self.decisions: list[Decision] = []
 
-    def _decide_cluster(self, cluster: tuple[int, ...], open_: set[int]) -> tuple[str, str] | None:
+    def _choose_cluster(self, cluster: tuple[int, ...], open_: set[int]) -> tuple[str, str] | None:
         decision = Decision(len(self.changes))
         self.decisions.append(decision)
-        failure = super()._decide_cluster(cluster, open_)
+        failure = super()._choose_cluster(cluster, open_)
         decision.last = len(self.changes)
         if failure is None:
             decision.z = self.at.z.copy()

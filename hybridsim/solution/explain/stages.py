@@ -13,7 +13,7 @@ from hybridsim.engine.events.input_jumps import surfaces_jump
 from hybridsim.engine.events.monitor_sides import MonitorSides
 from hybridsim.engine.events.outcome import Situation
 from hybridsim.engine.native.rows import evaluate_rows
-from hybridsim.engine.run.appointment_events import on_new_pieces
+from hybridsim.engine.run.appointment_events import events_before_appointment
 from hybridsim.engine.run.located import Located, with_evaluated
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.integrators.contract import Integrator
@@ -133,7 +133,9 @@ class _Instant:
         at = situation(self.system, self.segment, fired)
         found = self._nothing(at, {g: k for k, g in enumerate(fired)})
         if self.is_general and (self.schedules or self.knots) and (fired or self.stopping):
-            found = on_new_pieces(self.system, self.instant, found, self.schedules, self.task.forward)
+            found = events_before_appointment(
+                self.system, self.instant, found, self.schedules, self.task.forward
+            )
         if not (found.fired or self.stopping):
             return []
         return [self._settled(found, self.stopping, (), begins=found.inputs is not None)]

@@ -59,12 +59,12 @@ def test_the_near_grazing_scene_grazes_as_it_says() -> None:
     largest = np.abs(motion(np.linspace(0, scene.periods * period, 4001))[1]).max()
     dips = []
     # Left out: the first swing, and the second halves of those that a short stop cuts in two.
-    for piece, before in zip(motion.pieces[1:], motion.pieces):
-        cut_in_two = bool(dips) and piece.start - before.start < 0.05 * period
-        if piece.slip is None or piece.start < 0.4 * period or cut_in_two:
+    for segment, before in zip(motion.segments[1:], motion.segments):
+        cut_in_two = bool(dips) and segment.start - before.start < 0.05 * period
+        if segment.slip is None or segment.start < 0.4 * period or cut_in_two:
             continue
         s = np.linspace(0.15 * period, 0.26 * period, 200_001)
-        dips.append(float((piece.slip.direction * piece.slip.derivative(1, s)).min() / largest))
+        dips.append(float((segment.slip.direction * segment.slip.derivative(1, s)).min() / largest))
     assert dips[:3] == pytest.approx([-5.2e-4, -1.0e-4, -1.2e-5], rel=0.05)
     assert all(7e-6 < dip < 1e-5 for dip in dips[3:]) and len(dips) == 6
 

@@ -11,7 +11,7 @@ import pytest
 
 import hybridsim as hs
 from hybridsim.engine.system.system_cache import system_of
-from hybridsim.ensemble.runs import Fleet, sails
+from hybridsim.ensemble.runs import Ensemble, can_run_together
 from hybridsim.errors import UsageError
 from hybridsim.reference.closed_forms.den_hartog import no_stops
 
@@ -91,7 +91,7 @@ def test_the_map_of_the_reference_model() -> None:
     """Sticking, slipping, at rest, and exactly at the limit of it, where each touch is a question of rounding."""
     loads = [18.0, 20.0, np.nextafter(20.0, 21.0), 20.5, 24.0, 41.0, 57.0]
     speeds = (WN * np.array([0.09, 0.33, 0.71, 1.0, 1.6])).tolist()
-    assert sails(system_of(hs.load("dfcs").validate()))
+    assert can_run_together(system_of(hs.load("dfcs").validate()))
     found = hs.sweep("dfcs", {"F0": loads, "omega": speeds}, READINGS, after=40)
     assert not found.failed.any(), list(found.problems())
     for i, load in enumerate(loads):
@@ -121,7 +121,7 @@ def test_without_stops_the_amplitude_is_den_hartogs() -> None:
 def test_two_contacts_and_values_that_others_follow_from() -> None:
     """The load of both contacts, a start on and off the surfaces, and a floor that moves."""
     model = two_blocks()
-    assert sails(system_of(model.validate()))
+    assert can_run_together(system_of(model.validate()))
     points = {"N": [0.0, 1.0, 3.0, 9.0], "u": [0.0, 0.4], "v": [0.0, 0.4, -1.0]}
     words = ["amplitude.x", "energy.y", "stick_fraction.f", "stick_fraction.g", "stops_per_period.g"]
     found = hs.sweep(model, points, words, after=12)
@@ -225,7 +225,7 @@ def test_the_higher_one_of_two_tops_next_to_each_other_is_read() -> None:
         ],
         contacts=[hs.Contact("f", "v", "N", "coulomb", {"mu": 1.0})],
     )
-    assert sails(system_of(model.validate()))
+    assert can_run_together(system_of(model.validate()))
     s = np.linspace(-0.5, 0.5, 100_001)
     for a, d in ((0.2505, 1e-6), (0.252, 1e-5), (0.2535, 3e-4)):
         truth = highest(np.cos(s) - a * np.cos(2.0 * s) + d * np.sin(s))
@@ -275,7 +275,7 @@ def test_a_long_run_ends_where_the_sweep_is_to_end() -> None:
     start = np.zeros((1, 2))
     done = {
         answer: [
-            last.numbers.tolist() for last in Fleet(system, lambda a=answer: a).runs(values, start, 10_000)
+            last.numbers.tolist() for last in Ensemble(system, lambda a=answer: a).runs(values, start, 10_000)
         ]
         for answer in (False, True)
     }

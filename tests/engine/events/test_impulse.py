@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from reference.random_blows import random_blow
 
-from hybridsim.engine.events.jumps.impulse import Blow, answers, count, energy
+from hybridsim.engine.events.jumps.impulse import ImpactProblem, answers, count, energy
 
 
 def frictionless(effects, before, restitution):
     k = len(before)
     nothing = np.zeros((0, k))
-    return Blow(
+    return ImpactProblem(
         np.array(effects, dtype=float),
         np.array(before, float),
         np.array(restitution, float),
@@ -26,7 +26,7 @@ def frictionless(effects, before, restitution):
 def rubbing(effects, before, restitution, mu):
     """One normal contact and one tangential one, friction mu both ways."""
     limit = np.array([[float(mu)]])
-    return Blow(
+    return ImpactProblem(
         np.array(effects, dtype=float), np.array(before, float), np.array([restitution]), limit, limit
     )
 
@@ -83,7 +83,7 @@ def test_the_order_of_the_contacts_does_not_matter():
         first = answers(blow)
         order = rng.permutation(3)
         rows = np.array([*order, 3, 4])
-        turned = Blow(
+        turned = ImpactProblem(
             blow.effects[np.ix_(rows, rows)],
             blow.before[rows],
             blow.restitution[order],

@@ -79,7 +79,7 @@ def test_the_order_of_values_does_not_matter() -> None:
         return [getattr(made, name).tolist() for name in ("slopes", "rates", "weights", "values", "inverse")]
 
     forward = [tables(values) for values in sets]
-    System(MODEL).code.shared("linear plans", dict).clear()
+    System(MODEL).code.shared("matrix templates", dict).clear()
     backward = [tables(values) for values in reversed(sets)]
     assert forward == backward[::-1]
 

@@ -1,4 +1,4 @@
-"""Rows for high orders: the same coefficients as by the lean tape, along shorter chains."""
+"""Rows for high orders: the same coefficients as by the optimised tape, along shorter chains."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ def test_coefficients_are_those_of_the_lean_tape(name: str) -> None:
         z = np.array([min(mode, len(a.modes) - 1) for a in system.automata], dtype=np.int64)
         run = SeriesRun(system, p, z, Tolerances(1e-9, np.zeros(system.n)))
         short, plain = run.V.copy(), run.V.copy()
-        expand(run.lean.rows, run.high, run.places, run.order, 0.1, x, short)
-        expand(run.lean.rows, run.high[:0], run.places, run.order, 0.1, x, plain)
-        for registers in (run.states, run.watched):
+        expand(run.optimised.rows, run.high, run.flow_registers, run.order, 0.1, x, short)
+        expand(run.optimised.rows, run.high[:0], run.flow_registers, run.order, 0.1, x, plain)
+        for registers in (run.states, run.monitored_registers):
             np.testing.assert_array_equal(short[registers, :5], plain[registers, :5])
             np.testing.assert_allclose(short[registers], plain[registers], rtol=1e-12, atol=0.0)
 

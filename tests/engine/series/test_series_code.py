@@ -24,7 +24,7 @@ from hybridsim.engine.series.interpreter import expand, measure
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.programs import code_cache, mode_tables
 from hybridsim.engine.system.programs.code_cache import CodeShelf
-from hybridsim.engine.system.programs.mode_code import constant_rows, given, mode_tape
+from hybridsim.engine.system.programs.mode_code import constant_rows, constant_sources, mode_tape
 from hybridsim.engine.system.programs.mode_tables import shelf_of
 from hybridsim.engine.system.series_at import SeriesRun
 from hybridsim.engine.system.system import System
@@ -141,7 +141,18 @@ def test_series_and_what_is_ahead_of_them(name: str, tmp_path: Path) -> None:
         d = 0.01
         found, want = np.empty((2, room_ahead(order, n, len(watched))))
         called(ahead, 0.1, d, C, U, constants, found)
-        looked(run.lean.rows, run.places, order, 0.1, d, watched, expected, guards, interpreted, want)
+        looked(
+            run.optimised.rows,
+            run.flow_registers,
+            order,
+            0.1,
+            d,
+            watched,
+            expected,
+            guards,
+            interpreted,
+            want,
+        )
         np.testing.assert_array_equal(found, want)
         measured = np.empty(order + 1 + len(with_fading))
         called(sizes, d, 0.0, C, with_fading, constants, measured)
@@ -157,7 +168,7 @@ def test_series_and_what_is_ahead_of_them(name: str, tmp_path: Path) -> None:
         np.testing.assert_array_equal(C, run.V[run.states])
         rates, at = np.empty(n), np.empty(len(watched))
         called(values, 0.1 + d, 0.0, x1, at, constants, rates)
-        np.testing.assert_array_equal(rates, run.V[run.lean.derivatives, 0])
+        np.testing.assert_array_equal(rates, run.V[run.optimised.derivatives, 0])
         np.testing.assert_array_equal(at, run.V[watched, 0])
 
 
@@ -172,7 +183,7 @@ def test_short_series_with_bounds(name: str, tmp_path: Path) -> None:
         (code,), _keep = compile_series(
             tmp_path / f"{i}",
             ("bounds_0",),
-            partial(bounds_text, tape, rows, given(system), active.tolist(), system.guard_count),
+            partial(bounds_text, tape, rows, constant_sources(system), active.tolist(), system.guard_count),
         )
         out = np.empty((2, system.guard_count, ORDER + 1))
         called(code, 0.1, 1e-17, x, x_error, p, out)
@@ -198,7 +209,7 @@ def test_series_at_the_ends_of_steps_and_guards_along_them(name: str, tmp_path: 
     system, terms, first, order, s = SYSTEMS[name], 4, 7, 11, 0.1
     p, x = start_of(system)
     for i, z in enumerate(modes_of(system)):
-        tape, lean = mode_tape(system, z), system.lean_tape(z)
+        tape, lean = mode_tape(system, z), system.optimised_tape(z)
         watched = np.array(tape.guards, dtype=np.int64)
         constants = SeriesRun(system, p, z, Tolerances(1e-9, np.zeros(system.n))).V
         V, W = (np.pad(constants[:, :1], ((0, 0), (0, order))) for _ in range(2))

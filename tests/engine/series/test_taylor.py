@@ -35,8 +35,8 @@ def test_the_lean_tape_is_the_tape(name: str) -> None:
         active = system.active(z)
         for places, expected in (
             (run.states, full.states),
-            (run.lean.guards[active], full.guards[active]),
-            (run.lean.monitors, full.monitors),
+            (run.optimised.guards[active], full.guards[active]),
+            (run.optimised.monitors, full.monitors),
         ):
             np.testing.assert_array_equal(run.V[places, :4], expected)
 

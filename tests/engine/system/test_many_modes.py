@@ -140,7 +140,7 @@ def test_tables_that_grew_are_those_made_at_once() -> None:
         assert made is not None
         steps.append(made)
     assert len({id(step.rows) for step in steps}) < len(steps)  # some found room behind the former ones
-    system.code.shared("linear plans", dict).clear()
+    system.code.shared("matrix templates", dict).clear()
     whole = linear_tables(system, shelf.tapes.modes, p, 100.0)
     assert whole is not None
     for name in LinearTables._fields:

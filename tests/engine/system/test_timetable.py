@@ -64,7 +64,7 @@ def test_a_long_list_of_times_costs_no_more_for_each() -> None:
 
     def calls(count: int) -> int:
         table = timetable(Schedule("a", times=tuple(0.25 * k for k in range(count))))
-        table.kept(Instant(1.0))
+        table.mark_done(Instant(1.0))
         counted: list[str] = []
         sys.setprofile(lambda _frame, event, _argument: counted.append(event))
         try:

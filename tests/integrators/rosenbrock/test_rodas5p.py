@@ -100,7 +100,7 @@ def test_the_linearisation_is_exact() -> None:
     z = np.zeros(0, dtype=np.int64)
     p = system.vector(Instant(1.25), np.zeros(0))
     t = 1.25 + s
-    lean = system.lean_tape(z)
+    lean = system.optimised_tape(z)
     inputs = system.registers.inputs
     V = np.zeros((system.registers.count, 2))
     V[inputs.constants, 0], V[inputs.parameters, 0] = inputs.values[:, 0], p[inputs.sources]

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hybridsim.engine.events.resolve import Settling
 
 
-def kept(settling: Settling, automata: set[int], surfaces: set[int]) -> set[int]:
+def cancelled_by_surfaces(settling: Settling, automata: set[int], surfaces: set[int]) -> set[int]:
     """Return the automata whose located guards would not fire if the surfaces were decided first."""
     ahead = copy(settling)
     ahead.at = replace(settling.at, z=settling.at.z.copy())
@@ -26,7 +26,7 @@ def kept(settling: Settling, automata: set[int], surfaces: set[int]) -> set[int]
     ahead.sides, ahead.orders = settling.sides.copy(), settling.orders.copy()
     ahead.changes, ahead.warnings, ahead.series = [], [], {}
     open_ = set(surfaces)
-    if strike(ahead, open_) or ahead.decide(open_):
+    if strike(ahead, open_) or ahead.choose_jointly(open_):
         return set()
     take_corners(ahead)
     return {c for c in automata if ahead.verdict(ahead.at.z, [c]) != LEAVES}

@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 Failure = tuple[str, str]  # status and message
 
 
-def taken_at_once(
-    settling: Settling, given: Situation, component: int, leaving: Sequence[int]
+def guards_taken_together(
+    settling: Settling, read_from: Situation, component: int, leaving: Sequence[int]
 ) -> tuple[list[tuple[int, int]], Failure | None]:
     """Return the guards of a mode that are taken, each with the number of its choice, or why none can be taken.
 
-    leaving: positions of the guards that become negative, in the order in which they reached zero. given: the situation
-    that conditions and resets read. If several guards are negative when the mode begins, the first declared one is
-    taken.
+    leaving: positions of the guards that become negative, in the order in which they reached zero. read_from: the
+    situation that conditions and resets read. If several guards are negative when the mode begins, the first declared
+    one is taken.
     """
     system, mode = settling.system, int(settling.at.z[component])
     automaton = system.automata[component]
@@ -31,7 +31,10 @@ def taken_at_once(
     first = first or list(leaving[:1])
     if fatal := next((automaton.fatal[mode][j] for j in first if automaton.fatal[mode][j]), ""):
         return [], ("inconsistent", str(fatal))
-    numbers = {j: system.choose(component, mode, j, given.s, given.x, given.p, given.z) for j in first}
+    numbers = {
+        j: system.choose(component, mode, j, read_from.s, read_from.x, read_from.p, read_from.z)
+        for j in first
+    }
     if first and max(numbers.values()) < 0:
         return [], (
             "inconsistent",

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.engine.events.choice.verdict import FINE
-from hybridsim.engine.events.fatal_guards import said_by_every_mode
+from hybridsim.engine.events.fatal_guards import message_of_every_mode
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.model.meanings import Meanings
 
@@ -130,8 +130,8 @@ def _pull(settling: Settling, sliding: list[int], z: np.ndarray) -> np.ndarray:
 def refused(settling: Settling, members: list[int], message: str) -> tuple[str, str]:
     """Return status and message if no joint candidate is admissible, with hints on switching surfaces."""
     system = settling.system
-    if said := said_by_every_mode(system, members, settling.sides):
-        return "inconsistent", said
+    if fatal := message_of_every_mode(system, members, settling.sides):
+        return "inconsistent", fatal
     unique = [c for c in members if system.automata[c].is_unique]
     slow = [c for c in unique if c not in system.pins and c not in system.projected]
     if slow:
@@ -149,15 +149,15 @@ def refused(settling: Settling, members: list[int], message: str) -> tuple[str, 
     return "inconsistent", message
 
 
-def words_on_cascade(settling: Settling) -> str:
+def message_on_cascade(settling: Settling) -> str:
     """Return a hint on transitions that repeat without end, or an empty text."""
-    for words in (_words_on_opposed_modes, _words_on_negative_guard, _words_on_drift):
-        if found := words(settling):
+    for make_message in (_message_on_opposed_modes, _message_on_negative_guard, _message_on_drift):
+        if found := make_message(settling):
             return found
     return ""
 
 
-def _words_on_drift(settling: Settling) -> str:
+def _message_on_drift(settling: Settling) -> str:
     """Return a hint on a guard slightly below zero after a transition leads back to its mode."""
     system, last = settling.system, settling.changes[-2:]
     if len(last) < 2 or last[0].component != last[1].component or last[0].source != last[1].target:
@@ -178,7 +178,7 @@ def _words_on_drift(settling: Settling) -> str:
     return ""
 
 
-def _words_on_negative_guard(settling: Settling) -> str:
+def _message_on_negative_guard(settling: Settling) -> str:
     """Return a hint on a guard that is negative after its own transition."""
     if not settling.changes:
         return ""
@@ -197,7 +197,7 @@ def _words_on_negative_guard(settling: Settling) -> str:
     )
 
 
-def _words_on_opposed_modes(settling: Settling) -> str:
+def _message_on_opposed_modes(settling: Settling) -> str:
     """Return a hint on two modes that drive the motion against each other across one surface."""
     model, last = settling.system.model, settling.changes[-2:]
     if len(last) < 2 or last[0].component != last[1].component or last[0].source != last[1].target:

@@ -107,7 +107,7 @@ def choose(modes: Any, verdicts: Any, current: Any, holds: Any) -> int:
     highest `preference` is chosen, and a tie is NONUNIQUE. Undecided candidates are chosen only if no candidate is
     certain. The result is NONE if no candidate is left.
     """
-    best, best_score, ties = -1, -1, 0
+    best, best_score, equal_best = -1, -1, 0
     n = modes.shape[1]
     for c in range(modes.shape[0]):
         if verdicts[c] == LEAVES:
@@ -117,12 +117,12 @@ def choose(modes: Any, verdicts: Any, current: Any, holds: Any) -> int:
             return c
         score = rank + (n + 1) * (n + 1) * (verdicts[c] == FINE)
         if score > best_score:
-            best, best_score, ties = c, score, 0
+            best, best_score, equal_best = c, score, 0
         elif score == best_score:
-            ties += 1
+            equal_best += 1
     if best < 0:
         return NONE
-    return NONUNIQUE if ties > 0 else best
+    return NONUNIQUE if equal_best > 0 else best
 
 
 @inlined

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.engine.events.jumps.impulse import MOST, Answer, Blow, answers, count
+from hybridsim.engine.events.jumps.impulse import MOST, Answer, ImpactProblem, answers, count
 from hybridsim.engine.events.jumps.rest_impulses import loaded, stopped
 from hybridsim.engine.events.outcome import Change
 from hybridsim.engine.series.bounded import UNIT
@@ -60,7 +60,7 @@ def _surfaces(settling: Settling) -> tuple[np.ndarray, np.ndarray]:
     return series.surfaces, series.surface_bounds
 
 
-def restitution_in_words(name: str, value: float, speed: float) -> str:
+def message_on_restitution(name: str, value: float, speed: float) -> str:
     """Return the message for a restitution outside [0, 1]."""
     where = f"at a speed of approach of {speed:.6g}"
     return f"the restitution of {name} is {value!r} {where}, and must lie between 0 and 1"
@@ -152,32 +152,32 @@ class _Collision:
         normal = sorted([*self.rates, *held])
         modes = np.maximum(at.z, 0)
         slopes, changes, loads = system.impulses(at.s, at.x, at.p, modes)
-        places = [self.place[c] for c in normal]
-        rubbing = [c for c in self.cluster if loads[:, self.place[c]][:, places].any()]
+        normal_rows = [self.place[c] for c in normal]
+        rubbing = [c for c in self.cluster if loads[:, self.place[c]][:, normal_rows].any()]
         members = [*normal, *rubbing]
         rows = [self.place[c] for c in members]
         before = np.array([self.rates.get(c, 0.0) for c in normal] + [0.0] * len(rubbing))
         before[len(normal) :] = self._velocities(rubbing)
         speeds = np.zeros(len(system.surface_of))
-        speeds[places] = np.maximum(-before[: len(normal)], 0.0)
-        restitution = system.restitutions(at.s, at.x, at.p, modes, speeds)[places]
-        for c, value, speed in zip(normal, restitution.tolist(), speeds[places].tolist(), strict=True):
+        speeds[normal_rows] = np.maximum(-before[: len(normal)], 0.0)
+        restitution = system.restitutions(at.s, at.x, at.p, modes, speeds)[normal_rows]
+        for c, value, speed in zip(normal, restitution.tolist(), speeds[normal_rows].tolist(), strict=True):
             if not -ROUNDING <= value <= 1.0 + ROUNDING:
-                return "inconsistent", restitution_in_words(automata[c].name, value, speed)
+                return "inconsistent", message_on_restitution(automata[c].name, value, speed)
         restitution = np.clip(restitution, 0.0, 1.0)
         names = ", ".join(automata[c].name for c in members)
-        blow = Blow(
+        problem = ImpactProblem(
             slopes[rows] @ changes[rows].T,
             before,
             restitution,
-            *(loads[side][np.ix_(rows[len(normal) :], places)] for side in (0, 1)),
+            *(loads[side][np.ix_(rows[len(normal) :], normal_rows)] for side in (0, 1)),
         )
-        if count(blow) > MOST:
+        if count(problem) > MOST:
             return (
                 "inconsistent",
                 f"{len(members)} contacts take part in one impact ({names}), which are too many to solve",
             )
-        found = answers(blow)
+        found = answers(problem)
         if len(found) != 1:
             what = "several outcomes" if found else "no outcome"
             motion = ", ".join(f"{value:.6g}" for value in before)
@@ -214,8 +214,8 @@ class _Collision:
         sizes = np.abs(at.x) + np.abs(shares).sum(axis=0)
         error = at.x_error + 8.0 * UNIT * sizes + np.abs(changes).T @ self._uncertain(answer)
         # states evaluated from gaps are as accurate as the gaps
-        kept = np.where(settling.pinned_states(normal), 0.0, at.x_error)
-        at.x, at.x_error = x, np.where(moved, error, np.maximum(kept, UNIT * np.abs(x)))
+        unchanged_error = np.where(settling.pinned_states(normal), 0.0, at.x_error)
+        at.x, at.x_error = x, np.where(moved, error, np.maximum(unchanged_error, UNIT * np.abs(x)))
         # a rate that is zero within rounding is the end of an accumulation
         is_lost = np.abs(answer.after) <= np.abs(slopes) @ at.x_error
         if len(normal) == 1 and 0.0 < restitution[0] < 1.0:

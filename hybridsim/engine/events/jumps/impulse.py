@@ -34,7 +34,7 @@ _OFF, _ON, _FORWARD, _BACKWARD = range(4)
 
 
 @dataclass(frozen=True)
-class Blow:
+class ImpactProblem:
     """An impact on several contacts, the normal ones first.
 
     Parameters
@@ -68,66 +68,68 @@ class Answer:
     reduced: bool = False  # whether the impulses were reduced because energy would have grown
 
 
-def count(blow: Blow) -> int:
+def count(problem: ImpactProblem) -> int:
     """Return the number of combinations to try."""
-    return 2**blow.normal * 3 ** (len(blow.before) - blow.normal)
+    return 2**problem.normal * 3 ** (len(problem.before) - problem.normal)
 
 
-def answers(blow: Blow) -> list[Answer]:
+def answers(problem: ImpactProblem) -> list[Answer]:
     """Return all solutions that differ in the motion; one if the contacts are independent and without friction."""
-    rebound = blow.restitution * np.maximum(-blow.before[: blow.normal], 0.0)
-    found = _answers(blow, rebound)
-    if len(found) != 1 or not _gains(blow, found[0].impulses) or not rebound.any():
+    rebound = problem.restitution * np.maximum(-problem.before[: problem.normal], 0.0)
+    found = _answers(problem, rebound)
+    if len(found) != 1 or not _gains(problem, found[0].impulses) or not rebound.any():
         return found
-    dead = _answers(blow, np.zeros(blow.normal))
-    return [_between(blow, dead[0], found[0])] if len(dead) == 1 else dead
+    dead = _answers(problem, np.zeros(problem.normal))
+    return [_between(problem, dead[0], found[0])] if len(dead) == 1 else dead
 
 
-def energy(blow: Blow, impulses: np.ndarray) -> tuple[float, float]:
+def energy(problem: ImpactProblem, impulses: np.ndarray) -> tuple[float, float]:
     """Return the work of the impulses, and a bound of its rounding error."""
-    n = blow.normal
+    n = problem.normal
     sign = np.where(np.arange(len(impulses)) < n, 1.0, -1.0)
-    p, metric = sign * impulses, blow.effects * sign
+    p, metric = sign * impulses, problem.effects * sign
     change = metric @ p
-    terms = np.abs(p) @ (np.abs(blow.before) + 0.5 * np.abs(metric) @ np.abs(p))
-    return float(p @ (blow.before + 0.5 * change)), float(_rounding(blow) * terms)
+    terms = np.abs(p) @ (np.abs(problem.before) + 0.5 * np.abs(metric) @ np.abs(p))
+    return float(p @ (problem.before + 0.5 * change)), float(_rounding(problem) * terms)
 
 
-def _gains(blow: Blow, impulses: np.ndarray) -> bool:
-    work, bound = energy(blow, impulses)
+def _gains(problem: ImpactProblem, impulses: np.ndarray) -> bool:
+    work, bound = energy(problem, impulses)
     return work > bound
 
 
-def _rounding(blow: Blow) -> float:
-    return _OPERATIONS * len(blow.before) * UNIT
+def _rounding(problem: ImpactProblem) -> float:
+    return _OPERATIONS * len(problem.before) * UNIT
 
 
-def _answers(blow: Blow, rebound: np.ndarray) -> list[Answer]:
+def _answers(problem: ImpactProblem, rebound: np.ndarray) -> list[Answer]:
     """Solve for the impulses of all combinations, and return those that the law admits."""
-    m, n = len(blow.before), blow.normal
-    state = _combinations(blow)
+    m, n = len(problem.before), problem.normal
+    state = _combinations(problem)
     matrix, right = np.tile(np.eye(m), (len(state), 1, 1)), np.zeros((len(state), m))
     on = state == _ON
     rows, members = np.nonzero(on)
-    matrix[rows, members] = blow.effects[members]
-    right[:, :n] = np.where(on[:, :n], rebound - blow.before[:n], 0.0)
-    right[:, n:] = np.where(on[:, n:], -blow.before[n:], 0.0)
-    for slips, ends in ((_FORWARD, -blow.up), (_BACKWARD, blow.down)):
+    matrix[rows, members] = problem.effects[members]
+    right[:, :n] = np.where(on[:, :n], rebound - problem.before[:n], 0.0)
+    right[:, n:] = np.where(on[:, n:], -problem.before[n:], 0.0)
+    for slips, ends in ((_FORWARD, -problem.up), (_BACKWARD, problem.down)):
         rows, members = np.nonzero(state == slips)
         matrix[rows, members, :n] = ends[members - n]
     regular = np.linalg.det(matrix) != 0.0
     state, on, matrix, right = state[regular], on[regular], matrix[regular], right[regular]
     inverse = np.linalg.inv(matrix)
     impulses = np.where(state == _OFF, 0.0, np.einsum("sij,sj->si", inverse, right))
-    unit, sizes = _rounding(blow), np.abs(impulses)
+    unit, sizes = _rounding(problem), np.abs(impulses)
     off = unit * np.einsum("sij,sjk,sk->si", np.abs(inverse), np.abs(matrix), sizes)
     impulses[:, :n] = np.where(sizes[:, :n] <= off[:, :n], 0.0, impulses[:, :n])
-    after = blow.before + impulses @ blow.effects.T
-    bounds = unit * (np.abs(blow.before) + sizes @ np.abs(blow.effects).T) + off @ np.abs(blow.effects).T
+    after = problem.before + impulses @ problem.effects.T
+    bounds = (
+        unit * (np.abs(problem.before) + sizes @ np.abs(problem.effects).T) + off @ np.abs(problem.effects).T
+    )
     after, bounds = np.where(on, 0.0, after), np.where(on, 0.0, bounds)
     after[:, :n] = np.where(on[:, :n], rebound, after[:, :n])
     normal, tangential = impulses[:, :n], impulses[:, n:]
-    most, least = normal @ blow.up.T + off[:, n:], -(normal @ blow.down.T) - off[:, n:]
+    most, least = normal @ problem.up.T + off[:, n:], -(normal @ problem.down.T) - off[:, n:]
     admitted = (normal >= 0.0).all(axis=1) & (after[:, :n] >= rebound - bounds[:, :n]).all(axis=1)
     admitted &= (~on[:, n:] | ((tangential <= most) & (tangential >= least))).all(axis=1)
     admitted &= ((state != _FORWARD) | (after >= -bounds)).all(axis=1)
@@ -142,12 +144,12 @@ def _answers(blow: Blow, rebound: np.ndarray) -> list[Answer]:
     return found
 
 
-def _combinations(blow: Blow) -> np.ndarray:
+def _combinations(problem: ImpactProblem) -> np.ndarray:
     """Return the state of each contact, one combination per row: first most contacts closed, then most sticking."""
     found = []
-    for normal in product((_ON, _OFF), repeat=blow.normal):
+    for normal in product((_ON, _OFF), repeat=problem.normal):
         pushed = np.array(normal) == _ON
-        loaded = (blow.up[:, pushed] != 0.0).any(axis=1) | (blow.down[:, pushed] != 0.0).any(axis=1)
+        loaded = (problem.up[:, pushed] != 0.0).any(axis=1) | (problem.down[:, pushed] != 0.0).any(axis=1)
         ways = [(_ON, _FORWARD, _BACKWARD) if is_loaded else (_OFF,) for is_loaded in loaded]
         found += [(*normal, *tangential) for tangential in product(*ways)]
     return np.array(found, dtype=np.int64)
@@ -157,19 +159,19 @@ def _same(one: Answer, other: Answer) -> bool:
     return bool((np.abs(one.after - other.after) <= one.bounds + other.bounds).all())
 
 
-def _between(blow: Blow, dead: Answer, lively: Answer) -> Answer:
+def _between(problem: ImpactProblem, dead: Answer, lively: Answer) -> Answer:
     """Return the last impulses on the line from one solution to the other whose work is not positive.
 
     The work is quadratic in the position w on this line, not positive at 0 and positive at 1.
     """
-    start, end = energy(blow, dead.impulses)[0], energy(blow, lively.impulses)[0]
-    middle = energy(blow, 0.5 * (dead.impulses + lively.impulses))[0]
+    start, end = energy(problem, dead.impulses)[0], energy(problem, lively.impulses)[0]
+    middle = energy(problem, 0.5 * (dead.impulses + lively.impulses))[0]
     start = min(start, 0.0)
     square = 2.0 * (start + end - 2.0 * middle)
     linear = end - start - square
     root = math.sqrt(max(linear * linear - 4.0 * square * start, 0.0))
     way = -2.0 * start / (linear + root) if linear + root > 0.0 else 0.0
-    way = min(max(way, 0.0), 1.0) * (1.0 - _rounding(blow))
+    way = min(max(way, 0.0), 1.0) * (1.0 - _rounding(problem))
     impulses = dead.impulses + way * (lively.impulses - dead.impulses)
     after = dead.after + way * (lively.after - dead.after)
     zero = dead.zero & (lively.zero | (way == 0.0))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.engine.events.diagnosis import reset_in_words
+from hybridsim.engine.events.diagnosis import reset_description
 from hybridsim.engine.lowering.reset_keys import added, declared_reset, is_added
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.series.dual_numbers import differentiated, values_and_slopes, with_slopes
@@ -37,7 +37,7 @@ class _Changes:
     added: list[tuple[Key, float, float]] = field(default_factory=list)
 
 
-def merged_resets(
+def combine_resets(
     system: System,
     at: Situation,
     keys: list[Key],
@@ -59,9 +59,7 @@ def merged_resets(
                 place = _place(system, name)
                 if not np.isfinite(values[place]):
                     state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(system.names, at.x, strict=True))
-                    return (
-                        f"{reset_in_words(system, key)} sets {name} to a value that is not finite, at {state}"
-                    )
+                    return f"{reset_description(system, key)} sets {name} to a value that is not finite, at {state}"
                 one = changes.setdefault(name, _Changes())
                 (one.set if part is key else one.added).append(
                     (key, float(values[place]), float(errors[place]))
@@ -91,14 +89,16 @@ def _contradiction(system: System, name: str, one: _Changes) -> str:
     if len(keys) < 2 or not one.set:
         return ""
     remedy = f'; to add amounts in any order, write {name} = "+= amount"'
-    words = " and ".join(dict.fromkeys(reset_in_words(system, key) for key in keys))
+    descriptions = " and ".join(dict.fromkeys(reset_description(system, key) for key in keys))
     if one.added:
-        return f"at one instant {words} set {name} and add to it, and their order is not declared{remedy}"
+        return (
+            f"at one instant {descriptions} set {name} and add to it, and their order is not declared{remedy}"
+        )
     if any(_reads(system.model, key, name) for key in keys):
-        return f"{words} change {name} at one instant, and one of them also reads {name}{remedy}"
+        return f"{descriptions} change {name} at one instant, and one of them also reads {name}{remedy}"
     (_, low, low_error), *_, (_, high, high_error) = sorted(one.set, key=lambda c: c[1])
     if high - low > low_error + high_error:
-        return f"two resets at one instant set {name} to {low!r} and to {high!r} ({words}){remedy}"
+        return f"two resets at one instant set {name} to {low!r} and to {high!r} ({descriptions}){remedy}"
     return ""
 
 

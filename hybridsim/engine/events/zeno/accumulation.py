@@ -364,7 +364,7 @@ def accumulated(limit: Limit, automata: Sequence[Automaton], has_rtol: bool) -> 
     """Return the message of a run that ends where events accumulate without a declared limit."""
     changed = [automata[c] for c in limit.components if c != NOBODY]
     names = ", ".join(a.name for a in changed) or "monitors with resets"
-    holding = [f"{a.name}.{a.modes[a.resting]}" for a in changed if a.resting >= 0]
+    holding = [f"{a.name}.{a.modes[a.limit_mode]}" for a in changed if a.limit_mode >= 0]
     head = f"infinitely many events of {names} accumulate at t = {limit.time:.9g}"
     if not changed:
         return f"{head}: let a monitor end the run before that time"

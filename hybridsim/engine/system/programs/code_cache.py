@@ -13,11 +13,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from hybridsim.engine.native.kernels import ENABLED, compile_series, is_kept
+from hybridsim.engine.native.kernels import ENABLED, compile_series, is_stored
 from hybridsim.engine.native.llvm_text import TooLong
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.emit_series import ModeTape
-from hybridsim.engine.system.programs.mode_code import KNOWN, NEVER, WORTH, kept, mode_tape
+from hybridsim.engine.system.programs.mode_code import KNOWN, NEVER, WORTH, code_path, mode_tape
 from hybridsim.engine.system.programs.mode_tables import Tapes
 from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
@@ -71,8 +71,8 @@ class CodeShelf(ABC):
         if not ENABLED or max(codes.lacked.tolist(), default=0) < KNOWN:
             return
         for k in np.flatnonzero(codes.lacked >= KNOWN).tolist():
-            place = kept(self.system, self.kind, tapes.modes[k])
-            if codes.lacked[k] >= WORTH or is_kept(place):
+            place = code_path(self.system, self.kind, tapes.modes[k])
+            if codes.lacked[k] >= WORTH or is_stored(place):
                 with self._lock:
                     self._make(tapes.modes[k], place, codes, k)
 

@@ -13,7 +13,7 @@ from hybridsim.engine.series.optimise import (
     DIVIDE_BY,
     SCALE,
     SUB_CONSTANT,
-    needed_rows,
+    live_rows,
 )
 from hybridsim.engine.series.tape import ADD, NEG, SUB
 from hybridsim.engine.system.programs.mode_tables import Tapes, in_a_row
@@ -77,8 +77,8 @@ def _mode_parts(tapes: Tapes, k: int) -> _ModeParts:
     lean = [tuple(row) for row in tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]].tolist()]
     active = tapes.active[tapes.active_start[k] : tapes.active_start[k + 1]]
     watched, rates = set(tapes.guards[k, active].tolist()), set(tapes.derivatives[k].tolist())
-    guards = needed_rows(lean, watched)
+    guards = live_rows(lean, watched)
     is_linear = all(row[0] in _LINEAR for row in guards)
-    steps = needed_rows(lean, rates | watched if is_linear else rates)
+    steps = live_rows(lean, rates | watched if is_linear else rates)
     guard_rows, step_rows = (np.array(rows, dtype=np.int64).reshape(-1, 5) for rows in (guards, steps))
     return _ModeParts(guard_rows, is_linear, step_rows)

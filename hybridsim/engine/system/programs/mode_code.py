@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridsim.engine.series.emit_bounds import Given
+from hybridsim.engine.series.emit_bounds import ConstantSources
 from hybridsim.engine.series.emit_series import ModeTape
 from hybridsim.engine.series.optimise import PAIRED, arguments_of
 from hybridsim.engine.series.tape import EXP, LESS, MUL, SELECT, SINHCOSH, SQRT, TANGENT
@@ -33,7 +33,7 @@ NEVER = -(2**62)  # count of misses if code exists, or cannot be made
 
 def mode_tape(system: System, z: np.ndarray) -> ModeTape:
     """Return the tape of a vector of modes with its active guards."""
-    tape, lean = system.code.data["tape"], system.lean_tape(z)
+    tape, lean = system.code.data["tape"], system.optimised_tape(z)
     return ModeTape(
         rows=_rows(lean.rows),
         high=tuple(system.high_rows(z)),
@@ -58,7 +58,7 @@ def _holding(system: System, z: np.ndarray) -> Iterator[int]:
 
 def computed_rates(system: System, z: np.ndarray) -> list[bool]:
     """Return for each state whether its rate is computed, rather than constant, another state, or held."""
-    tape, sure = system.lean_tape(z), frozenset(_holding(system, z))
+    tape, sure = system.optimised_tape(z), frozenset(_holding(system, z))
     rows = _rows(tape.rows)
     chosen = {out: b for op, a, b, _, out in rows if op == SELECT and a in sure}
     results = {out + k for op, _, _, _, out in rows for k in range(2 if op in PAIRED else 1)}
@@ -75,7 +75,7 @@ def fading(system: System, z: np.ndarray) -> list[int]:
 
     See `hybridsim.engine.roots.vanishing_terms`.
     """
-    rows = _rows(system.lean_tape(z).rows)
+    rows = _rows(system.optimised_tape(z).rows)
     found: dict[tuple[int, int], int] = {}
     for op, a, b, _, out in rows:
         if _may_fade(op, b):
@@ -110,20 +110,20 @@ def _may_fade(op: int, b: int) -> bool:
 
 def constant_rows(system: System, z: np.ndarray) -> tuple[tuple[int, ...], ...]:
     """Return the rows that are executed once per segment."""
-    return _rows(system.lean_tape(z).constant_rows)
+    return _rows(system.optimised_tape(z).constant_rows)
 
 
-def given(system: System) -> Given:
+def constant_sources(system: System) -> ConstantSources:
     """Return the sources of the constants of a system's tapes."""
     tape = system.code.data["tape"]
-    return Given(
+    return ConstantSources(
         {register: (value, error) for register, value, error in tape["constants"]},
         dict(tape["parameters"]),
         frozenset(system.registers.inputs.phases.tolist()),
     )
 
 
-def kept(system: System, kind: str, z: np.ndarray) -> Path | None:
+def code_path(system: System, kind: str, z: np.ndarray) -> Path | None:
     """Return the path stem of stored code of a kind, or None; the name of the machine is appended."""
     file = getattr(system.code.module, "__file__", None)
     if file is None:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.native.kernels import ENABLED, compile_series, is_kept
+from hybridsim.engine.native.kernels import ENABLED, compile_series, is_stored
 from hybridsim.engine.native.llvm_text import TooLong
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.emit_bounds import bounds_text, can_bound
@@ -18,11 +18,11 @@ from hybridsim.engine.system.programs.mode_code import (
     KNOWN,
     NEVER,
     WORTH,
+    code_path,
     computed_rates,
     constant_rows,
+    constant_sources,
     fading,
-    given,
-    kept,
     mode_tape,
 )
 from hybridsim.engine.system.programs.modes_index import index_of
@@ -164,8 +164,8 @@ class TapeShelf:
         if not ENABLED or max(tapes.lacked.tolist(), default=0) < KNOWN:
             return
         for k in np.flatnonzero(tapes.lacked >= KNOWN).tolist():
-            place = kept(self.system, "bounds", tapes.modes[k])
-            if tapes.lacked[k] >= WORTH or is_kept(place):
+            place = code_path(self.system, "bounds", tapes.modes[k])
+            if tapes.lacked[k] >= WORTH or is_stored(place):
                 with self._lock:
                     self._make(tapes.modes[k], place, k)
 
@@ -181,7 +181,7 @@ class TapeShelf:
                 (address,), engine = compile_series(
                     place,
                     ("bounds_0",),
-                    lambda: bounds_text(tape, rows, given(system), numbers, system.guard_count),
+                    lambda: bounds_text(tape, rows, constant_sources(system), numbers, system.guard_count),
                 )
                 self._engines.append(engine)
                 tapes.bounds[k] = address
@@ -257,7 +257,7 @@ class _ModeRows(NamedTuple):
     @classmethod
     def of(cls, system: System, z: np.ndarray) -> _ModeRows:
         """Compute the rows. They are reused whenever the tapes grow."""
-        tape = system.lean_tape(z)
+        tape = system.optimised_tape(z)
         return cls(
             tape.rows,
             np.array(system.high_rows(z), dtype=np.int64).reshape(-1, 5),

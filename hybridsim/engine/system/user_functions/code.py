@@ -45,12 +45,12 @@ class PythonCode:
         self.forms = Forms(parts)
         self.resets, self.conditions = _resets(model), _conditions(model)
         self.data = _data(model, self.resets)
-        watched = (*parts.guards, *parts.monitors)
+        guards_and_monitors = (*parts.guards, *parts.monitors)
         self._rows: dict[str, tuple[Scalar, ...]] = {
             "guards": parts.guards,
             "monitors": parts.monitors,
             "quantities": parts.outputs,
-            "watched": watched,
+            "guards_and_monitors": guards_and_monitors,
         }
         nothing = self.forms.row(())
         self.module = SimpleNamespace(
@@ -72,7 +72,7 @@ class PythonCode:
             choose=self._choose,
             reset=self._reset,
         )
-        self._kept: dict[str, Any] = {}
+        self._addresses: dict[str, Any] = {}
         self._things: dict[str, Any] = {}
         self._compiler: Any = None
         self.refused = ""  # reason of numba if it cannot compile them
@@ -102,10 +102,10 @@ class PythonCode:
         return self._things[name]
 
     def address(self, name: str) -> Any:
-        """Return the address of flow, guards, monitors, quantities, or watched (guards and monitors)."""
-        if name not in self._kept:
-            self._kept.setdefault(name, self._addressed(name))
-        return self._kept[name][0]
+        """Return the address of flow, guards, monitors, quantities, or guards_and_monitors (guards and monitors)."""
+        if name not in self._addresses:
+            self._addresses.setdefault(name, self._addressed(name))
+        return self._addresses[name][0]
 
     def _addressed(self, name: str) -> tuple[Any, Any]:
         form = getattr(self.module, name)
@@ -134,12 +134,12 @@ class PythonCode:
         The text is empty if the flow raises an error. `report` covers that case, even if compiled code does not raise,
         as in a division by zero.
         """
-        function, given = self.forms.flow_of(z), self.forms.arguments(s, x, p)
+        function, call_arguments = self.forms.flow_of(z), self.forms.arguments(s, x, p)
         try:
             with np.errstate(all="ignore"):  # nan is what it looks for
-                found = rates(function, self.parts.states, *given)
+                found = rates(function, self.parts.states, *call_arguments)
         except Exception as fault:  # user code may raise anything
-            self.forms.failures.note(function, given[0], fault, True)
+            self.forms.failures.note(function, call_arguments[0], fault, True)
             return ""
         if np.isfinite(found).all():
             return ""
@@ -149,18 +149,18 @@ class PythonCode:
         )
 
     @property
-    def refused_in_words(self) -> str:
+    def refusal_message(self) -> str:
         """Return why the functions are not compiled."""
         return f"numba cannot compile its Python functions ({self.refused})"
 
     def report(self, trajectory: RunRecord) -> None:
         """Add warnings to the record of a run about derivatives, compilation and exceptions."""
-        if self._rows["watched"]:
+        if self._rows["guards_and_monitors"]:
             trajectory.warn(
                 "derivatives of guards and monitors are finite differences of the Python functions"
             )
         if self.refused:
-            trajectory.warn(f"{self.refused_in_words}: they were called as Python functions")
+            trajectory.warn(f"{self.refusal_message}: they were called as Python functions")
         failure = self.last_failure()
         if failure and trajectory.status not in ("finished", "terminated"):
             trajectory.message += f"; {failure}"
@@ -172,7 +172,7 @@ class PythonCode:
         """
         t, state, named = self.forms.arguments(0.0, x, p)
         flows = [(function, True) for _, function in self.parts.flows]
-        scalars = (*self._rows["watched"], *self.parts.outputs)
+        scalars = (*self._rows["guards_and_monitors"], *self.parts.outputs)
         others = [(scalar.function, False) for scalar in scalars if callable(scalar.function)]
         for function, is_flow in flows + others:
             try:
@@ -274,7 +274,7 @@ def _data(model: Model, resets: list[tuple[tuple[Any, ...], dict[str, Any]]]) ->
         "pins": {},
         "projected": {},
         "clusters": (),
-        "ties": (),
+        "stop_couplings": (),
         "rates": 0,
         "linear": {"": (False,)} | linear,
         "quantities": tuple(output.name for output in model.outputs),

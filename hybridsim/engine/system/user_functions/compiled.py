@@ -38,10 +38,10 @@ def _doubles_at(typingctx: Any, address: Any) -> Any:
 @numba.njit
 def _mark(address: int, function: int, t: float, x: Any, p: Any) -> None:
     """Store the last call that raised: number of the function (from 1), t, states, parameters."""
-    room = numba.carray(_doubles_at(address), (2 + x.shape[0] + p.shape[0],))
-    room[0], room[1] = function, t
-    room[2 : 2 + x.shape[0]] = x
-    room[2 + x.shape[0] :] = p
+    last_call = numba.carray(_doubles_at(address), (2 + x.shape[0] + p.shape[0],))
+    last_call[0], last_call[1] = function, t
+    last_call[2 : 2 + x.shape[0]] = x
+    last_call[2 + x.shape[0] :] = p
 
 
 class Compiler:
@@ -50,7 +50,7 @@ class Compiler:
     def __init__(self, parts: Parts) -> None:
         self.parts = parts
         self.count = len(parts.parameters._fields)
-        self.room = np.zeros(2 + parts.states + self.count)
+        self.last_call = np.zeros(2 + parts.states + self.count)
         self.functions: list[Any] = []
         self.refused = ""
         self._written: dict[tuple[int, bool], Any] = {}
@@ -70,21 +70,21 @@ class Compiler:
 
     def row(self, scalars: tuple[Scalar, ...]) -> tuple[int, Any]:
         """Return the address of a function of several numbers, and an object that keeps it alive."""
-        chain = _nothing
+        write_all = _nothing
         for k, scalar in reversed(list(enumerate(scalars))):
             f = scalar.function
             write = self._written[id(f), False] if callable(f) else _constant(f)
-            chain = _one_more(write, k, scalar.component, scalar.mode, chain)
-        return _as_cfunc(chain)
+            write_all = _one_more(write, k, scalar.component, scalar.mode, write_all)
+        return _as_cfunc(write_all)
 
     def replay(self, failures: Failures) -> None:
         """Repeat in plain Python the last call that raised in compiled code, to get its error."""
-        if self.room[0] == 0.0:
+        if self.last_call[0] == 0.0:
             return
-        function, is_flow = self.functions[int(self.room[0]) - 1]
-        t, x = float(self.room[1]), self.room[2 : 2 + self.parts.states].copy()
-        p = self.parts.parameters(*self.room[2 + self.parts.states :].tolist())
-        self.room[0] = 0.0
+        function, is_flow = self.functions[int(self.last_call[0]) - 1]
+        t, x = float(self.last_call[1]), self.last_call[2 : 2 + self.parts.states].copy()
+        p = self.parts.parameters(*self.last_call[2 + self.parts.states :].tolist())
+        self.last_call[0] = 0.0
         try:
             rates(function, self.parts.states, t, x, p) if is_flow else number(function, t, x, p)
         except Exception as fault:  # user code may raise anything; the run ends with its error
@@ -118,65 +118,65 @@ class Compiler:
     def _wrapped(self, function: Any, number: int, width: int) -> Any:
         """Return code that calls a function and writes `width` numbers; width = -1 for a scalar."""
         n, count, origin = self.parts.states, self.count, self.parts.origin_at
-        parameters, address, length = self.parts.parameters, self.room.ctypes.data, abs(width)
+        parameters, address, length = self.parts.parameters, self.last_call.ctypes.data, abs(width)
 
         @numba.njit(error_model="numpy")
         def write(s: float, x: Any, p: Any, out: Any, at: int) -> None:
-            t, state, given = p[origin] + s, numba.carray(x, (n,)), numba.carray(p, (count,))
+            t, state, parameter_array = p[origin] + s, numba.carray(x, (n,)), numba.carray(p, (count,))
             raised = False
             try:
-                named = parameters(*to_fixed_tuple(given, count))
+                named = parameters(*to_fixed_tuple(parameter_array, count))
                 _put(function(t, state.copy(), named), out, at, width)
             except Exception:  # numba supports no other clause; a repeated call gives the error
                 raised = True
             if raised:
                 if p[origin + 1] > 0.0:  # on the run, not in finite differences far from it
-                    _mark(address, number, t, state, given)
+                    _mark(address, number, t, state, parameter_array)
                 for i in range(length):
                     out[at + i] = math.nan
 
         return write
 
 
-def _put(given: Any, out: Any, at: int, width: int) -> None:
+def _put(result: Any, out: Any, at: int, width: int) -> None:
     """Write the result of a function, `width` numbers or (-1) a scalar; raises if it has another form."""
     raise NotImplementedError("compiled code only")
 
 
-def _put_compiled(given: Any, out: Any, at: Any, width: Any) -> Any:
+def _put_compiled(result: Any, out: Any, at: Any, width: Any) -> Any:
     """Return code that writes a result of this type, or None for a type that is not numeric."""
     real = (types.Float, types.Integer, types.Boolean)
-    parts = given.types if isinstance(given, types.BaseTuple) else (getattr(given, "dtype", given),)
+    parts = result.types if isinstance(result, types.BaseTuple) else (getattr(result, "dtype", result),)
     if not all(isinstance(part, real) for part in parts):
         return None
-    if isinstance(given, real):
+    if isinstance(result, real):
 
-        def single(given: Any, out: Any, at: Any, width: Any) -> Any:
+        def single(result: Any, out: Any, at: Any, width: Any) -> Any:
             if width != -1:
                 raise ValueError("one number")
-            out[at] = given
+            out[at] = result
 
         return single
-    if isinstance(given, types.Tuple):  # a tuple of different types
+    if isinstance(result, types.Tuple):  # a tuple of different types
 
-        def mixed(given: Any, out: Any, at: Any, width: Any) -> Any:
-            if len(given) != width:
+        def mixed(result: Any, out: Any, at: Any, width: Any) -> Any:
+            if len(result) != width:
                 raise ValueError("another number of rates")
             i = at
-            for number in literal_unroll(given):
+            for number in literal_unroll(result):
                 out[i] = number
                 i += 1
 
         return mixed
-    if isinstance(given, (types.UniTuple, types.List)) or (
-        isinstance(given, types.Array) and given.ndim == 1
+    if isinstance(result, (types.UniTuple, types.List)) or (
+        isinstance(result, types.Array) and result.ndim == 1
     ):
 
-        def row(given: Any, out: Any, at: Any, width: Any) -> Any:
-            if len(given) != width:
+        def row(result: Any, out: Any, at: Any, width: Any) -> Any:
+            if len(result) != width:
                 raise ValueError("another number of rates")
             for i in range(width):
-                out[at + i] = given[i]
+                out[at + i] = result[i]
 
         return row
     return None
@@ -202,14 +202,14 @@ def _one_more(write: Any, place: int, component: int, mode: int, rest: Any) -> A
     """Return a chain with one more number in front, which is 1 if its mode is not active."""
 
     @numba.njit
-    def chain(s: float, x: Any, p: Any, z: Any, out: Any) -> None:
+    def write_row(s: float, x: Any, p: Any, z: Any, out: Any) -> None:
         if component < 0 or z[component] == mode:
             write(s, x, p, out, place)
         else:
             out[place] = 1.0
         rest(s, x, p, z, out)
 
-    return chain
+    return write_row
 
 
 def _either(component: int, mode: int, write: Any, other: Any) -> Any:

@@ -157,11 +157,11 @@ class Forms:
 
 def rates(function: Function, count: int, t: float, x: np.ndarray, p: Any) -> np.ndarray:
     """Return the result of a flow as an array; raises an error with its name if it is not n numbers."""
-    given = function(t, x, p)
-    found = _array(given)
+    returned = function(t, x, p)
+    found = _array(returned)
     if found is None or found.shape != (count,):
         raise ModelError(
-            f"the flow {function_name(function)} returned {_shown(given)}, and the model has {count} states",
+            f"the flow {function_name(function)} returned {_shown(returned)}, and the model has {count} states",
             remedy=f"return {count} numbers, the rate of each state in order, as a tuple or an array",
         )
     return found
@@ -169,27 +169,27 @@ def rates(function: Function, count: int, t: float, x: np.ndarray, p: Any) -> np
 
 def number(function: Function, t: float, x: np.ndarray, p: Any) -> float:
     """Return the result of a scalar function; raises an error with its name if it is not a number."""
-    given = function(t, x, p)
-    found = _array(given)
+    returned = function(t, x, p)
+    found = _array(returned)
     if found is None or found.shape != ():
         raise ModelError(
-            f"the function {function_name(function)} returned {_shown(given)}", remedy="return one number"
+            f"the function {function_name(function)} returned {_shown(returned)}", remedy="return one number"
         )
     return float(found)
 
 
-def _array(given: Any) -> np.ndarray | None:
+def _array(returned: Any) -> np.ndarray | None:
     """Return real numbers as an array, or None for anything else."""
     try:
-        found = np.asarray(given)
+        found = np.asarray(returned)
     except ValueError:  # rows of unequal length
         return None
     return found.astype(float) if found.dtype.kind in "biuf" else None
 
 
-def _shown(given: Any) -> str:
-    found = _array(given)
+def _shown(returned: Any) -> str:
+    found = _array(returned)
     if found is None or not found.ndim:
-        text = repr(given if found is None else found.item())
+        text = repr(returned if found is None else found.item())
         return text if len(text) <= 60 else f"{text[:57]}..."
-    return f"{type(given).__name__} of shape {found.shape}"
+    return f"{type(returned).__name__} of shape {found.shape}"

@@ -26,12 +26,15 @@ def _surroundings(
     for function in functions:
         if isinstance(function, FunctionType) and function not in seen:
             seen.append(function)
-            yield "defaults", _told((function.__defaults__, tuple((function.__kwdefaults__ or {}).items())))
+            yield (
+                "defaults",
+                _fingerprint((function.__defaults__, tuple((function.__kwdefaults__ or {}).items()))),
+            )
             for name, value in (*globals_of(function).items(), *closure_of(function).items()):
-                yield name, _told(value)
+                yield name, _fingerprint(value)
                 if isinstance(value, ModuleType):  # attributes of a module that the function may read
                     for part in sorted(_names(function.__code__) & vars(value).keys()):
-                        yield f"{name}.{part}", _told(vars(value)[part])
+                        yield f"{name}.{part}", _fingerprint(vars(value)[part])
                 yield from _surroundings([value], seen)  # values read by plain functions that it calls
 
 
@@ -57,11 +60,11 @@ def _names(code: CodeType) -> set[str]:
     return set(code.co_names).union(*inner)
 
 
-def _told(value: Any) -> Any:
+def _fingerprint(value: Any) -> Any:
     if isinstance(value, _PLAIN):
         return type(value), repr(value)
     if isinstance(value, tuple):
-        return tuple(map(_told, value))
+        return tuple(map(_fingerprint, value))
     if isinstance(value, np.ndarray):
         return value.dtype.str, value.shape, value.tobytes()
     return id(value)

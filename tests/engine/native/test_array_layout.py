@@ -1,4 +1,4 @@
-"""Arrays behind one pointer: what a kernel reads and writes through a sheet is what its rows hold."""
+"""Arrays behind one pointer: what a kernel reads and writes through a layout is what its rows hold."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from hybridsim.engine.native.buffer_pool import Lender
-from hybridsim.engine.native.kernels import Door, kernel
-from hybridsim.engine.native.struct_pack import Sheet, packed
+from hybridsim.engine.native.buffer_pool import BufferPool
+from hybridsim.engine.native.kernels import Precompiled, kernel
+from hybridsim.engine.native.struct_pack import ArrayLayout, packed
 
 
 class Rows(NamedTuple):
@@ -39,20 +39,20 @@ def _number(rows: Any) -> int:
 
 @pytest.mark.parametrize("skipped", [None, (2, 1, 5)])
 def test_a_kernel_writes_to_the_rows_of_a_sheet(skipped: tuple[int, ...] | None) -> None:
-    sheet = Sheet(Rows, FIELDS)
-    blocks = sheet.blank()
-    rows = sheet.rows(blocks)
+    array_layout = ArrayLayout(Rows, FIELDS)
+    blocks = array_layout.blank()
+    rows = array_layout.rows(blocks)
     rows.numbers[:], rows.words[:] = -1.0, -1
     first = skipped or (0, 0, 0)
-    assert _number(sheet.packed(blocks, skipped)) == 6 - first[1] + 100 * (5 - first[2])
+    assert _number(array_layout.packed(blocks, skipped)) == 6 - first[1] + 100 * (5 - first[2])
     assert rows.numbers[first[0] :].ravel().tolist() == list(range(10 - 2 * first[0]))
     assert rows.words[first[1] :].tolist() == list(range(10, 16 - first[1]))
     assert (rows.numbers[: first[0]] == -1.0).all() and (rows.words[: first[1]] == -1).all()
 
 
 def test_arrays_of_different_blocks_do_not_hold_each_other() -> None:
-    sheet = Sheet(Rows, FIELDS)
-    rows = sheet.rows(sheet.blank())
+    array_layout = ArrayLayout(Rows, FIELDS)
+    rows = array_layout.rows(array_layout.blank())
     assert not np.shares_memory(rows.numbers, rows.words)
     assert rows.numbers.base is not rows.words.base
     assert all(array.flags.c_contiguous and array.flags.aligned for array in rows)
@@ -62,45 +62,45 @@ def test_arrays_of_different_blocks_do_not_hold_each_other() -> None:
     "view", [lambda a: a, lambda a: a[3:], lambda a: a.view(float).reshape(2, -1).T, memoryview]
 )
 def test_memory_is_handed_on_once_nobody_holds_it(view: Callable[[np.ndarray], Any]) -> None:
-    lender = Lender(1 << 12)
-    block = lender.block()
+    pool = BufferPool(1 << 12)
+    block = pool.block()
     block[:] = 1
     place, held = block.ctypes.data, view(block)
     before = bytes(held)
     del block
-    other = lender.block()
+    other = pool.block()
     other[:] = 2
     assert other.ctypes.data != place
     assert bytes(held) == before
     del held
-    assert lender.block().ctypes.data == place
+    assert pool.block().ctypes.data == place
 
 
 def test_large_sheets_take_such_memory() -> None:
-    sheet = Sheet(Rows, ((float, (1 << 15, 2), 0), (np.int64, (6,), 1), (complex, (5, 0), 0)))
-    numbers = sheet.rows(sheet.blank()).numbers
+    array_layout = ArrayLayout(Rows, ((float, (1 << 15, 2), 0), (np.int64, (6,), 1), (complex, (5, 0), 0)))
+    numbers = array_layout.rows(array_layout.blank()).numbers
     numbers[:] = 1.0
     place = numbers.ctypes.data
     last = numbers[-1:]
     del numbers
-    sheet.rows(sheet.blank()).numbers[:] = 2.0
-    assert sheet.blank()[0].ctypes.data != place
+    array_layout.rows(array_layout.blank()).numbers[:] = 2.0
+    assert array_layout.blank()[0].ctypes.data != place
     assert last.tolist() == [[1.0, 1.0]]
     del last
-    assert sheet.blank()[0].ctypes.data == place
+    assert array_layout.blank()[0].ctypes.data == place
 
 
 def test_a_door_leads_to_the_same_kernel() -> None:
     arrays = Rows(np.zeros((2, 2)), np.zeros(3, dtype=np.int64), np.zeros((1, 0), dtype=complex))
-    door = Door(_number)
-    assert [door(packed(arrays)), door(packed(arrays))] == [103, 103]
+    precompiled = Precompiled(_number)
+    assert [precompiled(packed(arrays)), precompiled(packed(arrays))] == [103, 103]
     assert arrays.numbers.tolist() == [[0.0, 1.0], [2.0, 3.0]]
 
 
 def test_a_block_that_is_taken_back_is_the_next_one() -> None:
-    sheet = Sheet(Rows, FIELDS)
-    first, _ = sheet.blank()
-    assert sheet.blank()[0] is not first
-    sheet.take_back(first)
-    assert sheet.blank()[0] is first
-    assert sheet.blank()[0] is not first
+    array_layout = ArrayLayout(Rows, FIELDS)
+    first, _ = array_layout.blank()
+    assert array_layout.blank()[0] is not first
+    array_layout.take_back(first)
+    assert array_layout.blank()[0] is first
+    assert array_layout.blank()[0] is not first
