@@ -141,3 +141,24 @@ def test_a_run_that_ends_where_its_load_ends_needs_no_load_behind_it(integrator,
         assert v == pytest.approx(50.0 - 0.2 * rate * T**2, abs=1e-9)
         if ends == "t_end":
             assert sol.resume(T + 1.0).status == "inconsistent"
+
+
+@pytest.mark.parametrize("integrator", [*METHODS, "moreau"])
+def test_a_tick_at_the_end_is_in_the_state_at_the_end(integrator):
+    """The length of the run is a rounded number, and so is the time of the end if it is summed from it."""
+    draw = random.Random(3)
+    options = {"step": 0.01} if integrator == "moreau" else {}
+    for number in range(24):
+        start = draw.choice([-0.1, -0.05, 0.1, 0.3, -0.7, draw.uniform(-2.0, 2.0)])
+        end = (
+            round(start + draw.choice([0.1, 0.2, 0.3, 1.1]), 3)
+            if number % 2
+            else start + draw.uniform(0.1, 2)
+        )
+        tick = hs.Schedule("tick", times=[repr(end)], reset={"x": "x + 5", "n": "+= 1"})
+        states, counts = [hs.State("x", 0, "1")], [hs.Discrete("n", 0)]
+        model = hs.Model("ramp", states=states, discrete=counts, schedules=[tick])
+        sol = hs.simulate(model, (start, end), integrator=integrator, **options)
+        assert sol(end) == pytest.approx([end - start + 5.0]) and sol.y[0, -1] == sol(end)[0]
+        assert sol(end, side="-") == pytest.approx([end - start])
+        assert sol.output("n", end) == 1.0 and sol.t[-2:].tolist() == [end, end]

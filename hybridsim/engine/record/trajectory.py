@@ -63,12 +63,17 @@ class Trajectory:
             f"{head} at t = {reached!r}; the results so far are kept, and sol.resume() continues the run"
         )
 
-    def finish(self, instant: Instant, z: np.ndarray, p: np.ndarray, x: np.ndarray, discrete: slice) -> None:
-        """Store the state after an event at the end of the run, because no segment begins there."""
+    def finish(
+        self, instant: Instant, t0: float, z: np.ndarray, p: np.ndarray, x: np.ndarray, discrete: slice
+    ) -> None:
+        """Store the state after an event at the end of the run, because no segment begins there.
+
+        A segment to this instant ends there up to the rounding of its length, which is less than the time since t0.
+        """
         if self.segments:
-            if float(self.segments.blocks[-1].until) != float(instant):
+            last, longest = self.segments[-1], abs(instant.minus(Instant(t0)))
+            if abs(instant.minus(last.end)) > math.ulp(longest):
                 return
-            last = self.segments[-1]
             if (last.z == z).all() and (last.x[-1] == x).all() and (last.p[discrete] == p[discrete]).all():
                 return
         self.segments.append(end_point(instant, z, p, x))

@@ -140,9 +140,8 @@ class ModeLoop:
         if not self.forward and self.record.status in ("backward-nonunique", "step-failure"):
             self.record.message += message_on_direction(self.task.t0, self.task.t1)
         if self.adopted == self.origin:
-            self.record.finish(
-                self.origin, self.outcome.z, self.p, self.outcome.x, self.system.layout.discrete_slice
-            )
+            outcome, discrete = self.outcome, self.system.layout.discrete_slice
+            self.record.finish(self.origin, self.task.t0, outcome.z, self.p, outcome.x, discrete)
         self.record.seal()
         return self.record
 

@@ -122,7 +122,8 @@ class FixedStepRun:
         record = self.record
         try:
             self._run()
-            record.finish(self.origin, self.z, self._vector(), self.x, self.system.layout.discrete_slice)
+            discrete = self.system.layout.discrete_slice
+            record.finish(self.origin, self.task.t0, self.z, self._vector(), self.x, discrete)
         except LimitReached as reached:
             record.stop_early("limit", str(reached), self.task.t0)
         except KeyboardInterrupt:
