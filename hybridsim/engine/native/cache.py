@@ -34,16 +34,13 @@ def chosen_root() -> Path | None:
     chosen = os.environ.get("HYBRIDSIM_CACHE")
     if chosen:
         return Path(os.path.abspath(chosen))
+    from platformdirs import user_cache_path
+
     try:
-        if sys.platform == "win32":
-            base = Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-        elif sys.platform == "darwin":
-            base = Path.home() / "Library" / "Caches"
-        else:
-            base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+        folder = user_cache_path("hybridsim", appauthor=False, opinion=False)
     except (RuntimeError, KeyError):  # no HOME, and no entry in the password file
         return None
-    return Path(os.path.abspath(base)) / "hybridsim"
+    return folder if folder.is_absolute() else None  # some versions return ~/.cache without a home folder
 
 
 def cache_root() -> Path | None:
