@@ -23,10 +23,10 @@ DONE, FULL, INCONSISTENT, NONUNIQUE, CASCADE, LOST, LIMITED = range(7)  # reason
 
 # Integer arguments of a kernel that is called by address; FIRST: start of a run of neighbours, or -1.
 COUNT, DOFS, CONS, ORDER, NODE, FIRED, FIRST = range(7)
-AT, LONGEST, RTOL, LENGTH = range(4)  # real arguments; LENGTH returns the length of a stretch
+AT, LONGEST, RTOL, LENGTH = range(4)  # real arguments; LENGTH returns the length of a step
 # Indices of these kernels; BERNSTEIN and later: conversion to Bernstein form, for decreasing numbers of
 # terms.
-EXPAND, STRETCH, DECIDE, BERNSTEIN = range(4)
+EXPAND, STEP_LENGTH, JOINT_CHOICE, BERNSTEIN = range(4)
 
 
 class State(NamedTuple):
@@ -56,12 +56,13 @@ class State(NamedTuple):
     real: np.ndarray  # their real arguments
 
 
-class Room(NamedTuple):
+class Scratch(NamedTuple):
     """Scratch arrays: the present patch, its series, and polynomials.
 
     Rows of Q, R, F and sums have equal lengths, in whole vectors. lane, lane_ptr, place, V: registers of the
-    tapes, see `expansion`. strips, W, laid: the layout of `runs` for each eight neighbours, their registers,
-    and the numbers of the eight. line: a series about another point, see `polynomials`.
+    tapes, see `expansion`. band_rows, W, band_first: coefficients of `banded_series` for each eight
+    neighbours, their registers, and one more than the number of the first of them. line: a series about
+    another point, see `polynomials`.
     """
 
     nodes: np.ndarray
@@ -94,16 +95,16 @@ class Room(NamedTuple):
     exits: np.ndarray
     kinds: np.ndarray
     line: np.ndarray
-    strips: np.ndarray
+    band_rows: np.ndarray
     W: np.ndarray
-    laid: np.ndarray
+    band_first: np.ndarray
     sums: np.ndarray
 
 
 class Record(NamedTuple):
-    """The record of a run: pieces (node, row; start as high, low, local), their series, and events."""
+    """The record of a run: segments (node, row; start as high, low, local), their series, and events."""
 
-    piece: np.ndarray
+    segment: np.ndarray
     start: np.ndarray
     series: np.ndarray
     event: np.ndarray

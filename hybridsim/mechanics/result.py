@@ -94,11 +94,11 @@ class ArraysResult(InTables):
             if before.any():
                 columns[name][before] = self._values(name, t[before], False)
         modes = {}
-        for component, stretches in self.modes.items():
-            begins = [stretch.t0 for stretch in stretches]
+        for component, intervals in self.modes.items():
+            begins = [interval.t0 for interval in intervals]
             place = np.where(before, np.searchsorted(begins, t), np.searchsorted(begins, t, side="right")) - 1
-            known = tuple(dict.fromkeys(stretch.mode for stretch in stretches))
-            numbers = np.array([known.index(stretch.mode) for stretch in stretches], dtype=np.int64)
+            known = tuple(dict.fromkeys(interval.mode for interval in intervals))
+            numbers = np.array([known.index(interval.mode) for interval in intervals], dtype=np.int64)
             modes[component] = (known, numbers[np.maximum(place, 0)])
         about = {"model": self.model.name, "title": "", "integrator": self.integrator, "status": self.status}
         return Table(t, columns, modes, {}, about)

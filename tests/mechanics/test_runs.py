@@ -47,7 +47,7 @@ def row(n: int, law: str, reach: int, damped: bool) -> hs.MechanicalSystem:
 )
 def test_a_row_moves_as_the_same_system_as_a_model(law: str, n: int, reach: int, damped: bool) -> None:
     system = row(n, law, reach, damped)
-    assert len(build(system).plant.offsets) == 2 * reach + 1
+    assert len(build(system).arrays.offsets) == 2 * reach + 1
     sol = hs.simulate(system, (0, 6.0), rtol=1e-11)
     model = hs.simulate(system.to_model(), (0, 6.0), integrator="dop853", rtol=1e-12)
     assert sol.success and sol.stats["events"] > n / 2
@@ -65,7 +65,7 @@ def test_blocks_with_no_order_are_left_to_the_others() -> None:
         K[[i, j], [i, j]] += 1.0
         K[[i, j], [j, i]] -= 1.0
     contacts = [hs.MechanicalContact(f"f{i}", {i: 1.0}, 1.0, "coulomb", {"mu": 0.5}) for i in range(n)]
-    assert not len(build(hs.MechanicalSystem(np.ones(n), None, K, None, contacts)).plant.offsets)
+    assert not len(build(hs.MechanicalSystem(np.ones(n), None, K, None, contacts)).arrays.offsets)
 
 
 @pytest.mark.parametrize("terms", [2, 8, 20, 31])

@@ -32,11 +32,11 @@ def weights(part: Declared, direction: Any) -> tuple[tuple[tuple[int, float], ..
             f"direction is {direction!r}", "give a row of weights, or a mapping from coordinates"
         )
     row = list(direction.items() if is_mapping else enumerate(direction))
-    given = [(i, finite(part, "direction", w)) for i, w in row]
-    for i, _ in given:
+    entries = [(i, finite(part, "direction", w)) for i, w in row]
+    for i, _ in entries:
         if not isinstance(i, Integral):
             raise part._fault(f"direction names the coordinate {i!r}", "give whole numbers, counted from 0")
-    pairs = tuple((int(i), w) for i, w in given if w != 0.0)
+    pairs = tuple((int(i), w) for i, w in entries if w != 0.0)
     if not pairs:
         raise part._fault("the direction is zero", "give at least one weight that is not zero")
     return pairs, 0 if is_mapping else len(row)

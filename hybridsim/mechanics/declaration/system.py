@@ -216,9 +216,9 @@ class MechanicalSystem:
         self.velocities = tuple(f"v{i + 1}" if names is None else f"v_{x}" for i, x in enumerate(self.names))
         self._check()
 
-    def _parts(self, given: Any, what: str, kind: type[Part]) -> tuple[Part, ...]:
+    def _parts(self, declared: Any, what: str, kind: type[Part]) -> tuple[Part, ...]:
         """Return a tuple of contacts or impacts."""
-        parts = as_tuple(given)
+        parts = as_tuple(declared)
         for part in parts:
             if not isinstance(part, kind):
                 raise UsageError(
@@ -243,13 +243,13 @@ class MechanicalSystem:
             )
         pairs = dict(forcing if isinstance(forcing, Mapping) else enumerate(forcing))
         found: dict[int, tuple[float | Harmonic, ...]] = {}
-        for i, given in pairs.items():
+        for i, entry in pairs.items():
             if not (isinstance(i, int | np.integer) and 0 <= i < self.n):
                 raise UsageError(
                     f"{self.name}: forcing has the coordinate {i!r}, but there are {self.n}",
                     remedy="count from 0",
                 )
-            terms = given if isinstance(given, tuple | list) else (given,)
+            terms = entry if isinstance(entry, tuple | list) else (entry,)
             for term in terms:
                 if not isinstance(term, Harmonic) and not math.isfinite(
                     math.nan if (n := as_real(term)) is None else n
@@ -258,16 +258,16 @@ class MechanicalSystem:
                         f"{self.name}: forcing of coordinate {i} holds {term!r}",
                         remedy="give numbers and hs.Harmonic(omega, ...); write other forcing in an hs.Model",
                     )
-            kept = tuple(t if isinstance(t, Harmonic) else float(t) for t in terms if t != 0.0)
-            if kept:
-                found[int(i)] = kept
+            nonzero = tuple(t if isinstance(t, Harmonic) else float(t) for t in terms if t != 0.0)
+            if nonzero:
+                found[int(i)] = nonzero
         return found
 
-    def _start(self, given: Any, what: str) -> np.ndarray:
+    def _start(self, start: Any, what: str) -> np.ndarray:
         remedy = f"give {self.n} finite numbers"
-        values = np.zeros(self.n) if given is None else real_array(given, f"{self.name}: {what}", remedy)
+        values = np.zeros(self.n) if start is None else real_array(start, f"{self.name}: {what}", remedy)
         if values.shape != (self.n,):
-            raise UsageError(f"{self.name}: {what} is {given!r}", remedy=remedy)
+            raise UsageError(f"{self.name}: {what} is {start!r}", remedy=remedy)
         return values
 
     def _check(self) -> None:
@@ -332,17 +332,17 @@ class MechanicalSystem:
         )
 
 
-def _matrix(given: Any, what: str, n: int | None) -> Any:
+def _matrix(entries: Any, what: str, n: int | None) -> Any:
     """Return a square matrix as scipy.sparse.csr_array; a row of numbers is a diagonal."""
     from scipy import sparse
 
-    if given is None and n is not None:
+    if entries is None and n is not None:
         return sparse.csr_array((n, n))
-    if sparse.issparse(given):
-        real_array(given.data, what, "give finite real numbers")
-        matrix = sparse.csr_array(given, dtype=float)
+    if sparse.issparse(entries):
+        real_array(entries.data, what, "give finite real numbers")
+        matrix = sparse.csr_array(entries, dtype=float)
     else:
-        dense = real_array(given, what, "give finite real numbers, (n, n), or (n,) for a diagonal")
+        dense = real_array(entries, what, "give finite real numbers, (n, n), or (n,) for a diagonal")
         if dense.ndim not in (1, 2):
             raise UsageError(
                 f"{what} has {dense.ndim} dimensions", remedy="give (n, n), or (n,) for a diagonal"

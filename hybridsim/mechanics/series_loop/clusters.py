@@ -22,54 +22,54 @@ _CORRECTIONS = 2  # the first removes the rounding of G^+, the second that of th
 
 
 @kernel
-def factorise(plant: Any, state: Any, room: Any, j: int) -> None:
+def factorise(arrays: Any, state: Any, scratch: Any, j: int) -> None:
     """Compute the pseudo-inverse of G over the sticking contacts of node j, and the pins and anchors."""
-    first, last = plant.node_con[j], plant.node_con[j + 1]
+    first, last = arrays.node_con[j], arrays.node_con[j + 1]
     m, size = last - first, 0
-    for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
+    for x in range(arrays.node_dof[j], arrays.node_dof[j + 1]):
         state.pin[x] = -1
     for c in range(first, last):
         state.anchor[c] = -1
         if state.mode[c] == STICK and state.held[c] == 0:
-            room.order[size] = c - first
+            scratch.order[size] = c - first
             size += 1
-            if plant.unit[c]:
-                state.pin[plant.w_col[plant.w_ptr[c]]] = c
+            if arrays.unit[c]:
+                state.pin[arrays.w_col[arrays.w_ptr[c]]] = c
     state.holds[j] = size
     if size == 0:
         return
-    _anchors(plant, state, first, last)
-    at = plant.g_ptr[j]
+    _anchors(arrays, state, first, last)
+    at = arrays.g_ptr[j]
     if m == 1:
-        state.pinv[at] = 1.0 / plant.g_val[at]
+        state.pinv[at] = 1.0 / arrays.g_val[at]
         return
     for i in range(m * m):
         state.pinv[at + i] = 0.0
-    pseudo_inverse(plant.g_val[at : at + m * m], m, room.order, size, room.tall, room.square)
+    pseudo_inverse(arrays.g_val[at : at + m * m], m, scratch.order, size, scratch.tall, scratch.square)
     for a in range(size):
         for b in range(size):
-            state.pinv[at + room.order[a] * m + room.order[b]] = room.square[a, b]
+            state.pinv[at + scratch.order[a] * m + scratch.order[b]] = scratch.square[a, b]
 
 
 @kernel
-def _anchors(plant: Any, state: Any, first: int, last: int) -> None:
+def _anchors(arrays: Any, state: Any, first: int, last: int) -> None:
     """Choose an anchor coordinate for each sticking contact with several weights that shares no coordinate.
 
     It is the coordinate with the largest weight. Contacts that share coordinates are solved by least squares only.
     """
     for c in range(first, last):
-        if state.mode[c] != STICK or plant.unit[c]:
+        if state.mode[c] != STICK or arrays.unit[c]:
             continue
         best, shares = 0.0, False
-        for e in range(plant.w_ptr[c], plant.w_ptr[c + 1]):
-            x = plant.w_col[e]
+        for e in range(arrays.w_ptr[c], arrays.w_ptr[c + 1]):
+            x = arrays.w_col[e]
             for other in range(first, last):
                 if other == c or state.mode[other] != STICK:
                     continue
-                for f in range(plant.w_ptr[other], plant.w_ptr[other + 1]):
-                    shares = shares or plant.w_col[f] == x
-            if abs(plant.w_val[e]) > best:
-                best, state.anchor[c] = abs(plant.w_val[e]), x
+                for f in range(arrays.w_ptr[other], arrays.w_ptr[other + 1]):
+                    shares = shares or arrays.w_col[f] == x
+            if abs(arrays.w_val[e]) > best:
+                best, state.anchor[c] = abs(arrays.w_val[e]), x
         if shares:
             state.anchor[c] = -1
 
@@ -148,55 +148,55 @@ def _from_factor(L: Any, size: int, rank: int, P: Any) -> None:
 
 
 @inlined
-def misfit(plant: Any, c: int, v: Any, base: float) -> float:
+def misfit(arrays: Any, c: int, v: Any, base: float) -> float:
     """Return w . v - base of a contact, summed in doubled precision."""
     high, low = -base, 0.0
-    for e in range(plant.w_ptr[c], plant.w_ptr[c + 1]):
-        product, error = two_product(plant.w_val[e], v[plant.w_col[e]])
+    for e in range(arrays.w_ptr[c], arrays.w_ptr[c + 1]):
+        product, error = two_product(arrays.w_val[e], v[arrays.w_col[e]])
         high, rest = two_sum(high, product)
         low += error + rest
     return high + low
 
 
 @kernel
-def project(plant: Any, state: Any, room: Any, j: int, tau: float, v: Any) -> None:
+def project(arrays: Any, state: Any, scratch: Any, j: int, tau: float, v: Any) -> None:
     """Make the velocities v (n,) satisfy the constraints of the sticking contacts of node j, after `factorise`.
 
     Single coordinates are set exactly. The others get the least change in kinetic energy, v -= M^-1 W^T f
     with f = G^+ (W v - base), with the misfit in doubled precision; the remaining error is the rounding of v.
     """
-    first, last = plant.node_con[j], plant.node_con[j + 1]
+    first, last = arrays.node_con[j], arrays.node_con[j + 1]
     m, several = last - first, False
-    if m == 1 and plant.unit[first]:
+    if m == 1 and arrays.unit[first]:
         if state.mode[first] == STICK:
-            e = plant.w_ptr[first]
-            v[plant.w_col[e]] = base_speed(plant, state, first, tau) / plant.w_val[e]
+            e = arrays.w_ptr[first]
+            v[arrays.w_col[e]] = base_speed(arrays, state, first, tau) / arrays.w_val[e]
         return
     for c in range(first, last):
-        if state.mode[c] == STICK and plant.unit[c]:
-            e = plant.w_ptr[c]
-            v[plant.w_col[e]] = base_speed(plant, state, c, tau) / plant.w_val[e]
-        several = several or (state.mode[c] == STICK and not plant.unit[c])
+        if state.mode[c] == STICK and arrays.unit[c]:
+            e = arrays.w_ptr[c]
+            v[arrays.w_col[e]] = base_speed(arrays, state, c, tau) / arrays.w_val[e]
+        several = several or (state.mode[c] == STICK and not arrays.unit[c])
     if not several:
         return
     for _ in range(_CORRECTIONS):
         for c in range(first, last):
-            room.tall[c - first, 0] = 0.0
+            scratch.tall[c - first, 0] = 0.0
             if state.mode[c] == STICK and state.held[c] == 0:
-                room.tall[c - first, 0] = misfit(plant, c, v, base_speed(plant, state, c, tau))
+                scratch.tall[c - first, 0] = misfit(arrays, c, v, base_speed(arrays, state, c, tau))
         for c in range(first, last):
-            total, row = 0.0, plant.g_ptr[j] + (c - first) * m
+            total, row = 0.0, arrays.g_ptr[j] + (c - first) * m
             for i in range(m):
-                total += state.pinv[row + i] * room.tall[i, 0]
-            room.tall[c - first, 1] = total
-        for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
+                total += state.pinv[row + i] * scratch.tall[i, 0]
+            scratch.tall[c - first, 1] = total
+        for x in range(arrays.node_dof[j], arrays.node_dof[j + 1]):
             if state.pin[x] < 0:
-                for e in range(plant.b_ptr[x], plant.b_ptr[x + 1]):
-                    v[x] -= plant.b_val[e] * room.tall[plant.b_col[e] - first, 1]
+                for e in range(arrays.b_ptr[x], arrays.b_ptr[x + 1]):
+                    v[x] -= arrays.b_val[e] * scratch.tall[arrays.b_col[e] - first, 1]
     for c in range(first, last):
         x = state.anchor[c]
         if state.mode[c] == STICK and x >= 0 and state.pin[x] < 0:
-            left = misfit(plant, c, v, base_speed(plant, state, c, tau))
-            for e in range(plant.w_ptr[c], plant.w_ptr[c + 1]):
-                if plant.w_col[e] == x:
-                    v[x] -= left / plant.w_val[e]
+            left = misfit(arrays, c, v, base_speed(arrays, state, c, tau))
+            for e in range(arrays.w_ptr[c], arrays.w_ptr[c + 1]):
+                if arrays.w_col[e] == x:
+                    v[x] -= left / arrays.w_val[e]

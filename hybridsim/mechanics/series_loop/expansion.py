@@ -15,277 +15,298 @@ from hybridsim.engine.native.simd_vectors import WIDTH, whole_vectors
 from hybridsim.mechanics.arrays import AT, CONS, COUNT, DOFS, EXPAND, FIRST, ORDER, STICK
 from hybridsim.mechanics.polynomials import shift, state_at
 from hybridsim.mechanics.series_loop.banded_series import clear_beside, expand_run
-from hybridsim.mechanics.series_loop.simd_series import advance_lanes, clear_constants, lane_place
+from hybridsim.mechanics.series_loop.simd_series import advance_simd_series, clear_constants, lane_place
 
 
 @kernel
-def gather(plant: Any, state: Any, room: Any, count: int, tau: float, top: int) -> tuple[int, int]:
-    """Number the coordinates and contacts of the nodes room.nodes[:count], and store their values at tau.
+def gather(arrays: Any, state: Any, scratch: Any, count: int, tau: float, top: int) -> tuple[int, int]:
+    """Number the coordinates and contacts of the nodes scratch.nodes[:count], and store their values at tau.
 
     The nodes around them get series about tau. Returns the numbers of coordinates and contacts of the patch.
     """
     state.whole[FIRST] = -1
-    room.stamp[-1] += 1
-    now, nd, nc = room.stamp[-1], 0, 0
+    scratch.stamp[-1] += 1
+    now, nd, nc = scratch.stamp[-1], 0, 0
     for i in range(count):
-        j = room.nodes[i]
-        room.stamp[j] = now
+        j = scratch.nodes[i]
+        scratch.stamp[j] = now
         d = tau - state.origin[j]
-        for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
-            room.loc[x], room.dofs[nd] = nd, x
+        for x in range(arrays.node_dof[j], arrays.node_dof[j + 1]):
+            scratch.loc[x], scratch.dofs[nd] = nd, x
             value, slope = state_at(state.series, x, d)
-            room.Q[0, nd], room.Q[1, nd] = value, slope
+            scratch.Q[0, nd], scratch.Q[1, nd] = value, slope
             nd += 1
-        for c in range(plant.node_con[j], plant.node_con[j + 1]):
-            room.lcon[c], room.cons[nc] = nc, c
+        for c in range(arrays.node_con[j], arrays.node_con[j + 1]):
+            scratch.lcon[c], scratch.cons[nc] = nc, c
             nc += 1
     lane = nd
     for i in range(count):
-        j = room.nodes[i]
-        for e in range(plant.near_ptr[j], plant.near_ptr[j + 1]):
-            other = plant.near[e]
-            if room.stamp[other] == now:
+        j = scratch.nodes[i]
+        for e in range(arrays.near_ptr[j], arrays.near_ptr[j + 1]):
+            other = arrays.near[e]
+            if scratch.stamp[other] == now:
                 continue
-            room.stamp[other] = now
+            scratch.stamp[other] = now
             d = tau - state.origin[other]
-            for x in range(plant.node_dof[other], plant.node_dof[other + 1]):
-                room.loc[x] = lane
-                shift(state.series, x, d, top, room.line)
+            for x in range(arrays.node_dof[other], arrays.node_dof[other + 1]):
+                scratch.loc[x] = lane
+                shift(state.series, x, d, top, scratch.line)
                 for k in range(top + 1):
-                    room.Q[k, lane] = room.line[k]
+                    scratch.Q[k, lane] = scratch.line[k]
                 lane += 1
     return nd, nc
 
 
 @kernel
-def whole(plant: Any, state: Any, room: Any, top: int) -> tuple[int, int]:
+def whole(arrays: Any, state: Any, scratch: Any, top: int) -> tuple[int, int]:
     """List all coordinates as one group to expand, from the start of the step."""
     state.whole[FIRST] = -1
-    if plant.offsets.shape[0] > 0:
+    if arrays.offsets.shape[0] > 0:
         state.whole[FIRST] = 0
-        clear_beside(plant, room, plant.dof_node.shape[0], top)
-    n, m = plant.dof_node.shape[0], plant.con_node.shape[0]
-    for j in range(plant.node_dof.shape[0] - 1):
-        room.nodes[j] = j
+        clear_beside(arrays, scratch, arrays.dof_node.shape[0], top)
+    n, m = arrays.dof_node.shape[0], arrays.con_node.shape[0]
+    for j in range(arrays.node_dof.shape[0] - 1):
+        scratch.nodes[j] = j
     for x in range(n):
-        room.loc[x] = room.dofs[x] = x
-        room.Q[0, x], room.Q[1, x] = state.x[0, x], state.x[1, x]
+        scratch.loc[x] = scratch.dofs[x] = x
+        scratch.Q[0, x], scratch.Q[1, x] = state.x[0, x], state.x[1, x]
     for c in range(m):
-        room.lcon[c] = room.cons[c] = c
+        scratch.lcon[c] = scratch.cons[c] = c
     return n, m
 
 
 @kernel
-def _angles(plant: Any, state: Any, room: Any, tau: float, top: int) -> None:
+def _angles(arrays: Any, state: Any, scratch: Any, tau: float, top: int) -> None:
     """Compute the series of sine and cosine of every angle about tau."""
-    for r in range(plant.rates.shape[0]):
-        rate = plant.rates[r]
+    for r in range(arrays.rates.shape[0]):
+        rate = arrays.rates[r]
         angle = state.phase[r] + rate * tau
-        room.trig[r, 0, 0], room.trig[r, 1, 0] = math.sin(angle), math.cos(angle)
+        scratch.trig[r, 0, 0], scratch.trig[r, 1, 0] = math.sin(angle), math.cos(angle)
         for k in range(1, top + 1):
-            room.trig[r, 0, k] = rate * room.trig[r, 1, k - 1] / k
-            room.trig[r, 1, k] = -rate * room.trig[r, 0, k - 1] / k
+            scratch.trig[r, 0, k] = rate * scratch.trig[r, 1, k - 1] / k
+            scratch.trig[r, 1, k] = -rate * scratch.trig[r, 0, k - 1] / k
 
 
 @inlined
-def base_coefficient(plant: Any, room: Any, c: int, k: int) -> float:
+def base_coefficient(arrays: Any, scratch: Any, c: int, k: int) -> float:
     """Return coefficient k of the speed of a contact's base."""
-    r = plant.base_rate[c]
+    r = arrays.base_rate[c]
     if r >= 0:
-        return plant.base[c, 1] * room.trig[r, 0, k] + plant.base[c, 2] * room.trig[r, 1, k]
-    return plant.base[c, 0] if k == 0 else 0.0
+        return arrays.base[c, 1] * scratch.trig[r, 0, k] + arrays.base[c, 2] * scratch.trig[r, 1, k]
+    return arrays.base[c, 0] if k == 0 else 0.0
 
 
 @inlined
-def base_speed(plant: Any, state: Any, c: int, tau: float) -> float:
+def base_speed(arrays: Any, state: Any, c: int, tau: float) -> float:
     """Return the speed of a contact's base at a time within the step."""
-    r = plant.base_rate[c]
+    r = arrays.base_rate[c]
     if r < 0:
-        return plant.base[c, 0]
-    angle = state.phase[r] + plant.rates[r] * tau
-    return plant.base[c, 1] * math.sin(angle) + plant.base[c, 2] * math.cos(angle)
+        return arrays.base[c, 0]
+    angle = state.phase[r] + arrays.rates[r] * tau
+    return arrays.base[c, 1] * math.sin(angle) + arrays.base[c, 2] * math.cos(angle)
 
 
 @kernel
-def _lanes(plant: Any, laws: Any, state: Any, room: Any, nc: int, orders: int) -> None:
+def _fill_registers(arrays: Any, laws: Any, state: Any, scratch: Any, nc: int, orders: int) -> None:
     """Sort the slipping contacts by tape, and put the constants of each into its registers."""
     tapes, used, at = laws.registers.shape[0], 0, 0
     for t in range(tapes):
-        room.lane_ptr[t], room.place[t] = used, at
+        scratch.lane_ptr[t], scratch.place[t] = used, at
         for i in range(nc):
-            c = room.cons[i]
-            if state.mode[c] != STICK and plant.tape[c, 0 if state.mode[c] > 0 else 1] == t:
-                room.lane[used] = i
+            c = scratch.cons[i]
+            if state.mode[c] != STICK and arrays.tape[c, 0 if state.mode[c] > 0 else 1] == t:
+                scratch.lane[used] = i
                 used += 1
-        if used > room.lane_ptr[t]:
-            at = constants(plant, laws, room, t, used, orders)
-    room.lane_ptr[tapes], room.place[tapes] = used, at
+        if used > scratch.lane_ptr[t]:
+            at = constants(arrays, laws, scratch, t, used, orders)
+    scratch.lane_ptr[tapes], scratch.place[tapes] = used, at
 
 
 @kernel
-def constants(plant: Any, laws: Any, room: Any, t: int, last: int, orders: int) -> int:
+def constants(arrays: Any, laws: Any, scratch: Any, t: int, last: int, orders: int) -> int:
     """Store the constants of lanes lane_ptr[t]..last - 1 in a tape's registers; return the end of these registers."""
-    first, at, block = room.lane_ptr[t], room.place[t], laws.registers[t] * orders * WIDTH
+    first, at, block = scratch.lane_ptr[t], scratch.place[t], laws.registers[t] * orders * WIDTH
     count, rows = last - first, laws.constant_rows
     end = at + whole_vectors(count) // WIDTH * block
     for i in range(at, end, block):
-        clear_constants(laws, room.V, t, i, orders)
+        clear_constants(laws, scratch.V, t, i, orders)
     for i in range(laws.par_ptr[t], laws.par_ptr[t + 1]):
         for j in range(whole_vectors(count)):
-            c = room.cons[room.lane[first + min(j, count - 1)]]
+            c = scratch.cons[scratch.lane[first + min(j, count - 1)]]
             place = lane_place(at, block, laws.par_reg[i], orders, 0, j)
-            room.V[place] = plant.par[c, i - laws.par_ptr[t]]
-    advance_lanes(rows, laws.constant_ptr[t], laws.constant_ptr[t + 1], room.V, at, end, block, orders, 0)
+            scratch.V[place] = arrays.par[c, i - laws.par_ptr[t]]
+    advance_simd_series(
+        rows, laws.constant_ptr[t], laws.constant_ptr[t + 1], scratch.V, at, end, block, orders, 0
+    )
     return end
 
 
 @inlined
-def _forces_of_slip(plant: Any, laws: Any, state: Any, room: Any, orders: int, k: int) -> None:
+def _forces_of_slip(arrays: Any, laws: Any, state: Any, scratch: Any, orders: int, k: int) -> None:
     """Compute coefficient k of all slip forces from that of the relative velocities."""
     for t in range(laws.registers.shape[0]):
-        first, count, at = room.lane_ptr[t], room.lane_ptr[t + 1] - room.lane_ptr[t], room.place[t]
+        first, count, at = (
+            scratch.lane_ptr[t],
+            scratch.lane_ptr[t + 1] - scratch.lane_ptr[t],
+            scratch.place[t],
+        )
         block = laws.registers[t] * orders * WIDTH
         for j in range(whole_vectors(count)):
-            i = room.lane[first + min(j, count - 1)]
+            i = scratch.lane[first + min(j, count - 1)]
             place = lane_place(at, block, laws.speed[t], orders, k, j)
-            room.V[place] = state.mode[room.cons[i]] * room.R[k, i]
+            scratch.V[place] = state.mode[scratch.cons[i]] * scratch.R[k, i]
         rows, end = (laws.row_ptr[t], laws.row_ptr[t + 1]), at + whole_vectors(count) // WIDTH * block
-        advance_lanes(laws.rows, rows[0], rows[1], room.V, at, end, block, orders, k)
+        advance_simd_series(laws.rows, rows[0], rows[1], scratch.V, at, end, block, orders, k)
         for j in range(count):
-            i = room.lane[first + j]
-            force = room.V[lane_place(at, block, laws.out[t], orders, k, j)]
-            room.F[k, i] = state.mode[room.cons[i]] * force
+            i = scratch.lane[first + j]
+            force = scratch.V[lane_place(at, block, laws.out[t], orders, k, j)]
+            scratch.F[k, i] = state.mode[scratch.cons[i]] * force
 
 
 @inlined
-def _relative(plant: Any, state: Any, room: Any, nc: int, k: int) -> None:
+def _relative(arrays: Any, state: Any, scratch: Any, nc: int, k: int) -> None:
     """Compute coefficient k of the relative velocities, exactly zero in stick."""
-    cons, loc, mode, ptr, col, val = room.cons, room.loc, state.mode, plant.w_ptr, plant.w_col, plant.w_val
-    q, r, f = room.Q[k + 1], room.R[k], room.F[k]
+    cons, loc, mode, ptr, col, val = (
+        scratch.cons,
+        scratch.loc,
+        state.mode,
+        arrays.w_ptr,
+        arrays.w_col,
+        arrays.w_val,
+    )
+    q, r, f = scratch.Q[k + 1], scratch.R[k], scratch.F[k]
     for i in range(nc):
         c = cons[i]
         total = 0.0
         if mode[c] != STICK:
             for e in range(ptr[c], ptr[c + 1]):
                 total += val[e] * q[loc[col[e]]]
-            total = (k + 1) * total - base_coefficient(plant, room, c, k)
+            total = (k + 1) * total - base_coefficient(arrays, scratch, c, k)
         r[i], f[i] = total, 0.0
         if k == 0 and state.held[c] != 0:
-            f[i] = plant.limits[c, 0] if state.held[c] > 0 else -plant.limits[c, 1]
+            f[i] = arrays.limits[c, 0] if state.held[c] > 0 else -arrays.limits[c, 1]
 
 
 @inlined
-def _accelerate(plant: Any, room: Any, nd: int, k: int) -> None:
+def _accelerate(arrays: Any, scratch: Any, nd: int, k: int) -> None:
     """Compute coefficient k of the accelerations, with slip forces but without those of sticking contacts."""
-    dofs, loc, lcon, acc = room.dofs, room.loc, room.lcon, room.acc
-    q, v, f = room.Q[k], room.Q[k + 1], room.F[k]
+    dofs, loc, lcon, acc = scratch.dofs, scratch.loc, scratch.lcon, scratch.acc
+    q, v, f = scratch.Q[k], scratch.Q[k + 1], scratch.F[k]
     k_ptr, k_col, k_val, b_ptr, b_col, b_val = (
-        plant.k_ptr, plant.k_col, plant.k_val, plant.b_ptr, plant.b_col, plant.b_val,
+        arrays.k_ptr, arrays.k_col, arrays.k_val, arrays.b_ptr, arrays.b_col, arrays.b_val,
     )  # fmt: skip
     for a in range(nd):
         x = dofs[a]
-        total = plant.still[x] if k == 0 else 0.0
+        total = arrays.still[x] if k == 0 else 0.0
         for e in range(k_ptr[x], k_ptr[x + 1]):
             total -= k_val[e] * q[loc[k_col[e]]]
         for e in range(b_ptr[x], b_ptr[x + 1]):
             total -= b_val[e] * f[lcon[b_col[e]]]
         acc[a] = total
-    if plant.c_col.shape[0] > 0:
+    if arrays.c_col.shape[0] > 0:
         for a in range(nd):
             x, total = dofs[a], 0.0
-            for e in range(plant.c_ptr[x], plant.c_ptr[x + 1]):
-                total += plant.c_val[e] * v[loc[plant.c_col[e]]]
+            for e in range(arrays.c_ptr[x], arrays.c_ptr[x + 1]):
+                total += arrays.c_val[e] * v[loc[arrays.c_col[e]]]
             acc[a] -= (k + 1) * total
-    if plant.rates.shape[0] > 0:
+    if arrays.rates.shape[0] > 0:
         for a in range(nd):
             x = dofs[a]
-            for e in range(plant.h_ptr[x], plant.h_ptr[x + 1]):
-                r = plant.h_rate[e]
-                acc[a] += plant.h_val[e, 0] * room.trig[r, 0, k] + plant.h_val[e, 1] * room.trig[r, 1, k]
+            for e in range(arrays.h_ptr[x], arrays.h_ptr[x + 1]):
+                r = arrays.h_rate[e]
+                acc[a] += (
+                    arrays.h_val[e, 0] * scratch.trig[r, 0, k] + arrays.h_val[e, 1] * scratch.trig[r, 1, k]
+                )
 
 
 @inlined
-def _advance(plant: Any, state: Any, room: Any, nd: int, k: int) -> None:
+def _advance(arrays: Any, state: Any, scratch: Any, nd: int, k: int) -> None:
     """Compute coefficient k + 2 of the positions from the accelerations, or from the base for a pinned coordinate."""
-    dofs, acc, pin, q, divisor = room.dofs, room.acc, state.pin, room.Q[k + 2], float((k + 1) * (k + 2))
+    dofs, acc, pin, q, divisor = (
+        scratch.dofs,
+        scratch.acc,
+        state.pin,
+        scratch.Q[k + 2],
+        float((k + 1) * (k + 2)),
+    )
     for a in range(nd):
         c = pin[dofs[a]]
         if c < 0:
             q[a] = acc[a] / divisor
-        elif plant.base_rate[c] < 0:
+        elif arrays.base_rate[c] < 0:
             q[a] = 0.0
         else:
-            q[a] = base_coefficient(plant, room, c, k + 1) / plant.w_val[plant.w_ptr[c]] / (k + 2)
+            q[a] = base_coefficient(arrays, scratch, c, k + 1) / arrays.w_val[arrays.w_ptr[c]] / (k + 2)
 
 
 @inlined
-def _hold_one(plant: Any, state: Any, room: Any, j: int, k: int) -> None:
+def _hold_one(arrays: Any, state: Any, scratch: Any, j: int, k: int) -> None:
     """Do the work of `_hold` for a node whose only contact sticks."""
-    c, total = plant.node_con[j], 0.0
-    for e in range(plant.w_ptr[c], plant.w_ptr[c + 1]):
-        total += plant.w_val[e] * room.acc[room.loc[plant.w_col[e]]]
-    force = state.pinv[plant.g_ptr[j]] * (total - (k + 1) * base_coefficient(plant, room, c, k + 1))
-    room.F[k, room.lcon[c]] = force
-    for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
-        if plant.b_ptr[x] < plant.b_ptr[x + 1]:
-            room.acc[room.loc[x]] -= plant.b_val[plant.b_ptr[x]] * force
+    c, total = arrays.node_con[j], 0.0
+    for e in range(arrays.w_ptr[c], arrays.w_ptr[c + 1]):
+        total += arrays.w_val[e] * scratch.acc[scratch.loc[arrays.w_col[e]]]
+    force = state.pinv[arrays.g_ptr[j]] * (total - (k + 1) * base_coefficient(arrays, scratch, c, k + 1))
+    scratch.F[k, scratch.lcon[c]] = force
+    for x in range(arrays.node_dof[j], arrays.node_dof[j + 1]):
+        if arrays.b_ptr[x] < arrays.b_ptr[x + 1]:
+            scratch.acc[scratch.loc[x]] -= arrays.b_val[arrays.b_ptr[x]] * force
 
 
 @kernel
-def _hold(plant: Any, state: Any, room: Any, j: int, k: int) -> None:
+def _hold(arrays: Any, state: Any, scratch: Any, j: int, k: int) -> None:
     """Compute the forces of sticking contacts of a node, f = (W M^-1 W^T)^+ (W a - base'), and add their effect."""
-    first, last = plant.node_con[j], plant.node_con[j + 1]
+    first, last = arrays.node_con[j], arrays.node_con[j + 1]
     m = last - first
     for c in range(first, last):
-        room.tall[c - first, 0] = 0.0
+        scratch.tall[c - first, 0] = 0.0
         if state.mode[c] == STICK and state.held[c] == 0:
-            total = -(k + 1) * base_coefficient(plant, room, c, k + 1)
-            for e in range(plant.w_ptr[c], plant.w_ptr[c + 1]):
-                total += plant.w_val[e] * room.acc[room.loc[plant.w_col[e]]]
-            room.tall[c - first, 0] = total
+            total = -(k + 1) * base_coefficient(arrays, scratch, c, k + 1)
+            for e in range(arrays.w_ptr[c], arrays.w_ptr[c + 1]):
+                total += arrays.w_val[e] * scratch.acc[scratch.loc[arrays.w_col[e]]]
+            scratch.tall[c - first, 0] = total
     for c in range(first, last):
         if state.mode[c] == STICK and state.held[c] == 0:
-            total, row = 0.0, plant.g_ptr[j] + (c - first) * m
+            total, row = 0.0, arrays.g_ptr[j] + (c - first) * m
             for i in range(m):
-                total += state.pinv[row + i] * room.tall[i, 0]
-            room.F[k, room.lcon[c]] = total
-    for x in range(plant.node_dof[j], plant.node_dof[j + 1]):
-        for e in range(plant.b_ptr[x], plant.b_ptr[x + 1]):
-            c = plant.b_col[e]
+                total += state.pinv[row + i] * scratch.tall[i, 0]
+            scratch.F[k, scratch.lcon[c]] = total
+    for x in range(arrays.node_dof[j], arrays.node_dof[j + 1]):
+        for e in range(arrays.b_ptr[x], arrays.b_ptr[x + 1]):
+            c = arrays.b_col[e]
             if state.mode[c] == STICK and state.held[c] == 0:
-                room.acc[room.loc[x]] -= plant.b_val[e] * room.F[k, room.lcon[c]]
+                scratch.acc[scratch.loc[x]] -= arrays.b_val[e] * scratch.F[k, scratch.lcon[c]]
 
 
-def expand(plant: Any, laws: Any, state: Any, room: Any) -> int:
+def expand(arrays: Any, laws: Any, state: Any, scratch: Any) -> int:
     """Compute the series of the gathered patch, Q, R and F; see `expanded`."""
     count, nd, nc, top = state.whole[COUNT], state.whole[DOFS], state.whole[CONS], state.whole[ORDER]
     tau = state.real[AT]
     if state.whole[FIRST] >= 0:
-        expand_run(plant, laws, state, room, count, top)
+        expand_run(arrays, laws, state, scratch, count, top)
         return 0
-    _angles(plant, state, room, tau, top)
-    _lanes(plant, laws, state, room, nc, top + 1)
+    _angles(arrays, state, scratch, tau, top)
+    _fill_registers(arrays, laws, state, scratch, nc, top + 1)
     for k in range(top - 1):
-        _relative(plant, state, room, nc, k)
-        _forces_of_slip(plant, laws, state, room, top + 1, k)
-        _accelerate(plant, room, nd, k)
+        _relative(arrays, state, scratch, nc, k)
+        _forces_of_slip(arrays, laws, state, scratch, top + 1, k)
+        _accelerate(arrays, scratch, nd, k)
         for i in range(count):
-            j = room.nodes[i]
+            j = scratch.nodes[i]
             if state.holds[j] > 0:
-                if plant.node_con[j + 1] - plant.node_con[j] == 1:
-                    _hold_one(plant, state, room, j, k)
+                if arrays.node_con[j + 1] - arrays.node_con[j] == 1:
+                    _hold_one(arrays, state, scratch, j, k)
                 else:
-                    _hold(plant, state, room, j, k)
-        _advance(plant, state, room, nd, k)
-    _relative(plant, state, room, nc, top - 1)
+                    _hold(arrays, state, scratch, j, k)
+        _advance(arrays, state, scratch, nd, k)
+    _relative(arrays, state, scratch, nc, top - 1)
     return 0
 
 
 @inlined
 def expanded(
-    plant: Any, laws: Any, state: Any, room: Any, count: int, nd: int, nc: int, tau: float, top: int
+    arrays: Any, laws: Any, state: Any, scratch: Any, count: int, nd: int, nc: int, tau: float, top: int
 ) -> None:
     """Expand the patch with these counts of nodes, coordinates and contacts about tau, to order `top`."""
     state.whole[COUNT], state.whole[DOFS], state.whole[CONS], state.whole[ORDER] = count, nd, nc, top
     state.real[AT] = tau
-    call_kernel(state.kernels[EXPAND], (plant, laws, state, room))
+    call_kernel(state.kernels[EXPAND], (arrays, laws, state, scratch))

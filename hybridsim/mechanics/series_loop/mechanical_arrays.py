@@ -24,7 +24,7 @@ from hybridsim.mechanics.series_loop.bands import in_bands
 MOST_COUPLED = 3000  # largest number of coordinates in a dense inverse of the mass matrix: 72 MB
 
 
-class Plant(NamedTuple):
+class MechanicalArrays(NamedTuple):
     """The arrays that are constant in a run; sparse matrices are (ptr, col, val), rows in the order of the nodes."""
 
     node_dof: np.ndarray  # first coordinate of each node
@@ -84,7 +84,7 @@ class Laws(NamedTuple):
 class Built:
     """The arrays, and the declared numbers of their coordinates and contacts."""
 
-    plant: Plant
+    arrays: MechanicalArrays
     laws: Laws
     dofs: np.ndarray
     contacts: np.ndarray
@@ -132,14 +132,14 @@ def build(system: MechanicalSystem) -> Built:
     single = count == n == m and not rates and len(laws.registers) == 1
     single = single and W.nnz == B.nnz == n and bool((np.diff(node_con) == 1).all())
     banded = in_bands(K, C, B, W, single, base[:, 0], still, par)
-    plant = Plant(
+    arrays = MechanicalArrays(
         integers(node_dof), integers(node_con), integers(node_of), integers(con_node),
         *parts(K), *parts(C), *parts(B), *parts(W),
         integers(np.concatenate([[0], np.cumsum(sizes**2)])), np.concatenate([np.zeros(0), *blocks]),
         *_neighbours(abs(K) + abs(C), node_of, count), still, *harmonics, np.array(rates, dtype=float),
         base, base_rate, limits, smooth, tape, par, integers(np.diff(W.indptr) == 1), *banded,
     )  # fmt: skip
-    return Built(plant, laws, dofs, contacts, is_linear)
+    return Built(arrays, laws, dofs, contacts, is_linear)
 
 
 def rates_of(system: MechanicalSystem) -> list[float]:
@@ -185,8 +185,8 @@ def parts(matrix: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def _neighbours(coupling: Any, node_of: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the nodes that act on each other through stiffness or damping."""
     entries = sparse.coo_array(coupling)
-    kept = entries.data != 0
-    a, b = node_of[entries.row[kept]], node_of[entries.col[kept]]
+    is_nonzero = entries.data != 0
+    a, b = node_of[entries.row[is_nonzero]], node_of[entries.col[is_nonzero]]
     apart = a != b
     graph = sparse.csr_array((np.ones(2 * apart.sum()), (np.r_[a[apart], b[apart]], np.r_[b[apart], a[apart]])),
                              shape=(count, count))  # fmt: skip
@@ -238,10 +238,10 @@ def stick_limits(contacts: list[MechanicalContact]) -> tuple[np.ndarray, np.ndar
     limits = np.zeros((len(contacts), 2))
     smooth = np.zeros((len(contacts), 2), dtype=np.int64)
     for i, contact in enumerate(contacts):
-        law, given = contact.law, {"N": contact.normal, **contact.values()}
+        law, arguments = contact.law, {"N": contact.normal, **contact.values()}
         for side, (slip, stick) in enumerate(sides(law)):
-            limits[i, side] = evaluate(stick, given)
-            onset = evaluate(slip, {**given, "v": 0.0})
+            limits[i, side] = evaluate(stick, arguments)
+            onset = evaluate(slip, {**arguments, "v": 0.0})
             smooth[i, side] = onset == limits[i, side] or is_same(slip, stick, "v")
             if limits[i, side] < 0.0 or onset < 0.0:
                 raise ModelError(

@@ -1,4 +1,4 @@
-"""This module runs a mechanical system: it prepares the arrays, calls the kernels, and collects pieces and events."""
+"""This module runs a mechanical system: it prepares the arrays, calls the kernels, and collects segments and events."""
 
 from __future__ import annotations
 
@@ -23,32 +23,32 @@ from hybridsim.mechanics.arrays import (
     AT,
     BERNSTEIN,
     CASCADE,
-    DECIDE,
     DONE,
     FIRED,
     FULL,
     INCONSISTENT,
+    JOINT_CHOICE,
     LIMITED,
     LOST,
     NODE,
     NONUNIQUE,
     OPEN_END,
     Record,
-    Room,
+    Scratch,
     State,
 )  # fmt: skip
 from hybridsim.mechanics.polynomials import TERMS
-from hybridsim.mechanics.series_loop.decision import decide
+from hybridsim.mechanics.series_loop.decision import choose_jointly
 from hybridsim.mechanics.series_loop.expansion import expand
 from hybridsim.mechanics.series_loop.loop import FRESH, LAST, RADIUS, WHERE, run
 from hybridsim.mechanics.series_loop.mechanical_arrays import Built
-from hybridsim.mechanics.series_loop.steps import stretch
+from hybridsim.mechanics.series_loop.steps import step_length_kernel
 
 STATUS = {
     DONE: "finished", INCONSISTENT: "inconsistent", NONUNIQUE: "nonunique", CASCADE: "cascade", LOST: "failed",
     LIMITED: "limit",
 }  # fmt: skip
-_ROOM = 1 << 20  # doubles for the series of one call
+_SERIES_DOUBLES = 1 << 20  # doubles for the series of one call
 _EVENTS = 4096  # events per call, in addition to those of one node
 _WORK = 1 << 20  # coordinates times (steps + events) per call: about 0.1 s between checks of the limits
 _TIGHTEST = 1e-15
@@ -59,8 +59,8 @@ _LEAST = 10  # a lower order makes series useless
 
 def _order_in_range(built: Built, span: tuple[float, float]) -> int:
     """Return the order up to which powers of rates and times are doubles, whatever the unit of time."""
-    plant = built.plant
-    rates = [abs(plant.k_val).max(initial=0.0) ** 0.5, abs(plant.c_val).max(initial=0.0), *plant.rates]
+    arrays = built.arrays
+    rates = [abs(arrays.k_val).max(initial=0.0) ** 0.5, abs(arrays.c_val).max(initial=0.0), *arrays.rates]
     sizes = [size for size in (max(rates), abs(span[1] - span[0])) if size > 0.0]
     decades = max((abs(math.log10(size)) for size in sizes), default=0.0)
     order = int(_RANGE / max(decades, 1.0))
@@ -76,18 +76,18 @@ class MechanicalRun:
     """One run of a mechanical system; `go` carries it out."""
 
     def __init__(self, built: Built, span: tuple[float, float], x: np.ndarray, rtol: float, atol: np.ndarray,
-                 max_step: float, keep: bool, limits: Limits = UNLIMITED) -> None:  # fmt: skip
+                 max_step: float, is_recorded: bool, limits: Limits = UNLIMITED) -> None:  # fmt: skip
         self.built, self.span = built, span
-        self.rtol, self.keep = max(rtol, _TIGHTEST), keep
+        self.rtol, self.is_recorded = max(rtol, _TIGHTEST), is_recorded
         # the linear part of a series is the more expensive one for coupled coordinates
         self.order = min(series_order(self.rtol, linear=True), _order_in_range(built, span))
         self.max_step, self.limits = max_step, limits
         self.state = new_state(built, self.order)
-        self.room = new_room(built, self.order)
+        self.scratch = new_scratch(built, self.order)
         self.state.x[:] = x.reshape(2, -1)[:, built.dofs]
         self.state.tolerance[:] = np.maximum(atol.reshape(2, -1)[:, built.dofs], 1e-300)
         self.state.clock[0] = span[0]
-        self.pieces: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+        self.segments: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
         self.events: list[np.ndarray] = []
         self.when: list[np.ndarray] = []
         self.first_modes = np.zeros(0, dtype=np.int64)
@@ -96,22 +96,22 @@ class MechanicalRun:
 
     def go(self, progress: Callable[[float], None] | None) -> None:
         """Run to the end of the span, or until no continuation exists."""
-        plant, laws = packed(self.built.plant), packed(self.built.laws)
-        state, room = packed(self.state), packed(self.room)
+        arrays, laws = packed(self.built.arrays), packed(self.built.laws)
+        state, scratch = packed(self.state), packed(self.scratch)
         began, compiled = perf_counter(), seconds_compiling()
         limit_monitor = LimitMonitor(self.limits, self.counters)
-        reach_kernels(self.state, plant, laws, state, room)
+        reach_kernels(self.state, arrays, laws, state, scratch)
         if ENABLED:
             self.state.kernels[BERNSTEIN:], self._code = bernstein_code(self.order - 1)
-        self.code = self._settle_start(plant, laws, state, room)
+        self.code = self._resolve_start(arrays, laws, state, scratch)
         self.first_modes = self.state.mode.copy()
         self.state.flags[FRESH], self.state.flags[RADIUS] = 1, _RADIUS
         target = np.array([self.span[1], 0.0])
         while self.code in (DONE, FULL):
             record = self._record()
             until = int(self.state.counts[:2].sum()) + max(_WORK // len(self.built.dofs), 16)
-            control = (self.rtol, self.max_step, self.order, self.keep, until)
-            self.code = run(plant, laws, state, room, packed(record), control, target)
+            control = (self.rtol, self.max_step, self.order, self.is_recorded, until)
+            self.code = run(arrays, laws, state, scratch, packed(record), control, target)
             self._collect(record)
             if self.code != FULL:
                 break
@@ -129,21 +129,21 @@ class MechanicalRun:
         """Update the counters of steps and events."""
         self.counters.steps, self.counters.events = self.state.counts[:2].tolist()
 
-    def _settle_start(self, *packs: Any) -> int:
+    def _resolve_start(self, *packs: Any) -> int:
         """Find the modes at the start: by sign for moving contacts, by decision for resting ones."""
-        plant, state = self.built.plant, self.state
-        state.series[:2, : len(plant.dof_node)] = state.x
-        for r, rate in enumerate(plant.rates):
+        arrays, state = self.built.arrays, self.state
+        state.series[:2, : len(arrays.dof_node)] = state.x
+        for r, rate in enumerate(arrays.rates):
             state.phase[r] = phase_of(state.clock[0], 0.0, rate, 0.0)
         weights = csr_array(
-            (plant.w_val, plant.w_col, plant.w_ptr), shape=(len(plant.con_node), len(plant.dof_node))
+            (arrays.w_val, arrays.w_col, arrays.w_ptr), shape=(len(arrays.con_node), len(arrays.dof_node))
         )
-        turns = state.phase[plant.base_rate] if len(plant.rates) else 0.0
-        base = plant.base[:, 0] + plant.base[:, 1] * np.sin(turns) + plant.base[:, 2] * np.cos(turns)
+        turns = state.phase[arrays.base_rate] if len(arrays.rates) else 0.0
+        base = arrays.base[:, 0] + arrays.base[:, 1] * np.sin(turns) + arrays.base[:, 2] * np.cos(turns)
         state.mode[:] = np.sign(weights @ state.x[1] - base)
-        if code := _settle_nodes(*packs):
+        if code := _resolve_nodes(*packs):
             return code
-        state.x[:] = state.series[:2, : len(plant.dof_node)]
+        state.x[:] = state.series[:2, : len(arrays.dof_node)]
         return DONE
 
     @property
@@ -155,12 +155,12 @@ class MechanicalRun:
     @property
     def node_contacts(self) -> list[int]:
         """The contacts (declared numbers) of the node at which the run stopped."""
-        j, plant = int(self.state.flags[WHERE]), self.built.plant
-        return [int(self.built.contacts[c]) for c in range(plant.node_con[j], plant.node_con[j + 1])]
+        j, arrays = int(self.state.flags[WHERE]), self.built.arrays
+        return [int(self.built.contacts[c]) for c in range(arrays.node_con[j], arrays.node_con[j + 1])]
 
-    def start_piece(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return a piece per node with the start only, for a run that ends where it begins."""
-        node_dof = self.built.plant.node_dof
+    def start_segments(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return a segment per node with the start only, for a run that ends where it begins."""
+        node_dof = self.built.arrays.node_dof
         nodes = len(node_dof) - 1
         start = np.zeros((nodes, 3))
         start[:, 0] = self.span[0]
@@ -169,13 +169,13 @@ class MechanicalRun:
         return np.stack([np.arange(nodes), node_dof[:-1]], axis=1).astype(np.int64), start, series
 
     def _record(self) -> Record:
-        plant, columns = self.built.plant, self.order + 1
-        nodes, n, m = len(plant.node_dof) - 1, len(plant.dof_node), len(plant.con_node)
-        rows = max(_ROOM // columns, 2 * n) if self.keep else 0
-        pieces = max(rows * nodes // n, 2 * nodes) if self.keep else 0
+        arrays, columns = self.built.arrays, self.order + 1
+        nodes, n, m = len(arrays.node_dof) - 1, len(arrays.dof_node), len(arrays.con_node)
+        rows = max(_SERIES_DOUBLES // columns, 2 * n) if self.is_recorded else 0
+        segments = max(rows * nodes // n, 2 * nodes) if self.is_recorded else 0
         return Record(
-            np.empty((pieces, 2), dtype=np.int64),
-            np.empty((pieces, 3)),
+            np.empty((segments, 2), dtype=np.int64),
+            np.empty((segments, 3)),
             np.empty((rows, columns)),
             np.empty((_EVENTS + 2 * m, 4), dtype=np.int64),
             np.empty((_EVENTS + 2 * m, 3)),
@@ -183,71 +183,78 @@ class MechanicalRun:
         )
 
     def _collect(self, record: Record) -> None:
-        pieces, rows, events = record.used
-        if pieces:
-            self.pieces.append(
-                (record.piece[:pieces].copy(), record.start[:pieces].copy(), record.series[:rows].copy())
+        segments, rows, events = record.used
+        if segments:
+            self.segments.append(
+                (
+                    record.segment[:segments].copy(),
+                    record.start[:segments].copy(),
+                    record.series[:rows].copy(),
+                )
             )
         self.events.append(record.event[:events].copy())
         self.when.append(record.when[:events].copy())
 
 
 @kernel
-def _settle_nodes(plant: Any, laws: Any, state: Any, room: Any) -> int:
+def _resolve_nodes(arrays: Any, laws: Any, state: Any, scratch: Any) -> int:
     """Decide the nodes at the start one by one, up to the first without a decision."""
-    for j in range(plant.node_dof.shape[0] - 1):
+    for j in range(arrays.node_dof.shape[0] - 1):
         state.whole[NODE], state.whole[FIRED], state.real[AT] = j, -1, 0.0
-        code = call_kernel(state.kernels[DECIDE], (plant, laws, state, room))
+        code = call_kernel(state.kernels[JOINT_CHOICE], (arrays, laws, state, scratch))
         if code != 0:
             state.flags[WHERE] = j
             return code
     return DONE
 
 
-def reach_kernels(arrays: State, *packs: Any) -> None:
+def reach_kernels(state: State, *packs: Any) -> None:
     """Compile the large kernels if necessary, and store their addresses for other kernels."""
-    arrays.kernels[:BERNSTEIN] = [kernel_address(function, *packs) for function in (expand, stretch, decide)]
+    state.kernels[:BERNSTEIN] = [
+        kernel_address(function, *packs) for function in (expand, step_length_kernel, choose_jointly)
+    ]
 
 
 def new_state(built: Built, order: int) -> State:
     """Return a state of zeros."""
-    plant = built.plant
-    nodes, n, m = len(plant.node_dof) - 1, len(plant.dof_node), len(plant.con_node)
+    arrays = built.arrays
+    nodes, n, m = len(arrays.node_dof) - 1, len(arrays.dof_node), len(arrays.con_node)
     leaves = 1 << max(m, 1).bit_length()
     ints: dict[str, Any] = {"dtype": np.int64}
     return State(
         x=np.zeros((2, n)), series=room_for(order + 1, -(-n // WIDTH) * WIDTH), origin=np.zeros(nodes),
         mode=np.zeros(m, **ints), held=np.zeros(m, **ints), decree=np.zeros((m, 2), **ints), stamp=np.full(m, -1.0),
-        until=np.full(m, OPEN_END), guard=np.zeros(m, **ints), pinv=np.zeros(max(len(plant.g_val), 1)),
+        until=np.full(m, OPEN_END), guard=np.zeros(m, **ints), pinv=np.zeros(max(len(arrays.g_val), 1)),
         holds=np.zeros(nodes, **ints), pin=np.full(n, -1, **ints), anchor=np.full(m, -1, **ints),
-        tree=np.full(2 * leaves, OPEN_END), clock=np.array([0.0, 0.0, 0.0, math.nan]), phase=np.zeros(len(plant.rates)),
+        tree=np.full(2 * leaves, OPEN_END), clock=np.array([0.0, 0.0, 0.0, math.nan]),
+        phase=np.zeros(len(arrays.rates)),
         flags=np.zeros(LAST + WHERE + 1, **ints), counts=np.zeros(6, **ints), tolerance=np.ones((2, n)),
         kernels=np.zeros(BERNSTEIN + LEADING, **ints), whole=np.zeros(7, **ints), real=np.zeros(4),
     )  # fmt: skip
 
 
-def new_room(built: Built, order: int) -> Room:
+def new_scratch(built: Built, order: int) -> Scratch:
     """Return the scratch arrays."""
-    plant, laws = built.plant, built.laws
-    nodes, n, m = len(plant.node_dof) - 1, len(plant.dof_node), len(plant.con_node)
-    widest = max(int(np.diff(plant.node_con).max(initial=0)), 2)
+    arrays, laws = built.arrays, built.laws
+    nodes, n, m = len(arrays.node_dof) - 1, len(arrays.dof_node), len(arrays.con_node)
+    widest = max(int(np.diff(arrays.node_con).max(initial=0)), 2)
     columns, tapes = order + 1, len(laws.registers)
     registers = int(laws.registers.max(initial=0))
     ints: dict[str, Any] = {"dtype": np.int64}
-    beside = WIDTH + int(abs(plant.offsets).max(initial=0))  # lanes next to a run
+    beside = WIDTH + int(abs(arrays.offsets).max(initial=0))  # lanes next to a run
     wide = -(-(max(n, m) + 2 * beside) // WIDTH) * WIDTH
-    return Room(
+    return Scratch(
         nodes=np.zeros(nodes, **ints), dofs=np.zeros(n, **ints), cons=np.zeros(m, **ints), loc=np.zeros(n, **ints),
         lcon=np.zeros(m, **ints), stamp=np.zeros(nodes + 1, **ints),
         Q=room_for(columns, wide, beside), R=room_for(columns, wide), F=room_for(columns, wide), acc=np.zeros(wide),
-        trig=np.zeros((len(plant.rates), 2, columns)), lane=np.zeros(m, **ints), lane_ptr=np.zeros(tapes + 1, **ints),
+        trig=np.zeros((len(arrays.rates), 2, columns)), lane=np.zeros(m, **ints), lane_ptr=np.zeros(tapes + 1, **ints),
         place=np.zeros(tapes + 1, **ints), poly=np.zeros(columns),
         V=room_for(1, registers * columns * (m + WIDTH * tapes) + 1)[0],
         bern=np.zeros(columns), stack=np.zeros((64, columns + 2)), before=np.zeros(m, **ints),
         zero=np.zeros(m, **ints), at_limit=np.zeros(m, **ints), next=np.zeros(m, **ints),
         err=np.zeros((columns, n)), err_f=np.zeros((columns + 8, m)), square=np.zeros((widest, widest)),
         tall=np.zeros((widest, widest)), order=np.zeros(widest, **ints), exits=np.zeros(m), kinds=np.zeros(m, **ints),
-        line=np.zeros(3 * TERMS), sums=room_for(4, wide), strips=room_for(1, (len(plant.bands) + 3) * wide)[0],
-        laid=np.zeros(wide // WIDTH, **ints),
-        W=room_for(1, (registers * columns + 1) * wide if len(plant.offsets) else 1)[0],
+        line=np.zeros(3 * TERMS), sums=room_for(4, wide), band_rows=room_for(1, (len(arrays.bands) + 3) * wide)[0],
+        band_first=np.zeros(wide // WIDTH, **ints),
+        W=room_for(1, (registers * columns + 1) * wide if len(arrays.offsets) else 1)[0],
     )  # fmt: skip

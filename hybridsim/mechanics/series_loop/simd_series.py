@@ -148,7 +148,7 @@ def _with_constant(op: int, x: Any, c: Any) -> Any:
 
 
 @kernel
-def advance_lanes(
+def advance_simd_series(
     rows: Any, first: int, last: int, V: Any, begin: int, end: int, block: int, orders: int, k: int
 ) -> None:
     """Compute coefficient k of operations first..last - 1 in all blocks of eight lanes from `begin` to `end` in V.

@@ -13,8 +13,8 @@ from hybridsim.engine.native.struct_pack import packed
 from hybridsim.errors import UsageError
 from hybridsim.mechanics.arrays import CASCADE, DONE, INCONSISTENT, LIMITED, LOST
 from hybridsim.mechanics.result import ArraysResult
-from hybridsim.mechanics.series_loop.run import STATUS, new_room, new_state, reach_kernels
-from hybridsim.mechanics.series_loop.trajectory import Pieces, instants, quantities
+from hybridsim.mechanics.series_loop.run import STATUS, new_scratch, new_state, reach_kernels
+from hybridsim.mechanics.series_loop.trajectory import NodeSegments, instants, quantities
 from hybridsim.solution import Event, ModeInterval
 from hybridsim.solution.by_name import ByName
 
@@ -75,14 +75,14 @@ class MechanicalSolution(ArraysResult):
     # -- trajectory -----------------------------------------------------------------------------------------
 
     @cached_property
-    def _pieces(self) -> Pieces:
+    def _segments(self) -> NodeSegments:
         self._require_states()
-        return Pieces(self._run.built.plant, self._run.pieces or [self._run.start_piece()])
+        return NodeSegments(self._run.built.arrays, self._run.segments or [self._run.start_segments()])
 
     @cached_property
     def _scratch(self) -> tuple[Any, Any]:
         built, order = self._run.built, self._run.order
-        return new_state(built, order), new_room(built, order)
+        return new_state(built, order), new_scratch(built, order)
 
     @property
     def t_start(self) -> float:
@@ -107,7 +107,7 @@ class MechanicalSolution(ArraysResult):
 
     @cached_property
     def _starts(self) -> np.ndarray:
-        begins = np.unique(self._pieces.begins)
+        begins = np.unique(self._segments.begins)
         return begins[~np.isin(begins, self._event_times) & (begins < self.t_end)]
 
     @cached_property
@@ -128,9 +128,9 @@ class MechanicalSolution(ArraysResult):
         return x[0] if np.ndim(t) == 0 else x.T
 
     def _states(self, times: np.ndarray, right: bool) -> np.ndarray:
-        out = self._pieces.states(times, right)
-        plant = self._run.built.plant
-        if not plant.unit.all():
+        out = self._segments.states(times, right)
+        arrays = self._run.built.arrays
+        if not arrays.unit.all():
             self._quantities(times, right, out)
         return out[:, self._columns]
 
@@ -138,10 +138,10 @@ class MechanicalSolution(ArraysResult):
         self, times: np.ndarray, right: bool, states: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return forces and relative velocities (k, m); the states are made to satisfy the stick constraints."""
-        built, (state, room) = self._run.built, self._scratch
+        built, (state, scratch) = self._run.built, self._scratch
         forces, velocities = np.empty((2, len(times), len(self.model.contacts)))
         order = np.argsort(times, kind="stable")
-        packs = (packed(built.plant), packed(built.laws), packed(state), packed(room))
+        packs = (packed(built.arrays), packed(built.laws), packed(state), packed(scratch))
         reach_kernels(state, *packs)
         quantities(
             *packs, self._when, self._event,
@@ -156,8 +156,8 @@ class MechanicalSolution(ArraysResult):
         ----------
         t : a number or an array of times; without it ``sol.t``.
         """
-        given, side = self.t if t is None else t, side_of_event(side)
-        times = as_times(given)
+        requested, side = self.t if t is None else t, side_of_event(side)
+        times = as_times(requested)
         name = known_name(
             name, [*self.names, *self.quantities], f"{self.model.name} has no quantity", "quantities"
         )
@@ -168,9 +168,9 @@ class MechanicalSolution(ArraysResult):
             own = name.removeprefix("v_rel(").removesuffix(")")
             right = side == "+"
             column = int(np.argsort(self._contact_of)[contacts.index(own)])
-            both = self._quantities(times, right, self._pieces.states(times, right))
+            both = self._quantities(times, right, self._segments.states(times, right))
             values = both[0 if own == name else 1][:, column]
-        return values[0] if np.ndim(given) == 0 else values
+        return values[0] if np.ndim(requested) == 0 else values
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -215,7 +215,7 @@ class MechanicalSolution(ArraysResult):
 
     @property
     def x_end(self) -> np.ndarray:
-        """States (2n,) at the end of the run, whatever was kept of it."""
+        """States (2n,) at the end of the run, whatever of it was saved."""
         run = self._run
         return run.state.x.reshape(-1)[self._columns].copy()
 
@@ -300,8 +300,8 @@ class _Events(Sequence[Event]):
         c, source, target, guard = sol._event[i].tolist()
         t, name = float(sol._when[i]), sol.model.contacts[sol._contact_of[c]].name
         nothing = np.full(2 * sol.model.n, np.nan)
-        kept = sol._save == "all"
-        x_minus, x_plus = (sol(t, "-"), sol(t)) if kept else (nothing, nothing)
+        has_states = sol._save == "all"
+        x_minus, x_plus = (sol(t, "-"), sol(t)) if has_states else (nothing, nothing)
         modes = (_MODES[source], _MODES[target])
         return Event(t, "transition", name, _GUARDS[guard], *modes, -1, x_minus, x_plus)
 

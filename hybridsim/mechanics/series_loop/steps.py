@@ -29,13 +29,13 @@ from hybridsim.mechanics.arrays import (
     OPEN_END,
     ORDER,
     RTOL,
+    STEP_LENGTH,
     STICK,
-    STRETCH,
     UPPER,
     VELOCITY,
 )  # fmt: skip
 from hybridsim.mechanics.series_loop.banded_series import law_holds_in_run
-from hybridsim.mechanics.series_loop.simd_series import advance_lanes, lane_place
+from hybridsim.mechanics.series_loop.simd_series import advance_simd_series, lane_place
 
 _UNIT = 2.0**-53
 _DEFECT = 100.0  # as in the taylor integrator: the permitted error of the law's series, in tolerances
@@ -68,38 +68,38 @@ def first_leaf(tree: Any) -> int:
 
 
 @inlined
-def _largest(room: Any, first: Any, second: Any, total: Any) -> tuple[float, float, bool]:
+def _largest(scratch: Any, first: Any, second: Any, total: Any) -> tuple[float, float, bool]:
     """Return the largest number of each of two vectors, and whether those of a third are finite."""
-    wide = room.sums.shape[1]
-    store(room.sums, 2 * wide, first)
-    store(room.sums, 2 * wide + WIDTH, second)
-    store(room.sums, 3 * wide, total)
+    wide = scratch.sums.shape[1]
+    store(scratch.sums, 2 * wide, first)
+    store(scratch.sums, 2 * wide + WIDTH, second)
+    store(scratch.sums, 3 * wide, total)
     one, other, is_finite = 0.0, 0.0, True
     for i in range(WIDTH):
-        one, other = max(one, room.sums[2, i]), max(other, room.sums[2, WIDTH + i])
-        is_finite = is_finite and room.sums[3, i] < math.inf
+        one, other = max(one, scratch.sums[2, i]), max(other, scratch.sums[2, WIDTH + i])
+        is_finite = is_finite and scratch.sums[3, i] < math.inf
     return one, other, is_finite
 
 
 @kernel
 def reach(
-    plant: Any, state: Any, room: Any, nd: int, nc: int, top: int, rtol: float, longest: float
+    arrays: Any, state: Any, scratch: Any, nd: int, nc: int, top: int, rtol: float, longest: float
 ) -> float:
     """Return the time over which the last two terms of each series stay below its tolerance; NaN if a term is NaN."""
-    h, Q, wide = longest, room.Q, room.Q.shape[1]
+    h, Q, wide = longest, scratch.Q, scratch.Q.shape[1]
     for a in range(nd):
-        x = room.dofs[a]
-        room.sums[0, a] = 1.0 / (state.tolerance[0, x] + rtol * abs(Q[0, a]))
-        room.sums[1, a] = 1.0 / (state.tolerance[1, x] + rtol * abs(Q[1, a]))
+        x = scratch.dofs[a]
+        scratch.sums[0, a] = 1.0 / (state.tolerance[0, x] + rtol * abs(Q[0, a]))
+        scratch.sums[1, a] = 1.0 / (state.tolerance[1, x] + rtol * abs(Q[1, a]))
     for a in range(nd, whole_vectors(nd)):
-        room.sums[0, a] = room.sums[1, a] = 0.0
+        scratch.sums[0, a] = scratch.sums[1, a] = 0.0
     for k in range(top - 1, top + 1):
         largest, fastest, total = splat(0.0), splat(0.0), splat(0.0)
         for a in range(0, nd, WIDTH):
             term = size(load(Q, k * wide + a))
-            at_q, at_v = term * load(room.sums, a), term * load(room.sums, wide + a)
+            at_q, at_v = term * load(scratch.sums, a), term * load(scratch.sums, wide + a)
             largest, fastest, total = larger(at_q, largest), larger(at_v, fastest), total + (at_q + at_v)
-        largest_q, largest_v, is_finite = _largest(room, largest, fastest, total)
+        largest_q, largest_v, is_finite = _largest(scratch, largest, fastest, total)
         largest_v *= k
         if not is_finite:
             return math.nan
@@ -108,17 +108,17 @@ def reach(
         if largest_v * h ** (k - 1) > 1.0:
             h = largest_v ** (-1.0 / (k - 1))
     for i in range(whole_vectors(nc)):
-        room.sums[0, i] = 0.0
+        scratch.sums[0, i] = 0.0
     for i in range(nc):
-        c = room.cons[i]
+        c = scratch.cons[i]
         if state.mode[c] == STICK:
-            most = max(plant.limits[c, 0], plant.limits[c, 1], abs(room.F[0, i]))
-            room.sums[0, i] = 1.0 / (rtol * most) if most > 0.0 else 0.0
+            most = max(arrays.limits[c, 0], arrays.limits[c, 1], abs(scratch.F[0, i]))
+            scratch.sums[0, i] = 1.0 / (rtol * most) if most > 0.0 else 0.0
     for k in range(top - 3, top - 1):
         largest = splat(0.0)
         for i in range(0, nc, WIDTH):
-            largest = larger(size(load(room.F, k * wide + i)) * load(room.sums, i), largest)
-        most, _, _ = _largest(room, largest, largest, largest)
+            largest = larger(size(load(scratch.F, k * wide + i)) * load(scratch.sums, i), largest)
+        most, _, _ = _largest(scratch, largest, largest, largest)
         if most * h**k > 1.0:
             h = most ** (-1.0 / k)
     return h
@@ -126,40 +126,40 @@ def reach(
 
 @kernel
 def _exit_of(
-    state: Any, room: Any, top: int, terms: int, h: float, order: int, slack: float, is_short: bool
+    state: Any, scratch: Any, top: int, terms: int, h: float, order: int, slack: float, is_short: bool
 ) -> tuple[int, float]:
-    """Find the first time in (0, h] at which the polynomial in room.poly[:terms] goes negative, in units of h.
+    """Find the first time in (0, h] at which the polynomial in scratch.poly[:terms] goes negative, in units of h.
 
     A polynomial that is zero throughout, or within the rounding `slack` of its terms, does not go negative.
     On a short interval a touch is passed if the polynomial is positive after it.
     """
     power, total, end = 1.0, 0.0, 0.0
     for k in range(terms):
-        room.poly[k] *= power
-        total += abs(room.poly[k])
-        end += room.poly[k]
+        scratch.poly[k] *= power
+        total += abs(scratch.poly[k])
+        end += scratch.poly[k]
         power *= h
     if total <= slack:
         return NEVER, 1.0
-    error = 2.0 * (abs(room.poly[terms - 1]) + abs(room.poly[terms - 2])) + 8.0 * _UNIT * total + slack
+    error = 2.0 * (abs(scratch.poly[terms - 1]) + abs(scratch.poly[terms - 2])) + 8.0 * _UNIT * total + slack
     form = BERNSTEIN + top - (terms - order)
     code = state.kernels[form] if form < state.kernels.shape[0] else 0
-    outcome, theta = first_exit(room.poly[:terms], error, 0.0, order, room.bern, room.stack, code)
+    outcome, theta = first_exit(scratch.poly[:terms], error, 0.0, order, scratch.bern, scratch.stack, code)
     if outcome == OPEN and is_short and end > error:
         outcome = NEVER
     return outcome, theta
 
 
 @kernel
-def _bound_rest(plant: Any, state: Any, room: Any, nc: int, top: int, h: float) -> None:
+def _bound_rest(arrays: Any, state: Any, scratch: Any, nc: int, top: int, h: float) -> None:
     """Sum the positive and the negative terms of each guard of slip (or force of stick) over a time h.
 
-    The first term is left out; results go to room.sums, rows 1 and 2.
+    The first term is left out; results go to scratch.sums, rows 1 and 2.
     """
-    R, F, sums = room.R, room.F, room.sums
+    R, F, sums = scratch.R, scratch.F, scratch.sums
     wide, step, zero = R.shape[1], splat(h), splat(0.0)
     for i in range(whole_vectors(nc)):
-        sums[0, i] = 1.0 if i < nc and state.mode[room.cons[i]] != STICK else 0.0
+        sums[0, i] = 1.0 if i < nc and state.mode[scratch.cons[i]] != STICK else 0.0
     for i in range(0, nc, WIDTH):
         above, below, power, slips = zero, zero, step, load(sums, i)
         for k in range(1, top - 1):
@@ -186,55 +186,57 @@ def _is_far(
 
 @kernel
 def isolate(
-    plant: Any, state: Any, room: Any, nc: int, tau: float, h: float, top: int, is_short: bool
+    arrays: Any, state: Any, scratch: Any, nc: int, tau: float, h: float, top: int, is_short: bool
 ) -> tuple[int, float]:
     """Find the first exit of each contact over (0, h]; return (OPEN, fraction) if one is undecided."""
-    _bound_rest(plant, state, room, nc, top, h)
+    _bound_rest(arrays, state, scratch, nc, top, h)
     power = h ** (top - 2)
     for i in range(nc):
-        c = room.cons[i]
-        room.exits[i], room.kinds[i] = OPEN_END, VELOCITY
-        fresh, above, below = state.stamp[c] == tau, room.sums[1, i], room.sums[2, i]
+        c = scratch.cons[i]
+        scratch.exits[i], scratch.kinds[i] = OPEN_END, VELOCITY
+        fresh, above, below = state.stamp[c] == tau, scratch.sums[1, i], scratch.sums[2, i]
         if state.mode[c] != STICK:
             sigma, order = float(state.mode[c]), state.decree[c, 0] if fresh else 0
-            lead = sigma * room.R[0, i]
+            lead = sigma * scratch.R[0, i]
             fall = below if sigma > 0.0 else -above
-            if order == 0 and _is_far(room.R, i, top - 1, lead, fall, power * h, h, lead + above - below):
+            if order == 0 and _is_far(scratch.R, i, top - 1, lead, fall, power * h, h, lead + above - below):
                 continue
             for k in range(top):
-                room.poly[k] = sigma * room.R[k, i]
-            outcome, theta = _exit_of(state, room, top, top, h, order, 0.0, is_short)
+                scratch.poly[k] = sigma * scratch.R[k, i]
+            outcome, theta = _exit_of(state, scratch, top, top, h, order, 0.0, is_short)
             if outcome == OPEN:
                 return OPEN, theta
             if outcome == FOUND:
-                room.exits[i] = theta * h
+                scratch.exits[i] = theta * h
         elif state.held[c] == 0:
             for side in range(2):
                 sigma = 1.0 if side == 0 else -1.0
-                limit, order = plant.limits[c, side], state.decree[c, side] if fresh else 0
-                most = max(limit, abs(room.F[0, i]))
-                lead = limit - sigma * room.F[0, i]
+                limit, order = arrays.limits[c, side], state.decree[c, side] if fresh else 0
+                most = max(limit, abs(scratch.F[0, i]))
+                lead = limit - sigma * scratch.F[0, i]
                 fall = -above if side == 0 else below
-                if order == 0 and _is_far(room.F, i, top - 2, lead, fall, power, h, most + above - below):
+                if order == 0 and _is_far(scratch.F, i, top - 2, lead, fall, power, h, most + above - below):
                     continue
                 for k in range(top - 1):
-                    room.poly[k] = -sigma * room.F[k, i]
-                room.poly[0] += limit
-                outcome, theta = _exit_of(state, room, top, top - 1, h, order, 8.0 * _UNIT * most, is_short)
+                    scratch.poly[k] = -sigma * scratch.F[k, i]
+                scratch.poly[0] += limit
+                outcome, theta = _exit_of(
+                    state, scratch, top, top - 1, h, order, 8.0 * _UNIT * most, is_short
+                )
                 if outcome == OPEN:
                     return OPEN, theta
-                if outcome == FOUND and theta * h < room.exits[i]:
-                    room.exits[i], room.kinds[i] = theta * h, UPPER if side == 0 else LOWER
+                if outcome == FOUND and theta * h < scratch.exits[i]:
+                    scratch.exits[i], scratch.kinds[i] = theta * h, UPPER if side == 0 else LOWER
     return FOUND, 1.0
 
 
 @kernel
-def _at_ends(room: Any, nc: int, h: float, top: int) -> None:
-    """Compute relative velocities and forces at the end, or at the exits, and their largest terms, to room.sums."""
-    R, F, sums = room.R, room.F, room.sums
+def _at_ends(scratch: Any, nc: int, h: float, top: int) -> None:
+    """Compute relative velocities and forces at the end, or at the exits, and their largest terms, to scratch.sums."""
+    R, F, sums = scratch.R, scratch.F, scratch.sums
     wide = R.shape[1]
     for i in range(whole_vectors(nc)):
-        sums[0, i] = min(h, room.exits[i]) if i < nc else 0.0
+        sums[0, i] = min(h, scratch.exits[i]) if i < nc else 0.0
     for i in range(0, nc, WIDTH):
         d, velocity = load(sums, i), splat(0.0)
         for k in range(top - 1, -1, -1):
@@ -252,51 +254,55 @@ def _at_ends(room: Any, nc: int, h: float, top: int) -> None:
 
 @kernel
 def _law_holds(
-    plant: Any, laws: Any, state: Any, room: Any, nc: int, h: float, top: int, rtol: float
+    arrays: Any, laws: Any, state: Any, scratch: Any, nc: int, h: float, top: int, rtol: float
 ) -> bool:
     """Return whether slip forces agree with their laws at the end of the patch's series, or at their exits."""
-    _at_ends(room, nc, h, top)
+    _at_ends(scratch, nc, h, top)
     if state.whole[FIRST] >= 0:
         share = _DEFECT * rtol + 64.0 * _UNIT
-        return laws.rows.shape[0] == 0 or law_holds_in_run(plant, laws, room, nc, share)
+        return laws.rows.shape[0] == 0 or law_holds_in_run(arrays, laws, scratch, nc, share)
     for t in range(laws.registers.shape[0]):
-        first, count, at = room.lane_ptr[t], room.lane_ptr[t + 1] - room.lane_ptr[t], room.place[t]
+        first, count, at = (
+            scratch.lane_ptr[t],
+            scratch.lane_ptr[t + 1] - scratch.lane_ptr[t],
+            scratch.place[t],
+        )
         if count == 0 or laws.row_ptr[t + 1] == laws.row_ptr[t]:
             continue
         orders = top + 1
         block = laws.registers[t] * orders * WIDTH
         for j in range(whole_vectors(count)):
-            i = room.lane[first + min(j, count - 1)]
+            i = scratch.lane[first + min(j, count - 1)]
             place = lane_place(at, block, laws.speed[t], orders, 0, j)
-            room.V[place] = max(state.mode[room.cons[i]] * room.sums[0, i], 0.0)
+            scratch.V[place] = max(state.mode[scratch.cons[i]] * scratch.sums[0, i], 0.0)
         # order 0 is overwritten, because its old value is no longer needed
         rows, end = (laws.row_ptr[t], laws.row_ptr[t + 1]), at + whole_vectors(count) // WIDTH * block
-        advance_lanes(laws.rows, rows[0], rows[1], room.V, at, end, block, orders, 0)
+        advance_simd_series(laws.rows, rows[0], rows[1], scratch.V, at, end, block, orders, 0)
         for j in range(count):
-            i = room.lane[first + j]
-            mode = state.mode[room.cons[i]]
-            off = abs(room.sums[1, i] - mode * room.V[lane_place(at, block, laws.out[t], orders, 0, j)])
-            if mode != STICK and not off <= (_DEFECT * rtol + 64.0 * _UNIT) * room.sums[2, i]:
+            i = scratch.lane[first + j]
+            mode = state.mode[scratch.cons[i]]
+            off = abs(scratch.sums[1, i] - mode * scratch.V[lane_place(at, block, laws.out[t], orders, 0, j)])
+            if mode != STICK and not off <= (_DEFECT * rtol + 64.0 * _UNIT) * scratch.sums[2, i]:
                 return False
     return True
 
 
-def stretch(plant: Any, laws: Any, state: Any, room: Any) -> int:
-    """Run `stretched` with the arguments in the state."""
+def step_length_kernel(arrays: Any, laws: Any, state: Any, scratch: Any) -> int:
+    """Run `step_length` with the arguments in the state."""
     nd, nc, top = state.whole[DOFS], state.whole[CONS], state.whole[ORDER]
     tau, longest, rtol = state.real[AT], state.real[LONGEST], state.real[RTOL]
-    h = reach(plant, state, room, nd, nc, top, rtol, longest)
+    h = reach(arrays, state, scratch, nd, nc, top, rtol, longest)
     scale = max(state.clock[2], longest)
     for _ in range(_SHRINKS):
         if not h > 0.0:
             break
-        outcome, _ = isolate(plant, state, room, nc, tau, h, top, h <= _SHORT * scale)
+        outcome, _ = isolate(arrays, state, scratch, nc, tau, h, top, h <= _SHORT * scale)
         if outcome == OPEN and h > _TINY * scale:
             h *= 0.5
             continue
         if outcome == OPEN:  # a touch: an exit within rounding that is not certainly negative does not fire
             state.counts[5] += 1
-        if _law_holds(plant, laws, state, room, nc, h, top, rtol):
+        if _law_holds(arrays, laws, state, scratch, nc, h, top, rtol):
             state.real[LENGTH] = h
             return 0
         h *= 0.5
@@ -305,11 +311,11 @@ def stretch(plant: Any, laws: Any, state: Any, room: Any) -> int:
 
 
 @inlined
-def stretched(plant: Any, laws: Any, state: Any, room: Any, longest: float, rtol: float) -> float:
+def step_length(arrays: Any, laws: Any, state: Any, scratch: Any, longest: float, rtol: float) -> float:
     """Return the length over which the series of the expanded patch are used, and find its exits up to there.
 
     NaN if there is no such length.
     """
     state.real[LONGEST], state.real[RTOL] = longest, rtol
-    call_kernel(state.kernels[STRETCH], (plant, laws, state, room))
+    call_kernel(state.kernels[STEP_LENGTH], (arrays, laws, state, scratch))
     return state.real[LENGTH]

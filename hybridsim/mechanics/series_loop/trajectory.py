@@ -1,4 +1,4 @@
-"""This module stores a run of a mechanical system as pieces of series per node, and evaluates it at any time."""
+"""This module stores a run of a mechanical system as segments of series per node, and evaluates it at any time."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from hybridsim.mechanics.series_loop.expansion import expanded, whole
 def evaluate(
     node_dof: Any, ptr: Any, begins: Any, start: Any, row: Any, series: Any, times: Any, right: bool, out: Any
 ) -> None:
-    """Evaluate positions and velocities (k, 2n) at times; pieces are sorted by node (ptr) and time (begins)."""
+    """Evaluate positions and velocities (k, 2n) at times; segments are sorted by node (ptr) and time (begins)."""
     n = out.shape[1] // 2
     for j in range(node_dof.shape[0] - 1):
         for i in range(times.shape[0]):
             low, high = ptr[j], ptr[j + 1] - 1
-            while low < high:  # the last piece that begins at or before the time
+            while low < high:  # the last segment that begins at or before the time
                 middle = (low + high + 1) // 2
                 if begins[middle] < times[i] or (right and begins[middle] == times[i]):
                     low = middle
@@ -38,10 +38,10 @@ def evaluate(
 
 @kernel
 def quantities(
-    plant: Any,
+    arrays: Any,
     laws: Any,
     state: Any,
-    room: Any,
+    scratch: Any,
     when: Any,
     event: Any,
     first: Any,
@@ -56,41 +56,41 @@ def quantities(
 
     order sorts the times; first: modes at the start; out (k, 2n): states, whose velocities are changed in place.
     """
-    n, at, nodes = out.shape[1] // 2, 0, plant.node_dof.shape[0] - 1
+    n, at, nodes = out.shape[1] // 2, 0, arrays.node_dof.shape[0] - 1
     for c in range(first.shape[0]):
         state.mode[c], state.held[c] = first[c], 0
     for j in range(nodes):
-        factorise(plant, state, room, j)
+        factorise(arrays, state, scratch, j)
         state.origin[j] = 0.0
     for i in order:
         while at < when.shape[0] and (when[at] < times[i] or (right and when[at] == times[i])):
             c = event[at, 0]
             state.mode[c] = event[at, 2]
-            factorise(plant, state, room, plant.con_node[c])
+            factorise(arrays, state, scratch, arrays.con_node[c])
             at += 1
-        for r in range(plant.rates.shape[0]):
-            state.phase[r] = phase_of(times[i], 0.0, plant.rates[r], 0.0)
+        for r in range(arrays.rates.shape[0]):
+            state.phase[r] = phase_of(times[i], 0.0, arrays.rates[r], 0.0)
         for j in range(nodes):
             if state.holds[j] > 0:
-                project(plant, state, room, j, 0.0, out[i, n:])
+                project(arrays, state, scratch, j, 0.0, out[i, n:])
         for x in range(n):
             state.x[0, x], state.x[1, x] = out[i, x], out[i, n + x]
-        nd, nc = whole(plant, state, room, 2)
-        expanded(plant, laws, state, room, nodes, nd, nc, 0.0, 2)
+        nd, nc = whole(arrays, state, scratch, 2)
+        expanded(arrays, laws, state, scratch, nodes, nd, nc, 0.0, 2)
         for c in range(nc):
-            forces[i, c], velocities[i, c] = room.F[0, c], room.R[0, c]
+            forces[i, c], velocities[i, c] = scratch.F[0, c], scratch.R[0, c]
 
 
-class Pieces:
-    """All pieces of a run, sorted by node and then by time."""
+class NodeSegments:
+    """All segments of a run, sorted by node and then by time."""
 
-    def __init__(self, plant: Any, chunks: list[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
-        self.plant = plant
-        n_nodes = len(plant.node_dof) - 1
-        pieces = [chunk[0] for chunk in chunks]
+    def __init__(self, arrays: Any, chunks: list[tuple[np.ndarray, np.ndarray, np.ndarray]]) -> None:
+        self.arrays = arrays
+        n_nodes = len(arrays.node_dof) - 1
+        segments = [chunk[0] for chunk in chunks]
         offsets = np.cumsum([0, *(len(chunk[2]) for chunk in chunks)])
-        node = np.concatenate([p[:, 0] for p in pieces])
-        row = np.concatenate([p[:, 1] + offset for p, offset in zip(pieces, offsets[:-1], strict=True)])
+        node = np.concatenate([p[:, 0] for p in segments])
+        row = np.concatenate([p[:, 1] + offset for p, offset in zip(segments, offsets[:-1], strict=True)])
         order = np.argsort(node, kind="stable")
         self.start = np.ascontiguousarray(np.concatenate([chunk[1] for chunk in chunks])[order])
         self.row = np.ascontiguousarray(row[order])
@@ -100,9 +100,9 @@ class Pieces:
 
     def states(self, times: np.ndarray, right: bool) -> np.ndarray:
         """Return positions and velocities (k, 2n) in the order of the arrays."""
-        out = np.empty((len(times), 2 * len(self.plant.dof_node)))
+        out = np.empty((len(times), 2 * len(self.arrays.dof_node)))
         arguments = (self.ptr, self.begins, self.start, self.row, self.series)
-        evaluate(self.plant.node_dof, *arguments, np.ascontiguousarray(times), right, out)
+        evaluate(self.arrays.node_dof, *arguments, np.ascontiguousarray(times), right, out)
         return out
 
 

@@ -55,7 +55,7 @@ class Stepped(NamedTuple):
     u_val: np.ndarray
     row: np.ndarray  # permutations of the factors
     column: np.ndarray
-    still: np.ndarray  # this and the next six as in `Plant`, but forces
+    still: np.ndarray  # this and the next six as in `MechanicalArrays`, but forces
     h_ptr: np.ndarray
     h_rate: np.ndarray
     h_val: np.ndarray
@@ -64,8 +64,8 @@ class Stepped(NamedTuple):
     base_rate: np.ndarray
     limits: np.ndarray  # (m, 2) stick limits, forward and backward
     onset: np.ndarray  # (m, 2) slip forces at v = 0
-    tape: np.ndarray  # as in `Plant`
-    par: np.ndarray  # as in `Plant`
+    tape: np.ndarray  # as in `MechanicalArrays`
+    par: np.ndarray  # as in `MechanicalArrays`
     gap: np.ndarray  # of the impacts
     restitution: np.ndarray  # of the impacts
 
@@ -93,14 +93,14 @@ def build_stepped(system: MechanicalSystem, step: float, theta: float) -> tuple[
     rates = rates_of(system)
     still, harmonics = forcing(system, sparse.eye_array(n, format="csr"), np.arange(n), rates)
     laws, tape, par, _ = law_tapes(contacts)
-    plant = Stepped(
+    arrays = Stepped(
         *parts(system.K), *parts(system.C), *parts(W), *parts(_delassus(W, factors)), *parts(lower.T), *parts(upper.T),
         integers(factors.perm_r), integers(factors.perm_c), still, *harmonics, np.array(rates, dtype=float),
         *bases(contacts, rates), stick_limits(contacts)[0], _onsets(contacts), tape, par,
         np.array([i.gap for i in system.impacts], dtype=float),
         np.array([i.restitution for i in system.impacts], dtype=float),
     )  # fmt: skip
-    return plant, laws
+    return arrays, laws
 
 
 def directions(system: MechanicalSystem) -> Any:
@@ -127,13 +127,15 @@ def _delassus(W: Any, factors: Any) -> Any:
         return sparse.csr_array((0, 0))
     G = sparse.coo_array(sparse.hstack(columns))
     size = np.sqrt(np.abs(diagonal))
-    kept = np.abs(G.data) >= _DROPPED * size[G.row] * size[G.col]
-    return sparse.csr_array((G.data[kept], (G.row[kept], G.col[kept])), shape=(m, m))
+    is_significant = np.abs(G.data) >= _DROPPED * size[G.row] * size[G.col]
+    return sparse.csr_array(
+        (G.data[is_significant], (G.row[is_significant], G.col[is_significant])), shape=(m, m)
+    )
 
 
 def _onsets(contacts: list[Any]) -> np.ndarray:
     found = np.zeros((len(contacts), 2))
     for i, contact in enumerate(contacts):
-        given = {"N": contact.normal, **contact.values(), "v": 0.0}
-        found[i] = [evaluate(slip, given) for slip, _ in sides(contact.law)]
+        arguments = {"N": contact.normal, **contact.values(), "v": 0.0}
+        found[i] = [evaluate(slip, arguments) for slip, _ in sides(contact.law)]
     return found

@@ -9,7 +9,7 @@ import numpy as np
 
 from hybridsim.engine.native.kernels import inlined, kernel
 from hybridsim.engine.native.simd_vectors import WIDTH, whole_vectors
-from hybridsim.mechanics.series_loop.simd_series import advance_lanes, clear_constants, lane_place
+from hybridsim.mechanics.series_loop.simd_series import advance_simd_series, clear_constants, lane_place
 
 HOLDS, ABOVE, BELOW = (
     0,
@@ -23,7 +23,7 @@ _SWEEPS = 20_000
 _NOTHING = 1e-2  # of the tolerance; a smaller change of an impulse is not passed on to its neighbours
 
 
-class Stand(NamedTuple):
+class SteppedState(NamedTuple):
     """The state of a run: q, v (n,), mode, impulse (m,), works (5,), counts (4,), residual (1,)."""
 
     q: np.ndarray
@@ -35,7 +35,7 @@ class Stand(NamedTuple):
     residual: np.ndarray
 
 
-class Bench(NamedTuple):
+class SteppedScratch(NamedTuple):
     """Scratch arrays for n coordinates, nc contacts, and m contacts and impacts."""
 
     force: np.ndarray  # (n,) forcing at the start
@@ -59,7 +59,7 @@ class Bench(NamedTuple):
     V: np.ndarray  # registers of the tapes
 
 
-class Kept(NamedTuple):
+class SteppedRecord(NamedTuple):
     """The record: states (k, 2n), forces (k, m), events (step, which, mode before, after), counts used."""
 
     states: np.ndarray
@@ -78,130 +78,137 @@ def product(ptr: Any, col: Any, val: Any, k: int, x: Any) -> float:
 
 
 @kernel
-def solve_step(plant: Any, x: Any, work: Any) -> None:
+def solve_step(arrays: Any, x: Any, work: Any) -> None:
     """Replace x by A^-1 x."""
     n = x.shape[0]
     for i in range(n):
-        work[plant.row[i]] = x[i]
+        work[arrays.row[i]] = x[i]
     for j in range(n):
         value = work[j]
-        for e in range(plant.l_ptr[j], plant.l_ptr[j + 1]):
-            work[plant.l_row[e]] -= plant.l_val[e] * value
+        for e in range(arrays.l_ptr[j], arrays.l_ptr[j + 1]):
+            work[arrays.l_row[e]] -= arrays.l_val[e] * value
     for j in range(n - 1, -1, -1):
-        last = plant.u_ptr[j + 1] - 1
-        value = work[j] / plant.u_val[last]
+        last = arrays.u_ptr[j + 1] - 1
+        value = work[j] / arrays.u_val[last]
         work[j] = value
-        for e in range(plant.u_ptr[j], last):
-            work[plant.u_row[e]] -= plant.u_val[e] * value
+        for e in range(arrays.u_ptr[j], last):
+            work[arrays.u_row[e]] -= arrays.u_val[e] * value
     for i in range(n):
-        x[i] = work[plant.column[i]]
+        x[i] = work[arrays.column[i]]
 
 
 @kernel
-def forces_at(plant: Any, t: float, out: Any) -> None:
+def forces_at(arrays: Any, t: float, out: Any) -> None:
     """Compute the forcing at a time."""
     for x in range(out.shape[0]):
-        total = plant.still[x]
-        for e in range(plant.h_ptr[x], plant.h_ptr[x + 1]):
-            angle = plant.rates[plant.h_rate[e]] * t
-            total += plant.h_val[e, 0] * math.sin(angle) + plant.h_val[e, 1] * math.cos(angle)
+        total = arrays.still[x]
+        for e in range(arrays.h_ptr[x], arrays.h_ptr[x + 1]):
+            angle = arrays.rates[arrays.h_rate[e]] * t
+            total += arrays.h_val[e, 0] * math.sin(angle) + arrays.h_val[e, 1] * math.cos(angle)
         out[x] = total
 
 
 @inlined
-def base_at(plant: Any, c: int, t: float) -> float:
+def base_at(arrays: Any, c: int, t: float) -> float:
     """Return the speed of a contact's base."""
-    r = plant.base_rate[c]
+    r = arrays.base_rate[c]
     if r < 0:
-        return plant.base[c, 0]
-    return plant.base[c, 1] * math.sin(plant.rates[r] * t) + plant.base[c, 2] * math.cos(plant.rates[r] * t)
+        return arrays.base[c, 0]
+    return arrays.base[c, 1] * math.sin(arrays.rates[r] * t) + arrays.base[c, 2] * math.cos(
+        arrays.rates[r] * t
+    )
 
 
 @kernel
-def slip_forces(plant: Any, laws: Any, room: Any) -> None:
+def slip_forces(arrays: Any, laws: Any, scratch: Any) -> None:
     """Compute the slip forces, forward and backward, at the relative velocities; at v = 0 the forces at onset."""
-    nc = room.speed.shape[0]
+    nc = scratch.speed.shape[0]
     for c in range(nc):
-        room.up[c], room.down[c] = plant.onset[c, 0], plant.onset[c, 1]
+        scratch.up[c], scratch.down[c] = arrays.onset[c, 0], arrays.onset[c, 1]
     for t in range(laws.registers.shape[0]):
         count = 0
         for c in range(nc):
-            if room.speed[c] != 0.0 and plant.tape[c, 0 if room.speed[c] > 0.0 else 1] == t:
-                room.lane[count] = c
+            if scratch.speed[c] != 0.0 and arrays.tape[c, 0 if scratch.speed[c] > 0.0 else 1] == t:
+                scratch.lane[count] = c
                 count += 1
         if count == 0:
             continue
         block = laws.registers[t] * WIDTH
         size = whole_vectors(count) // WIDTH * block
         for at in range(0, size, block):
-            clear_constants(laws, room.V, t, at, 1)
+            clear_constants(laws, scratch.V, t, at, 1)
         for j in range(whole_vectors(count)):
-            c = room.lane[min(j, count - 1)]
+            c = scratch.lane[min(j, count - 1)]
             for i in range(laws.par_ptr[t], laws.par_ptr[t + 1]):
-                room.V[lane_place(0, block, laws.par_reg[i], 1, 0, j)] = plant.par[c, i - laws.par_ptr[t]]
-            room.V[lane_place(0, block, laws.speed[t], 1, 0, j)] = abs(room.speed[c])
+                scratch.V[lane_place(0, block, laws.par_reg[i], 1, 0, j)] = arrays.par[c, i - laws.par_ptr[t]]
+            scratch.V[lane_place(0, block, laws.speed[t], 1, 0, j)] = abs(scratch.speed[c])
         begin, end = laws.constant_ptr[t], laws.constant_ptr[t + 1]
-        advance_lanes(laws.constant_rows, begin, end, room.V, 0, size, block, 1, 0)
-        advance_lanes(laws.rows, laws.row_ptr[t], laws.row_ptr[t + 1], room.V, 0, size, block, 1, 0)
+        advance_simd_series(laws.constant_rows, begin, end, scratch.V, 0, size, block, 1, 0)
+        advance_simd_series(laws.rows, laws.row_ptr[t], laws.row_ptr[t + 1], scratch.V, 0, size, block, 1, 0)
         for j in range(count):
-            c, value = room.lane[j], room.V[lane_place(0, block, laws.out[t], 1, 0, j)]
-            if room.speed[c] > 0.0:
-                room.up[c] = value
+            c, value = scratch.lane[j], scratch.V[lane_place(0, block, laws.out[t], 1, 0, j)]
+            if scratch.speed[c] > 0.0:
+                scratch.up[c] = value
             else:
-                room.down[c] = value
+                scratch.down[c] = value
 
 
 @kernel
-def sweep(plant: Any, state: Any, room: Any, h: float, tolerance: float) -> bool:
+def sweep(arrays: Any, state: Any, scratch: Any, h: float, tolerance: float) -> bool:
     """Compute impulses for given slip forces by projected Gauss-Seidel sweeps; return whether they converged.
 
     Only contacts with a changed neighbour are swept. A friction impulse is positive along its direction, so that a
     force f gives - h f.
     """
-    nc, m = room.speed.shape[0], room.y.shape[0]
+    nc, m = scratch.speed.shape[0], scratch.y.shape[0]
     scale = 0.0
     for k in range(m):
-        room.dirty[k] = room.active[k]
+        scratch.dirty[k] = scratch.active[k]
         scale = max(scale, abs(state.impulse[k]))
     for c in range(nc):
-        scale = max(scale, h * max(plant.limits[c, 0], plant.limits[c, 1]))
+        scale = max(scale, h * max(arrays.limits[c, 0], arrays.limits[c, 1]))
     for turn in range(_SWEEPS):
         largest = 0.0
         for i in range(m):
             k = i if turn % 2 == 0 else m - 1 - i
-            if room.dirty[k] == 0:
+            if scratch.dirty[k] == 0:
                 continue
-            room.dirty[k] = 0
-            rate, own, before = room.y[k], 0.0, state.impulse[k]
-            for e in range(plant.g_ptr[k], plant.g_ptr[k + 1]):
-                j = plant.g_col[e]
+            scratch.dirty[k] = 0
+            rate, own, before = scratch.y[k], 0.0, state.impulse[k]
+            for e in range(arrays.g_ptr[k], arrays.g_ptr[k + 1]):
+                j = arrays.g_col[e]
                 if j == k:
-                    own = plant.g_val[e]
+                    own = arrays.g_val[e]
                 else:
-                    rate += plant.g_val[e] * state.impulse[j]
+                    rate += arrays.g_val[e] * state.impulse[j]
             impulse, mode = 0.0, HOLDS
             if k < nc:
                 impulse = -rate / own
-                up, down, most, least = room.up[k], room.down[k], plant.limits[k, 0], plant.limits[k, 1]
-                if turn > _PATIENCE and room.next[k] != HOLDS:
+                up, down, most, least = (
+                    scratch.up[k],
+                    scratch.down[k],
+                    arrays.limits[k, 0],
+                    arrays.limits[k, 1],
+                )
+                if turn > _PATIENCE and scratch.next[k] != HOLDS:
                     most, least = min(most, up), min(least, down)
                 if impulse < -h * most:
                     impulse, mode = -h * up, ABOVE
                 elif impulse > h * least:
                     impulse, mode = h * down, BELOW
             else:
-                impulse = max((room.rebound[k] - rate) / own, 0.0)
-                mode = HOLDS if impulse > 0.0 and room.rebound[k] == 0.0 else ABOVE
-            room.next[k], state.impulse[k] = mode, impulse
+                impulse = max((scratch.rebound[k] - rate) / own, 0.0)
+                mode = HOLDS if impulse > 0.0 and scratch.rebound[k] == 0.0 else ABOVE
+            scratch.next[k], state.impulse[k] = mode, impulse
             change, scale = abs(impulse - before), max(scale, abs(impulse))
             if not change <= _NOTHING * tolerance * scale:
                 largest = max(largest, change)
                 if not change < math.inf:
                     return False
-                for e in range(plant.g_ptr[k], plant.g_ptr[k + 1]):
-                    j = plant.g_col[e]
+                for e in range(arrays.g_ptr[k], arrays.g_ptr[k + 1]):
+                    j = arrays.g_col[e]
                     if j != k:
-                        room.dirty[j] = room.active[j]
+                        scratch.dirty[j] = scratch.active[j]
         state.counts[SWEEPS] += 1
         if largest <= tolerance * scale:
             if scale > 0.0:
@@ -212,26 +219,28 @@ def sweep(plant: Any, state: Any, room: Any, h: float, tolerance: float) -> bool
 
 @kernel
 def impulses(
-    plant: Any, laws: Any, state: Any, room: Any, h: float, tolerance: float, iterations: int
+    arrays: Any, laws: Any, state: Any, scratch: Any, h: float, tolerance: float, iterations: int
 ) -> bool:
     """Compute the impulses of a step, with slip forces at its end velocities; return whether they converged."""
-    nc = room.speed.shape[0]
-    slip_forces(plant, laws, room)
+    nc = scratch.speed.shape[0]
+    slip_forces(arrays, laws, scratch)
     for _ in range(iterations):
-        settled = sweep(plant, state, room, h, tolerance)
+        settled = sweep(arrays, state, scratch, h, tolerance)
         change = scale = 0.0
         for c in range(nc):
-            room.up_before[c], room.down_before[c] = room.up[c], room.down[c]
-            room.speed[c] = 0.0
-            if room.next[c] != HOLDS:
-                room.speed[c] = room.y[c] + product(plant.g_ptr, plant.g_col, plant.g_val, c, state.impulse)
-        slip_forces(plant, laws, room)
+            scratch.up_before[c], scratch.down_before[c] = scratch.up[c], scratch.down[c]
+            scratch.speed[c] = 0.0
+            if scratch.next[c] != HOLDS:
+                scratch.speed[c] = scratch.y[c] + product(
+                    arrays.g_ptr, arrays.g_col, arrays.g_val, c, state.impulse
+                )
+        slip_forces(arrays, laws, scratch)
         for c in range(nc):
-            scale = max(scale, max(plant.limits[c, 0], plant.limits[c, 1]))
-            if room.next[c] == ABOVE:
-                change = max(change, abs(room.up[c] - room.up_before[c]))
-            elif room.next[c] == BELOW:
-                change = max(change, abs(room.down[c] - room.down_before[c]))
+            scale = max(scale, max(arrays.limits[c, 0], arrays.limits[c, 1]))
+            if scratch.next[c] == ABOVE:
+                change = max(change, abs(scratch.up[c] - scratch.up_before[c]))
+            elif scratch.next[c] == BELOW:
+                change = max(change, abs(scratch.down[c] - scratch.down_before[c]))
         if not change < math.inf:
             return False
         if settled and change <= tolerance * scale:
@@ -240,123 +249,131 @@ def impulses(
 
 
 @kernel
-def begin(plant: Any, state: Any, room: Any, h: float, theta: float, t: float, t_after: float) -> None:
+def begin(arrays: Any, state: Any, scratch: Any, h: float, theta: float, t: float, t_after: float) -> None:
     """Prepare a step: free velocities and rates, and the gaps that may exert a force."""
-    n, nc = state.q.shape[0], room.speed.shape[0]
-    forces_at(plant, t_after, room.force_after)
+    n, nc = state.q.shape[0], scratch.speed.shape[0]
+    forces_at(arrays, t_after, scratch.force_after)
     for x in range(n):
-        total = theta * room.force_after[x] + (1.0 - theta) * room.force[x]
-        total -= product(plant.c_ptr, plant.c_col, plant.c_val, x, state.v)
-        total -= product(plant.k_ptr, plant.k_col, plant.k_val, x, state.q)
-        total -= h * theta * product(plant.k_ptr, plant.k_col, plant.k_val, x, state.v)
-        room.b[x] = room.free[x] = h * total
-    solve_step(plant, room.free, room.solved)
+        total = theta * scratch.force_after[x] + (1.0 - theta) * scratch.force[x]
+        total -= product(arrays.c_ptr, arrays.c_col, arrays.c_val, x, state.v)
+        total -= product(arrays.k_ptr, arrays.k_col, arrays.k_val, x, state.q)
+        total -= h * theta * product(arrays.k_ptr, arrays.k_col, arrays.k_val, x, state.v)
+        scratch.b[x] = scratch.free[x] = h * total
+    solve_step(arrays, scratch.free, scratch.solved)
     for x in range(n):
-        room.free[x] += state.v[x]
-    for k in range(room.y.shape[0]):
-        room.y[k] = product(plant.w_ptr, plant.w_col, plant.w_val, k, room.free)
-        room.u[k] = product(plant.w_ptr, plant.w_col, plant.w_val, k, state.v)
-        room.active[k], room.rebound[k], room.next[k] = 1, 0.0, state.mode[k]
+        scratch.free[x] += state.v[x]
+    for k in range(scratch.y.shape[0]):
+        scratch.y[k] = product(arrays.w_ptr, arrays.w_col, arrays.w_val, k, scratch.free)
+        scratch.u[k] = product(arrays.w_ptr, arrays.w_col, arrays.w_val, k, state.v)
+        scratch.active[k], scratch.rebound[k], scratch.next[k] = 1, 0.0, state.mode[k]
         if k < nc:
-            room.base[k, 0], room.base[k, 1] = base_at(plant, k, t), base_at(plant, k, t_after)
-            room.base[k, 2] = 0.5 * (room.base[k, 0] + room.base[k, 1])
-            room.y[k] -= room.base[k, 1]
-            room.speed[k] = room.u[k] - room.base[k, 0]
+            scratch.base[k, 0], scratch.base[k, 1] = base_at(arrays, k, t), base_at(arrays, k, t_after)
+            scratch.base[k, 2] = 0.5 * (scratch.base[k, 0] + scratch.base[k, 1])
+            scratch.y[k] -= scratch.base[k, 1]
+            scratch.speed[k] = scratch.u[k] - scratch.base[k, 0]
             continue
         is_closed = state.mode[k] == HOLDS
-        gap = plant.gap[k - nc] + product(plant.w_ptr, plant.w_col, plant.w_val, k, state.q)
-        if not is_closed and gap + 0.5 * h * room.u[k] > 0.0:
-            room.active[k], state.impulse[k], room.next[k] = 0, 0.0, ABOVE
+        gap = arrays.gap[k - nc] + product(arrays.w_ptr, arrays.w_col, arrays.w_val, k, state.q)
+        if not is_closed and gap + 0.5 * h * scratch.u[k] > 0.0:
+            scratch.active[k], state.impulse[k], scratch.next[k] = 0, 0.0, ABOVE
         elif not is_closed:
-            room.rebound[k] = plant.restitution[k - nc] * max(-room.u[k], 0.0)
+            scratch.rebound[k] = arrays.restitution[k - nc] * max(-scratch.u[k], 0.0)
 
 
 @kernel
-def finish(plant: Any, state: Any, room: Any, h: float, theta: float) -> None:
+def finish(arrays: Any, state: Any, scratch: Any, h: float, theta: float) -> None:
     """Compute velocities and positions at the end of a step from its impulses, and the works in it.
 
     An impulse does the work of the mean of the velocities before and after, whatever theta is.
     """
-    n, nc = state.q.shape[0], room.speed.shape[0]
-    change = room.free
-    put_impulses(plant, state, room)
+    n, nc = state.q.shape[0], scratch.speed.shape[0]
+    change = scratch.free
+    put_impulses(arrays, state, scratch)
     for x in range(n):
-        change[x] = room.b[x]
-    solve_step(plant, change, room.solved)
+        change[x] = scratch.b[x]
+    solve_step(arrays, change, scratch.solved)
     for x in range(n):
         change[x] += state.v[x]
     for c in range(nc):  # a sticking contact has exactly the velocity of its base
-        first = plant.w_ptr[c]
-        if room.next[c] == HOLDS and plant.w_ptr[c + 1] == first + 1:
-            change[plant.w_col[first]] = room.base[c, 1] / plant.w_val[first]
+        first = arrays.w_ptr[c]
+        if scratch.next[c] == HOLDS and arrays.w_ptr[c + 1] == first + 1:
+            change[arrays.w_col[first]] = scratch.base[c, 1] / arrays.w_val[first]
     for x in range(n):
         after = change[x]
         state.q[x] += h * (theta * after + (1.0 - theta) * state.v[x])
         change[x] = 0.5 * (after + state.v[x])
-        room.b[x] = after - change[x]
+        scratch.b[x] = after - change[x]
         state.v[x] = after
-        force = theta * room.force_after[x] + (1.0 - theta) * room.force[x]
+        force = theta * scratch.force_after[x] + (1.0 - theta) * scratch.force[x]
         state.work[FORCING] += h * force * change[x]
-        room.force[x] = room.force_after[x]
+        scratch.force[x] = scratch.force_after[x]
     for x in range(n):
-        for e in range(plant.c_ptr[x], plant.c_ptr[x + 1]):
-            speed = change[plant.c_col[e]] + (2.0 * theta - 1.0) * room.b[plant.c_col[e]]
-            state.work[DAMPING] -= h * change[x] * plant.c_val[e] * speed
-    for k in range(room.y.shape[0]):
-        rate = product(plant.w_ptr, plant.w_col, plant.w_val, k, change)
+        for e in range(arrays.c_ptr[x], arrays.c_ptr[x + 1]):
+            speed = change[arrays.c_col[e]] + (2.0 * theta - 1.0) * scratch.b[arrays.c_col[e]]
+            state.work[DAMPING] -= h * change[x] * arrays.c_val[e] * speed
+    for k in range(scratch.y.shape[0]):
+        rate = product(arrays.w_ptr, arrays.w_col, arrays.w_val, k, change)
         if k < nc:
-            state.work[FRICTION] += state.impulse[k] * (rate - room.base[k, 2])
-            state.work[BASES] += state.impulse[k] * room.base[k, 2]
+            state.work[FRICTION] += state.impulse[k] * (rate - scratch.base[k, 2])
+            state.work[BASES] += state.impulse[k] * scratch.base[k, 2]
         else:
             state.work[IMPACTS] += state.impulse[k] * rate
-            if state.impulse[k] > 0.0 and room.rebound[k] > 0.0:
+            if state.impulse[k] > 0.0 and scratch.rebound[k] > 0.0:
                 state.counts[BOUNCES] += 1
 
 
 @kernel
-def put_impulses(plant: Any, state: Any, room: Any) -> None:
+def put_impulses(arrays: Any, state: Any, scratch: Any) -> None:
     """Add the effect of the impulses to b."""
-    for k in range(room.y.shape[0]):
-        for e in range(plant.w_ptr[k], plant.w_ptr[k + 1]):
-            room.b[plant.w_col[e]] += plant.w_val[e] * state.impulse[k]
+    for k in range(scratch.y.shape[0]):
+        for e in range(arrays.w_ptr[k], arrays.w_ptr[k + 1]):
+            scratch.b[arrays.w_col[e]] += arrays.w_val[e] * state.impulse[k]
 
 
 @kernel
 def steps(
-    plant: Any, laws: Any, state: Any, room: Any, kept: Any, settings: Any, t0: float, first: int, count: int
+    arrays: Any,
+    laws: Any,
+    state: Any,
+    scratch: Any,
+    record: Any,
+    settings: Any,
+    t0: float,
+    first: int,
+    count: int,
 ) -> int:
     """Make `count` steps; return the number done, which is smaller if the record is full or a state is NaN.
 
-    settings: step, theta, tolerance, iterations. kept.used: numbers of rows of states and of events.
+    settings: step, theta, tolerance, iterations. record.used: numbers of rows of states and of events.
     """
     h, theta, tolerance, iterations = settings
-    n, m = state.q.shape[0], room.y.shape[0]
-    forces_at(plant, t0 + first * h, room.force)
+    n, m = state.q.shape[0], scratch.y.shape[0]
+    forces_at(arrays, t0 + first * h, scratch.force)
     for i in range(first, first + count):
-        if kept.event.shape[0] - kept.used[1] < m:
+        if record.event.shape[0] - record.used[1] < m:
             return i - first
-        begin(plant, state, room, h, theta, t0 + i * h, t0 + (i + 1) * h)
-        if not impulses(plant, laws, state, room, h, tolerance, iterations):
+        begin(arrays, state, scratch, h, theta, t0 + i * h, t0 + (i + 1) * h)
+        if not impulses(arrays, laws, state, scratch, h, tolerance, iterations):
             state.counts[UNSETTLED] += 1
-        finish(plant, state, room, h, theta)
+        finish(arrays, state, scratch, h, theta)
         for k in range(m):
-            if room.next[k] != state.mode[k]:
-                at = kept.used[1]
-                kept.event[at, 0], kept.event[at, 1] = i, k
-                kept.event[at, 2], kept.event[at, 3] = state.mode[k], room.next[k]
-                kept.used[1] = at + 1
-                state.mode[k] = room.next[k]
+            if scratch.next[k] != state.mode[k]:
+                at = record.used[1]
+                record.event[at, 0], record.event[at, 1] = i, k
+                record.event[at, 2], record.event[at, 3] = state.mode[k], scratch.next[k]
+                record.used[1] = at + 1
+                state.mode[k] = scratch.next[k]
         is_finite = True
         for x in range(n):
             is_finite = is_finite and np.isfinite(state.q[x]) and np.isfinite(state.v[x])
         if not is_finite:
             return i - first
         state.counts[STEPS] += 1
-        row = kept.used[0]
-        if row < kept.states.shape[0]:
+        row = record.used[0]
+        if row < record.states.shape[0]:
             for x in range(n):
-                kept.states[row, x], kept.states[row, n + x] = state.q[x], state.v[x]
+                record.states[row, x], record.states[row, n + x] = state.q[x], state.v[x]
             for k in range(m):
-                kept.forces[row, k] = state.impulse[k] / h
-            kept.used[0] = row + 1
+                record.forces[row, k] = state.impulse[k] / h
+            record.used[0] = row + 1
     return count

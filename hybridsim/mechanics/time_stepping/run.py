@@ -18,13 +18,20 @@ from hybridsim.engine.series.bounded import UNIT
 from hybridsim.errors import UsageError
 from hybridsim.mechanics.series_loop.mechanical_arrays import rates_of
 from hybridsim.mechanics.time_stepping.arrays import build_stepped, directions
-from hybridsim.mechanics.time_stepping.kernels import ABOVE, HOLDS, Bench, Kept, Stand, steps
+from hybridsim.mechanics.time_stepping.kernels import (
+    ABOVE,
+    HOLDS,
+    SteppedRecord,
+    SteppedScratch,
+    SteppedState,
+    steps,
+)
 
 if TYPE_CHECKING:
     from hybridsim.integrators.fixed_step.moreau import Moreau
     from hybridsim.mechanics.declaration.system import MechanicalSystem
 
-_ROOM = 1 << 21  # doubles for the states of one call
+_STATE_DOUBLES = 1 << 21  # doubles for the states of one call
 _EVENTS = 4096  # events per call, in addition to those of one step
 _EQUAL = 1e-9  # tolerance for a span that is a whole number of steps
 
@@ -41,18 +48,18 @@ class SteppedRun:
         method: Moreau,
         span: tuple[float, float],
         x: np.ndarray,
-        keep: bool,
+        is_recorded: bool,
         limits: Limits = UNLIMITED,
     ) -> None:
-        self.system, self.span, self.keep, self.start = system, span, keep, x
+        self.system, self.span, self.is_recorded, self.start = system, span, is_recorded, x
         self.count = max(math.ceil((span[1] - span[0]) / _length(system, method) * (1.0 - _EQUAL)), 1)
         self.step, self.theta = (span[1] - span[0]) / self.count, method.theta
         self.settings = (self.step, method.theta, method.tolerance, method.iterations)
-        self.plant, self.laws = build_stepped(system, self.step, method.theta)
+        self.arrays, self.laws = build_stepped(system, self.step, method.theta)
         n, nc = system.n, len(system.contacts)
         m = nc + len(system.impacts)
-        self.state = _stand(n, m)
-        self.room = _bench(n, nc, m, int(self.laws.registers.max(initial=0)))
+        self.state = _new_state(n, m)
+        self.scratch = _new_scratch(n, nc, m, int(self.laws.registers.max(initial=0)))
         self.state.q[:], self.state.v[:] = x[:n], x[n:]
         self.states: list[np.ndarray] = [x[None, :]]
         self.forces: list[np.ndarray] = []
@@ -69,29 +76,29 @@ class SteppedRun:
             self.status = "inconsistent"
             return
         system, state = self.system, self.state
-        packs = [packed(a) for a in (self.plant, self.laws, state, self.room)]
+        packs = [packed(a) for a in (self.arrays, self.laws, state, self.scratch)]
         began, compiled, m = perf_counter(), seconds_compiling(), len(state.mode)
-        rows = max(_ROOM // (2 * system.n + m), 16)
+        rows = max(_STATE_DOUBLES // (2 * system.n + m), 16)
         limit_monitor = LimitMonitor(self.limits, self.counters)
         while self.done < self.count:
-            wanted = min(rows, self.count - self.done)
-            kept = Kept(
-                np.empty((wanted if self.keep else 0, 2 * system.n)),
-                np.empty((wanted if self.keep else 0, m)),
+            rows_now = min(rows, self.count - self.done)
+            record = SteppedRecord(
+                np.empty((rows_now if self.is_recorded else 0, 2 * system.n)),
+                np.empty((rows_now if self.is_recorded else 0, m)),
                 np.empty((_EVENTS + m, 4), dtype=np.int64),
                 np.zeros(2, dtype=np.int64),
             )
-            done = steps(*packs, packed(kept), self.settings, self.span[0], self.done, wanted)
+            done = steps(*packs, packed(record), self.settings, self.span[0], self.done, rows_now)
             self.done += done
-            self.states.append(kept.states[: kept.used[0]])
-            self.forces.append(kept.forces[: kept.used[0]])
-            self.events.append(kept.event[: kept.used[1]].copy())
+            self.states.append(record.states[: record.used[0]])
+            self.forces.append(record.forces[: record.used[0]])
+            self.events.append(record.event[: record.used[1]].copy())
             if not (np.isfinite(state.q).all() and np.isfinite(state.v).all()):
                 self.status = "step-failure"
                 break
             if progress is not None:
                 progress(self.done / self.count)
-            self.counters.steps, self.counters.events = self.done, self.counters.events + int(kept.used[1])
+            self.counters.steps, self.counters.events = self.done, self.counters.events + int(record.used[1])
             if self.done < self.count:
                 try:
                     limit_monitor.check()
@@ -103,16 +110,16 @@ class SteppedRun:
 
     def _begin(self) -> None:
         """Find the modes at the start from the motion, and the gaps that are negative there."""
-        system, plant, n = self.system, self.plant, self.system.n
+        system, arrays, n = self.system, self.arrays, self.system.n
         W, nc, x = directions(system), len(system.contacts), self.start
-        turns = plant.rates * self.span[0]
-        angle = turns[plant.base_rate] if len(plant.rates) else np.zeros(nc)
-        base = plant.base[:, 0] + plant.base[:, 1] * np.sin(angle) + plant.base[:, 2] * np.cos(angle)
+        turns = arrays.rates * self.span[0]
+        angle = turns[arrays.base_rate] if len(arrays.rates) else np.zeros(nc)
+        base = arrays.base[:, 0] + arrays.base[:, 1] * np.sin(angle) + arrays.base[:, 2] * np.cos(angle)
         mode = self.state.mode
         mode[:nc] = np.sign((W @ x[n:])[:nc] - base)
         mode[nc:] = ABOVE
-        gaps = (W @ x[:n])[nc:] + plant.gap
-        sizes = (abs(W) @ np.abs(x[:n]))[nc:] + np.abs(plant.gap)
+        gaps = (W @ x[:n])[nc:] + arrays.gap
+        sizes = (abs(W) @ np.abs(x[:n]))[nc:] + np.abs(arrays.gap)
         self.overlaps = [
             i.name for i, g, s in zip(system.impacts, gaps, sizes, strict=True) if g < -8 * UNIT * s
         ]
@@ -142,22 +149,22 @@ def _length(system: MechanicalSystem, method: Moreau) -> float:
     return period / method.steps_per_period
 
 
-def _stand(n: int, m: int) -> Stand:
-    return Stand(
+def _new_state(n: int, m: int) -> SteppedState:
+    return SteppedState(
         np.zeros(n), np.zeros(n), np.full(m, HOLDS, dtype=np.int64), np.zeros(m), np.zeros(5),
         np.zeros(4, dtype=np.int64), np.zeros(1),
     )  # fmt: skip
 
 
-def _bench(n: int, nc: int, m: int, registers: int) -> Bench:
+def _new_scratch(n: int, nc: int, m: int, registers: int) -> SteppedScratch:
     of: dict[str, Any] = {name: np.zeros(n) for name in ("force", "force_after", "b", "free", "solved")}
     of |= {name: np.zeros(m) for name in ("y", "u", "rebound")}
     of |= {name: np.zeros(nc) for name in ("speed", "up", "down", "up_before", "down_before")}
     of |= {name: np.zeros(m, dtype=np.int64) for name in ("active", "dirty", "next")}
-    lanes = nc + WIDTH  # in whole vectors
-    return Bench(
+    width = nc + WIDTH  # in whole vectors
+    return SteppedScratch(
         **of,
         base=np.zeros((nc, 3)),
-        lane=np.zeros(lanes, dtype=np.int64),
-        V=room_for(1, registers * lanes + 1)[0],
+        lane=np.zeros(width, dtype=np.int64),
+        V=room_for(1, registers * width + 1)[0],
     )

@@ -122,8 +122,8 @@ class SteppedSolution(ArraysResult):
         ----------
         t : a number or an array of times; without it ``sol.t``.
         """
-        given = self.t if t is None else t
-        times = as_times(given)
+        requested = self.t if t is None else t
+        times = as_times(requested)
         name = known_name(
             name, [*self.names, *self.quantities], f"{self.model.name} has no quantity", "quantities"
         )
@@ -141,8 +141,10 @@ class SteppedSolution(ArraysResult):
             k, n = speeds.get(name, gaps.get(name, 0)), self.model.n
             x = self(times)
             values = (directions(self.model)[[k]] @ (x[n:] if name in speeds else x[:n])).ravel()
-            values = values - self._base(k, times) if name in speeds else values + self._run.plant.gap[k - nc]
-        return values[0] if np.ndim(given) == 0 else values
+            values = (
+                values - self._base(k, times) if name in speeds else values + self._run.arrays.gap[k - nc]
+            )
+        return values[0] if np.ndim(requested) == 0 else values
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -154,9 +156,11 @@ class SteppedSolution(ArraysResult):
         return self.output(name, t)
 
     def _base(self, c: int, times: np.ndarray) -> np.ndarray:
-        plant = self._run.plant
-        constant, sine, cosine = plant.base[c]
-        angle = plant.rates[plant.base_rate[c]] * times if plant.base_rate[c] >= 0 else np.zeros(len(times))
+        arrays = self._run.arrays
+        constant, sine, cosine = arrays.base[c]
+        angle = (
+            arrays.rates[arrays.base_rate[c]] * times if arrays.base_rate[c] >= 0 else np.zeros(len(times))
+        )
         return constant + sine * np.sin(angle) + cosine * np.cos(angle)
 
     # -- events and modes -----------------------------------------------------------------------------------
@@ -208,7 +212,7 @@ class SteppedSolution(ArraysResult):
 
     @property
     def x_end(self) -> np.ndarray:
-        """States (2n,) at the end of the run, whatever was kept of it."""
+        """States (2n,) at the end of the run, whatever of it was saved."""
         return np.concatenate([self._run.state.q, self._run.state.v])
 
     @property
