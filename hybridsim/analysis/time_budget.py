@@ -24,20 +24,20 @@ class Stopwatch:
         return time.perf_counter() - self._began - (seconds_compiling() - self._compiled)
 
 
-class Allowance:
+class TimeBudget:
     """A progress callback that raises `OutOfTime` after a given time.
 
     Parameters
     ----------
     seconds : the time limit from now on, without compiling.
-    told : called at each check, to show progress.
+    report : called at each check, to show progress.
     """
 
-    def __init__(self, seconds: float, told: Callable[[], None] | None = None) -> None:
-        self.seconds, self._told, self._watch = seconds, told, Stopwatch()
+    def __init__(self, seconds: float, report: Callable[[], None] | None = None) -> None:
+        self.seconds, self._report, self._watch = seconds, report, Stopwatch()
 
     def __call__(self, fraction: float = 0.0) -> None:
-        if self._told is not None:
-            self._told()
+        if self._report is not None:
+            self._report()
         if self._watch.seconds > self.seconds:
             raise OutOfTime(f"not finished after {self.seconds:.2g} s")

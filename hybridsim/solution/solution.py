@@ -130,7 +130,7 @@ class Solution(InTables):
         With side "+" the result is right-continuous, x+ at an event; "-" gives x-.
         """
         times = as_times(t)
-        x = self._segments.states(*self._places(times, side))
+        x = self._segments.states(*self._segment_at(times, side))
         return x[0] if np.ndim(t) == 0 else x.T
 
     @refusing
@@ -221,7 +221,7 @@ class Solution(InTables):
             return None
         return ~((times >= low) & (times <= high))
 
-    def _places(self, times: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray]:
+    def _segment_at(self, times: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray]:
         """Return the number of the segment that holds each time, and the local time in it."""
         side = side_of_event(side)
         if not self._segments:
@@ -249,7 +249,7 @@ class Solution(InTables):
         self, times: np.ndarray, side: str
     ) -> tuple[np.ndarray, list[tuple[Segment, np.ndarray, np.ndarray]]]:
         """Return states (k, n) at some times, and (segment, indices, local times) for each segment."""
-        index, s = self._places(times, side)
+        index, s = self._segment_at(times, side)
         parts = [(i, np.flatnonzero(index == i)) for i in np.unique(index)]
         pieces = [(self._segments[int(i)], chosen, s[chosen]) for i, chosen in parts]
         return self._segments.states(index, s), pieces

@@ -1,4 +1,4 @@
-"""What a stopwatch leaves out, and that an allowance ends."""
+"""What a stopwatch leaves out, and that a time budget ends."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from hybridsim.analysis.time_budget import Allowance, OutOfTime, Stopwatch
+from hybridsim.analysis.time_budget import OutOfTime, Stopwatch, TimeBudget
 from hybridsim.engine.native import kernels
 
 
@@ -27,10 +27,10 @@ def test_a_stopwatch_stands_still_while_a_kernel_is_compiled() -> None:
 
 def test_an_allowance_is_looked_at_until_it_is_over() -> None:
     looks: list[None] = []
-    Allowance(1e9, lambda: looks.append(None))(0.5)
+    TimeBudget(1e9, lambda: looks.append(None))(0.5)
     assert len(looks) == 1
     with pytest.raises(OutOfTime, match="not finished after"):
-        Allowance(-1.0)()
+        TimeBudget(-1.0)()
 
 
 @pytest.mark.skipif(not kernels.ENABLED, reason="the compiler is switched off")

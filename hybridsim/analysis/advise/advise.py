@@ -13,13 +13,13 @@ from hybridsim import arguments
 from hybridsim.analysis.advise.advice import Advice
 from hybridsim.analysis.advise.certificates import certificates
 from hybridsim.analysis.advise.ladder import FULL, Limits, Step, climb, scene_of
-from hybridsim.analysis.advise.question import NoAnswer, Question, question_of, watched
+from hybridsim.analysis.advise.question import NoAnswer, Question, question_of, with_contact_outputs
 from hybridsim.analysis.advise.region import over_region
 from hybridsim.analysis.advise.settings import settings
 from hybridsim.analysis.advise.uncertainty import ranges_of, spread
-from hybridsim.analysis.compare.comparison_request import mapping, positive, words
+from hybridsim.analysis.compare.comparison_request import checked_names, mapping, positive
 from hybridsim.analysis.compare.timed_runs import Budget
-from hybridsim.analysis.ladder import LADDER, Rung
+from hybridsim.analysis.ladder import LADDER, LadderStep
 from hybridsim.analysis.progress import Progress
 from hybridsim.analysis.time_budget import OutOfTime
 from hybridsim.calls import refusing
@@ -131,7 +131,7 @@ def advise(
     width = None if v0 is None else positive(v0, "v0")
     chosen, ranges = _chosen(rungs), None if uncertain is None else ranges_of(model, uncertain)
     spending = Budget(_spendable(budget, over is not None))
-    seen = watched(model)
+    seen = with_contact_outputs(model)
     if over is not None:
         if ranges is not None:
             raise UsageError(
@@ -149,11 +149,11 @@ def advise(
             region=region,
             seconds=time.perf_counter() - began,
         )
-    told = _Told(progress, len(chosen) + 1 + integrators + (ranges is not None))
-    limits = Limits(spending, _LEAST, told=told.again)
-    told("full model")
+    report = _ProgressReport(progress, len(chosen) + 1 + integrators + (ranges is not None))
+    limits = Limits(spending, _LEAST, report=report.again)
+    report("full model")
     try:
-        full = limits.warm(partial(question.ask, seen), limits.allowance())
+        full = limits.warm(partial(question.ask, seen), limits.time_budget())
     except NoAnswer as reason:
         raise SimulationError(f"the full model gives no {question.text}: {reason}") from reason
     except OutOfTime as fault:
@@ -164,15 +164,15 @@ def advise(
     scene = scene_of(seen, full.motion, width)
     steps = []
     for rung, step in zip(chosen, climb(chosen, scene, question, full, tol, limits), strict=True):
-        told(rung.name)
+        report(rung.name)
         steps.append(step)
     steps.append(
         Step(FULL, FULL, "nothing", full.value, 0.0, full.seconds, FULL, "the reference for the others")
     )
-    tried = settings(seen, question, full, tol, limits, told) if integrators else ()
+    tried = settings(seen, question, full, tol, limits, report) if integrators else ()
     known, left_out = None, ""
     if ranges is not None:
-        told("ranges of parameters")
+        report("ranges of parameters")
         try:
             known = _spread(seen, question, full.value, ranges, limits)
         except OutOfTime:
@@ -199,25 +199,25 @@ def _spendable(budget: float | None, is_region: bool) -> float:
 
 def _spread(model: Model, question: Question, full: Any, ranges: Any, limits: Limits) -> Any:
     try:
-        return spread(model, question, full, ranges, limits.allowance())
+        return spread(model, question, full, ranges, limits.time_budget())
     except NoAnswer as reason:
         raise SimulationError(
             f"at an end of the given ranges there is no {question.text}: {reason}"
         ) from reason
 
 
-def _chosen(names: Sequence[str] | None) -> tuple[Rung, ...]:
+def _chosen(names: Sequence[str] | None) -> tuple[LadderStep, ...]:
     if names is None:
         return LADDER
     known = {rung.name: rung for rung in LADDER}
-    asked_for = words(names, "rungs")
+    asked_for = checked_names(names, "rungs")
     for name in asked_for:
         if name not in known:
             raise UsageError(f"there is no rung {name!r}", remedy=nearest(name, known, kind="rungs"))
     return tuple(rung for rung in LADDER if rung.name in asked_for)
 
 
-class _Told:
+class _ProgressReport:
     """Reports progress: the next item, and repeated signs of life."""
 
     def __init__(self, progress: Progress | None, total: int) -> None:

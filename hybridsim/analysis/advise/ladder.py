@@ -12,9 +12,9 @@ from hybridsim.analysis.advise.certificates import Certificate
 from hybridsim.analysis.advise.question import Answer, NoAnswer, Number, Question, speeds
 from hybridsim.analysis.compare.rows import NOT_STARTED, STOPPED
 from hybridsim.analysis.compare.timed_runs import Budget
-from hybridsim.analysis.ladder import DoesNotApply, NothingToDrop, Rung, Scene
+from hybridsim.analysis.ladder import DoesNotApply, LadderStep, NothingToDrop, Scene
 from hybridsim.analysis.steady.measures import Measures
-from hybridsim.analysis.time_budget import Allowance, OutOfTime, Stopwatch
+from hybridsim.analysis.time_budget import OutOfTime, Stopwatch, TimeBudget
 from hybridsim.errors import ModelError
 from hybridsim.model import Model
 
@@ -23,7 +23,7 @@ NOTHING_TO_DROP, WHERE_TRIED = "nothing to drop", "adequate where tried"
 WITHOUT_TRIAL = (NOT_APPLICABLE, NOTHING_TO_DROP)  # verdicts without a run
 _AGAIN_BELOW = 2.0  # seconds; only shorter runs are repeated, to measure their time without set-up
 Watch = Callable[[float], None]
-"""The type of progress callbacks that long computations call from time to time; see `Allowance`."""
+"""The type of progress callbacks that long computations call from time to time; see `TimeBudget`."""
 
 _DEARER = 10.0  # times the full model's cost; a simpler model that takes longer is stopped
 
@@ -77,18 +77,18 @@ class Limits:
     budget : the time for everything.
     least : seconds that each part may take, however quick the full model is.
     repeat : whether quick runs are repeated, so that their time excludes set-up.
-    told : called at each check of the time.
+    report : called at each check of the time.
     """
 
     budget: Budget
     least: float
     repeat: bool = True
-    told: Callable[[], None] | None = None
+    report: Callable[[], None] | None = None
 
-    def allowance(self, full: Answer | None = None) -> Allowance:
-        """Return the allowance of one part, from the cost of the full model (if known) and the remaining budget."""
+    def time_budget(self, full: Answer | None = None) -> TimeBudget:
+        """Return the time budget of one part, from the cost of the full model (if known) and the remaining budget."""
         own = math.inf if full is None else max(_DEARER * full.seconds, self.least)
-        return Allowance(min(own, self.budget.left), self.told)
+        return TimeBudget(min(own, self.budget.left), self.report)
 
     def reason(self, fault: OutOfTime, full: Answer) -> str:
         """Return the reason why a part was stopped."""
@@ -124,27 +124,34 @@ def scene_of(model: Model, motion: Any, v0: float | None) -> Scene:
 
 
 def climb(
-    rungs: Sequence[Rung], scene: Scene, question: Question, full: Answer, tol: float, limits: Limits
+    ladder_steps: Sequence[LadderStep],
+    scene: Scene,
+    question: Question,
+    full: Answer,
+    tol: float,
+    limits: Limits,
 ) -> Iterator[Step]:
     """Yield the steps one by one, from the simplest rung up."""
-    for rung in rungs:
+    for rung in ladder_steps:
         if limits.budget.left:
             yield _step(rung, scene, question, full, tol, limits)
         else:
             yield _without(rung, NOT_STARTED, limits.spent)
 
 
-def _step(rung: Rung, scene: Scene, question: Question, full: Answer, tol: float, limits: Limits) -> Step:
+def _step(
+    rung: LadderStep, scene: Scene, question: Question, full: Answer, tol: float, limits: Limits
+) -> Step:
     model: Model | None = None
-    allowance = limits.allowance(full)
-    watched = replace(scene, progress=allowance)
+    time_budget = limits.time_budget(full)
+    budgeted = replace(scene, progress=time_budget)
     try:
-        simpler = rung.apply(watched)
+        simpler = rung.apply(budgeted)
         if isinstance(simpler, Model):
             model = simpler
-            answer = limits.warm(partial(question.ask, simpler), allowance)
+            answer = limits.warm(partial(question.ask, simpler), time_budget)
         else:
-            answer = limits.warm(partial(_formula, rung, watched, question), allowance)
+            answer = limits.warm(partial(_formula, rung, budgeted, question), time_budget)
     except NothingToDrop as reason:
         return _without(rung, NOTHING_TO_DROP, str(reason), model)
     except DoesNotApply as reason:
@@ -159,17 +166,27 @@ def _step(rung: Rung, scene: Scene, question: Question, full: Answer, tol: float
     error = relative_error(answer.value, full.value)
     verdict = ADEQUATE if error <= tol else NOT_ADEQUATE
     why = _why(error, tol, full.value)
-    return Step(rung.name, rung.title, rung.drops, answer.value, error, answer.seconds, verdict, why, model)
+    return Step(
+        rung.name,
+        rung.title,
+        rung.drops,
+        answer.value,
+        error,
+        answer.seconds,
+        verdict,
+        why,
+        model,
+    )
 
 
-def _formula(rung: Rung, scene: Scene, question: Question, _: Watch | None = None) -> Answer:
+def _formula(rung: LadderStep, scene: Scene, question: Question, _: Watch | None = None) -> Answer:
     """Return the answer of a rung that is a formula; its cost is the time to evaluate the formula."""
     watch = Stopwatch()
     motion = rung.apply(scene)
     return Answer(question.read(motion), watch.seconds, motion)
 
 
-def _without(rung: Rung, verdict: str, why: str, model: Model | None = None) -> Step:
+def _without(rung: LadderStep, verdict: str, why: str, model: Model | None = None) -> Step:
     """Return a step without a value."""
     return Step(rung.name, rung.title, rung.drops, None, math.inf, math.nan, verdict, why, model)
 

@@ -178,8 +178,8 @@ class Question:
         assert self.function is not None
         if not isinstance(motion, Measures):
             raise NoAnswer("a closed form has no trajectory to pass to a function")
-        given = motion if self.t_span is None else motion.solution
-        value = self.function(given)
+        argument = motion if self.t_span is None else motion.solution
+        value = self.function(argument)
         try:
             found = complex(value) if isinstance(value, complex) else float(value)
         except (TypeError, ValueError, OverflowError):
@@ -238,7 +238,7 @@ def _speed(contact: str) -> str:
     return f"speed_of_{contact}"
 
 
-def watched(model: Model) -> Model:
+def with_contact_outputs(model: Model) -> Model:
     """Return the model with the velocity, speed and power of each contact as outputs, which all rungs keep."""
     known = {output.name for output in model.outputs}
     more = []

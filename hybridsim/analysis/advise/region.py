@@ -24,7 +24,7 @@ from hybridsim.analysis.advise.ladder import (
 )
 from hybridsim.analysis.advise.question import NoAnswer, Question
 from hybridsim.analysis.compare.rows import STOPPED
-from hybridsim.analysis.ladder import Rung
+from hybridsim.analysis.ladder import LadderStep
 from hybridsim.analysis.sweep import Sweep, sweep
 from hybridsim.analysis.time_budget import OutOfTime
 from hybridsim.errors import SimulationError
@@ -42,7 +42,7 @@ _DEAR = (
 class _Point:
     """The measurement at one point; it can be sent to another process."""
 
-    rungs: tuple[Rung, ...]
+    ladder_steps: tuple[LadderStep, ...]
     question: Question
     tol: float
     v0: float | None
@@ -53,23 +53,23 @@ class _Point:
             raise SimulationError(self.limits.spent)
         try:
             full = by_theory(certificates(model), self.question) or self.question.ask(
-                model, self.limits.allowance()
+                model, self.limits.time_budget()
             )
         except (NoAnswer, OutOfTime) as reason:
             raise SimulationError(str(reason)) from reason
         scene = scene_of(model, full.motion, self.v0)
-        errors, stopped = np.full(len(self.rungs), math.inf), np.zeros(len(self.rungs))
-        tried = np.zeros(len(self.rungs))
+        errors, stopped = np.full(len(self.ladder_steps), math.inf), np.zeros(len(self.ladder_steps))
+        tried = np.zeros(len(self.ladder_steps))
         simplest = None
-        for k, step in enumerate(climb(self.rungs, scene, self.question, full, self.tol, self.limits)):
+        for k, step in enumerate(climb(self.ladder_steps, scene, self.question, full, self.tol, self.limits)):
             errors[k], stopped[k], tried[k] = step.error, step.verdict == STOPPED, 1.0
             if simplest is None and step.is_adequate:
                 simplest = k
-            following = self.rungs[k + 1 : k + 2]
+            following = self.ladder_steps[k + 1 : k + 2]
             if simplest is not None and following and following[0].name in _DEAR:
                 break
         return {
-            "simplest": FULL if simplest is None else self.rungs[simplest].name,
+            "simplest": FULL if simplest is None else self.ladder_steps[simplest].name,
             "error": 0.0 if simplest is None else float(errors[simplest]),
             "value": full.value,
             "errors": errors,
@@ -81,7 +81,7 @@ class _Point:
 def over_region(
     model: Model,
     over: Mapping[str, Any],
-    rungs: Sequence[Rung],
+    ladder_steps: Sequence[LadderStep],
     question: Question,
     tol: float,
     v0: float | None,
@@ -89,19 +89,19 @@ def over_region(
     options: Mapping[str, Any],
 ) -> tuple[Sweep, tuple[Step, ...]]:
     """Return the map, and the ladder summed up over all points."""
-    found = sweep(model, over, _Point(tuple(rungs), question, tol, v0, limits), **options)
+    found = sweep(model, over, _Point(tuple(ladder_steps), question, tol, v0, limits), **options)
     if found.failed.all():
         raise SimulationError(f"no point of the region has an answer: {next(found.problems())[0]}")
-    return found, tuple(_steps(found, rungs, tol))
+    return found, tuple(_steps(found, ladder_steps, tol))
 
 
-def _steps(found: Sweep, rungs: Sequence[Rung], tol: float) -> list[Step]:
+def _steps(found: Sweep, ladder_steps: Sequence[LadderStep], tol: float) -> list[Step]:
     """Return for each rung the count of points where it is adequate, and its largest error."""
     done = ~found.failed
     total = int(done.sum())
     errors, simplest = found["errors"][done], found["simplest"][done]
     steps = []
-    for k, rung in enumerate(rungs):
+    for k, rung in enumerate(ladder_steps):
         known = errors[:, k]
         tried = int(found["tried"][done][:, k].sum())
         serves, first = int((known <= tol).sum()), int((simplest == rung.name).sum())
@@ -115,10 +115,19 @@ def _steps(found: Sweep, rungs: Sequence[Rung], tol: float) -> list[Step]:
         why = f"adequate at {serves} of {total} points, the simplest at {first}"
         if tried < total:
             why = f"adequate at {serves} of the {tried} points where nothing simpler is"
-        if given_up := int(found["stopped"][done][:, k].sum()):
-            why += f", slower than the full model at {given_up} and stopped there"
+        if stopped_at := int(found["stopped"][done][:, k].sum()):
+            why += f", slower than the full model at {stopped_at} and stopped there"
         steps.append(
-            Step(rung.name, rung.title, rung.drops, None, float(known.max()), math.nan, verdict, why)
+            Step(
+                rung.name,
+                rung.title,
+                rung.drops,
+                None,
+                float(known.max()),
+                math.nan,
+                verdict,
+                why,
+            )
         )
     alone = int((simplest == FULL).sum())
     steps.append(

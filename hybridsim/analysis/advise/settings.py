@@ -39,7 +39,7 @@ _FAMILIES: tuple[tuple[str, str], ...] = (
 )
 _SHOOTING = "steady_state"
 FAILED = "failed"
-_FEWEST, _MOST = 8, 1000  # periods of settling
+_MIN_PERIODS, _MAX_PERIODS = 8, 1000  # periods of settling
 _NEUTRAL = 1.0 - 1e-6  # the multiplier from which a disturbance counts as persistent
 _SHARE = 0.01  # of the tolerance; the transient that settling may leave
 _RUN_STEPS = 10  # periods assumed in a run with t_span, to choose fixed steps
@@ -115,7 +115,7 @@ def settings(
     full: Answer,
     tol: float,
     limits: Limits,
-    told: Callable[[str], None],
+    report: Callable[[str], None],
 ) -> tuple[Setting, ...]:
     """Try every family from its loosest setting until one is adequate; return all, sorted by `rank`."""
     found = []
@@ -128,7 +128,7 @@ def settings(
         for name, option in _FAMILIES:
             values: tuple[float, ...] = {"rtol": _RTOLS, "steps": _STEPS}.get(option, (0.0,))
             for value in values:
-                told(f"{name} {value:g}" if option else name)
+                report(f"{name} {value:g}" if option else name)
 
                 def measured(value: float, name: str = name, option: str = option) -> Setting:
                     options = settling.options(option, value)
@@ -169,7 +169,7 @@ def _measured(
     if not limits.budget.left:
         return Setting(name, options, verdict=NOT_STARTED, why=limits.spent)
     try:
-        answer = limits.warm(ask, limits.allowance(full))
+        answer = limits.warm(ask, limits.time_budget(full))
     except NoAnswer as reason:
         refused = isinstance(reason.__cause__, UsageError)
         return Setting(name, options, verdict=NOT_APPLICABLE if refused else FAILED, why=str(reason))
@@ -190,9 +190,11 @@ def _settling(question: Question, motion: Any, tol: float) -> _Settling:
     )
     slowest = 0.0 if motion.kind == "equilibrium" else float(max(abs(motion.multipliers), default=0.0))
     if slowest <= 0.0:
-        count = _FEWEST
+        count = _MIN_PERIODS
     elif slowest >= _NEUTRAL:
-        count = max(motion.periods, _FEWEST)  # no disturbance decays; the motion was reached by following it
+        count = max(
+            motion.periods, _MIN_PERIODS
+        )  # no disturbance decays; the motion was reached by following it
     else:
-        count = min(max(math.ceil(math.log(_SHARE * tol) / math.log(slowest)), _FEWEST), _MOST)
+        count = min(max(math.ceil(math.log(_SHARE * tol) / math.log(slowest)), _MIN_PERIODS), _MAX_PERIODS)
     return _Settling(question, (0.0, count * period), period, period)

@@ -12,7 +12,7 @@ from hybridsim.arguments import is_row, number
 from hybridsim.errors import UsageError
 from hybridsim.model import Model
 
-_MOST = 6  # ranges; 2**6 corners need as many runs
+_MAX_RANGES = 6  # ranges; 2**6 corners need as many runs
 
 
 @dataclass(frozen=True)
@@ -28,14 +28,16 @@ class Spread:
     relative: float
 
 
-def ranges_of(model: Model, given: Any) -> dict[str, tuple[float, float]]:
+def ranges_of(model: Model, declared_ranges: Any) -> dict[str, tuple[float, float]]:
     """Return the checked ranges by parameter; each must contain the model's own value."""
-    if not isinstance(given, Mapping) or not given:
-        raise UsageError(f"uncertain is {given!r}", remedy="give ranges by parameter: {'mu': (0.28, 0.32)}")
-    if len(given) > _MOST:
-        raise UsageError(f"uncertain has {len(given)} ranges", remedy=f"give at most {_MOST}")
+    if not isinstance(declared_ranges, Mapping) or not declared_ranges:
+        raise UsageError(
+            f"uncertain is {declared_ranges!r}", remedy="give ranges by parameter: {'mu': (0.28, 0.32)}"
+        )
+    if len(declared_ranges) > _MAX_RANGES:
+        raise UsageError(f"uncertain has {len(declared_ranges)} ranges", remedy=f"give at most {_MAX_RANGES}")
     found, known = {}, model.parameter_values()
-    for name, ends in given.items():
+    for name, ends in declared_ranges.items():
         if not is_row(ends) or len(ends) != 2:
             raise UsageError(f"the range of {name} is {ends!r}", remedy="give (low, high)")
         low, high = (number(end, f"an end of the range of {name}") for end in ends)

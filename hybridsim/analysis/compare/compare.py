@@ -9,10 +9,10 @@ from typing import Any
 from hybridsim.analysis.compare import comparison_request
 from hybridsim.analysis.compare.comparison import Comparison
 from hybridsim.analysis.compare.lines import Series, choose_series
-from hybridsim.analysis.compare.prepared_case import Bench
+from hybridsim.analysis.compare.prepared_case import PreparedCase
 from hybridsim.analysis.compare.reference import find_reference
 from hybridsim.analysis.compare.regularised import regularised_series
-from hybridsim.analysis.compare.timed_runs import Budget, Entry, race
+from hybridsim.analysis.compare.timed_runs import Budget, Entry, timed_rows
 from hybridsim.analysis.progress import Progress, Steps
 from hybridsim.arguments import callback, chosen_model, time_span
 from hybridsim.calls import refusing
@@ -102,8 +102,8 @@ def compare(
     period = forcing_period(model)
     span = _span(t_span, model.duration_value(), period)
     if regularized is not None:
-        kinds = comparison_request.words(regularized, "regularized")
-        names = None if integrators is None else comparison_request.words(integrators, "integrators")
+        kinds = comparison_request.checked_names(regularized, "regularized")
+        names = None if integrators is None else comparison_request.checked_names(integrators, "integrators")
         series = regularised_series(model, kinds, v0, names, rtols)
     elif v0 is not None:
         raise UsageError(
@@ -111,14 +111,14 @@ def compare(
         )
     else:
         series = choose_series(integrators, rtols, steps, None if period else span[1] - span[0])
-    bench = Bench(model, span, period)
+    case = PreparedCase(model, span, period)
     spending = Budget(budget)
     steps_to_do = Steps(1 + (1 + repeat) * sum(len(line.values) for line in series), callback(progress))
     steps_to_do("reference")
-    against = find_reference(model, span, period, bench.simulate, reference, seconds=REFERENCE_SHARE * budget)
-    (rows,) = race([Entry(bench, against, series)], repeat, spending, steps_to_do)
+    against = find_reference(model, span, period, case.simulate, reference, seconds=REFERENCE_SHARE * budget)
+    (rows,) = timed_rows([Entry(case, against, series)], repeat, spending, steps_to_do)
     steps_to_do.finish()
-    return bench.comparison(against, rows, repeat)
+    return case.comparison(against, rows, repeat)
 
 
 def _span(

@@ -49,7 +49,7 @@ def mapping(value: Any, what: str) -> Mapping[str, Any]:
     return value
 
 
-def words(values: Any, what: str) -> tuple[str, ...]:
+def checked_names(values: Any, what: str) -> tuple[str, ...]:
     """Return names; a single one becomes a tuple of one."""
     found = (values,) if isinstance(values, str) else tuple(_row(values, what, "give names"))
     for value in found:

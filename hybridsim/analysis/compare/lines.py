@@ -65,7 +65,7 @@ def _shown(value: Any) -> str:
 
 
 def choose_series(
-    wanted: Sequence[str | tuple[str, Mapping[str, Any]] | Series] | None,
+    requested: Sequence[str | tuple[str, Mapping[str, Any]] | Series] | None,
     rtols: Sequence[float] | None = None,
     steps: Sequence[int] | None = None,
     untimed_span: float | None = None,
@@ -74,14 +74,14 @@ def choose_series(
 
     Parameters
     ----------
-    wanted : names, (name, options) or `Series`; by default all registered integrators.
+    requested : names, (name, options) or `Series`; by default all registered integrators.
     rtols : tolerances of the integrators with adaptive steps.
     steps : steps per period of the others.
     untimed_span : length of the run if the model has no period; a tenth of it then counts as one.
     """
     line = functools.partial(_line, rtols=rtols, steps=steps, untimed_span=untimed_span)
     chosen: list[Series] = []
-    if wanted is None:
+    if requested is None:
         from hybridsim.integrators import list_integrators
 
         for integrator in list_integrators():
@@ -89,7 +89,7 @@ def choose_series(
                 line(integrator.name, options, label) for options, label in _shown_unasked(integrator.name)
             ]
     else:
-        for item in row_of_integrators(wanted):
+        for item in row_of_integrators(requested):
             chosen.append(item if isinstance(item, Series) else line(*named_options(item)))
     if not chosen:
         raise UsageError("no integrators to compare", remedy="name some, see hybridsim.list_integrators()")

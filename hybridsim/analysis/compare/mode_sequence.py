@@ -117,12 +117,14 @@ def _sequences(trajectory: Trajectory) -> dict[tuple[str, str], list[_Entry]]:
 
 def _without_instants(entries: Sequence[_Entry]) -> list[_Entry]:
     """Return a sequence of modes without those of zero duration."""
-    kept: list[_Entry] = []
+    lasting: list[_Entry] = []
     for _, group in itertools.groupby(entries, key=lambda entry: entry.t):
         *passing, last = group
-        if not (passing and kept and kept[-1].label == last.label):  # otherwise the mode returned at once
-            kept.append(last)
-    return kept
+        if not (
+            passing and lasting and lasting[-1].label == last.label
+        ):  # otherwise the mode returned at once
+            lasting.append(last)
+    return lasting
 
 
 def _align(expected: Sequence[_Entry], found: Sequence[_Entry], window: float) -> list[tuple[int, int]]:

@@ -27,7 +27,7 @@ class _OutOfTime(Exception):
 
 
 @dataclass(frozen=True)
-class Bench:
+class PreparedCase:
     """Runs of one model over one span.
 
     Parameters
@@ -69,8 +69,8 @@ class Bench:
                 raise _OutOfTime
 
         try:
-            watched: Mapping[str, Any] = {"progress": watch} if limit < math.inf else {}
-            solution = self.simulate(line.integrator, model=self._form(line, value), **options, **watched)
+            time_limit: Mapping[str, Any] = {"progress": watch} if limit < math.inf else {}
+            solution = self.simulate(line.integrator, model=self._form(line, value), **options, **time_limit)
             if not solution.success:
                 return replace(row, status=solution.status, message=solution.message)
             found = trajectory_of(solution)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from hybridsim.analysis.compare.errors_against_reference import Errors, Yardstick
 from hybridsim.analysis.compare.resets import resets_of
 from hybridsim.analysis.compare.trajectory import as_trajectory, trajectory_of
-from hybridsim.analysis.time_budget import Allowance, OutOfTime
+from hybridsim.analysis.time_budget import OutOfTime, TimeBudget
 from hybridsim.errors import HybridsimError, SimulationError, UsageError
 from hybridsim.reference.closed_forms import find_closed_form
 from hybridsim.reference.trajectory import Trajectory
@@ -67,7 +67,7 @@ def find_reference(
     t_span: tuple[float, float],
     period: float | None,
     run: Run,
-    wanted: Any = None,
+    requested: Any = None,
     progress: Callable[[float], None] | None = None,
     seconds: float = math.inf,
 ) -> Reference:
@@ -75,7 +75,7 @@ def find_reference(
 
     Parameters
     ----------
-    wanted : None for a closed form if one is known, else two runs; "closed form", "multiple precision" or
+    requested : None for a closed form if one is known, else two runs; "closed form", "multiple precision" or
     "runs" to require that kind; several of these for the first one available; or the reference itself: a
     Solution, a Trajectory, or a function of times (k,) that returns states (n, k).
     run : runs the model with an integrator and its options.
@@ -94,19 +94,19 @@ def find_reference(
 
     def timed(integrator: str, **options: Any) -> Solution:
         try:
-            return run(integrator, **options, progress=Allowance(seconds))
+            return run(integrator, **options, progress=TimeBudget(seconds))
         except OutOfTime as late:
             raise _TooLong(
                 f"the run with {_describe((integrator, options))} was {late}",
                 remedy="shorten the span, give a larger budget, or give a reference",
             ) from None
 
-    if wanted is None:
+    if requested is None:
         kinds: tuple[str, ...] = (CLOSED_FORM, RUNS)
-    elif isinstance(wanted, str | tuple):
-        kinds = (wanted,) if isinstance(wanted, str) else wanted
+    elif isinstance(requested, str | tuple):
+        kinds = (requested,) if isinstance(requested, str) else requested
     else:
-        return Reference("given by the caller", yardstick(as_trajectory(wanted, t_span)), None)
+        return Reference("given by the caller", yardstick(as_trajectory(requested, t_span)), None)
     refusal: UsageError | None = None
     for kind in kinds:
         if kind not in KINDS:

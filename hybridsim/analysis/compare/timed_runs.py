@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from hybridsim.analysis.compare.lines import Series
-from hybridsim.analysis.compare.prepared_case import Bench
+from hybridsim.analysis.compare.prepared_case import PreparedCase
 from hybridsim.analysis.compare.reference import Reference
 from hybridsim.analysis.compare.rows import NOT_STARTED, STOPPED, Row
 from hybridsim.analysis.compare.timing import timed_in_turns
@@ -17,7 +17,7 @@ from hybridsim.analysis.time_budget import Stopwatch
 # A run may take this multiple of its equal share of the budget, because most runs take far less.
 _SHARES = 10
 # The shares allow for this many repetitions; further ones are dropped first.
-_TURNS = 3
+_TIMED_TURNS = 3
 # A run that takes longer than predicted is stopped at this multiple of its limit.
 _PATIENCE = 2
 
@@ -43,7 +43,7 @@ class Budget:
 class Entry:
     """A scene, its reference, and the lines to run on it."""
 
-    bench: Bench
+    case: PreparedCase
     reference: Reference
     lines: tuple[Series, ...]
 
@@ -55,7 +55,7 @@ class _Run:
     level: int
 
 
-def race(
+def timed_rows(
     entries: Sequence[Entry], repeat: int, budget: Budget, step: Callable[[str], None]
 ) -> list[tuple[Row, ...]]:
     """Make all runs, and return the rows of each entry in the order of its lines.
@@ -77,7 +77,7 @@ def race(
         for i, line in enumerate(entry.lines)
         for level in range(len(line.values))
     ]
-    share = _SHARES * budget.seconds / max(len(runs) * (1 + min(repeat, _TURNS)), 1)
+    share = _SHARES * budget.seconds / max(len(runs) * (1 + min(repeat, _TIMED_TURNS)), 1)
     for level in range(max((run.level + 1 for run in runs), default=0)):
         here = [run for run in runs if run.level == level]
         predicted = {run: _predicted(entries, rows, run) for run in here}
@@ -96,7 +96,7 @@ def race(
             entry = entries[run.entry]
             line = entry.lines[run.line]
             value = line.values[level]
-            step(f"{entry.bench.model.name}: {line.label}, {line.varied} {value:g}")
+            step(f"{entry.case.model.name}: {line.label}, {line.varied} {value:g}")
             reason = too_long.get(run) or (
                 "" if budget.left else f"the budget of {budget.seconds:.3g} s is spent"
             )
@@ -107,7 +107,7 @@ def race(
                 rows[run] = replace(row, message=reason, form=line.regularized)
             else:
                 limit = min(_PATIENCE * share, budget.left)
-                rows[run] = entry.bench.first_run(line, value, entry.reference, limit)
+                rows[run] = entry.case.first_run(line, value, entry.reference, limit)
     _time(entries, rows, repeat, budget, step)
     return [tuple(rows[run] for run in runs if run.entry == e) for e in range(len(entries))]
 
@@ -150,11 +150,11 @@ def _time(
     for run in timed:
         entry, cost = entries[run.entry], rows[run].cost
         line = entry.lines[run.line]
-        calls.append(entry.bench.call(line, line.values[run.level]))
+        calls.append(entry.case.call(line, line.values[run.level]))
         expected.append(cost.wall_time if cost else 0.0)
 
     def announce(k: int) -> None:
-        step(f"timing {entries[timed[k].entry].bench.model.name}: {rows[timed[k]].label}")
+        step(f"timing {entries[timed[k].entry].case.model.name}: {rows[timed[k]].label}")
 
     times = timed_in_turns(calls, repeat, announce, expected, time.monotonic() + budget.left)
     for run, spent in zip(timed, times, strict=True):

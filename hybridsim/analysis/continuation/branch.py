@@ -131,7 +131,7 @@ def specials(points: tuple[BranchPoint, ...]) -> tuple[Special, ...]:
     for i, (a, b) in enumerate(pairwise(points)):
         if a.word != b.word:
             found.append(Special("sequence", 0.5 * (a.parameter + b.parameter), i))
-        found += _crossings(a, b, i)
+        found += _stability_changes(a, b, i)
         if i > 0 and (a.parameter - points[i - 1].parameter) * (b.parameter - a.parameter) < 0.0:
             found.append(Special("fold", _turn(points[i - 1], a, b), i))
     return tuple(sorted([*found, *_branchings(points, found)], key=lambda s: s.index))
@@ -161,7 +161,7 @@ def _branchings(points: tuple[BranchPoint, ...], found: list[Special]) -> list[S
     return branchings
 
 
-def _crossings(a: BranchPoint, b: BranchPoint, i: int) -> list[Special]:
+def _stability_changes(a: BranchPoint, b: BranchPoint, i: int) -> list[Special]:
     """Return the points where a multiplier passes -1, or a pair passes the unit circle."""
     if a.word != b.word or len(a.multipliers) != len(b.multipliers):
         return []

@@ -37,7 +37,7 @@ _FIRST, _LARGEST, _SMALLEST = (
     1e-6,
 )
 _MORE, _LESS = 1.5, 0.4
-_FEW = 3  # corrections, at most, after which the next step may grow
+_QUICK_CORRECTIONS = 3  # corrections, at most, after which the next step may grow
 _DIFFERENCE = 1e-6  # of the parameter, to differentiate the forcing's period
 
 
@@ -199,7 +199,7 @@ class _Follower:
             found.append(there.point)
             tangent = self._tangent(there, tangent)
             here = there
-            if count <= _FEW:
+            if count <= _QUICK_CORRECTIONS:
                 step = min(step * _MORE, _LARGEST)
         return found, f"{self.parameter} = {here.point.parameter:g} (after {self.max_points} points)"
 
@@ -289,8 +289,8 @@ class _Follower:
             row = np.zeros(len(unit))
             row[self.section] = 1.0
             jacobian = np.concatenate([jacobian, row[None, :]])
-            kept = previous.orbit.start.values[self.section]
-            change = np.append(change, (start.values[self.section] - kept) / unit[self.section])
+            previous_value = previous.orbit.start.values[self.section]
+            change = np.append(change, (start.values[self.section] - previous_value) / unit[self.section])
         orbit = Orbit(start, period, self.multiple, relative(end.values - start.values, unit[:count]))
         found_here = multipliers(found.by_start, rates_at_end(solution) if self.is_free else None)
         point = BranchPoint(value, orbit, motion, found_here, _word(solution), self.is_free)

@@ -20,7 +20,7 @@ from hybridsim.presentation.readable import Readable, in_numbers
 if TYPE_CHECKING:
     from hybridsim.model import Model
 
-_MOST = 4096  # combinations of modes that are tried
+_MAX_COMBINATIONS = 4096  # combinations of modes that are tried
 _ROUNDS = 30
 _SETTLED = 1e-14
 
@@ -117,9 +117,9 @@ def equilibria(
             remedy="use hs.steady_state, or hs.linearize",
         )
     count = int(np.prod([len(a.modes) for a in system.automata]))
-    if count > _MOST:
+    if count > _MAX_COMBINATIONS:
         raise UsageError(
-            f"model {model.name} has {count} combinations of modes; at most {_MOST} are tried",
+            f"model {model.name} has {count} combinations of modes; at most {_MAX_COMBINATIONS} are tried",
             remedy="find one with hs.linearize(model, mode)",
         )
     found = []

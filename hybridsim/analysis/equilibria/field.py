@@ -105,9 +105,9 @@ def modes_of(system: System, mode: Mapping[str, str] | str | None) -> tuple[np.n
         mode = {declared[0].name: mode}
     if not (mode is None or isinstance(mode, Mapping)):
         raise UsageError(f"mode is {mode!r}", remedy="give a mapping from components to modes")
-    given: dict[str, Any] = dict(mode or {})
+    mode_names: dict[str, Any] = dict(mode or {})
     names = [a.name for a in system.declared]
-    for name in given:
+    for name in mode_names:
         if name not in names:
             raise UsageError(
                 f"mode contains {name!r}, which is not a component of model {system.model.name}",
@@ -115,7 +115,7 @@ def modes_of(system: System, mode: Mapping[str, str] | str | None) -> tuple[np.n
             )
     numbers, by_state = [], []
     for c, automaton in enumerate(system.automata):
-        chosen = given.get(automaton.name)
+        chosen = mode_names.get(automaton.name)
         if chosen is None and (automaton.is_corner or automaton.name not in written):
             by_state.append(c)
         elif chosen is None and automaton.initial < 0:

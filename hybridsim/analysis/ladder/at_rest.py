@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from hybridsim.analysis.ladder.rung import DoesNotApply, Rung, Scene, need_contacts
+from hybridsim.analysis.ladder.ladder_step import DoesNotApply, LadderStep, Scene, need_contacts
 
 if TYPE_CHECKING:
     from hybridsim.model import Contact
@@ -30,7 +30,7 @@ class Rest:
         return complex(self.x[name] if k == 0 else 0.0)
 
 
-class AtRest(Rung):
+class AtRest(LadderStep):
     """The rung in which every state keeps its start value."""
 
     name = "at-rest"

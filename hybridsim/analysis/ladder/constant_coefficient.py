@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from hybridsim.analysis.ladder.forces import at_speed, with_contacts, with_law, with_parameters
-from hybridsim.analysis.ladder.rung import DoesNotApply, NothingToDrop, Rung, Scene, need_stick
+from hybridsim.analysis.ladder.ladder_step import DoesNotApply, LadderStep, NothingToDrop, Scene, need_stick
 from hybridsim.expr import parse
 from hybridsim.model import Contact, Model
 from hybridsim.model.laws.law import SPEED
@@ -21,7 +21,7 @@ def _need_velocity_law(model: Model) -> None:
         raise NothingToDrop("mu is constant already: no friction force depends on the speed")
 
 
-class ConstantAtRest(Rung):
+class ConstantAtRest(LadderStep):
     """The rung with slip := stick := slip(0)."""
 
     name = "constant-mu-at-rest"
@@ -35,7 +35,7 @@ class ConstantAtRest(Rung):
         return with_contacts(model, lambda c: _constant(c, "0"), "constant mu (at rest)")
 
 
-class ConstantAtMeanSpeed(Rung):
+class ConstantAtMeanSpeed(LadderStep):
     """The rung with slip := stick := slip(mean sliding speed of the full motion)."""
 
     name = "constant-mu-mean"

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from hybridsim.analysis.ladder.forces import inlined
-from hybridsim.analysis.ladder.rung import DoesNotApply
+from hybridsim.analysis.ladder.ladder_step import DoesNotApply
 from hybridsim.expr import evaluate, parse
 from hybridsim.model import Contact, Model
 

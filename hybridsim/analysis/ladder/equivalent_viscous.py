@@ -10,8 +10,8 @@ import numpy as np
 
 from hybridsim.analysis.ladder.describing import FirstHarmonic
 from hybridsim.analysis.ladder.forces import with_forces, with_parameters
+from hybridsim.analysis.ladder.ladder_step import DoesNotApply, LadderStep, Scene, need_stick
 from hybridsim.analysis.ladder.linear_response import LinearResponse, NotLinear
-from hybridsim.analysis.ladder.rung import DoesNotApply, Rung, Scene, need_stick
 from hybridsim.errors import HybridsimError
 from hybridsim.expr import parse, substitute
 from hybridsim.model import Model, Output
@@ -19,14 +19,14 @@ from hybridsim.model import Model, Output
 Response = Callable[[np.ndarray], np.ndarray]
 
 _SOLVED = 1e-12  # relative change of the dampers at convergence
-_MOST, _MOST_RUNS = 5000, 60  # rounds with a linear response, and with runs
+_MAX_ROUNDS, _MAX_ROUNDS_OF_RUNS = 5000, 60  # rounds with a linear response, and with runs
 _BELOW, _NO_END = 1e3, 1e15  # start and end of a search, in dampers of the free motion
 _ONE_WAY = 1e-6  # relative to its amplitude: a smaller mean velocity counts as zero
 _DRIFTS = "a contact slides in one direction on average, so that friction does not damp its vibration"
 _NOTHING = "the harmonic balance has no moving solution: it predicts that friction stops everything"
 
 
-class EquivalentViscous(Rung):
+class EquivalentViscous(LadderStep):
     """The rung f = c_eq v, c_eq = F1(V)/V, with F1 the first harmonic of friction for a cosine of amplitude V.
 
     For Coulomb friction c_eq = 4 mu N/(pi V), a damper that does the same work per cycle. V is the first
@@ -54,11 +54,11 @@ class EquivalentViscous(Rung):
         order = [names[wish] for wish in wishes]
         try:
             response = LinearResponse(model, 2.0 * math.pi / period)
-            c = _solve(response, forces, _MOST)
+            c = _solve(response, forces, _MAX_ROUNDS)
             if (np.abs(response.mean(c)) > _ONE_WAY * np.abs(response(c))).any():
                 raise DoesNotApply(_DRIFTS)
         except NotLinear:
-            c = _solve(_by_runs(viscous, scene, order), forces, _MOST_RUNS)
+            c = _solve(_by_runs(viscous, scene, order), forces, _MAX_ROUNDS_OF_RUNS)
         return viscous.with_(**dict(zip(order, c.tolist(), strict=True)))
 
 
@@ -107,36 +107,36 @@ def _solve(response: Response, forces: list[FirstHarmonic], most: int) -> np.nda
     """
     c = _first(response, forces)
     if len(c) == 1:
-        return _solve_one(lambda value: _wanted(response, forces, np.array([value]))[0], float(c[0]))
+        return _solve_one(lambda value: _balanced(response, forces, np.array([value]))[0], float(c[0]))
     largest = _NO_END * c
     for _ in range(most):
-        wanted = _wanted(response, forces, c)
-        if (np.abs(wanted - c) <= _SOLVED * wanted).all():
-            return wanted
-        c = np.sqrt(c * wanted)
+        balanced = _balanced(response, forces, c)
+        if (np.abs(balanced - c) <= _SOLVED * balanced).all():
+            return balanced
+        c = np.sqrt(c * balanced)
         if (c > largest).any():
             raise DoesNotApply(_NOTHING)
     raise DoesNotApply(f"the harmonic balance did not converge in {most} rounds")
 
 
-def _solve_one(wanted: Callable[[float], float], start: float) -> np.ndarray:
+def _solve_one(balanced: Callable[[float], float], start: float) -> np.ndarray:
     from scipy.optimize import brentq
 
     low = start / _BELOW
-    if wanted(low) < low:
+    if balanced(low) < low:
         raise DoesNotApply(
             "the harmonic balance has no solution above 1/1000 of the damping of the free motion"
         )
     high = 2.0 * low
-    while wanted(high) > high:
+    while balanced(high) > high:
         low, high = high, 2.0 * high
         if high > _NO_END * start:
             raise DoesNotApply(_NOTHING)
-    root = brentq(lambda z: math.log(wanted(math.exp(z))) - z, math.log(low), math.log(high), xtol=_SOLVED)
+    root = brentq(lambda z: math.log(balanced(math.exp(z))) - z, math.log(low), math.log(high), xtol=_SOLVED)
     return np.array([math.exp(root)])
 
 
-def _wanted(response: Response, forces: list[FirstHarmonic], c: np.ndarray) -> np.ndarray:
+def _balanced(response: Response, forces: list[FirstHarmonic], c: np.ndarray) -> np.ndarray:
     speeds = np.abs(response(c))
     if not (np.isfinite(speeds) & (speeds > 0.0)).all():
         raise DoesNotApply(_NOTHING)
@@ -146,9 +146,9 @@ def _wanted(response: Response, forces: list[FirstHarmonic], c: np.ndarray) -> n
 def _first(response: Response, forces: list[FirstHarmonic]) -> np.ndarray:
     """Return the dampers of the frictionless motion; if that is unbounded, of a motion with very small damping."""
     try:
-        found = _wanted(response, forces, np.zeros(len(forces)))
+        found = _balanced(response, forces, np.zeros(len(forces)))
     except (np.linalg.LinAlgError, DoesNotApply):
-        found = _wanted(response, forces, np.full(len(forces), 1e-6))
+        found = _balanced(response, forces, np.full(len(forces), 1e-6))
     if not (found > 0.0).all():
         raise DoesNotApply("a contact without load has no friction that a damper could replace")
     return found

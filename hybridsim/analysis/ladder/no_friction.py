@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from hybridsim.analysis.ladder.forces import with_forces
-from hybridsim.analysis.ladder.rung import Rung, Scene, need_contacts
+from hybridsim.analysis.ladder.ladder_step import LadderStep, Scene, need_contacts
 from hybridsim.expr import parse
 from hybridsim.model import Model
 
 
-class NoFriction(Rung):
+class NoFriction(LadderStep):
     """The rung with f = 0."""
 
     name = "no-friction"

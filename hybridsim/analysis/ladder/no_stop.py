@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hybridsim.analysis.ladder.rung import DoesNotApply, Rung, Scene, need_stick
+from hybridsim.analysis.ladder.ladder_step import DoesNotApply, LadderStep, Scene, need_stick
 from hybridsim.model import Model
 from hybridsim.reference.closed_forms.coulomb_model import Recognised, recognise
 from hybridsim.reference.closed_forms.den_hartog import no_stops
@@ -41,11 +41,11 @@ class NoStopMotion:
             acceleration=(force - s.stiffness * amplitude + s.slip_force) / s.mass,
         )
         self._top_at = (angle - s.phase) / s.frequency
-        pieces = max(8, math.ceil(8.0 * self._phase.natural / s.frequency))
+        intervals = max(8, math.ceil(8.0 * self._phase.natural / s.frequency))
         half = 0.5 * self.period
-        begins = half / pieces * np.arange(pieces)
-        self._s = (begins[:, None] + 0.5 * half / pieces * (1.0 + _NODES)).ravel()
-        self._w = np.tile(0.5 * half / pieces * _WEIGHTS, pieces)
+        begins = half / intervals * np.arange(intervals)
+        self._s = (begins[:, None] + 0.5 * half / intervals * (1.0 + _NODES)).ravel()
+        self._w = np.tile(0.5 * half / intervals * _WEIGHTS, intervals)
         self.fastest = self._fastest()
         self.amplitude = {self._x: amplitude, self._v: self.fastest, contact: s.slip_force}
         self.mean = {self._x: self._centre, self._v: 0.0, contact: 0.0}
@@ -157,7 +157,7 @@ def _angle_at_top(system: ForcedCoulombOscillator, amplitude: float) -> float:
     return cmath.phase(complex(forced_v / w, forced_x) / response)
 
 
-class NoStop(Rung):
+class NoStop(LadderStep):
     """The rung of the closed form of J. P. Den Hartog, Trans. ASME 53 (1931) 107."""
 
     name = "no-stop"

@@ -6,14 +6,14 @@ import random
 from dataclasses import replace
 
 from hybridsim.analysis.ladder.forces import at_speed, inlined, with_contacts, with_law
-from hybridsim.analysis.ladder.rung import DoesNotApply, NothingToDrop, Rung, Scene, need_stick
+from hybridsim.analysis.ladder.ladder_step import DoesNotApply, LadderStep, NothingToDrop, Scene, need_stick
 from hybridsim.expr import evaluate
 from hybridsim.model import Contact, Model
 
 _TRIALS = 4  # points at which a jump at rest is looked for; more than one excludes coincidences
 
 
-class OneCoefficient(Rung):
+class OneCoefficient(LadderStep):
     """The rung with stick := slip(0), for every contact whose static friction exceeds its kinetic friction."""
 
     name = "mu_s=mu_k"

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from hybridsim.analysis.ladder.rung import DoesNotApply, Rung, Scene, need_stick
+from hybridsim.analysis.ladder.ladder_step import DoesNotApply, LadderStep, Scene, need_stick
 from hybridsim.errors import HybridsimError
 from hybridsim.model import Model
 
 SHARE = 0.01  # of the largest sliding speed; makes the regularised region narrow compared with the motion
 
 
-class _Regularised(Rung):
+class _Regularised(LadderStep):
     """A rung that regularises the force within a width v0 around zero velocity; see `Model.regularized`."""
 
     def apply(self, scene: Scene) -> Model:

@@ -14,7 +14,7 @@ from hybridsim.analysis.variations.sizes import ranges, sizes
 from hybridsim.errors import UsageError
 
 _DIES_OUT = 1e-6  # a change of the start that has shrunk to this factor counts as zero
-_MOST = 512  # periods of the slowest forcing
+_MAX_SLOW_PERIODS = 512  # periods of the slowest forcing
 _LONGER = 4
 _NO_PERIOD = "the periods of forcing and clocks have no common multiple"
 
@@ -53,9 +53,9 @@ def follow(motion: Motion, longest: float, settle: int, max_periods: int) -> Fol
         unit = np.where(largest > 0.0, largest, 1.0)
         unit = np.concatenate([unit, np.ones(len(matrix) - len(unit))])
         left = float(np.abs(matrix * unit[None, :] / unit[:, None]).max(initial=0.0))
-        said = f"a change of the start is {left:.1e} times as large after {count} periods of the slowest"
+        growth = f"a change of the start is {left:.1e} times as large after {count} periods of the slowest"
         if left <= _DIES_OUT:
-            return Followed(None, True, count, f"quasi-periodic: {_NO_PERIOD}, and {said}")
-        if count * _LONGER > min(max_periods, _MOST):
-            return Followed(None, False, count, f"not settled: {_NO_PERIOD}, and {said}")
+            return Followed(None, True, count, f"quasi-periodic: {_NO_PERIOD}, and {growth}")
+        if count * _LONGER > min(max_periods, _MAX_SLOW_PERIODS):
+            return Followed(None, False, count, f"not settled: {_NO_PERIOD}, and {growth}")
         count *= _LONGER

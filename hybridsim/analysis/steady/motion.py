@@ -77,7 +77,7 @@ class CostsTooMuch(SimulationError):
 
 _TELLING = 100
 # A run is checked after this many steps or events, then after twice as many, and so on. It is abandoned if it
-# has used this fraction of the allowance and would exceed the allowance at its pace.
+# has used this fraction of the time budget and would exceed the time budget at its pace.
 _LOOK, _SHARE = {"steps": 20000, "events": 20000}, 0.05
 # Approximate seconds: for carrying the derivative by one state through a step, for carrying all of them over
 # a segment's end, and for a segment's end without derivatives.
@@ -111,7 +111,7 @@ class Motion:
         # The allowed cost of all runs together, their cost so far (`hybridsim.engine.run.headway.cost`), and that
         # of the last run per unit of time. The cost is counted, not timed, so that a search ends at the same
         # place on every machine.
-        self.allowance, self._spent, self._pace = math.inf, 0.0, 0.0
+        self.time_budget, self._spent, self._pace = math.inf, 0.0, 0.0
 
     def unwatched(self) -> Motion:
         """Return the same without the progress callback, for later runs."""
@@ -154,20 +154,20 @@ class Motion:
 
         is_carried: derivatives will be carried along the run, so that their cost counts too.
         """
-        given: dict[str, Any] = dict(self.first) if start is None else {}
+        settings: dict[str, Any] = dict(self.first) if start is None else {}
         if start is not None:
-            given |= self._tolerances(start, options.get("rtol", self.rtol))
-            given["x0"] = dict(zip(self.names + self.discrete, start.values.tolist(), strict=True))
-            given["z0"] = start.z or None
+            settings |= self._tolerances(start, options.get("rtol", self.rtol))
+            settings["x0"] = dict(zip(self.names + self.discrete, start.values.tolist(), strict=True))
+            settings["z0"] = start.z or None
         begin = 0.0 if start is None else start.at
         self._spend(0.0, self._pace * float(duration))
-        given |= self.options | options
-        is_watched = "limits" not in given and self.allowance < math.inf
-        if is_watched:
-            given["limits"] = _LOOK
+        settings |= self.options | options
+        is_limited = "limits" not in settings and self.time_budget < math.inf
+        if is_limited:
+            settings["limits"] = _LOOK
         with np.errstate(over="ignore", invalid="ignore"):  # a motion may grow without bound
-            solution = simulate(self.model, (begin, begin + duration), progress=self.progress, **given)
-            while is_watched and solution.status == "limit":
+            solution = simulate(self.model, (begin, begin + duration), progress=self.progress, **settings)
+            while is_limited and solution.status == "limit":
                 solution = self._longer(solution, duration, is_carried)
         spent = float(_cost_of(solution))
         is_long = solution.stats["steps"] >= _TELLING  # a few steps do not show how a longer run would go
@@ -188,7 +188,10 @@ class Motion:
         """Continue a run that has reached its limits, for as many steps again, if it can still finish."""
         spent, reached = _cost_of(solution), solution.t_end - solution.t_start
         spent += _cost_of_carrying(solution) if is_carried else 0.0
-        if spent >= _SHARE * self.allowance and spent * duration > (self.allowance - self._spent) * reached:
+        if (
+            spent >= _SHARE * self.time_budget
+            and spent * duration > (self.time_budget - self._spent) * reached
+        ):
             raise CostsTooMuch
         return solution.resume(
             limits={name: max(most, solution.stats[name]) for name, most in _LOOK.items()},
@@ -201,7 +204,7 @@ class Motion:
 
     def _spend(self, seconds: float, ahead: float = 0.0) -> None:
         self._spent += seconds
-        if self._spent + ahead > self.allowance:
+        if self._spent + ahead > self.time_budget:
             raise CostsTooMuch
 
     def _refuse_growth(self, solution: Solution) -> None:
@@ -231,7 +234,7 @@ def point_at_end(solution: Solution) -> Point:
 
 def point_at(solution: Solution, t: float) -> Point:
     """Return the point of a run just before time t."""
-    index, _ = solution._places(np.array([t]), "-")
+    index, _ = solution._segment_at(np.array([t]), "-")
     segment = solution._segments[int(index[0])]
     point = _point(solution, segment, side=-1)
     return replace(point, x=solution(t, side="-"))

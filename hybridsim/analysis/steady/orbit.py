@@ -18,7 +18,7 @@ from hybridsim.errors import SimulationError
 POINTS = 16  # Gauss points per piece: a polynomial of degree 15
 _DENSE = 65  # points at which a slope is checked for changes of sign
 _STEPS = 4  # steps of Newton's method, from the chord through two of these points
-_AT_ONCE = 2**20  # slopes per batch
+_SLOPES_PER_BATCH = 2**20  # slopes per batch
 
 NODES, WEIGHTS = legendre.leggauss(POINTS)
 TO_COEFFICIENTS = np.linalg.inv(legendre.legvander(NODES, POINTS - 1))
@@ -133,7 +133,7 @@ class Orbit:
 
     def _blocks(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
         """Yield batches of pieces: number, Legendre coefficients (k * Q, POINTS), and validity (k, Q)."""
-        block = max(1, _AT_ONCE // (_DENSE * len(self.names)))
+        block = max(1, _SLOPES_PER_BATCH // (_DENSE * len(self.names)))
         for first in range(0, max(len(self.values), 1), block):
             chosen = slice(first, first + block)
             rows = self.values[chosen].transpose(0, 2, 1).reshape(-1, POINTS)

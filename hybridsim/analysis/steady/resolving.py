@@ -1,4 +1,4 @@
-"""This module converts a run to an `Orbit`: steps are halved until a polynomial is accurate on each piece."""
+"""This module converts a run to an `Orbit`: steps are halved until a polynomial is accurate on each interval."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ if TYPE_CHECKING:
 _TAIL = 4  # last coefficients, which show whether the polynomial is accurate
 _ASIDE_OF_ENDS = (
     2.0**-26
-)  # of half a piece; samples keep this distance from the ends, where sign(v) may be determined by rounding
+)  # of half a interval; samples keep this distance from the ends, where sign(v) may be determined by rounding
 _RESOLVED = 1e-13  # the misfit relative to the largest value of the whole run
 _HOLDS = 1e-6  # if rounding exceeds this fraction of a quantity, no polynomial represents it
 _NOISE = 1e-9  # below this fraction, a misfit that halving does not reduce is rounding
 _SMALLER = 0.7
 _HALVINGS = 24
-_MOST, _MOST_VALUES = 2**17, 2**24  # pieces, and values on all of them: 128 MB
-_MOST_OF_A_STEP = 8.0  # pieces per step, on average, that are always allowed
-_AT_ONCE = 2**19  # values per batch
+_MAX_INTERVALS, _MAX_VALUES = 2**17, 2**24  # intervals, and values on all of them: 128 MB
+_MAX_PER_STEP = 8.0  # intervals per step, on average, that are always allowed
+_VALUES_PER_BATCH = 2**19  # values per batch
 _PROBED = 16  # steps at which rounding is measured
-# Fractions of a step to probe. A fast quantity is smooth on a short piece, where only rounding remains; but
+# Fractions of a step to probe. A fast quantity is smooth on a short interval, where only rounding remains; but
 # on a fraction of 2^-53 the states do not change. The first fraction leaves the states half of their digits,
 # the second is for even faster quantities.
 _TINY = (2.0**-26, 2.0**-40)
@@ -37,7 +37,7 @@ _ROUNDINGS = 4.0  # multiple of the measured rounding
 
 
 def _misfits() -> tuple[np.ndarray, np.ndarray]:
-    """Return the sample places on a piece (Gauss points and two near its ends) and the misfit weights (rows).
+    """Return the sample places on a interval (Gauss points and two near its ends) and the misfit weights (rows).
 
     Misfits are the last coefficients, and the errors of the polynomial near the ends. Only the latter show a
     feature that begins behind the last Gauss point.
@@ -52,7 +52,7 @@ def _misfits() -> tuple[np.ndarray, np.ndarray]:
     return np.append(NODES, near), np.concatenate([np.pad(tails, ((0, 0), (0, 2))), off])
 
 
-_PLACES, _MISFITS = _misfits()
+_SAMPLE_POINTS, _MISFITS = _misfits()
 
 
 class Sampler:
@@ -105,123 +105,129 @@ class Sampler:
         return np.concatenate([*columns, surfaces, guards], axis=1)
 
 
-class _Pieces(NamedTuple):
+class _Intervals(NamedTuple):
     """Parts of segments (k,), from one local time to another."""
 
     segments: np.ndarray
     begins: np.ndarray
     ends: np.ndarray
 
-    def of(self, chosen: np.ndarray | slice) -> _Pieces:
-        return _Pieces(*(part[chosen] for part in self))
+    def of(self, chosen: np.ndarray | slice) -> _Intervals:
+        return _Intervals(*(part[chosen] for part in self))
 
-    def part(self, share: float, length: float) -> _Pieces:
-        """Return a part of each piece; its start and length are fractions of the piece."""
+    def part(self, share: float, length: float) -> _Intervals:
+        """Return a part of each interval; its start and length are fractions of the interval."""
         whole = self.ends - self.begins
         begins = self.begins + share * whole
-        return _Pieces(self.segments, begins, begins + length * whole)
+        return _Intervals(self.segments, begins, begins + length * whole)
 
-    def halves(self) -> _Pieces:
+    def halves(self) -> _Intervals:
         middle = 0.5 * (self.begins + self.ends)
         begins = np.stack([self.begins, middle], axis=1).ravel()
-        return _Pieces(np.repeat(self.segments, 2), begins, np.stack([middle, self.ends], axis=1).ravel())
+        return _Intervals(np.repeat(self.segments, 2), begins, np.stack([middle, self.ends], axis=1).ravel())
 
 
 class _Finished(NamedTuple):
     """Pieces with values (k, POINTS, Q), and a mask (k, Q) of non-constant polynomials."""
 
-    pieces: _Pieces
+    intervals: _Intervals
     values: np.ndarray
     is_smooth: np.ndarray
 
 
 def orbit_of(solution: Solution, *, states_only: bool = False) -> Orbit:
-    """Return a forward run, or its kept part, as polynomials on pieces."""
+    """Return a forward run, or its saved part, as polynomials on intervals."""
     sample = Sampler(solution, states_only)
     index, s, _ = solution._segments.knots()
     same = (index[1:] == index[:-1]) & (s[1:] > s[:-1])
-    steps = _Pieces(index[:-1][same], s[:-1][same], s[1:][same])
+    steps = _Intervals(index[:-1][same], s[:-1][same], s[1:][same])
     rounding = _ROUNDINGS * _rounding(sample, steps)
     is_too_fast = np.zeros(len(sample.names), dtype=np.bool_)
-    while True:  # repeat without the quantities that need too many pieces
+    while True:  # repeat without the quantities that need too many intervals
         finished, left = _resolved(sample, steps, rounding, ~is_too_fast)
         if not left.any():
             break
         is_too_fast |= left
-    pieces = _Pieces(*(np.concatenate(parts) for parts in zip(*(f.pieces for f in finished), strict=True)))
-    order = np.lexsort((pieces.begins, pieces.segments))
-    places = np.split(np.argsort(order), np.cumsum([len(f.values) for f in finished])[:-1])
+    intervals = _Intervals(
+        *(np.concatenate(parts) for parts in zip(*(f.intervals for f in finished), strict=True))
+    )
+    order = np.lexsort((intervals.begins, intervals.segments))
+    positions = np.split(np.argsort(order), np.cumsum([len(f.values) for f in finished])[:-1])
     values = np.empty((len(order), POINTS, len(sample.names)))
     is_smooth = np.empty((len(order), len(sample.names)), dtype=np.bool_)
-    for part, place in zip(finished, places, strict=True):
-        values[place], is_smooth[place] = part.values, part.is_smooth
+    for part, position in zip(finished, positions, strict=True):
+        values[position], is_smooth[position] = part.values, part.is_smooth
     values[:, :, is_too_fast] = np.nan
-    pieces = pieces.of(order)
-    origins = solution._segments.origins()[pieces.segments]
-    starts = (origins[:, 0] - solution.t_start) + (origins[:, 1] + pieces.begins)
+    intervals = intervals.of(order)
+    origins = solution._segments.origins()[intervals.segments]
+    starts = (origins[:, 0] - solution.t_start) + (origins[:, 1] + intervals.begins)
     too_fast = frozenset(name for name, is_it in zip(sample.names, is_too_fast, strict=True) if is_it)
-    lengths = pieces.ends - pieces.begins
-    return Orbit(sample.names, starts, lengths, pieces.segments, values, is_smooth, too_fast)
+    lengths = intervals.ends - intervals.begins
+    return Orbit(sample.names, starts, lengths, intervals.segments, values, is_smooth, too_fast)
 
 
 def _resolved(
-    sample: Sampler, pieces: _Pieces, rounding: np.ndarray, watched: np.ndarray
+    sample: Sampler, intervals: _Intervals, rounding: np.ndarray, required: np.ndarray
 ) -> tuple[list[_Finished], np.ndarray]:
-    """Return pieces that resolve the watched quantities (Q,), or a mask of those that need too many."""
+    """Return intervals that resolve the required quantities (Q,), or a mask of those that need too many."""
     count = len(sample.names)
-    most = max(min(_MOST, _MOST_VALUES // (POINTS * count)), int(_MOST_OF_A_STEP * len(pieces.begins)))
+    most = max(
+        min(_MAX_INTERVALS, _MAX_VALUES // (POINTS * count)), int(_MAX_PER_STEP * len(intervals.begins))
+    )
     finished: list[_Finished] = []
     done, scale = 0, np.zeros(count)
-    before = np.full((len(pieces.begins), count), np.inf)  # misfits on the pieces before they were halved
+    before = np.full(
+        (len(intervals.begins), count), np.inf
+    )  # misfits on the intervals before they were halved
     for halving in range(_HALVINGS):
-        values, misfits = _sampled(sample, pieces)
+        values, misfits = _sampled(sample, intervals)
         low, high = values.min(axis=1), values.max(axis=1)
         scale = np.maximum(scale, np.maximum(-low, high).max(axis=0, initial=0.0))
         bound = np.maximum(_RESOLVED * scale, rounding)
         is_rounding = (misfits <= _NOISE * scale) & (misfits >= _SMALLER * before)
         # A quantity with NaN is not smooth there, and halving does not help.
-        is_rough = watched & (misfits > bound) & ~is_rounding
+        is_rough = required & (misfits > bound) & ~is_rounding
         # The polynomial of a constant shows only rounding.
         is_smooth = ((misfits <= bound) | is_rounding) & (rounding <= _HOLDS * scale) & (low < high)
         good = ~is_rough.any(axis=1) | (halving == _HALVINGS - 1)
-        finished.append(_Finished(pieces.of(good), values[good], is_smooth[good]))
+        finished.append(_Finished(intervals.of(good), values[good], is_smooth[good]))
         if good.all():
             break
         done += int(good.sum())
-        pieces, before = pieces.of(~good).halves(), np.repeat(misfits[~good], 2, axis=0)
-        if done + len(pieces.begins) > most:
+        intervals, before = intervals.of(~good).halves(), np.repeat(misfits[~good], 2, axis=0)
+        if done + len(intervals.begins) > most:
             takes = is_rough.sum(axis=0)
             return [], 2 * takes >= takes.max()
     return finished, np.zeros(count, dtype=np.bool_)
 
 
-def _sampled(sample: Sampler, pieces: _Pieces) -> tuple[np.ndarray, np.ndarray]:
-    """Return values (K, POINTS, Q) on pieces, and the largest misfit (K, Q) of each polynomial."""
-    count = len(pieces.begins)
+def _sampled(sample: Sampler, intervals: _Intervals) -> tuple[np.ndarray, np.ndarray]:
+    """Return values (K, POINTS, Q) on intervals, and the largest misfit (K, Q) of each polynomial."""
+    count = len(intervals.begins)
     values, misfits = np.empty((count, POINTS, len(sample.names))), np.empty((count, len(sample.names)))
-    block = max(1, _AT_ONCE // (len(_PLACES) * len(sample.names)))
+    block = max(1, _VALUES_PER_BATCH // (len(_SAMPLE_POINTS) * len(sample.names)))
     for first in range(0, count, block):
         chosen = slice(first, first + block)
-        segments, begins, ends = pieces.of(chosen)
-        at = begins[:, None] + 0.5 * (ends - begins)[:, None] * (1.0 + _PLACES)
-        found = sample(np.repeat(segments, len(_PLACES)), at.ravel()).reshape(*at.shape, -1)
+        segments, begins, ends = intervals.of(chosen)
+        at = begins[:, None] + 0.5 * (ends - begins)[:, None] * (1.0 + _SAMPLE_POINTS)
+        found = sample(np.repeat(segments, len(_SAMPLE_POINTS)), at.ravel()).reshape(*at.shape, -1)
         found[np.isinf(found)] = np.nan  # no polynomial has a pole
         values[chosen] = found[:, :POINTS]
         misfits[chosen] = np.abs(_MISFITS @ found).max(axis=1)
     return values, misfits
 
 
-def _rounding(sample: Sampler, steps: _Pieces) -> np.ndarray:
-    """Return the misfit (Q,) of rounding alone, measured on pieces so short that nothing else remains.
+def _rounding(sample: Sampler, steps: _Intervals) -> np.ndarray:
+    """Return the misfit (Q,) of rounding alone, measured on intervals so short that nothing else remains.
 
     For a difference of large terms, such as an energy balance, the misfit may consist of rounding on every
-    piece.
+    interval.
     """
     count = len(steps.begins)
     probed = steps.of(np.unique(np.linspace(0, count - 1, _PROBED).astype(int)) if count else slice(0))
     probes = [probed.part(share, tiny) for tiny in _TINY for share in _ASIDE]
     values, misfits = _sampled(
-        sample, _Pieces(*(np.concatenate(parts) for parts in zip(*probes, strict=True)))
+        sample, _Intervals(*(np.concatenate(parts) for parts in zip(*probes, strict=True)))
     )
     # otherwise all samples are equal in double precision
     tells = (values.min(axis=1) < values.max(axis=1)) & np.isfinite(misfits)

@@ -17,7 +17,7 @@ from hybridsim.errors import HybridsimError, UsageError
 from hybridsim.presentation.readable import Readable
 
 if TYPE_CHECKING:
-    from hybridsim.analysis.steady.orbit import Orbit as Stretch
+    from hybridsim.analysis.steady.orbit import Orbit as PeriodOrbit
     from hybridsim.analysis.steady.shooting import Orbit
     from hybridsim.model import Model
     from hybridsim.solution import Solution
@@ -108,7 +108,7 @@ class SteadyState(Readable, Measures):
         return 0.0 if self._closed is None else self._closed.start.at
 
     @cached_property
-    def _orbit(self) -> Stretch:
+    def _orbit(self) -> PeriodOrbit:
         from hybridsim.analysis.steady.resolving import orbit_of
 
         if not self.success:

@@ -153,7 +153,7 @@ def forced_passings(motion: Motion, start: Point | None, period: float, count: i
     values = solution(times, side="-").T
     system = solution._system
     if system.layout.discrete:
-        index, _ = solution._places(times, "-")
+        index, _ = solution._segment_at(times, "-")
         discrete = [solution._segments[int(i)].p[system.layout.discrete_slice] for i in index]
         values = np.concatenate([values, discrete], axis=1)
     late = solution.t_end - max(1, count // 4) * period
@@ -191,13 +191,13 @@ def free_passings(
             end = point_at_end(following)
             return Passings(np.array([0.0]), end.values[None, :], scale, end, rests=True)
         largest[:] = 0.5 * (high - low)
-    others = np.where(_goes_on(late, high - low, _STEADY), 0.0, moves)
+    others = np.where(_drifts_steadily(late, high - low, _STEADY), 0.0, moves)
     j = int(np.argmax(others if others.max() > RESTS else moves))
     times = orbit.passes(motion.names[j], 0.5 * (low[j] + high[j]))
     times, j = _without_events(late, orbit, times, j, others > RESTS)
     points = [point_at(late, t) for t in times]
     values = np.array([p.values for p in points]).reshape(len(points), len(scale))
-    adds_up = bool((moves <= RESTS)[~_goes_on(late, high - low, _CONSTANT)].all())
+    adds_up = bool((moves <= RESTS)[~_drifts_steadily(late, high - low, _CONSTANT)].all())
     return Passings(
         times, values, scale_of(late, 0.0), points[-1] if points else end, state=j, adds_up=adds_up
     )
@@ -216,12 +216,12 @@ def _without_events(
     if len(times) < 2 or not len(events):
         return times, j
     period = float(times[-1] - times[-2])
-    if not any(is_event_near(late, events, t, period) for t in times[-_FEW:]):
+    if not any(is_event_near(late, events, t, period) for t in times[-_LAST_PASSAGES:]):
         return times, j
     begin = float(times[-2])
     inside = events[(events >= begin) & (events < begin + period)] - begin
     middle = begin + (middle_of_longest(inside, period) if len(inside) else 0.5 * period)
-    index, s = late._places(np.array([middle]), "-")
+    index, s = late._segment_at(np.array([middle]), "-")
     segment = late._segments[int(index[0])]
     x = late(middle)
     rates = rates_of(late._system, float(s[0]), x, segment.p, segment.z)
@@ -234,10 +234,10 @@ def _without_events(
     return np.array([t for t in found if not is_event_near(late, events, t, period)]), j
 
 
-_FEW = 3  # last passages that are checked for events
+_LAST_PASSAGES = 3  # last passages that are checked for events
 
 
-def _goes_on(solution: Solution, moves: np.ndarray, steady: float) -> np.ndarray:
+def _drifts_steadily(solution: Solution, moves: np.ndarray, steady: float) -> np.ndarray:
     """Return which states (n,) with the given ranges move by the same amount in each quarter of a run."""
     steps = np.diff(solution(np.linspace(solution.t_start, solution.t_end, 5)), axis=1)
     is_steady = np.ptp(steps, axis=1) <= steady * np.abs(steps[:, 0])

@@ -46,10 +46,10 @@ if TYPE_CHECKING:
     from hybridsim.model import Model
 
 _SETTLE = 32  # periods of the first run
-_MOST_AT_ONCE = 512
+_MAX_PERIODS_PER_RUN = 512
 _MAX_PERIODS = 4096
-_MOST_PERIODS = 10**6  # more would take days
-_ALLOWANCE = 60.0  # approximate seconds for these periods
+_MAX_PERIODS_EVER = 10**6  # more would take days
+_TIME_BUDGET = 60.0  # approximate seconds for these periods
 _DURATION = 100.0  # of a first run without forcing, if the model has no duration
 _FIRST_RUN = {
     "events": 1000,
@@ -160,21 +160,21 @@ def steady_state(
         "integrator": integrator,
         "rtol": max(_TIGHTER * tol, 10.0 * arguments.SMALLEST_RTOL) if rtol is None else rtol,
     }
-    told = arguments.callback(progress)
+    report = arguments.callback(progress)
     refuse_unknown([steady_state, simulate], {**method, **options})
     motion = Motion(model, {**method, **options}, {"x0": x0, "z0": z0})
     for name, count in (("settle", settle), ("max_periods", max_periods)):
-        arguments.whole_number(count, name, 1, _MOST_PERIODS)
-    motion.allowance = _ALLOWANCE * max(1.0, max_periods / _MAX_PERIODS)
+        arguments.whole_number(count, name, 1, _MAX_PERIODS_EVER)
+    motion.time_budget = _TIME_BUDGET * max(1.0, max_periods / _MAX_PERIODS)
     search = _Search(motion, period, tol, settle, max_periods)
     try:
         if period is None and (periods := all_periods(system)):
-            motion.progress = told
+            motion.progress = report
             found = follow(motion, max(periods), max(settle, _FEWEST), max_periods)
             kind = EQUILIBRIUM if found.rests else QUASI if found.dies_out else UNSETTLED
             return _found(motion, kind, found.rests, periods=found.periods, message=found.message)
-        if told is not None:
-            motion.progress = lambda _: told(search.share)
+        if report is not None:
+            motion.progress = lambda _: report(search.share)
         return search.run()
     except (CostsTooMuch, GrowsWithoutBound) as fault:
         return _found(
@@ -257,7 +257,7 @@ class _Search:
         """Follow the motion from its present point for as long again as so far."""
         start = None if last is None else last.last
         if self.period is not None:
-            count = self.expected or min(max(self.settle, self.periods), _MOST_AT_ONCE)
+            count = self.expected or min(max(self.settle, self.periods), _MAX_PERIODS_PER_RUN)
             self.expected = 0
             self.periods += count
             phase = 0.0 if last is None else last.last.at
@@ -312,7 +312,7 @@ class _Search:
             if found.residual <= CLOSER * self.tol:
                 return found
         self.expected = (
-            math.ceil(min(_MARGIN * passings.more(multiple, self.tol), _MOST_AT_ONCE)) + 2 * multiple
+            math.ceil(min(_MARGIN * passings.more(multiple, self.tol), _MAX_PERIODS_PER_RUN)) + 2 * multiple
         )
         if self.period is not None and self.expected <= _WAIT:
             return None  # it settles before Newton's method would be ready
@@ -452,7 +452,7 @@ def _check_period(model: Model, period: float, own: float | None) -> None:
         )
 
 
-def _refuse_what_ends(system: System, is_period_given: bool) -> None:
+def _refuse_what_ends(system: System, has_period: bool) -> None:
     """Refuse impacts, and events or inputs that change the model permanently."""
     model = system.model
     if system.is_unilateral.any():
@@ -480,7 +480,7 @@ def _refuse_what_ends(system: System, is_period_given: bool) -> None:
             )
     tape = system.code.data["tape"]
     plain = tape is not None and any(source == system.layout.origin_at for _, source in tape["parameters"])
-    if plain and not is_period_given:
+    if plain and not has_period:
         raise UsageError(
             f"model {model.name} contains t outside of sines and cosines: its period is unknown",
             remedy="if the motion is periodic, pass period=",

@@ -107,8 +107,8 @@ class SuiteComparison(Readable):
                     left_out.setdefault(row.label, {}).setdefault(result.scene.name, []).append(setting(row))
         notes = [
             f"{label}, left out because of the time it takes: "
-            + "; ".join(f"{scene} at {', '.join(settings)}" for scene, settings in places.items())
-            for label, places in left_out.items()
+            + "; ".join(f"{scene} at {', '.join(settings)}" for scene, settings in scenes.items())
+            for label, scenes in left_out.items()
         ]
         for result in self.results:
             notes += [f"{result.scene.name}: {warning}" for warning in result.comparison.warnings]

@@ -9,7 +9,7 @@ from typing import Any
 
 from hybridsim.analysis.compare import comparison_request
 from hybridsim.analysis.compare.lines import Series, choose_series
-from hybridsim.analysis.compare.prepared_case import Bench
+from hybridsim.analysis.compare.prepared_case import PreparedCase
 from hybridsim.analysis.compare.reference import (
     CLOSED_FORM,
     MULTIPLE_PRECISION,
@@ -17,7 +17,7 @@ from hybridsim.analysis.compare.reference import (
     Reference,
     find_reference,
 )
-from hybridsim.analysis.compare.timed_runs import Budget, Entry, race
+from hybridsim.analysis.compare.timed_runs import Budget, Entry, timed_rows
 from hybridsim.analysis.progress import Progress, Steps
 from hybridsim.analysis.suite.result import SceneResult, SuiteComparison
 from hybridsim.analysis.suite.scenes import SCENES, Scene, scene_names
@@ -82,22 +82,22 @@ def compare_suite(
     rtols, steps = comparison_request.positives(rtols, "rtols"), comparison_request.wholes(steps, "steps")
     spending = Budget(_RUNNING * budget)
     chosen = _chosen(scenes)
-    benches = [_bench(scene) for scene in chosen]
+    cases = [_prepared_case(scene) for scene in chosen]
     lines = [
-        choose_series(integrators, rtols, steps, None if bench.period else bench.t_span[1] - bench.t_span[0])
-        for bench in benches
+        choose_series(integrators, rtols, steps, None if case.period else case.t_span[1] - case.t_span[0])
+        for case in cases
     ]
     runs = sum(len(line.values) for series in lines for line in series)
     step = Steps(len(chosen) + (1 + repeat) * runs, callback(progress))
     entries = []
-    for scene, bench, series in zip(chosen, benches, lines, strict=True):
+    for scene, case, series in zip(chosen, cases, lines, strict=True):
         step(f"reference of {scene.name}")
-        reference = _reference(bench, min(budget * _REFERENCE_SHARE, spending.left), step)
-        entries.append(Entry(bench, reference, series))
-    rows = race(entries, repeat, spending, step)
+        reference = _reference(case, min(budget * _REFERENCE_SHARE, spending.left), step)
+        entries.append(Entry(case, reference, series))
+    rows = timed_rows(entries, repeat, spending, step)
     step.finish()
     results = [
-        SceneResult(scene, entry.bench.comparison(entry.reference, found, repeat))
+        SceneResult(scene, entry.case.comparison(entry.reference, found, repeat))
         for scene, entry, found in zip(chosen, entries, rows, strict=True)
     ]
     return SuiteComparison(tuple(results), repeat, budget, spending.spent)
@@ -106,7 +106,7 @@ def compare_suite(
 def _chosen(names: Sequence[str] | None) -> tuple[Scene, ...]:
     if names is None:
         return SCENES
-    names = comparison_request.words(names, "scenes")
+    names = comparison_request.checked_names(names, "scenes")
     for name in names:
         if name not in scene_names():
             raise UsageError(
@@ -117,14 +117,14 @@ def _chosen(names: Sequence[str] | None) -> tuple[Scene, ...]:
     return tuple(scene for scene in SCENES if scene.name in names)
 
 
-def _bench(scene: Scene) -> Bench:
+def _prepared_case(scene: Scene) -> PreparedCase:
     model = load(scene.model).with_(**scene.params).validate()
     period = forcing_period(model)
     length = scene.t_end if scene.periods is None else scene.periods * (period or math.nan)
-    return Bench(model, (0.0, float(length or math.nan)), period)
+    return PreparedCase(model, (0.0, float(length or math.nan)), period)
 
 
-def _reference(bench: Bench, seconds: float, step: Callable[[str], None]) -> Reference:
+def _reference(case: PreparedCase, seconds: float, step: Callable[[str], None]) -> Reference:
     """Find a reference that is independent of the engine; if that takes too long, use two runs and add a warning."""
     limit = Budget(seconds)
 
@@ -133,7 +133,7 @@ def _reference(bench: Bench, seconds: float, step: Callable[[str], None]) -> Ref
             raise _TooSlow
 
     def find(kinds: tuple[str, ...]) -> Reference:
-        return find_reference(bench.model, bench.t_span, bench.period, bench.simulate, kinds, watch)
+        return find_reference(case.model, case.t_span, case.period, case.simulate, kinds, watch)
 
     try:
         return find((CLOSED_FORM, MULTIPLE_PRECISION, RUNS))

@@ -69,9 +69,9 @@ class Points:
         """Return the settings of the axes at some points."""
         if self.mode == "list":
             return [tuple(axis.settings[k] for axis in self.axes) for k in numbers]
-        places = np.unravel_index(np.asarray(numbers), self.shape)
+        indices = np.unravel_index(np.asarray(numbers), self.shape)
         columns: list[list[float | Expression]] = [
-            [row[i] for i in p.tolist()] for row, p in zip(self._parsed, places, strict=True)
+            [row[i] for i in p.tolist()] for row, p in zip(self._parsed, indices, strict=True)
         ]
         return list(zip(*columns, strict=True))
 
@@ -174,17 +174,19 @@ def _setting(name: str, value: Any) -> float | Expression:
 def _values(model: Model, name: str, row: Sequence[float | Expression], swept: frozenset[str]) -> np.ndarray:
     """Return the numbers of the settings, or their texts if a number would depend on another axis."""
     declared = {p.name: p.value for p in model.parameters}
-    needed = {}
+    dependencies = {}
     for setting in row:
         if isinstance(setting, Expression):
             require_names(setting, declared)
-            needed[setting] = _needed({**declared, name: setting}, name)
-    if any(parameters.keys() & (swept - {name}) for parameters in needed.values()):
+            dependencies[setting] = _dependencies({**declared, name: setting}, name)
+    if any(parameters.keys() & (swept - {name}) for parameters in dependencies.values()):
         return np.array([s.text if isinstance(s, Expression) else f"{s!r}" for s in row], dtype=np.str_)
-    return np.array([_number(name, needed[s]) if isinstance(s, Expression) else s for s in row], dtype=float)
+    return np.array(
+        [_number(name, dependencies[s]) if isinstance(s, Expression) else s for s in row], dtype=float
+    )
 
 
-def _needed(declared: Mapping[str, Expression], name: str) -> dict[str, Expression]:
+def _dependencies(declared: Mapping[str, Expression], name: str) -> dict[str, Expression]:
     """Return a parameter and all parameters that its value depends on."""
     found: dict[str, Expression] = {}
     waiting = {name}
@@ -195,9 +197,9 @@ def _needed(declared: Mapping[str, Expression], name: str) -> dict[str, Expressi
     return found
 
 
-def _number(name: str, needed: Mapping[str, Expression]) -> float:
+def _number(name: str, dependencies: Mapping[str, Expression]) -> float:
     """Return the value of a parameter; NaN if it has none, which is an error of that point only."""
     try:
-        return resolve(needed)[name]
+        return resolve(dependencies)[name]
     except ExpressionError:
         return math.nan

@@ -113,7 +113,7 @@ def bifurcation(
         raise UsageError(
             f"{parameter} is a state", remedy="vary a parameter; initial values are swept with hs.sweep"
         )
-    watched, level = with_section(base, section)
+    with_level, level = with_section(base, section)
     measure = Section(
         level,
         whole(settle, "settle"),
@@ -123,7 +123,7 @@ def bifurcation(
         options,
     )
     branches = _Branches(points, len(points.axes[0].values))
-    job = Job(new_token(), watched, (parameter,), frozenset(), measure, True)
+    job = Job(new_token(), with_level, (parameter,), frozenset(), measure, True)
     count = None if workers is None else whole(workers, "workers")
     began = time.perf_counter()
     collected, finished, who = work(job, branches, executor, count, callback(progress))

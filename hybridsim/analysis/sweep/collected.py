@@ -21,7 +21,7 @@ class Collected:
         self.status = np.full(total, NOT_RUN, dtype=object)
         self.done = 0
         self._arrays: dict[str, np.ndarray] = {}
-        self._places: dict[
+        self._first_positions: dict[
             str, tuple[int, int]
         ] = {}  # for each name: the first point that has it, and the position there
 
@@ -30,11 +30,11 @@ class Collected:
         for number, (status, found) in zip(numbers, outcomes):
             self.status[number] = status
             for place, (name, value) in enumerate((found or {}).items()):
-                if (number, place) < self._places.get(name, (len(self.status), 0)):
-                    self._places[name] = number, place
+                if (number, place) < self._first_positions.get(name, (len(self.status), 0)):
+                    self._first_positions[name] = number, place
                 array = self._arrays.get(name)
                 if array is None or not _fits(array, value):
-                    array = self._arrays[name] = self._room(array, value)
+                    array = self._arrays[name] = self._enlarged(array, value)
                 if array.ndim == 1:
                     array[number] = value
                 else:
@@ -48,10 +48,10 @@ class Collected:
         for name, value in (nothing or {}).items():
             if name not in self._arrays:
                 self._arrays[name] = np.full(len(self.status), value, dtype=_kind(value))
-        names = sorted(self._arrays, key=lambda name: self._places.get(name, (len(self.status), 0)))
+        names = sorted(self._arrays, key=lambda name: self._first_positions.get(name, (len(self.status), 0)))
         return {name: self._arrays[name].reshape(*shape, *self._arrays[name].shape[1:]) for name in names}
 
-    def _room(self, old: np.ndarray | None, value: Reading) -> np.ndarray:
+    def _enlarged(self, old: np.ndarray | None, value: Reading) -> np.ndarray:
         """Return an array for such values with the content of the old one."""
         total, kind = len(self.status), _kind(value)
         long = np.ndim(value) == 1

@@ -65,10 +65,10 @@ def frequency_response(
         raise UsageError(
             f"model {model.name} has no states", remedy="give a model with a state that responds"
         )
-    words = [f"amplitude.{model.states[0].name if quantity is None else text(quantity, 'quantity')}"]
+    readings = [f"amplitude.{model.states[0].name if quantity is None else text(quantity, 'quantity')}"]
     for contact in model.contacts:
-        words += [f"stick_fraction.{contact.name}", f"stops_per_period.{contact.name}"]
+        readings += [f"stick_fraction.{contact.name}", f"stops_per_period.{contact.name}"]
     # with warm starts the chain runs along the frequency, which is the first axis
     if options.get("warm_start"):
-        return sweep(model, {frequency: frequencies, **others}, words, **options)
-    return sweep(model, {**others, frequency: frequencies}, words, **options)
+        return sweep(model, {frequency: frequencies, **others}, readings, **options)
+    return sweep(model, {**others, frequency: frequencies}, readings, **options)

@@ -49,10 +49,10 @@ def identity(value: Any) -> str:
     UsageError
         For an object whose state cannot be read.
     """
-    return _Teller().of(value)
+    return _Describer().of(value)
 
 
-class _Teller:
+class _Describer:
     """Identifies values that may contain one another."""
 
     def __init__(self) -> None:
@@ -67,13 +67,13 @@ class _Teller:
         if id(value) in self._known:
             return self._known[id(value)]
         self._around.append(id(value))
-        told = self._told(value)
+        described = self._describe(value)
         self._around.pop()
         if isinstance(value, FunctionType | type):
-            told = self._known[id(value)] = hashlib.sha256(told.encode()).hexdigest()
-        return told
+            described = self._known[id(value)] = hashlib.sha256(described.encode()).hexdigest()
+        return described
 
-    def _told(self, value: Any) -> str:
+    def _describe(self, value: Any) -> str:
         if isinstance(value, ModuleType):
             return _of_module(value.__name__)
         if isinstance(value, FunctionType | type) and _is_library(_module(value)):
@@ -106,7 +106,7 @@ class _Teller:
             return self.of(value.item())
         if isinstance(value, Mapping) and _is_library(_module(type(value))):
             keys = sorted(((self.of(key), key) for key in value), key=itemgetter(0))
-            return f"{{{', '.join(f'{told}: {self.of(value[key])}' for told, key in keys)}}}"
+            return f"{{{', '.join(f'{described}: {self.of(value[key])}' for described, key in keys)}}}"
         if type(value) in (list, tuple):
             return f"({', '.join(map(self.of, value))})"
         if type(value) in (set, frozenset):
@@ -145,9 +145,9 @@ class _Teller:
             ) from error
         if isinstance(state, str):
             return f"{_of_module(_module(value))}.{state}"
-        made, given, *rest = state
+        made, arguments, *rest = state
         held, items, pairs = (*rest, None, None, None)[:3]
-        return self.of((made, given, held, list(items or ()), dict(pairs or ())))
+        return self.of((made, arguments, held, list(items or ()), dict(pairs or ())))
 
 
 def _module(value: Any) -> str:

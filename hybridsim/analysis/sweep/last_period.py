@@ -45,14 +45,14 @@ class MeasuredPeriod(Measures):
 class LastPeriod:
     """Readings of the period that ends `after` forcing periods from the start."""
 
-    words: tuple[str, ...]
+    reading_names: tuple[str, ...]
     after: int
     options: Mapping[str, Any]
     read_one: Callable[[Any, str], Any]
 
     def nothing(self) -> dict[str, float | str]:
         """Return the readings of a point without a result."""
-        return {word: "" if word == "word" else math.nan for word in self.words}
+        return {word: "" if word == "word" else math.nan for word in self.reading_names}
 
     def run(self, model: Model, previous: Any) -> MeasuredPeriod:
         """Make one run."""
@@ -65,8 +65,8 @@ class LastPeriod:
         return MeasuredPeriod(solution, period)
 
     def read(self, result: MeasuredPeriod) -> dict[str, Any]:
-        """Return the readings in the order of the words."""
-        return {word: self.read_one(result, word) for word in self.words}
+        """Return the readings in the order of their names."""
+        return {word: self.read_one(result, word) for word in self.reading_names}
 
     def together(
         self,
@@ -83,20 +83,20 @@ class LastPeriod:
         from hybridsim.ensemble.runs import Ensemble, can_run_together
 
         system = system_of(job.model)
-        readers = [_reader(word, system) for word in self.words]
+        readers = [_reader(word, system) for word in self.reading_names]
         if not self._is_plain() or None in readers or not can_run_together(system):
             return None
         parameters, starts, sound = Setter(job.model, job.names, job.at).values(points)
         outcomes: list[Outcome | None] = [None] * len(points)
-        for last in Ensemble(system, watch.goes_on).runs(parameters[sound], starts[sound], self.after):
+        for last in Ensemble(system, watch.may_continue).runs(parameters[sound], starts[sound], self.after):
             rows = np.array([read(last) for read in readers if read]).T.tolist()
             for number, row in zip(sound[last.numbers].tolist(), rows, strict=True):
-                outcomes[number] = _outcome(dict(zip(self.words, row, strict=True)))
+                outcomes[number] = _outcome(dict(zip(self.reading_names, row, strict=True)))
             watch.tell(len(rows))
         known: list[Outcome] = []
         for outcome, settings in zip(outcomes, points, strict=True):
             if outcome is None:
-                if not watch.goes_on():
+                if not watch.may_continue():
                     break
                 outcome = alone(settings)
                 watch.tell(1)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from hybridsim.analysis.sweep.named_measures import ready_measure
+from hybridsim.analysis.sweep.named_measures import named_measure
 from hybridsim.analysis.sweep.sweep_request import refuse_what_it_does_not_take
 from hybridsim.analysis.sweep.work.job import Measure
 from hybridsim.arguments import is_row
@@ -15,7 +15,7 @@ from hybridsim.model import Model
 
 
 @dataclass(frozen=True)
-class Given:
+class UserFunction:
     """A function of the user's, of the model and, in a chain, of the neighbour's result."""
 
     function: Callable[..., Any]
@@ -37,12 +37,12 @@ def measure_of(measure: Any, model: Model, chained: bool, options: Mapping[str, 
     """Return the measure for the argument of `sweep`."""
     if callable(measure):
         refuse_what_it_does_not_take(measure, options)
-        return Given(measure, options, chained)
+        return UserFunction(measure, options, chained)
     if isinstance(measure, str):
-        return ready_measure(measure, model, options)
-    words = tuple(measure) if is_row(measure) else ()
-    if words and all(isinstance(word, str) for word in words):
-        return ready_measure(words, model, options)
+        return named_measure(measure, model, options)
+    names = tuple(measure) if is_row(measure) else ()
+    if names and all(isinstance(word, str) for word in names):
+        return named_measure(names, model, options)
     raise UsageError(
         f"measure is {measure!r}", remedy="give a function of the model, or the name of a built-in measure"
     )

@@ -35,12 +35,12 @@ class Steady:
     A motion that does not repeat has no such measures; its status names its kind.
     """
 
-    words: tuple[str, ...]
+    reading_names: tuple[str, ...]
     options: Mapping[str, Any]
 
     def nothing(self) -> dict[str, float | str]:
         """Return the readings of a point without a result."""
-        return {word: "" if word in _TEXTS else math.nan for word in self.words}
+        return {word: "" if word in _TEXTS else math.nan for word in self.reading_names}
 
     def run(self, model: Model, previous: SteadyState | None) -> SteadyState:
         """Return the steady state, searched from that of the neighbour if there is one."""
@@ -50,11 +50,13 @@ class Steady:
         return steady_state(model, **{**self.options, **start})
 
     def read(self, result: SteadyState) -> dict[str, Any]:
-        """Return the readings in the order of the words."""
+        """Return the readings in the order of their names."""
         if not result.success:
-            known = {name: getattr(result, name) for name in self.words if name in ("kind", "residual")}
+            known = {
+                name: getattr(result, name) for name in self.reading_names if name in ("kind", "residual")
+            }
             raise Incomplete(f"{result.kind}: {result.message}", known)
-        return {word: _reading(result, word) for word in self.words}
+        return {word: _reading(result, word) for word in self.reading_names}
 
     def blank(self, result: SteadyState) -> tuple[str, ...]:
         """Return the readings that do not exist for a result: an equilibrium has no period."""
@@ -76,10 +78,10 @@ class Final:
         """Return the states by name, from a run that starts at the neighbour's end if there is one."""
         from hybridsim.simulate import simulate
 
-        given = {"save": "nothing", **self.options}
+        arguments = {"save": "nothing", **self.options}
         if previous is not None:
-            given["x0"] = previous
-        solution = simulate(model, **given)
+            arguments["x0"] = previous
+        solution = simulate(model, **arguments)
         if not solution.success:
             raise SimulationError(f"{solution.status}: {solution.message}")
         return dict(zip(solution.names, solution.y[:, -1].tolist(), strict=True))
@@ -89,8 +91,8 @@ class Final:
         return {f"{FINAL}.{name}": result[name] for name in self.names}
 
 
-def ready_measure(
-    words: str | Sequence[str], model: Model, options: Mapping[str, Any]
+def named_measure(
+    reading_names: str | Sequence[str], model: Model, options: Mapping[str, Any]
 ) -> Steady | Final | LastPeriod:
     """Return a measure given by its name, "steady" or "final", or by the names of its readings.
 
@@ -99,7 +101,7 @@ def ready_measure(
     UsageError
         For unknown names, or readings of both kinds together.
     """
-    asked = (words,) if isinstance(words, str) else tuple(words)
+    asked = (reading_names,) if isinstance(reading_names, str) else tuple(reading_names)
     states = [state.name for state in model.states]
     from hybridsim.analysis.steady import steady_state
     from hybridsim.simulate import simulate
@@ -107,13 +109,13 @@ def ready_measure(
     heads = {word.partition(".")[0] for word in asked}
     if heads == {FINAL}:
         if "t_span" not in options:
-            raise UsageError(f"measure is {words!r} without t_span", remedy="give t_span=(0, ...)")
+            raise UsageError(f"measure is {reading_names!r} without t_span", remedy="give t_span=(0, ...)")
         refuse_unknown([simulate], options)
         names = states if asked == (FINAL,) else [_of(word, states, "states") for word in asked]
         return Final(tuple(names), options)
     if FINAL in heads:
         raise UsageError(
-            f"measure is {words!r}",
+            f"measure is {reading_names!r}",
             remedy="steady states and ends of runs need two sweeps; ask for one of them",
         )
     if AFTER in options:
@@ -146,7 +148,7 @@ def ready_measure(
     return Steady(asked, options)
 
 
-def _last_period(words: tuple[str, ...], model: Model, options: dict[str, Any]) -> LastPeriod:
+def _last_period(reading_names: tuple[str, ...], model: Model, options: dict[str, Any]) -> LastPeriod:
     after = whole(options.pop(AFTER), AFTER)
     for name in ("t_span", "save", "t_eval"):
         if name in options:
@@ -154,14 +156,14 @@ def _last_period(words: tuple[str, ...], model: Model, options: dict[str, Any]) 
                 f"{name} and after cannot be combined", remedy="leave it out: the last period is kept"
             )
     period_of(model)  # an unforced model is refused here, once for all points
-    return LastPeriod(words, after, options, _reading)
+    return LastPeriod(reading_names, after, options, _reading)
 
 
-def units_of_readings(words: Iterable[str], model: Model) -> dict[str, str]:
+def units_of_readings(reading_names: Iterable[str], model: Model) -> dict[str, str]:
     """Return the units of named readings, as far as the model declares them."""
     known, time = units_of(model), time_unit(model)
     units = {}
-    for word in words:
+    for word in reading_names:
         head, _, rest = word.partition(".")
         if head == "period":
             units[word] = time

@@ -32,8 +32,8 @@ class Setter:
         self._start = np.array(list(model.start_values().values()), dtype=float)
         others = [p.value for p in model.parameters if p.name not in names]
         others += [s.start for s in model.states if s.name not in names]
-        needed = set().union(*(expression.names for expression in others), checked_names(model))
-        self._is_plain = not needed & set(names)
+        read_names = set().union(*(expression.names for expression in others), checked_names(model))
+        self._is_plain = not read_names & set(names)
         self._known: dict[Expression, float] = {}
 
     def values(self, points: Sequence[Settings]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

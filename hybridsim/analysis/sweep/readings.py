@@ -47,8 +47,8 @@ def _reading(name: str, value: Any) -> Reading:
     if is_row(value) or isinstance(value, np.ndarray | np.generic):
         array = np.asarray(value)
         if array.ndim <= 1 and array.dtype.kind in "fiubc":
-            kept = array.astype(complex if array.dtype.kind == "c" else float)
-            return kept if kept.ndim else kept.item()
+            converted = array.astype(complex if array.dtype.kind == "c" else float)
+            return converted if converted.ndim else converted.item()
     elif isinstance(value, complex):
         return value
     else:

@@ -24,7 +24,7 @@ REPEATS = "repeats_after"
 _DURATION = (
     10.0  # the first interval of a model without a duration: a few swings of a mechanism of about 1 Hz
 )
-_STRETCHES = 12  # each twice as long as the previous one, the last two thousand times the first
+_ATTEMPTS = 12  # each twice as long as the previous one, the last two thousand times the first
 _FEWEST = 32  # periods of a first interval with forcing: a section that is not passed in them is not reached
 _EMPTY_FREE = 5  # intervals without any passage after which the search ends, without forcing
 
@@ -80,23 +80,23 @@ class Section:
         return Passings(run(times, side="-").T, _sizes(run), point_at_end(run))
 
     def _passed(self, motion: Motion, start: Point | None) -> Passings:
-        wanted = self.settle + self.samples
+        passages = self.settle + self.samples
         period = common_period(system_of(motion.model))
-        length = motion.model.duration_value() or (period * max(wanted, _FEWEST) if period else _DURATION)
-        for stretch in range(1, _STRETCHES + 1):
+        length = motion.model.duration_value() or (period * max(passages, _FEWEST) if period else _DURATION)
+        for attempt in range(1, _ATTEMPTS + 1):
             # from the start each time, because a motion with forcing or a clock cannot be cut anywhere
             run = motion.run(start, length)
             found = [e.x_minus for e in run.events if e.component == self.level and e.kind == "monitor"]
-            if len(found) >= wanted:
-                return Passings(np.array(found[self.settle : wanted]), _sizes(run), point_at_end(run))
-            if not found and (period or stretch == _EMPTY_FREE):
+            if len(found) >= passages:
+                return Passings(np.array(found[self.settle : passages]), _sizes(run), point_at_end(run))
+            if not found and (period or attempt == _EMPTY_FREE):
                 raise SimulationError(
                     f"the section was not crossed upward in a run of length {length:.6g}: the motion does not reach "
                     "it, or a contact sticks there"
                 )
             length *= 2.0
         raise SimulationError(
-            f"the section was crossed {len(found)} times, but {wanted} crossings are needed"
+            f"the section was crossed {len(found)} times, but {passages} crossings are needed"
         )
 
 

@@ -42,11 +42,11 @@ def agreed(
         ends = np.concatenate([both.x, both.discrete])
         shifts = np.array([shift for _, shift in both.times]).reshape(len(times), 2 * count)
         sizes = carrier.sizes() / carrier.own_sizes(directions)[chosen]
-        end[:, chosen] = _meeting(ends[:, :count], -ends[:, count:], _ROUNDING * sizes, lost < np.inf)
+        end[:, chosen] = _agreeing(ends[:, :count], -ends[:, count:], _ROUNDING * sizes, lost < np.inf)
         length = carrier.solution.t_end - carrier.solution.t_start
         at = np.array([t for t, _ in carried.times])
         least = _ROUNDING * length / carrier.own_sizes(directions)[chosen]
-        times[:, chosen] = _meeting(shifts[:, :count], -shifts[:, count:], least, at[:, None] > lost)
+        times[:, chosen] = _agreeing(shifts[:, :count], -shifts[:, count:], least, at[:, None] > lost)
     differs = np.isnan(end).any(axis=0) | np.isnan(times).any(axis=0)
     parted = [
         (f"at t = {one.t:.9g} {one.name} is exactly at its zero", one.moves & differs) for one in carried.off
@@ -54,7 +54,7 @@ def agreed(
     return end, times, [(name, mask) for name, mask in parted if mask.any()]
 
 
-def _meeting(one: np.ndarray, other: np.ndarray, least: np.ndarray, lost: np.ndarray) -> np.ndarray:
+def _agreeing(one: np.ndarray, other: np.ndarray, least: np.ndarray, lost: np.ndarray) -> np.ndarray:
     """Return the derivatives if both sides agree; NaN elsewhere, and for lost directions."""
     apart = np.abs(one - other) > _AGREE * (np.abs(one) + np.abs(other)) + least
     return np.where(apart | lost, np.nan, 0.5 * (one + other))

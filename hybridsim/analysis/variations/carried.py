@@ -25,8 +25,8 @@ from hybridsim.analysis.variations.off_zero import (
     OffZero,
     beyond,
     differ,
-    limits_at_zero,
-    monitors_at_zero,
+    limits_reached,
+    monitors_reached,
     off_zero,
     rates_of,
 )
@@ -40,9 +40,15 @@ from hybridsim.analysis.variations.rounds import (
     lifted_vector,
 )
 from hybridsim.analysis.variations.seeds import rate_slopes, seeds
+from hybridsim.analysis.variations.segment_events import (
+    Last,
+    SegmentEvents,
+    at_start,
+    segment_events_of,
+    time_rounding,
+)
 from hybridsim.analysis.variations.sizes import sizes
 from hybridsim.analysis.variations.smooth import transition
-from hybridsim.analysis.variations.stretches import Last, Stretch, at_start, stretches_of, time_rounding
 from hybridsim.engine.series.dual_numbers import differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.system.tangents import TangentTape
 from hybridsim.errors import UsageError
@@ -91,14 +97,16 @@ class Carrier:
         self._off: list[OffZero] = []
         event_times, last = EventTimes(self._changes), None
         times: list[tuple[float, np.ndarray]] = []
-        stretches = list(stretches_of(self.solution))
-        if any(not is_recorded(self.system, one) for one in stretches[-1].happened):
-            whole = stretches[-1].segment  # at the end, and left the states and modes as they were
-            stretches.append(Stretch(replace(whole, s=whole.s[-1:], x=whole.x[-1:]), (), ()))
-        Y, Yd = self._started(stretches[0].segment, Y, Yd, G, event_times)
-        for stretch, following in zip(stretches, [*stretches[1:], None], strict=True):
-            segment, s = stretch.segment, float(stretch.segment.s[0])
-            for one in stretch.recorded:
+        all_segment_events = list(segment_events_of(self.solution))
+        if any(not is_recorded(self.system, one) for one in all_segment_events[-1].happened):
+            whole = all_segment_events[-1].segment  # at the end, and left the states and modes as they were
+            all_segment_events.append(SegmentEvents(replace(whole, s=whole.s[-1:], x=whole.x[-1:]), (), ()))
+        Y, Yd = self._started(all_segment_events[0].segment, Y, Yd, G, event_times)
+        for segment_events, following in zip(
+            all_segment_events, [*all_segment_events[1:], None], strict=True
+        ):
+            segment, s = segment_events.segment, float(segment_events.segment.s[0])
+            for one in segment_events.recorded:
                 here = one.instant.minus(segment.origin)
                 Y, s = self._over(segment, Y, Yd, G, s, here), here
                 x = segment.dense(np.array([here]))[0]
@@ -106,14 +114,14 @@ class Carrier:
             Y = self._over(segment, Y, Yd, G, s, float(segment.s[-1]))
             if following is None:
                 break
-            behind = self._through(stretch, following.segment, Y, Yd, G, event_times)
+            behind = self._through(segment_events, following.segment, Y, Yd, G, event_times)
             if self._is_end(following.segment) and last is None:
-                last = Last(segment, Y, Yd, behind[2], stretch.happened)
+                last = Last(segment, Y, Yd, behind[2], segment_events.happened)
             Y, Yd, shift = behind
-            if any(one.kind != "corner" for one in stretch.happened):
+            if any(one.kind != "corner" for one in segment_events.happened):
                 times.append((float(following.segment.start), shift))
         if last is not None:
-            Y, Yd = self._at_end(last, stretches[-1].segment, Y, Yd)
+            Y, Yd = self._at_end(last, all_segment_events[-1].segment, Y, Yd)
         return Carried(Y, Yd, times, self._off, self._lost)
 
     def _is_end(self, segment: Segment) -> bool:
@@ -199,7 +207,7 @@ class Carrier:
         before = rates_of(self.system, float(segment.s[0]), x, segment.p, z)
         at = _place(rounds, segment)
         later = replace(at, s=float(segment.s[:2][-1]), x=segment.x[:2][-1])
-        off = monitors_at_zero(self._changes, at, later)
+        off = monitors_reached(self._changes, at, later)
         Y = self._settled(rounds, segment, x, before) + self._note(off)
         return self._projected(segment, Y, rounds.Yd, G), rounds.Yd
 
@@ -245,19 +253,19 @@ class Carrier:
 
     def _through(
         self,
-        stretch: Stretch,
+        segment_events: SegmentEvents,
         following: Segment,
         Y: np.ndarray,
         Yd: np.ndarray,
         G: np.ndarray,
         event_times: EventTimes,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        segment = stretch.segment
+        segment = segment_events.segment
         system, s = self.system, float(segment.s[-1])
         x = segment.x[-1]
-        happened = [one for one in stretch.happened if not is_recorded(system, one)]
-        if not happened and stretch.happened:
-            return Y, Yd, event_times.recorded(segment, stretch.happened[0], s, x, Y, Yd)
+        happened = [one for one in segment_events.happened if not is_recorded(system, one)]
+        if not happened and segment_events.happened:
+            return Y, Yd, event_times.recorded(segment, segment_events.happened[0], s, x, Y, Yd)
         shift = event_times.of(segment, happened, s, x, Y, Yd)
         before = rates_of(system, s, x, segment.p, segment.z)
         moved = np.outer(before, shift)
@@ -274,7 +282,7 @@ class Carrier:
                 rounds.at_appointment(following.start, batch)
             else:
                 rounds.at_end(segment, batch)
-        Yd, at_once = rounds.Yd, rounds.Y
+        Yd, immediate = rounds.Yd, rounds.Y
         if self._is_end(
             following
         ):  # a state that a jump moves off its surface has no time to return, and no guard fires
@@ -289,13 +297,13 @@ class Carrier:
             }
             surfaces = [c for c in sorted(changed) if system.automata[c].has_surface]
             more = (
-                self._note(limits_at_zero(self._changes, _place(rounds, following), surfaces))
+                self._note(limits_reached(self._changes, _place(rounds, following), surfaces))
                 if surfaces
                 else 0.0
             )
             Y = rounds.Y + more - np.outer(self._rates_at_start(following), rounds.shift)
         Y = self._projected(following, Y, Yd, G)
-        return np.where(self._is_end(following) & ~self._moves(shift), at_once, Y), Yd, shift
+        return np.where(self._is_end(following) & ~self._moves(shift), immediate, Y), Yd, shift
 
     def _rates_at_start(self, segment: Segment) -> np.ndarray:
         return rates_of(self.system, float(segment.s[0]), segment.x[0], segment.p, segment.z)

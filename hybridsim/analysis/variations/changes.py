@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _ALIKE = 1e-7  # of its terms: a smaller change is zero
 _ROUNDING = 1e-11  # of the effect of a change of everything by its own size: a smaller one is rounding
 _EXACT = 2.0**-46  # of its terms: a smaller value is zero
-_AT_ZERO = 1e-9  # of a guard's terms along the run: it is at zero, and so has fired by itself
+_ZERO = 1e-9  # of a guard's terms along the run: it is at zero, and so has fired by itself
 _TANGENTIAL = (
     1e-9  # a guard that falls by less than this part of its terms leaves the time of its event undefined
 )
@@ -122,7 +122,7 @@ class Changes:
                     row[:n],
                     float(row[n]),
                     bool(abs(value) <= _EXACT * exact),
-                    bool(abs(value) <= _AT_ZERO * size),
+                    bool(abs(value) <= _ZERO * size),
                 )
             )
         return result

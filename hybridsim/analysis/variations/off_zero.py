@@ -60,13 +60,13 @@ def off_zero(changes: Changes, at: Place) -> tuple[np.ndarray, list[OffZero]]:
     return sides.at.Y, off + sides.guards()
 
 
-def limits_at_zero(changes: Changes, at: Place, components: Sequence[int]) -> list[OffZero]:
+def limits_reached(changes: Changes, at: Place, components: Sequence[int]) -> list[OffZero]:
     """Return the limits that are exactly reached by components that have just begun to hold, or pass a surface."""
     sides = _Sides(changes, at)
     return [one for c in components for one in sides.limits(c)]
 
 
-def monitors_at_zero(changes: Changes, at: Place, later: Place) -> list[OffZero]:
+def monitors_reached(changes: Changes, at: Place, later: Place) -> list[OffZero]:
     """Return monitors at zero at the start of a run, which from one side would fire a little later.
 
     later : a later place; it gives the side if the rate at the start is zero.
@@ -98,18 +98,18 @@ class _Sides:
 
     def guards(self) -> list[OffZero]:
         """Return the guards at zero that do not fire, and would fire with an effect on one side only."""
-        places = [
+        guards_here = [
             (c, i, g)
             for c, automaton in enumerate(self.system.automata)
             if not automaton.has_surface
             for i, g in enumerate(automaton.guards[self.at.z[c]])
         ]
-        if not places:
+        if not guards_here:
             return []
-        numbers = tuple(g for _, _, g in places)
+        numbers = tuple(g for _, _, g in guards_here)
         found, before = self.changes.of(self.at, numbers), self.changes.of(self.before, numbers)
         off = []
-        for (c, i, _), one, earlier in zip(places, found, before, strict=True):
+        for (c, i, _), one, earlier in zip(guards_here, found, before, strict=True):
             if one.is_zero and one.moves.any():
                 off += self._guard(c, i, one)
             if one.is_zero and (earlier.moves & self.pushed).any():  # it may fire before holding is restored

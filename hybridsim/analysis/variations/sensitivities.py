@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybridsim.analysis.compare.comparison_request import words
+from hybridsim.analysis.compare.comparison_request import checked_names
 from hybridsim.analysis.variations.both_sides import agreed
 from hybridsim.analysis.variations.carried import Carrier
 from hybridsim.analysis.variations.directions import Carried, Directions
@@ -137,7 +137,7 @@ def _found(
     solution: Solution,
     parameters: Sequence[str] | None,
     starts_follow: bool,
-    decide: Callable[
+    combine: Callable[
         [Carrier, Directions, Carried], tuple[np.ndarray, np.ndarray, list[tuple[str, np.ndarray]]]
     ],
 ) -> Sensitivities:
@@ -146,7 +146,7 @@ def _found(
     model, system = solution.model, solution._system
     names = [p.name for p in model.parameters]
     starts_follow = flag(starts_follow, "starts_follow")
-    chosen = tuple(names) if parameters is None else words(parameters, "parameters")
+    chosen = tuple(names) if parameters is None else checked_names(parameters, "parameters")
     for name in chosen:
         if name not in names:
             raise UsageError(
@@ -168,7 +168,7 @@ def _found(
     )
     carrier = Carrier(solution)
     carried = carrier.carry(directions)
-    end, shifts, parted = decide(carrier, directions, carried)
+    end, shifts, parted = combine(carrier, directions, carried)
     states = (*solution.names, *(q.name for q in model.discrete))
     changed = [*(f"the start of {name}" for name in states), *chosen]
     return Sensitivities(

@@ -32,8 +32,8 @@ _CANCELS = (
 )
 
 _FADES = 32  # decays by a factor e per step of the run: explicit methods stay below it, stiff methods do not
-_AT_ONCE = 2**22  # entries of the linear systems that are solved together
-_TURNS = 2**17  # additional radians that are followed; more take minutes
+_ENTRIES_PER_BATCH = 2**22  # entries of the linear systems that are solved together
+_MAX_RADIANS = 2**17  # additional radians that are followed; more take minutes
 
 
 class Collocation(NamedTuple):
@@ -76,30 +76,30 @@ def transition(slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: 
     fades, turns = _work(slopes, begins, ends)
     if fades > _FADES * len(begins) + 2**12:
         return stiff_transition(slopes, knots, scale, constants)
-    if turns > _FADES * len(begins) + _TURNS:
+    if turns > _FADES * len(begins) + _MAX_RADIANS:
         raise UsageError(
             f"derivatives between t = {knots[0]:.9g} and {knots[-1]:.9g} (since the last event) oscillate over about "
             f"{turns:.1g} radians: following that takes minutes or longer",
             remedy="simulate a shorter time, or choose parameters for which the motion is slower",
         )
-    pieces: list[tuple[np.ndarray, np.ndarray]] = []
+    found_parts: list[tuple[np.ndarray, np.ndarray]] = []
     before = np.full(len(begins), np.inf)
     for halving in range(_HALVINGS):
-        count = 1 + len(begins) * (_STAGES * len(scale)) ** 2 // _AT_ONCE
+        count = 1 + len(begins) * (_STAGES * len(scale)) ** 2 // _ENTRIES_PER_BATCH
         parts = np.array_split(np.arange(len(begins)), count)
-        done = [_pieces(slopes, begins[part], ends[part], scale, constants) for part in parts]
+        done = [_transitions(slopes, begins[part], ends[part], scale, constants) for part in parts]
         found, tails = (np.concatenate(each) for each in zip(*done, strict=True))
         is_rounding = (tails <= _NOISE) & (tails >= 0.7 * before)
         good = (tails <= _RESOLVED) | is_rounding | (halving == _HALVINGS - 1)
-        pieces.append((begins[good], found[good]))
+        found_parts.append((begins[good], found[good]))
         if good.all():
             break
         begins, ends, before = begins[~good], ends[~good], tails[~good]
         middle = 0.5 * (begins + ends)
         begins, ends = np.concatenate([begins, middle]), np.concatenate([middle, ends])
         before = np.concatenate([before, before])
-    starts = np.concatenate([b for b, _ in pieces])
-    matrices = np.concatenate([m for _, m in pieces])[np.argsort(starts, kind="stable")]
+    starts = np.concatenate([b for b, _ in found_parts])
+    matrices = np.concatenate([m for _, m in found_parts])[np.argsort(starts, kind="stable")]
     n = matrices.shape[1]
     total = np.eye(n, matrices.shape[2])
     for matrix in matrices:
@@ -160,7 +160,7 @@ def stiff_transition(
     )
 
 
-def _pieces(
+def _transitions(
     slopes: Slopes, begins: np.ndarray, ends: np.ndarray, scale: np.ndarray, constants: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the transition (K, n, n + q) over each piece, and the resolution of the rates on it (K,)."""

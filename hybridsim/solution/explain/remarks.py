@@ -179,7 +179,7 @@ def _load(solution: Solution, contact: Contact, t: float) -> float | None:
 
 def _modes_after(solution: Solution, t: float) -> np.ndarray:
     """Return the modes of all components just after an instant."""
-    index, _ = solution._places(np.array([t]), "+")
+    index, _ = solution._segment_at(np.array([t]), "+")
     return np.maximum(solution._segments[int(index[0])].z, 0)
 
 

@@ -13,7 +13,7 @@ from hybridsim.analysis.compare.errors_against_reference import Errors
 from hybridsim.analysis.compare.lines import Series
 from hybridsim.analysis.compare.mode_sequence import SequenceVerdict
 from hybridsim.analysis.compare.rows import Cost, Row
-from hybridsim.analysis.compare.timed_runs import Budget, Entry, race
+from hybridsim.analysis.compare.timed_runs import Budget, Entry, timed_rows
 from hybridsim.analysis.compare.timing import timed_in_turns
 
 
@@ -40,7 +40,7 @@ class FakeBench:
 
 
 def run(bench: FakeBench, lines: list[Series], repeat: int, seconds: float) -> tuple[Row, ...]:
-    (rows,) = race([Entry(bench, None, tuple(lines))], repeat, Budget(seconds), lambda what: None)
+    (rows,) = timed_rows([Entry(bench, None, tuple(lines))], repeat, Budget(seconds), lambda what: None)
     return rows
 
 

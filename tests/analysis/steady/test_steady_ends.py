@@ -20,7 +20,7 @@ def slow_and_fast() -> hs.Model:
 def test_a_search_that_costs_too_much_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     """Some 10 000 steps, and it is told before a run that would take more."""
     module = import_module("hybridsim.analysis.steady.steady_state")
-    monkeypatch.setattr(module, "_ALLOWANCE", 0.01)
+    monkeypatch.setattr(module, "_TIME_BUDGET", 0.01)
     found = hs.steady_state(slow_and_fast())
     assert found.kind == "not settled" and "declare the `duration`" in found.message
 
@@ -41,7 +41,7 @@ def two_tones(fast: float, further: str = "") -> hs.Model:
 
 @pytest.fixture
 def most_steps(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """The steps of the longest run of a search, whose allowance is a second."""
+    """The steps of the longest run of a search, whose time budget is a second."""
     most, module = [0], import_module("hybridsim.analysis.steady.motion")
     cost = module._cost_of
 
@@ -50,7 +50,7 @@ def most_steps(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         return float(cost(solution))
 
     monkeypatch.setattr(module, "_cost_of", counted)
-    monkeypatch.setattr(import_module("hybridsim.analysis.steady.steady_state"), "_ALLOWANCE", 1.0)
+    monkeypatch.setattr(import_module("hybridsim.analysis.steady.steady_state"), "_TIME_BUDGET", 1.0)
     return most
 
 

@@ -19,7 +19,7 @@ import pytest
 from analysis.swept import SPAN, end, fall, height, longer
 
 import hybridsim as hs
-from hybridsim.analysis.sweep.work.pieces import Pieces
+from hybridsim.analysis.sweep.work.batches import Batches
 
 F0, OMEGA = [22.0, 30.0, 38.0, 40.0], [350.0, 424.0, 500.0]
 GRID = {"F0": F0, "omega": OMEGA}
@@ -124,10 +124,10 @@ def test_few_pieces_are_under_way_at_a_time() -> None:
 
 def test_pieces_hold_every_point_once() -> None:
     for total, chains, workers in ((1, None, 4), (1000, None, 3), (60, 12, 2), (7, 1, 2)):
-        pieces, seen = Pieces(total, chains, workers), []
-        while (piece := pieces.next()) is not None:
+        batches, seen = Batches(total, chains, workers), []
+        while (piece := batches.next()) is not None:
             seen += piece
-            pieces.learn(len(piece), 1e-5 * len(piece))
+            batches.learn(len(piece), 1e-5 * len(piece))
         assert sorted(seen) == list(range(total))
 
 

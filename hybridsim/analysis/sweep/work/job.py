@@ -14,7 +14,7 @@ from hybridsim.expr import Expression
 from hybridsim.model import Model
 
 DONE, NOT_RUN = "ok", "not run"
-_MOST = 4  # number of sweeps whose model a worker process keeps
+_MAX_JOBS = 4  # number of sweeps whose model a worker process keeps
 
 
 class Incomplete(SimulationError):
@@ -85,7 +85,7 @@ class Batch(NamedTuple):
 class Watch(NamedTuple):
     """The link to a worker that shares memory: it asks whether to go on, and reports finished points."""
 
-    goes_on: Callable[[], bool]
+    may_continue: Callable[[], bool]
     tell: Callable[[int], None]
 
 
@@ -103,7 +103,7 @@ _jobs: dict[str, Job] = {}
 def run_batch(job: Job, points: Sequence[Settings], watch: Watch | None = None) -> Batch:
     """Measure the model at some points, one after the other."""
     if watch is None:
-        job, watch = _kept(job), _NOBODY
+        job, watch = _first_copy(job), _NOBODY
     began = time.perf_counter()
     together = None if job.chained else _together(job, points, watch)
     if together is not None:
@@ -111,7 +111,7 @@ def run_batch(job: Job, points: Sequence[Settings], watch: Watch | None = None) 
     outcomes = []
     previous: Any = None
     for settings in points:
-        if not watch.goes_on():
+        if not watch.may_continue():
             break
         outcome, result = _run(job, settings, previous)
         outcomes.append(outcome)
@@ -139,25 +139,25 @@ def _run(job: Job, settings: Settings, previous: Any) -> tuple[Outcome, Any]:
     except Incomplete as error:
         return Outcome(error.message, error.found), None
     except Exception as error:  # a user's measure may raise anything; it costs its own point only
-        return Outcome(_said(error), None), None
+        return Outcome(_message(error), None), None
     missing = [name for name in not_numbers(found) if name not in blank]
     if missing:
         return Outcome(f"not a number: {', '.join(missing)}", found), None
     return Outcome(DONE, found), result
 
 
-def _said(error: Exception) -> str:
+def _message(error: Exception) -> str:
     """Return an error in one line, with its type first."""
     text = " ".join(str(error).split())
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
-def _kept(job: Job) -> Job:
+def _first_copy(job: Job) -> Job:
     """Return the job as it arrived first, because the engine's data of a model belongs to that object."""
     known = _jobs.get(job.token)
     if known is not None:
         return known
-    while len(_jobs) >= _MOST:
+    while len(_jobs) >= _MAX_JOBS:
         _jobs.pop(next(iter(_jobs)), None)
     _jobs[job.token] = job
     return job

@@ -12,8 +12,8 @@ import numpy as np
 from hybridsim.analysis.progress import Progress
 from hybridsim.analysis.sweep.collected import Collected
 from hybridsim.analysis.sweep.journal import Journal
+from hybridsim.analysis.sweep.work.batches import Batches
 from hybridsim.analysis.sweep.work.job import Job
-from hybridsim.analysis.sweep.work.pieces import Pieces
 from hybridsim.analysis.sweep.work.sending import Points, Sending, require_sendable, worker_count
 from hybridsim.errors import UsageError
 
@@ -45,8 +45,8 @@ def work(
     chains = total // points.shape[0] if job.chained else None
     collected = Collected(total)
     done = _taken_over(journal, collected, chains) if journal is not None else None
-    pieces = Pieces(total, chains, count, done)
-    sending = Sending(job, points, pieces, collected, _Told(total, progress), journal)
+    batches = Batches(total, chains, count, done)
+    sending = Sending(job, points, batches, collected, _ProgressReport(total, progress), journal)
     if executor is not None:
         return collected, sending.run(executor, count), f"{type(executor).__name__} ({count})"
     with ThreadPoolExecutor(count, thread_name_prefix="sweep") as threads:
@@ -72,12 +72,12 @@ def _taken_over(journal: Journal, collected: Collected, chains: int | None) -> n
         if chains is None or len(outcomes) == len(range(numbers[0], total, chains)):
             collected.put(numbers, outcomes)
     if chains is not None:
-        by_chain = known.reshape(-1, chains)
-        by_chain &= by_chain.all(axis=0)
+        columns = known.reshape(-1, chains)
+        columns &= columns.all(axis=0)
     return known
 
 
-class _Told:
+class _ProgressReport:
     """Reports the number of finished points and the remaining time."""
 
     def __init__(self, total: int, progress: Progress | None) -> None:
@@ -93,11 +93,11 @@ class _Told:
             done and self._began is None
         ):  # the first point includes compiling, so that its time is not representative
             self._began, self._first = now, done
-        words = f"{done} of {self._total} points"
+        text = f"{done} of {self._total} points"
         if self._began is not None and self._first < done < self._total:
             left = (now - self._began) / (done - self._first) * (self._total - done)
-            words += f", {_duration(left)} left"
-        self._progress(done, self._total, words)
+            text += f", {_duration(left)} left"
+        self._progress(done, self._total, text)
 
 
 def _duration(seconds: float) -> str:

@@ -1,4 +1,4 @@
-"""This module sends pieces of a sweep to an executor, a few at a time, and stores the results."""
+"""This module sends batches of a sweep to an executor, a few at a time, and stores the results."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from typing import Any, Protocol
 
 from hybridsim.analysis.sweep.collected import Collected
 from hybridsim.analysis.sweep.journal import Journal
+from hybridsim.analysis.sweep.work.batches import Batches
 from hybridsim.analysis.sweep.work.job import Batch, Job, Outcome, Settings, Watch, run_batch
-from hybridsim.analysis.sweep.work.pieces import Pieces
 from hybridsim.errors import UsageError
 
-# Pieces in progress per worker: one being computed and one waiting. More would only need memory.
+# Batches in progress per worker: one being computed and one waiting. More would only need memory.
 _AHEAD = 2
 _LOOK = 0.1  # seconds between checks of the threads, for progress and Ctrl-C
 
@@ -47,7 +47,7 @@ class Sending:
     Parameters
     ----------
     job : the work at a point.
-    points, pieces : the points, and their division into pieces.
+    points, batches : the points, and their division into batches.
     collected : stores the results.
     tell : called with the number of finished points; may raise KeyboardInterrupt.
     journal : receives the results as they arrive.
@@ -57,12 +57,12 @@ class Sending:
         self,
         job: Job,
         points: Points,
-        pieces: Pieces,
+        batches: Batches,
         collected: Collected,
         tell: Callable[[int], None],
         journal: Journal | None = None,
     ) -> None:
-        self._job, self._points, self._pieces, self._collected = job, points, pieces, collected
+        self._job, self._points, self._batches, self._collected = job, points, batches, collected
         self._tell, self._journal = tell, journal
         self._stop = threading.Event()
         self._shared_done = collected.done
@@ -70,7 +70,7 @@ class Sending:
         self._under_way: dict[Future[Batch], range] = {}
 
     def run(self, executor: Executor, workers: int) -> bool:
-        """Run all pieces; return False if interrupted, with the results so far in `collected`.
+        """Run all batches; return False if interrupted, with the results so far in `collected`.
 
         Raises
         ------
@@ -79,7 +79,7 @@ class Sending:
         """
         shares = isinstance(executor, ThreadPoolExecutor)
         watch = Watch(lambda: not self._stop.is_set(), self._count) if shares else None
-        waiting = self._pieces.next()
+        waiting = self._batches.next()
         try:
             while waiting is not None or self._under_way:
                 # threads share the code that the first point compiles, so it runs alone
@@ -92,7 +92,7 @@ class Sending:
                         self._refused(waiting, error)
                     else:
                         self._under_way[future] = waiting
-                    waiting = self._pieces.next()
+                    waiting = self._batches.next()
                 done, _ = wait(self._under_way, timeout=_LOOK, return_when=FIRST_COMPLETED)
                 self._take(done)
                 self._tell(self._done)
@@ -100,7 +100,7 @@ class Sending:
             self._stop.set()
             for future in self._under_way:
                 future.cancel()
-            # a thread stops after its point; pieces begun in other processes are lost
+            # a thread stops after its point; batches begun in other processes are lost
             if shares:
                 wait(self._under_way)
             self._take({f for f in self._under_way if f.done() and not f.cancelled() and not f.exception()})
@@ -128,7 +128,7 @@ class Sending:
                 self._collected.put(numbers, batch.outcomes)
                 if self._journal is not None:
                     self._journal.note(numbers, batch.outcomes)
-                self._pieces.learn(len(batch.outcomes), batch.seconds)
+                self._batches.learn(len(batch.outcomes), batch.seconds)
             elif isinstance(error, KeyboardInterrupt):  # Ctrl-C reaches all processes of a terminal
                 raise error
             else:

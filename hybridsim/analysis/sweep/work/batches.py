@@ -1,4 +1,4 @@
-"""This module divides the points of a sweep into pieces of work of a suitable length."""
+"""This module divides the points of a sweep into batches of a suitable length."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ import math
 
 import numpy as np
 
-# Seconds per piece: a thousand times the cost of sending one, and short enough for ten reports of progress a
+# Seconds per batch: a thousand times the cost of sending one, and short enough for ten reports of progress a
 # second.
-_LENGTH = 0.1
+_SECONDS = 0.1
 
 
-class Pieces:
+class Batches:
     """Hands out ranges of points.
 
     Parameters
     ----------
     total : number of points.
-    chains : number of chains, each of which is one piece; None if no point needs its neighbour. The points of
+    chains : number of chains, each of which is one batch; None if no point needs its neighbour. The points of
         chain c are c, c + chains, c + 2 chains, ...: along the first axis of a grid, at fixed places on all others.
-    workers : number of workers that share the pieces.
+    workers : number of workers that share the batches.
     done : mask of the points (total,) that are finished; a chain is restarted unless all of it is finished.
     """
 
@@ -29,7 +29,7 @@ class Pieces:
         self._open = np.arange(total + 1) if done is None else np.append(np.flatnonzero(~done), total)
 
     def next(self) -> range | None:
-        """Return the next piece, or None after the last one."""
+        """Return the next batch, or None after the last one."""
         start = self._next
         if self._chains is not None:
             while start < self._chains and not (self._open[:-1] % self._chains == start).any():
@@ -39,7 +39,7 @@ class Pieces:
         left = len(self._open) - 1 - start
         if left <= 0:
             return None
-        # the last pieces are small, so that the workers finish together
+        # the last batches are small, so that the workers finish together
         size = min(self._size, math.ceil(left / (2 * self._workers)))
         first = int(self._open[start])
         while self._open[start + size - 1] != first + size - 1:  # consecutive points
@@ -48,6 +48,6 @@ class Pieces:
         return range(first, first + size)
 
     def learn(self, points: int, seconds: float) -> None:
-        """Adjust the size of the pieces to the time that some points took."""
-        fitting = int(_LENGTH * points / seconds) if seconds > 0 else 2 * points
+        """Adjust the size of the batches to the time that some points took."""
+        fitting = int(_SECONDS * points / seconds) if seconds > 0 else 2 * points
         self._size = max(1, min(fitting, 2 * points if points >= self._size else self._size))

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Stretch:
+class SegmentEvents:
     """A segment, the monitors recorded along it, and the events between its end and the next segment."""
 
     segment: Segment
@@ -35,7 +35,7 @@ class Last(NamedTuple):
     happened: tuple[Occurrence, ...]
 
 
-def stretches_of(solution: Solution) -> Iterator[Stretch]:
+def segment_events_of(solution: Solution) -> Iterator[SegmentEvents]:
     """Yield the segments, each with the events before the next segment that changed modes or states."""
     waiting = [o for o in solution._trajectory.occurrences if o.kind != "near-grazing"]
     at, segments = 0, list(solution._segments)
@@ -52,7 +52,7 @@ def stretches_of(solution: Solution) -> Iterator[Stretch]:
         first = at
         while at < len(waiting) and waiting[at].instant.minus(until) <= rounding:
             at += 1
-        yield Stretch(segment, tuple(recorded), tuple(waiting[first:at]))
+        yield SegmentEvents(segment, tuple(recorded), tuple(waiting[first:at]))
 
 
 def time_rounding(solution: Solution) -> float:

@@ -39,7 +39,7 @@ class Scene:
     progress: Callable[[float], None] | None = None
 
 
-class Rung(ABC):
+class LadderStep(ABC):
     """A simpler model: a transformation Model -> Model, or a closed form instead of a model.
 
     name : one word for options and maps.
@@ -61,7 +61,7 @@ class Rung(ABC):
         """
 
     def __repr__(self) -> str:
-        return f"<Rung {self.name}: {self.title}>"
+        return f"<LadderStep {self.name}: {self.title}>"
 
 
 def need_contacts(model: Model) -> None:
