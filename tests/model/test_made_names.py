@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 import hybridsim as hs
-from hybridsim.analysis.advise.question import watched
+from hybridsim.analysis.advise.question import with_contact_outputs
 from hybridsim.errors import HybridsimError, ModelError
 from hybridsim.mechanics.declaration.as_model import as_model
 from hybridsim.model.free_name import names_of_model
@@ -95,4 +95,4 @@ def test_what_is_compared_has_names_that_no_output_has() -> None:
     model = hs.load("belt")
     taken = hs.Output(f"speed_of_{model.contacts[0].name}", "1")
     with pytest.raises(HybridsimError, match="rename the output"):
-        watched(replace(model, outputs=(*model.outputs, taken)))
+        with_contact_outputs(replace(model, outputs=(*model.outputs, taken)))

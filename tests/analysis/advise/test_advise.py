@@ -22,7 +22,7 @@ from analysis.advice_by_hand import (
 import hybridsim as hs
 from hybridsim.analysis.advise.certificates import certificates
 from hybridsim.analysis.advise.ladder import Limits, climb, scene_of
-from hybridsim.analysis.advise.question import Answer, question_of, watched
+from hybridsim.analysis.advise.question import Answer, question_of, with_contact_outputs
 from hybridsim.analysis.advise.settings import Setting, confirmed, rank
 from hybridsim.analysis.compare.timed_runs import Budget
 from hybridsim.analysis.ladder import Scene
@@ -341,7 +341,7 @@ def test_a_nonlinear_model_below_the_threshold_is_at_rest_by_theory() -> None:
 def test_a_rung_dearer_than_the_full_model_is_stopped() -> None:
     # next to the threshold the body creeps through v0, a hundredth of next to nothing: 1e8 per second
     limits = Limits(Budget(1e9), least=0.05, repeat=False)
-    model = watched(dfcs(20.08, 1.03))
+    model = with_contact_outputs(dfcs(20.08, 1.03))
     question = question_of(model, "amplitude.x", None, 1e-8)
     full = question.ask(model)
     (step,) = climb([Tanh()], scene_of(model, full.motion, None), question, full, 0.01, limits)
