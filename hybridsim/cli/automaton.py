@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from hybridsim.expr import assignment
 from hybridsim.model.parts.switching import ATTRACTION
-from hybridsim.model.smoothing.nonsmooth import COMPONENT, KEPT, MODE, POWER, SURFACE, TIMED
+from hybridsim.model.smoothing.nonsmooth import COMPONENT, MODE, POWER, SURFACE, TIMED, UNCHANGED
 
 if TYPE_CHECKING:
     from hybridsim.engine.run.report import Report
@@ -54,7 +54,7 @@ def _primitive(primitive: Primitive) -> str:
         SURFACE: f"a jump at the switching surface {remark}",
         TIMED: f"a known function of time that switches at the zeros of {remark}",
         MODE: remark,
-        KEPT: f"not replaced by modes, {remark}; exact and taylor reject it",
+        UNCHANGED: f"not replaced by modes, {remark}; exact and taylor reject it",
         POWER: f"a fractional power, {remark}",
     }
     return f"{text} in {', '.join(primitive.where)}: {became[primitive.became]}"

@@ -23,11 +23,11 @@ def evaluate(expr: Expression, values: Mapping[str, float]) -> float:
     try:
         return float(value_of(expr.tree, values))
     except NoValue as fault:
-        given = ", ".join(f"{name} = {values[name]:g}" for name in sorted(expr.names))
+        values_shown = ", ".join(f"{name} = {values[name]:g}" for name in sorted(expr.names))
         raise expr.error(
             f"'{expr.text}' has no finite real value: {fault.reason}",
             node=fault.node,
-            remedy=f"it was evaluated with {given}" if given else "correct the numbers",
+            remedy=f"it was evaluated with {values_shown}" if values_shown else "correct the numbers",
         ) from None
 
 

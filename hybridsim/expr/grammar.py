@@ -25,7 +25,8 @@ class Function:
         return f"{self.least} argument" + ("s" if self.least > 1 else "")
 
 
-_MOST = 64  # largest number of arguments of min and max, which become nested calls with two arguments
+# Largest number of arguments of min and max, which become nested calls with two arguments.
+_MAX_ARGUMENTS = 64
 
 
 def _sign(x: float) -> float:
@@ -49,8 +50,8 @@ FUNCTIONS: Mapping[str, Function] = MappingProxyType(
         "sqrt": Function(1, 1, math.sqrt),
         "abs": Function(1, 1, math.fabs),
         "sign": Function(1, 1, _sign),
-        "min": Function(2, _MOST, min),
-        "max": Function(2, _MOST, max),
+        "min": Function(2, _MAX_ARGUMENTS, min),
+        "max": Function(2, _MAX_ARGUMENTS, max),
     }
 )
 CONSTANTS: Mapping[str, float] = MappingProxyType({"pi": math.pi})

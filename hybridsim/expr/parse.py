@@ -193,8 +193,8 @@ def substitute(expr: Expression, values: Mapping[str, Expression | str | float])
 
 def of_tree(tree: ast.expr, place: Place | None = None) -> Expression:
     """Return an expression of a checked tree; it may contain internal names with two underscores."""
-    words = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-    return Expression(write(tree), frozenset(words - CONSTANTS.keys() - FUNCTIONS.keys()), place, tree)
+    identifiers = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    return Expression(write(tree), frozenset(identifiers - CONSTANTS.keys() - FUNCTIONS.keys()), place, tree)
 
 
 def _check_text(text: str, where: Place) -> None:
@@ -223,22 +223,22 @@ def _check_text(text: str, where: Place) -> None:
             )
 
 
-def _as_text(given: object, where: Place) -> str:
+def _as_text(quantity: object, where: Place) -> str:
     """Return the text of a number or string, and reject other objects."""
-    if isinstance(given, str):
-        return given
-    if isinstance(given, bool):
-        return str(given)
-    if isinstance(given, Integral):
-        value = int(given)
+    if isinstance(quantity, str):
+        return quantity
+    if isinstance(quantity, bool):
+        return str(quantity)
+    if isinstance(quantity, Integral):
+        value = int(quantity)
         return str(value) if abs(value) <= MAX_INTEGER else repr(_double(value, where))
-    if isinstance(given, Real):
-        number = _double(given, where)
+    if isinstance(quantity, Real):
+        number = _double(quantity, where)
         if not math.isfinite(number):
             raise ExpressionError(f"{number} is not finite", place=where, remedy="use a finite number")
         return repr(number)
     raise ExpressionError(
-        f"{_short(repr(given))} is not an expression",
+        f"{_short(repr(quantity))} is not an expression",
         place=where,
         remedy='write a number, or an expression in quotes such as "sqrt(k/m)"',
     )

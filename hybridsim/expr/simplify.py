@@ -10,9 +10,9 @@ from typing import Any
 
 import sympy
 
-# For random formulas with at most _FEW_TERMS terms sympy.simplify took at most 1 s, and above this limit sometimes more
-# than 10 s. With at most _MANY_TERMS terms, quotients of polynomials took at most 0.25 s.
-_FEW_TERMS = 16
+# For random formulas with at most _CHEAP_TERMS terms sympy.simplify took at most 1 s, and above this limit sometimes
+# more than 10 s. With at most _MANY_TERMS terms, quotients of polynomials took at most 0.25 s.
+_CHEAP_TERMS = 16
 _MANY_TERMS = 200
 
 
@@ -26,7 +26,7 @@ def simplified(e: Any) -> Any:
     terms = terms_of(plain)
     if terms > _MANY_TERMS:
         return e
-    if terms <= _FEW_TERMS:
+    if terms <= _CHEAP_TERMS:
         found = sympy.simplify(plain)
     else:
         found = sympy.factor(sympy.cancel(sympy.together(plain)))

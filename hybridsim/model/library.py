@@ -53,14 +53,14 @@ def load(name_or_path: str | os.PathLike[str]) -> Model:
     >>> hs.load("dfcs").parameter_values()["N"]
     40.0
     """
-    given: object = name_or_path
-    if not isinstance(given, str | os.PathLike):
+    argument: object = name_or_path
+    if not isinstance(argument, str | os.PathLike):
         remedy = "use a Model, a name or a path"
-        if hasattr(given, "to_model"):
+        if hasattr(argument, "to_model"):
             remedy = "pass the system to hs.simulate directly, or use its model, system.to_model()"
-        elif callable(given):
+        elif callable(argument):
             remedy = "for rates from a function f(t, x, p) use hs.Model('m', states={'x': 1.0}, flow=f)"
-        raise UsageError(f"The model is {given!r}", remedy=remedy)
+        raise UsageError(f"The model is {argument!r}", remedy=remedy)
     text = os.fspath(name_or_path)
     if isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or "/" in text or os.sep in text:
         path = Path(text)

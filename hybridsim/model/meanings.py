@@ -32,8 +32,8 @@ class Meanings:
             for mode in component.modes:
                 for name, expr in mode.set.items():
                     behind.setdefault(name, []).append(expr.tree)
-        given = {TIME, *(state.name for state in model.states), *(signal.name for signal in model.inputs)}
-        self.moving = _reaching(behind, given | self.unknowns)
+        sources = {TIME, *(state.name for state in model.states), *(signal.name for signal in model.inputs)}
+        self.moving = _reaching(behind, sources | self.unknowns)
         self.forced = _reaching(behind, self.unknowns)
         self.definitions = {name: self.with_single_signs(tree) for name, tree in trees.items()}
 
@@ -107,9 +107,9 @@ class Meanings:
         return known
 
 
-def _reaching(behind: Mapping[str, Iterable[ast.expr]], given: set[str]) -> set[str]:
+def _reaching(behind: Mapping[str, Iterable[ast.expr]], sources: set[str]) -> set[str]:
     """Return the given names and all names that depend on one of them."""
-    found, size = set(given), -1
+    found, size = set(sources), -1
     while len(found) > size:
         size = len(found)
         found |= {name for name, trees in behind.items() if any(names_of(tree) & found for tree in trees)}

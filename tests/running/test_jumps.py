@@ -10,7 +10,7 @@ import pytest
 import hybridsim as hs
 from hybridsim import plot
 from hybridsim.model.smoothing.explicit_corners import smoothing_of
-from hybridsim.model.smoothing.nonsmooth import JUMPS, KEPT
+from hybridsim.model.smoothing.nonsmooth import JUMPS, UNCHANGED
 
 METHODS = ["exact", "taylor", "dop853", "tsit5", "rodas5p", "scipy-radau", "cvode-bdf"]
 SMOOTH = METHODS[1:]  # that take rates which are not linear
@@ -176,7 +176,7 @@ def test_what_is_kept(rates: tuple[str, str], text: str, reason: str) -> None:
         initial="a",
     )
     built = model(("x", 1.0, rates[0]), ("y", 2.0, rates[1]), ("q", 0.0, "0"), components=[relay])
-    found = {one.text: one for one in smoothing_of(built).primitives if one.became == KEPT}
+    found = {one.text: one for one in smoothing_of(built).primitives if one.became == UNCHANGED}
     assert found[text].remark.startswith(JUMPS)
     assert reason in found[text].remark
     assert hs.simulate(built, (0.0, 0.2), integrator="dop853").success

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.model.laws.load_at_zero import load_at_zero
+from hybridsim.model.laws.vanishing_load import vanishing_load
 
 if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Outcome
@@ -39,7 +39,7 @@ def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Ins
     here = origin.plus(s) if last is None else last.end
     t, began = float(here), record.segments[0].x[0] if record.segments else x
     t0 = float(record.segments[0].origin) if record.segments else t
-    if load := load_at_zero(system.written, system.names, (t0, began.tolist()), (t, x.tolist())):
+    if load := vanishing_load(system.written, system.names, (t0, began.tolist()), (t, x.tolist())):
         return load
     first = np.abs(began)
     grown = np.flatnonzero(np.abs(x) > _GROWN * np.maximum(first, 1.0))

@@ -121,8 +121,8 @@ def _surface(scope: Scope, component: Component, what: str, names: list[str]) ->
         if name not in names:
             scope.unknown(surface, f"{what}, surface: unknown mode", name, names, "modes")
     if set(sides) <= set(names) and not len(set(sides)) == len(names) == len(sides):
-        words = "two modes (above, hold)" if surface.is_unilateral else "three modes (above, below, hold)"
-        message = f"{what}: a surface needs {words}, but the modes are {', '.join(names)}"
+        roles = "two modes (above, hold)" if surface.is_unilateral else "three modes (above, below, hold)"
+        message = f"{what}: a surface needs {roles}, but the modes are {', '.join(names)}"
         scope.fail(surface, message, f"declare exactly {len(sides)} modes")
     for mode in component.modes:
         ways = len(sides) - 1 if mode.name == surface.hold else 1

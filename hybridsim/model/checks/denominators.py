@@ -70,10 +70,13 @@ def _denominators(model: Model) -> Iterator[Denominator]:
                 if text in seen or never_negative(node, {}, meanings.lookup) is not None:
                     continue
                 seen.add(text)
-                needed = _in_order(node, meanings)
-                free = names_of(node).union(*(names_of(t) for t in needed.values())) - needed.keys()
+                meanings_used = _in_order(node, meanings)
+                free = (
+                    names_of(node).union(*(names_of(t) for t in meanings_used.values()))
+                    - meanings_used.keys()
+                )
                 if free <= known and not free.isdisjoint(known - {p.name for p in model.parameters}):
-                    yield Denominator(node, needed, state.name)
+                    yield Denominator(node, meanings_used, state.name)
 
 
 def _divisors(node: ast.expr) -> Iterator[ast.expr]:

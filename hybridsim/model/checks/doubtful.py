@@ -16,7 +16,7 @@ from hybridsim.model.laws.force_signs import wrong_signs
 from hybridsim.model.laws.velocity_powers import velocity_powers
 from hybridsim.model.meanings import Meanings
 from hybridsim.model.smoothing.explicit_corners import smoothing_of
-from hybridsim.model.smoothing.nonsmooth import JUMPS, KEPT, uses_primitives
+from hybridsim.model.smoothing.nonsmooth import JUMPS, UNCHANGED, uses_primitives
 from hybridsim.model.smoothing.one_sided import names_of, never_negative, number_of
 
 if TYPE_CHECKING:
@@ -137,7 +137,7 @@ def _reset_names(model: Model, own: Component | None) -> set[str]:
 
 
 @dataclass(frozen=True)
-class _Watched:
+class _EventFunction:
     """A guard or a monitor: its description, expression and place, and the meaning of its names."""
 
     what: str
@@ -147,7 +147,7 @@ class _Watched:
     is_guard: bool
 
 
-def _watched(model: Model) -> Iterator[_Watched]:
+def _event_functions(model: Model) -> Iterator[_EventFunction]:
     for component in model.components:
         for mode in component.modes:
             reading = _Reading(model, component, mode)
@@ -155,16 +155,16 @@ def _watched(model: Model) -> Iterator[_Watched]:
                 what = (
                     f"guard {guard.name} of mode {mode.name}, component {component.name}: '{guard.expr.text}'"
                 )
-                yield _Watched(what, guard.expr, guard.expr.place or guard.place, reading, True)
+                yield _EventFunction(what, guard.expr, guard.expr.place or guard.place, reading, True)
     reading = _Reading(model)
     for monitor in model.monitors:
         what = f"monitor {monitor.name}: '{monitor.expr.text}'"
-        yield _Watched(what, monitor.expr, monitor.expr.place or monitor.place, reading, False)
+        yield _EventFunction(what, monitor.expr, monitor.expr.place or monitor.place, reading, False)
 
 
 def _of_signs(model: Model) -> Iterator[Caution]:
     """Yield warnings about guards and monitors that are constant or of one sign."""
-    for item in _watched(model):
+    for item in _event_functions(model):
         meant = "at the end of the mode" if item.is_guard else "at the event"
         remedy = f"write an expression that changes its sign {meant}"
         if not item.reading.changes(item.expr):
@@ -185,9 +185,9 @@ def _of_units(model: Model) -> Iterator[Caution]:
     units = {state.name: state.unit for state in model.states}
     units |= {parameter.name: parameter.unit for parameter in model.parameters}
     units |= {part.name: part.unit or "1" for part in model.discrete}
-    watched = [(item, _quantities(item.expr, item.reading, units)) for item in _watched(model)]
-    bare = [(item, names) for item, names in watched if names and not any(units[name] for name in names)]
-    measured = [item for item, names in watched if any(units[name] for name in names)]
+    functions = [(item, _quantities(item.expr, item.reading, units)) for item in _event_functions(model)]
+    bare = [(item, names) for item, names in functions if names and not any(units[name] for name in names)]
+    measured = [item for item, names in functions if any(units[name] for name in names)]
     named = {name for _, names in bare for name in names}
     others = [state for state in model.states if state.name not in named]
     if not (measured or len(bare) == 1) or not others or not all(state.unit for state in others):
@@ -254,13 +254,13 @@ def _of_jumps(model: Model) -> Iterator[Caution]:
     meanings, states = Meanings(model), {state.name for state in model.states}
     known = {TIME, *(signal.name for signal in model.inputs)}
     for one in smoothing_of(model).primitives:
-        if one.became != KEPT or not one.remark.startswith(JUMPS):
+        if one.became != UNCHANGED or not one.remark.startswith(JUMPS):
             continue
         reason = one.remark.removeprefix(f"{JUMPS}: ")
         what = f"'{one.text}' in {', '.join(one.where)}"
         names = meanings.depended_on(re.findall(r"[A-Za-z_]\w*", one.text))
-        is_watched = all(where.startswith(("monitor ", "guard ")) for where in one.where)
-        if names & states and not is_watched:
+        in_events_only = all(where.startswith(("monitor ", "guard ")) for where in one.where)
+        if names & states and not in_events_only:
             yield Caution(
                 f"{what} is not treated as a switching surface ({reason}), so a run that slides along the jump "
                 "becomes extremely slow",

@@ -17,7 +17,7 @@ Item = tuple[str, Expression, bool]
 
 def check_expressions(scope: Scope) -> None:
     """Report unknown names, wrong kinds, cyclic definitions, and definitions that become too large."""
-    check_given(scope)
+    check_before_run(scope)
     items = list(_of_everything(scope))
     for what, expr, boolean in items:
         scope.need(expr, what, scope.all_names, boolean=boolean)
@@ -27,7 +27,7 @@ def check_expressions(scope: Scope) -> None:
         _constants(scope, items)
 
 
-def check_given(scope: Scope) -> None:
+def check_before_run(scope: Scope) -> None:
     """Report errors in expressions that are evaluated before a run."""
     for what, expr in _of_parameters(scope):
         if expr.names or expr.is_boolean:  # all others are numbers
@@ -110,9 +110,9 @@ def _circles(scope: Scope) -> None:
         for mode in component.modes:
             for name, expr in mode.set.items():
                 edges.setdefault(name, []).append(expr)
-    merged = {name: _merged(exprs) for name, exprs in edges.items()}
+    over_modes = {name: _over_modes(exprs) for name, exprs in edges.items()}
     try:
-        order = dependency_order(merged, "definitions and variables")
+        order = dependency_order(over_modes, "definitions and variables")
     except ExpressionError as fault:
         scope.errors.append(fault)
         return
@@ -126,7 +126,7 @@ def _circles(scope: Scope) -> None:
             return
 
 
-def _merged(exprs: list[Expression]) -> Expression:
+def _over_modes(exprs: list[Expression]) -> Expression:
     """Return an expression with the dependencies of all modes."""
     first = exprs[0]
     return Expression(first.text, frozenset().union(*(expr.names for expr in exprs)), first.place, first.tree)

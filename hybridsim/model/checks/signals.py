@@ -7,7 +7,7 @@ import math
 from hybridsim.errors import nearest
 from hybridsim.model.checks.automata import check_reset
 from hybridsim.model.checks.scope import Scope
-from hybridsim.model.parts.inputs import INTERPOLATIONS, KINDS, NEEDED, OPTIONAL, SHAPES, Input
+from hybridsim.model.parts.inputs import INTERPOLATIONS, KINDS, OPTIONAL, REQUIRED, SHAPES, Input
 from hybridsim.model.parts.monitor import ACTIONS, DIRECTIONS, Monitor
 from hybridsim.model.parts.schedule import Schedule
 
@@ -62,11 +62,11 @@ def _input(scope: Scope, signal: Input) -> None:
         scope.unknown(signal, f"{what}: unknown kind", signal.kind, KINDS, "kinds")
         return
     for kind in KINDS:
-        for field in (*NEEDED[kind], *OPTIONAL[kind]):
-            given = getattr(signal, field) not in (None, ())
-            if given and field not in (*NEEDED[signal.kind], *OPTIONAL[signal.kind]):
+        for field in (*REQUIRED[kind], *OPTIONAL[kind]):
+            has_field = getattr(signal, field) not in (None, ())
+            if has_field and field not in (*REQUIRED[signal.kind], *OPTIONAL[signal.kind]):
                 scope.fail(signal, f"{what} of kind {signal.kind} cannot have '{field}'", f"remove {field}")
-    for field in NEEDED[signal.kind]:
+    for field in REQUIRED[signal.kind]:
         if getattr(signal, field) in (None, ()):
             scope.fail(signal, f"{what} of kind {signal.kind} needs '{field}'", f"set {field}")
     if signal.shape is not None and signal.shape not in SHAPES:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from hybridsim.errors import ModelError
 from hybridsim.model.checks.automata import check_automata
 from hybridsim.model.checks.contacts import check_contacts
-from hybridsim.model.checks.expressions import check_expressions, check_given
+from hybridsim.model.checks.expressions import check_before_run, check_expressions
 from hybridsim.model.checks.functions import check_functions
 from hybridsim.model.checks.impacts import check_impacts
 from hybridsim.model.checks.names import check_names
@@ -30,7 +30,7 @@ def find_errors(model: Model) -> tuple[ModelError, ...]:
     """
     scope = Scope(model)
     if model.is_known_to_be_sound:
-        check_given(scope)
+        check_before_run(scope)
         if not scope.errors:
             check_values(scope)
         return tuple(scope.errors)

@@ -55,7 +55,7 @@ def _of_contact(
         state.nominal for state in model.states if state.name in contact.velocity.names and state.nominal
     ]
     if not contact.law.is_set_valued:
-        return _driving(contact, value, load, max(sizes, default=1.0))
+        return _force_along_velocity(contact, value, load, max(sizes, default=1.0))
     if contact.law.tables or contact.opens:
         return None  # the force depends on variables that modes set
     for backward in (False, True):
@@ -66,22 +66,24 @@ def _of_contact(
         if sizes:
             usual = contact.slip_force(parse(max(sizes)), backward=backward)
             forces[f"the slip force is {{:.6g}} at the nominal speed v = {max(sizes):g}"] = usual
-        for words, force in forces.items():
+        for template, force in forces.items():
             found = value(force)
             if found is not None and found < 0.0:
-                return words.format(found), _FRICTION
+                return template.format(found), _FRICTION
     return None
 
 
-def _driving(
+def _force_along_velocity(
     contact: Contact, value: Callable[[Expression], float | None], load: float | None, size: float
 ) -> tuple[str, str] | None:
     """Report a single-valued force that acts along the velocity; laws with states are not checked."""
     law = contact.law
     if law.states or law.modes or law.tables or law.copies or law.force is None:
         return None
-    given = {name: value(expr) for name, expr in contact.values(varies=False).items() if name != NORMAL}
-    known = {name: number for name, number in given.items() if number is not None}
+    argument_values = {
+        name: value(expr) for name, expr in contact.values(varies=False).items() if name != NORMAL
+    }
+    known = {name: number for name, number in argument_values.items() if number is not None}
     known |= {NORMAL: 1.0 if load is None else load, LOAD_RATE: 0.0}
     trees = {name: expr.tree for name, expr in law.definitions.items()}
     for speed in (sign * share * size for share in _SPEEDS for sign in (1.0, -1.0)):

@@ -92,12 +92,12 @@ class FrictionLaw(Declared):
     def __post_init__(self) -> None:
         self._texts("name", "initial", "copies")
         self._expressions("slip", "stick", "slip_backward", "stick_backward", "force")
-        given: object = self.parameters
-        if not isinstance(given, Mapping):
-            names = as_tuple(given)
+        parameters: object = self.parameters
+        if not isinstance(parameters, Mapping):
+            names = as_tuple(parameters)
             if not all(isinstance(name, str) for name in names):
                 raise self._fault(
-                    f"parameters is {given!r}", "use a list of names, or a dict of names and defaults"
+                    f"parameters is {parameters!r}", "use a list of names, or a dict of names and defaults"
                 )
             object.__setattr__(self, "parameters", dict.fromkeys(names))
         self._maps("parameters", "definitions")
@@ -106,13 +106,13 @@ class FrictionLaw(Declared):
         self._parts("tables", LawTable)
         if self.initial is None and len(self.modes) == 1:
             object.__setattr__(self, "initial", self.modes[0].name)
-        given_forms = [name for name in ("slip", "stick") if getattr(self, name) is not None]
-        if self.force is None and len(given_forms) < 2:
+        forms = [name for name in ("slip", "stick") if getattr(self, name) is not None]
+        if self.force is None and len(forms) < 2:
             raise self._fault(
                 "it has neither slip and stick nor force",
                 "set slip and stick (magnitudes), or force (with its sign)",
             )
-        if self.force is not None and given_forms:
+        if self.force is not None and forms:
             raise self._fault(
                 "it has force together with slip or stick", "set either slip and stick, or force"
             )

@@ -34,8 +34,8 @@ def states_of(contact: Contact, values: Mapping[str, Expression]) -> tuple[State
             name = _own(contact, state.name, index)
             own = name.removeprefix(contact.variable(""))  # z, or z3 in the third copy
             nominal = contact.nominal.get(own, contact.nominal.get(state.name, state.nominal))
-            given = contact.start.get(own, contact.start.get(state.name))
-            start = substitute(state.start, names) if given is None else given
+            own_start = contact.start.get(own, contact.start.get(state.name))
+            start = substitute(state.start, names) if own_start is None else own_start
             der = substitute(state.der, names)
             found.append(ContactState(name, start, der, state.unit, nominal, place=contact.place))
     return tuple(found)
@@ -117,14 +117,14 @@ def _indices(contact: Contact, values: Mapping[str, Expression]) -> list[int | N
     law = contact.law
     if law.copies is None:
         return [None]
-    given = values.get(law.copies, parse("none"))
+    copies = values.get(law.copies, parse("none"))
     try:
-        count = int(given.text)
+        count = int(copies.text)
     except ValueError:
         count = 0
     if not 0 < count <= MOST_COPIES:
         raise contact.error(
-            f"contact {contact.name}: the law '{law.name}' cannot have {law.copies} = {given.text} copies",
+            f"contact {contact.name}: the law '{law.name}' cannot have {law.copies} = {copies.text} copies",
             f"write a whole number from 1 to {MOST_COPIES}, not an expression, because it sets the number of states",
         )
     return list(range(1, count + 1))

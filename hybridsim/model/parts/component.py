@@ -228,10 +228,10 @@ class Component(Declared):
     limit: Choice | None = None
 
     def __post_init__(self) -> None:
-        given: object = self.initial
-        if isinstance(given, Mode):  # a second mode passed instead of a list
+        initial_mode: object = self.initial
+        if isinstance(initial_mode, Mode):  # a second mode passed instead of a list
             remedy = "pass several modes as a list, [hs.Mode(...), hs.Mode(...)]"
-            raise self._fault(f"initial is the mode {given.name!r}", remedy)
+            raise self._fault(f"initial is the mode {initial_mode.name!r}", remedy)
         self._texts("name", "initial")
         self._parts("modes", Mode)
         limit: object = self.limit

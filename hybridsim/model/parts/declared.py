@@ -135,11 +135,11 @@ class Declared(metaclass=_Refusing):
     def _numbers(self, *fields: str) -> None:
         """Convert the fields to tuples of floats."""
         for name in fields:
-            given = getattr(self, name)
+            entries = getattr(self, name)
             try:
-                object.__setattr__(self, name, tuple(_as_double(number) for number in as_tuple(given)))
+                object.__setattr__(self, name, tuple(_as_double(number) for number in as_tuple(entries)))
             except (TypeError, ValueError, OverflowError):
-                raise self._fault(f"{name} is {given!r}", "use numbers") from None
+                raise self._fault(f"{name} is {entries!r}", "use numbers") from None
 
     def _has_default(self, field: str) -> bool:
         return self.__dataclass_fields__[field].default is not MISSING

@@ -10,8 +10,8 @@ from hybridsim.model.parts.declared import Declared
 KINDS = ("table", "wave", "chirp")
 SHAPES = ("square", "triangle", "sawtooth", "sine")
 INTERPOLATIONS = ("linear", "cubic")
-# Required fields of each kind (NEEDED), and fields with defaults (OPTIONAL).
-NEEDED = {"table": ("times", "values"), "wave": ("shape", "period"), "chirp": ("f0", "f1", "duration")}
+# Required fields of each kind (REQUIRED), and fields with defaults (OPTIONAL).
+REQUIRED = {"table": ("times", "values"), "wave": ("shape", "period"), "chirp": ("f0", "f1", "duration")}
 OPTIONAL = {
     "table": ("interpolation",),
     "wave": ("amplitude", "phase", "offset", "duty"),

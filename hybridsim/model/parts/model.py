@@ -166,9 +166,9 @@ class Model(Declared):
         return State(name, start, parse(0))
 
     def _named(self, field: str, kind: Callable[[str, Any], Any]) -> None:
-        given = getattr(self, field)
-        if isinstance(given, Mapping):
-            object.__setattr__(self, field, tuple(kind(name, value) for name, value in given.items()))
+        entries = getattr(self, field)
+        if isinstance(entries, Mapping):
+            object.__setattr__(self, field, tuple(kind(name, value) for name, value in entries.items()))
 
     def __eq__(self, other: object) -> bool:
         """Compare all declared parts; the place and the path of the file are ignored."""
@@ -212,7 +212,8 @@ class Model(Declared):
         names = [parameter.name for parameter in self.parameters]
         _known(changes, names, "parameter", self.name, self.remedy_for_parameter)
         changed = (
-            replace(p, value=_given(changes, p.name)) if p.name in changes else p for p in self.parameters
+            replace(p, value=_changed_value(changes, p.name)) if p.name in changes else p
+            for p in self.parameters
         )
         return self._valued(parameters=tuple(changed))
 
@@ -222,10 +223,10 @@ class Model(Declared):
         for contact in self.contacts:
             if name not in contact.law.parameters:
                 continue
-            given = contact.arguments.get(name, contact.law.parameters[name])
-            if given is not None and given.text in names:
-                return f"contact {contact.name} has {name} = {given.text}; change {given.text} instead"
-            text = "its default" if given is None else given.text
+            argument = contact.arguments.get(name, contact.law.parameters[name])
+            if argument is not None and argument.text in names:
+                return f"contact {contact.name} has {name} = {argument.text}; change {argument.text} instead"
+            text = "its default" if argument is None else argument.text
             return (
                 f"{name} is an argument of the law of contact {contact.name} with the value {text}; declare a "
                 f'parameter, {name} = {text} under [parameters], and write law = {{ ..., {name} = "{name}" }}'
@@ -240,7 +241,7 @@ class Model(Declared):
 
         def changed(parts: Iterable[Any]) -> tuple[Any, ...]:
             return tuple(
-                replace(part, start=_given(changes, part.name)) if part.name in changes else part
+                replace(part, start=_changed_value(changes, part.name)) if part.name in changes else part
                 for part in parts
             )
 
@@ -452,11 +453,11 @@ def _content(model: Model) -> tuple[object, ...]:
         model.states, model.parameters, model.discrete, model.components, model.contacts, model.surfaces, model.inputs,
         model.monitors, model.schedules, model.outputs, model.definitions, model.impacts,
     )  # fmt: skip
-    words = (model.title, model.source, model.description, model.look, model.duration)
-    return (model.name, *parts, *words, model.flow)
+    texts = (model.title, model.source, model.description, model.look, model.duration)
+    return (model.name, *parts, *texts, model.flow)
 
 
-def _given(changes: Mapping[str, Any], name: str) -> Expression:
+def _changed_value(changes: Mapping[str, Any], name: str) -> Expression:
     """Return a changed value as an expression; an error names the changed quantity."""
     try:
         return parse(changes[name])

@@ -20,7 +20,7 @@ from hybridsim.model.parts.component import Component, Corner, Guard, Mode, Surf
 from hybridsim.model.parts.frozen_map import FrozenMap
 from hybridsim.model.smoothing.jumps import not_linear
 from hybridsim.model.smoothing.nonsmooth import MODE, Primitive, sides_of, uses_primitives
-from hybridsim.model.smoothing.rewriting import IN_VELOCITY, WATCHED, Found, Here, Rewriting
+from hybridsim.model.smoothing.rewriting import IN_EVENTS, IN_VELOCITY, Found, Here, Rewriting
 
 if TYPE_CHECKING:
     from hybridsim.model.parts.model import Model
@@ -120,18 +120,18 @@ class _Smoothing:
             )
             for monitor in model.monitors
         )
-        wanted = self.meanings.reached((*self._integrated(), *self._watched_trees()))
+        in_use = self.meanings.reached((*self._integrated(), *self._event_trees()))
         of_modes = self.meanings.reached(self._of_modes())
-        outside = self.meanings.reached(self._watched_trees()) | of_modes
+        outside = self.meanings.reached(self._event_trees()) | of_modes
         definitions = []
         for name, expr in model.definitions:
             where = f"definition {name}"
-            here = Here(where, expr.place, jumps="", times=WATCHED if name in outside else "")
+            here = Here(where, expr.place, jumps="", times=IN_EVENTS if name in outside else "")
             if name in velocities:
                 here = replace(here, untouched=IN_VELOCITY)
             elif name in of_modes:
                 here = replace(here, jumps=IN_MODE, is_passing=True)
-            definitions.append((name, self._rewritten(expr, here) if name in wanted else expr))
+            definitions.append((name, self._rewritten(expr, here) if name in in_use else expr))
         if not self.work.count and not self.work.corners:
             return model, []
         made = [self._with_implied(c, component) for c, component in enumerate(components)]
@@ -159,7 +159,7 @@ class _Smoothing:
             for mode in component.modes:
                 yield from (expr.tree for expr in (*mode.der.values(), *mode.set.values()))
 
-    def _watched_trees(self) -> Iterator[ast.expr]:
+    def _event_trees(self) -> Iterator[ast.expr]:
         yield from (monitor.expr.tree for monitor in self.model.monitors)
         for component in self.components:
             yield from (guard.expr.tree for mode in component.modes for guard in mode.guards)

@@ -82,8 +82,8 @@ class Borders:
         self._rates = {state.name: state.der.tree for state in model.states}
         still = {state.name for state in model.states if not polynomial(state.der.tree)} - rates
         self._moving = {state.name for state in model.states} - still
-        given = {part.name for part in model.discrete} | {signal.name for signal in model.inputs}
-        self._held = still | (given - lasting(model))
+        piecewise_constant = {part.name for part in model.discrete} | {signal.name for signal in model.inputs}
+        self._held = still | (piecewise_constant - lasting(model))
         self._surfaces = [
             c.surface.function.tree for c in components if c.surface and not c.surface.is_unilateral
         ]
@@ -245,7 +245,9 @@ def not_linear(trees: Iterable[tuple[str, ast.expr]], carried: Mapping[str, Set[
         for monomial in polynomial(tree):
             factors = [factor for factor, power in monomial for _ in range(power)]
             signs = [sign for factor in factors if factor in carried for sign in carried[factor]]
-            words = {word for factor in factors if factor not in carried for word in _WORD.findall(factor)}
-            found.update(*(carried[name] for name in words & carried.keys()))
+            names_in_factors = {
+                word for factor in factors if factor not in carried for word in _WORD.findall(factor)
+            }
+            found.update(*(carried[name] for name in names_in_factors & carried.keys()))
             found.update(sign for sign in signs if signs.count(sign) > 1)
     return found

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hybridsim.model.parts.model import Model
 
 # the treatments of a primitive, see Primitive.became
-COMPONENT, SURFACE, MODE, KEPT, POWER, TIMED = "component", "surface", "mode", "kept", "power", "signal"
+COMPONENT, SURFACE, MODE, UNCHANGED, POWER, TIMED = "component", "surface", "mode", "kept", "power", "signal"
 JUMPS = "it jumps, judging by its form"  # start of the remark on a kept primitive whose sides differ
 _WORD = re.compile(r"\b(abs|min|max|sign|if)\b")
 _LIMITED = ("sqrt", "log", "asin", "acos")
@@ -157,8 +157,8 @@ def sides_of(node: ast.expr) -> Sides | None:
         case ast.IfExp(test=ast.Compare(left=a, ops=[op], comparators=[b]), body=body, orelse=orelse) if (
             type(op) in _HOLDS
         ):
-            above, at_zero, below = (body if holds else orelse for holds in _HOLDS[type(op)])
-            return _minus(a, b), above, below, at_zero
+            above, on_border, below = (body if holds else orelse for holds in _HOLDS[type(op)])
+            return _minus(a, b), above, below, on_border
     return None
 
 

@@ -26,11 +26,11 @@ from hybridsim.model.smoothing.jumps import SIGN, Borders, Jump, product_of_sign
 from hybridsim.model.smoothing.nonsmooth import (
     COMPONENT,
     JUMPS,
-    KEPT,
     MODE,
     POWER,
     SURFACE,
     TIMED,
+    UNCHANGED,
     Primitive,
     Sides,
     is_clear_of_zero,
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 _EITHER = parse("p*a + (1 - p)*b").tree
 IN_VELOCITY = "it is part of a relative velocity"
-WATCHED = "a guard, a monitor or another corner depends on it"
+IN_EVENTS = "a guard, a monitor or another corner depends on it"
 VARIABLE = "__corner_"  # declared names cannot start with two underscores
 
 
@@ -65,9 +65,9 @@ class Here:
     place: Place | None
     signs: Mapping[Family, int] = field(default_factory=dict)
     untouched: str = ""
-    jumps: str = WATCHED
+    jumps: str = IN_EVENTS
     is_passing: bool = False
-    times: str = WATCHED
+    times: str = IN_EVENTS
     rooted: frozenset[Family] = frozenset()
 
 
@@ -191,7 +191,7 @@ class Rewriting:
         if parts is not None and self.meanings.moves(parts[0]):
             return self._side(node, parts, here)
         if isinstance(node, ast.IfExp) and self.meanings.moves(node.test):
-            return self._kept(node, f"{JUMPS}: its condition is an equality", here)
+            return self._unchanged(node, f"{JUMPS}: its condition is an equality", here)
         changed: list[bool] = []
 
         def change(part: ast.expr) -> ast.expr:
@@ -207,7 +207,7 @@ class Rewriting:
         try:
             single = single_comparisons(self.meanings, node)
         except TooManyConditions:
-            return self._kept(node, f"{JUMPS}: its condition has too many comparisons", here)
+            return self._unchanged(node, f"{JUMPS}: its condition has too many comparisons", here)
         return node if single is node else self.walk(single, here)
 
     def _sign_taken_apart(self, argument: ast.expr, here: Here) -> ast.expr | None:
@@ -267,58 +267,58 @@ class Rewriting:
 
     def _side(self, node: ast.expr, parts: Sides, here: Here) -> ast.expr:
         """Return the replacement of a primitive: one of its sides, or a variable with the active side."""
-        argument, above, below, at_zero = parts
+        argument, above, below, on_border = parts
         if here.signs and not self.is_smooth(argument):
             argument = resolved(self.meanings, argument, here.signs)
         branches = (above, below) if isinstance(node, ast.IfExp) else ()
         forced = names_of(node) & self.meanings.forced
         family, sign = self.meanings.family(argument)
         if not family:
-            return self.walk((below, at_zero, above)[sign + 1], here)
+            return self.walk((below, on_border, above)[sign + 1], here)
         agrees = self.agrees(node, parts)
         if family in here.signs and not agrees:
-            return self._implied(node, (below, at_zero, above)[here.signs[family] * sign + 1], here)
+            return self._implied(node, (below, on_border, above)[here.signs[family] * sign + 1], here)
         if family in here.rooted and not agrees:
-            return self._kept(node, "its product with a root or power is continuous", here)
+            return self._unchanged(node, "its product with a root or power is continuous", here)
         if self._is_step(family, argument, here, agrees) and (step := self._step(family, argument)):
             return self._stepped(node, step, parts, family, sign, here)
         if here.untouched == IN_VELOCITY and here.where and (not agrees or self.borders.is_timed(argument)):
             self.faults.append(self._fault_in_velocity(node, argument, here))
         if here.untouched:
-            return self._kept(node, here.untouched if agrees else f"{JUMPS}: {here.untouched}", here)
+            return self._unchanged(node, here.untouched if agrees else f"{JUMPS}: {here.untouched}", here)
         if any(
             self._is_limited(side, argument, family, s)
             for side, s in zip(branches, (sign, -sign), strict=False)
         ):
             reason = "one of its sides is undefined on the other side"
-            return self._kept(node, reason if agrees else f"{JUMPS}: {reason}", here)
+            return self._unchanged(node, reason if agrees else f"{JUMPS}: {reason}", here)
         if family in here.signs:
-            return self._implied(node, (below, at_zero, above)[here.signs[family] * sign + 1], here)
+            return self._implied(node, (below, on_border, above)[here.signs[family] * sign + 1], here)
         if self.never_negative(argument):
             return self._implied(node, above, here)
         owner = self._owner(family)
         if owner is not None:
             self.note(node, MODE, f"its side follows from the modes of {self.components[owner].name}", here)
-            sides = [self.walk(part, here) for part in (below, at_zero, above)]
+            sides = [self.walk(part, here) for part in (below, on_border, above)]
             values = tuple(sides[signs[family] * sign + 1] for signs in self.signs[owner])
             return self._variable(self.implied.setdefault(owner, {}), values)
         if not agrees:
-            return self._jump(node, (argument, above, below, at_zero), family, sign, here)
+            return self._jump(node, (argument, above, below, on_border), family, sign, here)
         if forced:
-            return self._kept(
+            return self._unchanged(
                 node, f"it depends on {', '.join(sorted(forced))}, which the solver computes in a mode", here
             )
         if self.refusal:
-            return self._kept(node, self.refusal, here)
+            return self._unchanged(node, self.refusal, here)
         inside = replace(here, signs=self._signs(here, family, sign))  # on one side of the node
         if isinstance(node, ast.IfExp) and (border := jump_inside(self, node, inside)):
             return self._hoisted(node, border, here)
-        here = replace(here, jumps=WATCHED, is_passing=False)
+        here = replace(here, jumps=IN_EVENTS, is_passing=False)
         pair = self._pair(above, below, family, sign, here)
         if family in self.shared:
             jump = self._jump_at(family, argument, sign)
             self.note(node, MODE, f"its side follows from the modes of {jump.name}", here)
-            row = (*(pair if sign == jump.sign else pair[::-1]), self.walk(at_zero, here))
+            row = (*(pair if sign == jump.sign else pair[::-1]), self.walk(on_border, here))
             return self._variable(jump.values, row)
         found = self.corners.get(family)
         if found is None:
@@ -390,8 +390,8 @@ class Rewriting:
 
     def _is_step(self, family: Family, argument: ast.expr, here: Here, agrees: bool) -> bool:
         """Return whether a signal represents a condition on time alone at this place."""
-        wanted = here.untouched or (here.times and not agrees) or family in self.timed
-        return bool(wanted) and self.borders.is_timed(argument) and not self.borders.refusal(argument)
+        may_be_timed = here.untouched or (here.times and not agrees) or family in self.timed
+        return bool(may_be_timed) and self.borders.is_timed(argument) and not self.borders.refusal(argument)
 
     def _step(self, family: Family, argument: ast.expr) -> TimeStep | None:
         """Return the signal of a border in time, or None if its zeros cannot be computed."""
@@ -430,7 +430,7 @@ class Rewriting:
         else:
             reason = self._left(family, argument, here)
         if reason:
-            return self._kept(node, f"{JUMPS}: {reason}", here)
+            return self._unchanged(node, f"{JUMPS}: {reason}", here)
         jump = self._jump_at(family, argument, sign)
         is_whole = isinstance(node, ast.IfExp) and node.body is node.orelse  # made by _hoisted
         self.note(above if is_whole else node, SURFACE, jump.name, here)
@@ -513,8 +513,8 @@ class Rewriting:
         self.count += 1
         return self.walk(side, here)
 
-    def _kept(self, node: ast.expr, reason: str, here: Here) -> ast.expr:
-        self.note(node, KEPT, reason, here)
+    def _unchanged(self, node: ast.expr, reason: str, here: Here) -> ast.expr:
+        self.note(node, UNCHANGED, reason, here)
         return node
 
     def _title(self, node: ast.expr) -> str:

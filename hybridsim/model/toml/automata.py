@@ -53,11 +53,11 @@ def read_mode(name: str, table: Table) -> Mode:
 
 def _guard(name: str, table: Table) -> Guard:
     table.only("expr", "then", "fatal")
-    expr = table.needed("expr", 'write expr = "EXPRESSION", which is >= 0 while the mode lasts')
-    given = table.data.get("then", [])
+    expr = table.required("expr", 'write expr = "EXPRESSION", which is >= 0 while the mode lasts')
+    transitions = table.data.get("then", [])
     then = []
-    for index, value in enumerate(given if isinstance(given, list) else [given]):
-        keys = ("then", index) if isinstance(given, list) else ("then",)
+    for index, value in enumerate(transitions if isinstance(transitions, list) else [transitions]):
+        keys = ("then", index) if isinstance(transitions, list) else ("then",)
         part = table.sub(value, f"{table.kind}, then", "to", *keys)
         if part is not None:
             then.append(_choice(part))
@@ -91,9 +91,9 @@ def _surface(parent: Table) -> Surface | None:
         table.require(key, f'write {key} = "..."')
     unknown, above, hold, *sides = (table.text(key) for key in names)
     jump_above, jump_below = (
-        table.needed(key, f"write {key} = 0 if the unknown does not jump there") for key in jumps
+        table.required(key, f"write {key} = 0 if the unknown does not jump there") for key in jumps
     )
-    function = table.needed("function", 'write function = "EXPRESSION"')
+    function = table.required("function", 'write function = "EXPRESSION"')
     unique = table.flag("unique")
     below = sides[0] if sides else None
     jumps_of = (jump_above, jump_below)

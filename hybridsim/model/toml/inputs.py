@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hybridsim.errors import ModelError, nearest
-from hybridsim.model.parts.inputs import KINDS, NEEDED, OPTIONAL, Input
+from hybridsim.model.parts.inputs import KINDS, OPTIONAL, REQUIRED, Input
 from hybridsim.model.toml.table import Table
 from hybridsim.model.toml.table_file import read_columns
 
@@ -23,14 +23,14 @@ def read_inputs(root: Table, folder: Path) -> Iterable[Input]:
             what = f"unknown kind '{kind}'" if kind else "'kind' is missing"
             table.fail(what, nearest(kind, KINDS, kind="kinds"), "kind")
             continue
-        known = (*NEEDED[kind], *OPTIONAL[kind])
+        known = (*REQUIRED[kind], *OPTIONAL[kind])
         extra = ("file", "columns") if kind == "table" else ()
         table.only("kind", *known, *extra)
         if "file" in table.data:
             numbers = _from_file(table, folder)
         else:
-            for key in NEEDED[kind]:
-                table.require(key, f"an input of kind {kind} needs {', '.join(NEEDED[kind])}")
+            for key in REQUIRED[kind]:
+                table.require(key, f"an input of kind {kind} needs {', '.join(REQUIRED[kind])}")
             numbers = {key: _numbers(table, key) for key in _NUMBERS if key in table.data}
         texts = {key: table.text(key) for key in _TEXTS if key in table.data}
         rest = [key for key in known if key not in (*_TEXTS, *_NUMBERS) and key in table.data]
@@ -40,8 +40,8 @@ def read_inputs(root: Table, folder: Path) -> Iterable[Input]:
 
 
 def _numbers(table: Table, key: str) -> tuple[float, ...]:
-    given = table.data[key]
-    numbers = given if isinstance(given, list) else [given]
+    entry = table.data[key]
+    numbers = entry if isinstance(entry, list) else [entry]
     for index, value in enumerate(numbers):
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             table.fail(f"'{key}' contains {value!r}", "it must be a list of numbers", key, index)

@@ -73,10 +73,10 @@ def _packaged(name: str) -> FrictionLaw | None:
 
 
 def _law(name: str, table: Table, arguments: dict[str, Expression]) -> FrictionLaw | None:
-    given: Any = table.data.get("parameters", {})
+    declared: Any = table.data.get("parameters", {})
     parameters: dict[str, Expression | None] = {}
-    if isinstance(given, list):
-        for index, item in enumerate(given):
+    if isinstance(declared, list):
+        for index, item in enumerate(declared):
             parameters.update(_listed(table, item, index))
     else:
         parameters.update(table.expressions("parameters"))
@@ -86,10 +86,10 @@ def _law(name: str, table: Table, arguments: dict[str, Expression]) -> FrictionL
     slip: Any = table.expression("slip")  # None only together with a force, which FrictionLaw checks
     stick: Any = table.expression("stick")
     if force is None:
-        slip = table.needed(
+        slip = table.required(
             "slip", 'write slip = "EXPRESSION" of v >= 0, N and parameters, or force = "EXPRESSION"'
         )
-        stick = table.needed("stick", 'write stick = "EXPRESSION" of N and parameters')
+        stick = table.required("stick", 'write stick = "EXPRESSION" of N and parameters')
     modes = dict(table.entries("modes", "mode"))
     marked = [mode for mode, part in modes.items() if part.flag("initial")]
     texts = {key: table.text(key) for key in ("initial", "copies") if key in table.data}
@@ -121,7 +121,7 @@ def _states(law: Table) -> Iterator[State]:
     for name, table in law.entries("states", f"{law.kind}, state", "der"):
         table.only("start", "der", "unit", "nominal")
         start = table.expression("start") or parse(0)
-        der = table.needed("der", 'write der = "EXPRESSION" of v, N, parameters and states of the law')
+        der = table.required("der", 'write der = "EXPRESSION" of v, N, parameters and states of the law')
         yield State(name, start, der, table.text("unit"), table.real("nominal"), place=table.place)
 
 

@@ -113,30 +113,30 @@ def _model(root: Table, folder: Path) -> Model:
 def _parameters(root: Table) -> Iterable[Parameter]:
     for name, table in root.entries("parameters", "parameter", "value"):
         table.only("value", "unit", "title")
-        value = table.needed("value", 'write value = NUMBER or "EXPRESSION"')
+        value = table.required("value", 'write value = NUMBER or "EXPRESSION"')
         yield Parameter(name, value, table.text("unit"), table.text("title"), place=table.place)
 
 
 def _states(root: Table) -> Iterable[State]:
     for name, table in root.entries("states", "state"):
         table.only("start", "der", "unit", "nominal")
-        start = table.needed("start", "write start = NUMBER, the initial value")
-        der = table.needed("der", 'write der = "EXPRESSION"; modes may replace it by their own der')
+        start = table.required("start", "write start = NUMBER, the initial value")
+        der = table.required("der", 'write der = "EXPRESSION"; modes may replace it by their own der')
         yield State(name, start, der, table.text("unit"), table.real("nominal"), place=table.place)
 
 
 def _discrete(root: Table) -> Iterable[Discrete]:
     for name, table in root.entries("discrete", "discrete state", "start"):
         table.only("start", "unit")
-        start = table.needed("start", "write start = NUMBER, the initial value")
+        start = table.required("start", "write start = NUMBER, the initial value")
         yield Discrete(name, start, table.text("unit"), place=table.place)
 
 
 def _contacts(root: Table, laws: dict[str, FrictionLaw]) -> Iterable[Contact]:
     for name, table in root.entries("contacts", "contact"):
         table.only("velocity", "normal", "law", "opens", "start", "nominal")
-        velocity = table.needed("velocity", 'write velocity = "EXPRESSION", the relative velocity')
-        normal = table.needed("normal", 'write normal = "EXPRESSION", the normal load')
+        velocity = table.required("velocity", 'write velocity = "EXPRESSION", the relative velocity')
+        normal = table.required("normal", 'write normal = "EXPRESSION", the normal load')
         law = read_law_of_contact(table, laws)
         if law is not None:
             yield Contact(
@@ -154,12 +154,14 @@ def _contacts(root: Table, laws: dict[str, FrictionLaw]) -> Iterable[Contact]:
 def _surfaces(root: Table) -> Iterable[SwitchingSurface]:
     for name, table in root.entries("surfaces", "surface", "expr"):
         table.only("expr", "above", "below")
-        expr = table.needed("expr", 'write expr = "EXPRESSION", which changes its sign at the surface')
+        expr = table.required("expr", 'write expr = "EXPRESSION", which changes its sign at the surface')
         above, below = table.expressions("above"), table.expressions("below")
         single = sorted(set(above) ^ set(below))
         for one in single:
-            given, side = ("above", "below") if one in above else ("below", "above")
-            table.fail(f"'{one}' has no value {side}", f"write {side} = {{ {one} = ... }}", given, one)
+            declared_side, side = ("above", "below") if one in above else ("below", "above")
+            table.fail(
+                f"'{one}' has no value {side}", f"write {side} = {{ {one} = ... }}", declared_side, one
+            )
         if not single:
             yield SwitchingSurface(name, expr, above, below, place=table.place)
 
@@ -167,15 +169,15 @@ def _surfaces(root: Table) -> Iterable[SwitchingSurface]:
 def _impacts(root: Table) -> Iterable[Impact]:
     for name, table in root.entries("impacts", "impact"):
         table.only("gap", "restitution")
-        gap = table.needed("gap", 'write gap = "EXPRESSION" of positions, which cannot become negative')
-        restitution = table.needed("restitution", "write restitution = NUMBER from 0 to 1")
+        gap = table.required("gap", 'write gap = "EXPRESSION" of positions, which cannot become negative')
+        restitution = table.required("restitution", "write restitution = NUMBER from 0 to 1")
         yield Impact(name, gap, restitution, place=table.place)
 
 
 def _monitors(root: Table) -> Iterable[Monitor]:
     for name, table in root.entries("monitors", "monitor", "expr"):
         table.only("expr", "direction", "action", "reset")
-        expr = table.needed("expr", 'write expr = "EXPRESSION", whose zeros are the events')
+        expr = table.required("expr", 'write expr = "EXPRESSION", whose zeros are the events')
         action = table.text("action", "reset" if "reset" in table.data else "record")
         direction = table.text("direction", "both")
         yield Monitor(name, expr, direction, action, table.resets("reset"), place=table.place)
@@ -205,7 +207,7 @@ def _times(table: Table) -> Iterable[Expression]:
 def _clocks(root: Table) -> Iterable[Schedule]:
     for name, table in root.entries("clocks", "clock"):
         table.only("period", "offset", "set")
-        period = table.needed("period", "write period = NUMBER, the time between ticks")
+        period = table.required("period", "write period = NUMBER, the time between ticks")
         start = table.expression("offset")
         yield Schedule(name, start=start, period=period, reset=table.resets("set"), place=table.place)
 
@@ -213,5 +215,5 @@ def _clocks(root: Table) -> Iterable[Schedule]:
 def _outputs(root: Table) -> Iterable[Output]:
     for name, table in root.entries("outputs", "output", "expr"):
         table.only("expr", "unit", "modes")
-        expr = table.needed("expr", 'write expr = "EXPRESSION", the value of the output')
+        expr = table.required("expr", 'write expr = "EXPRESSION", the value of the output')
         yield Output(name, expr, table.text("unit"), table.expressions("modes"), place=table.place)

@@ -108,7 +108,7 @@ class Table:
             return _ZERO
         return self.parsed(self.data[key], key)
 
-    def needed(self, key: str, remedy: str) -> Expression:
+    def required(self, key: str, remedy: str) -> Expression:
         return self.expression(key, remedy) or _ZERO
 
     def parsed(
@@ -152,10 +152,10 @@ class Table:
             value = {shorthand: value}
         return Table(self.source, (*self.path, *keys), value, kind)
 
-    def _typed(self, key: str, kind: type, wanted: str, default: Any) -> Any:
+    def _typed(self, key: str, kind: type, required_kind: str, default: Any) -> Any:
         value = self.data.get(key, default)
         if not isinstance(value, kind):
-            self.fail(f"'{key}' is {_shown(value)}", f"it must be {wanted}", key)
+            self.fail(f"'{key}' is {_shown(value)}", f"it must be {required_kind}", key)
             return default
         return value
 

@@ -66,15 +66,15 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
     except (OSError, ValueError) as fault:
         reason = getattr(fault, "strerror", None) or str(fault)
         raise ModelError(f"{path} cannot be read: {reason}", remedy="use a CSV file") from None
-    kept = [
+    content_lines = [
         (n, line) for n, line in enumerate(lines, 1) if line.strip() and not line.lstrip().startswith("#")
     ]
-    if not kept:
+    if not content_lines:
         return []
-    separator = max(",;\t", key=kept[0][1].count)
-    rows = csv.reader((line for _, line in kept), delimiter=separator)
+    separator = max(",;\t", key=content_lines[0][1].count)
+    rows = csv.reader((line for _, line in content_lines), delimiter=separator)
     try:
-        return [(n, row) for (n, _), row in zip(kept, rows, strict=True)]
+        return [(n, row) for (n, _), row in zip(content_lines, rows, strict=True)]
     except (csv.Error, ValueError) as fault:
         raise ModelError(
             f"{path} is not a valid CSV file: {fault}",

@@ -7,7 +7,7 @@ import pytest
 import hybridsim as hs
 from hybridsim.model.parts.component import Corner
 from hybridsim.model.smoothing.explicit_corners import MOST, smoothed, smoothing_of
-from hybridsim.model.smoothing.nonsmooth import COMPONENT, KEPT, MODE, POWER, SURFACE, Primitive
+from hybridsim.model.smoothing.nonsmooth import COMPONENT, MODE, POWER, SURFACE, UNCHANGED, Primitive
 
 
 def moving(rate: str, **more: object) -> hs.Model:
@@ -65,7 +65,7 @@ def test_definitions_are_seen_through() -> None:
         ("1 if t > g else 0", SURFACE),
         ("sign(x)", SURFACE),
         ("sign(v)*v**2", COMPONENT),
-        ("sqrt(x) if x > 0 else 0", KEPT),
+        ("sqrt(x) if x > 0 else 0", UNCHANGED),
     ],
 )
 def test_a_conditional_is_a_corner_where_its_branches_agree(text: str, became: str) -> None:
@@ -124,7 +124,7 @@ def test_what_waits_for_a_force_is_kept() -> None:
     contact = hs.Contact("f", "v", "1", "coulomb", {"mu": 0.5})
     states = [hs.State("v", 1, der="1 - f"), hs.State("heat", 0, der="abs(f)")]
     account = accounts(hs.Model("m", states=states, contacts=[contact]))["abs(f)"]
-    assert account.became == KEPT
+    assert account.became == UNCHANGED
     assert "f, which the solver computes in a mode" in account.remark
 
 
@@ -135,13 +135,13 @@ def test_more_corners_than_are_worth_it_are_kept() -> None:
     assert len(corners(model(MOST))) == MOST
     many = model(MOST + 1)
     assert smoothed(many) is many
-    assert {one.became for one in accounts(many).values()} == {KEPT}
+    assert {one.became for one in accounts(many).values()} == {UNCHANGED}
 
 
 def test_fractional_powers_are_flagged() -> None:
     found = accounts(moving("sqrt(1 + v**2) - abs(x)**0.5 + x**k"))
     assert found["abs(x)**0.5"].became == POWER
-    assert found["abs(x)"].became == KEPT
+    assert found["abs(x)"].became == UNCHANGED
     assert "sqrt(1 + v**2)" not in found
     assert "x**k" not in found  # k is 2
     raised = moving("abs(x)**k").with_(k=1.5)

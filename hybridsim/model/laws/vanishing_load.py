@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _FADED = 1e-6  # fraction of the initial load below which the steps of such a law are too small to continue
 
 
-def load_at_zero(
+def vanishing_load(
     model: Model,
     names: Sequence[str],
     start: tuple[float, Sequence[float]],
