@@ -187,9 +187,9 @@ def _checked_tables(title: str, arrays: Arrays, sizes: dict[str, int]) -> Linear
     used = np.arange(widest) < counts[:, None]
     if not ((ends > np.arange(widest)) & (ends <= counts[:, None]))[used].all():
         raise ValueError(f"{title}: a block of coordinates ends outside of its coordinates")
-    needed = {name: arrays[name] for name in (*_TABLE_FORMS, "states", "flows")}
+    present = {name: arrays[name] for name in (*_TABLE_FORMS, "states", "flows")}
     empty = {name: getattr(no_tables(), name) for name in LinearTables._fields}
-    tables: LinearTables = packed(LinearTables(**(empty | needed)))
+    tables: LinearTables = packed(LinearTables(**(empty | present)))
     return tables
 
 

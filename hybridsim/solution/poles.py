@@ -121,8 +121,8 @@ def end_at_pole(system: System, trajectory: Trajectory) -> None:
     )
     trajectory.segments.blocks = [SegmentList(system, [*way.segments[:number], ended])]
     forward = last.s[-1] >= last.s[0]
-    kept = [o for o in trajectory.occurrences if (o.instant.minus(ended.end) <= 0.0) == forward]
-    trajectory.occurrences.blocks = [OccurrenceList(kept)] if kept else []
+    before_pole = [o for o in trajectory.occurrences if (o.instant.minus(ended.end) <= 0.0) == forward]
+    trajectory.occurrences.blocks = [OccurrenceList(before_pole)] if before_pole else []
     trajectory.forget_checkpoint()
     trajectory.status = "step-failure"
     trajectory.message = (
@@ -132,7 +132,7 @@ def end_at_pole(system: System, trajectory: Trajectory) -> None:
 
 
 def passed_unseen(system: System, trajectory: Trajectory, x0: np.ndarray, t0: float) -> list[str]:
-    """Return a warning for each denominator whose sign changed in a run whose states were not kept."""
+    """Return a warning for each denominator whose sign changed in a run whose states were not saved."""
     every = denominators(system.model)
     if not every or not trajectory.segments or system.n == 0:
         return []

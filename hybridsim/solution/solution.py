@@ -17,7 +17,7 @@ from hybridsim.presentation.tables import Table
 from hybridsim.solution.by_name import ByName
 from hybridsim.solution.event import Event, ModeInterval
 from hybridsim.solution.files.in_tables import InTables
-from hybridsim.solution.summary import in_html, in_words
+from hybridsim.solution.summary import as_text, in_html
 
 if TYPE_CHECKING:
     from hybridsim.engine.record.block_list import SegmentBlockList
@@ -155,13 +155,13 @@ class Solution(InTables):
         if t is None and self._grid is None:
             parts = [self._quantity(name, g, g.s, g.x) for g in self._segments]
             return np.concatenate(parts) if parts else np.zeros(0)
-        given = self.t if t is None else t
-        times = as_times(given)
+        requested = self.t if t is None else t
+        times = as_times(requested)
         out = np.empty(len(times))
-        x, pieces = self._pieces(times, side)
-        for segment, chosen, s in pieces:
+        x, by_segment = self._by_segment(times, side)
+        for segment, chosen, s in by_segment:
             out[chosen] = self._quantity(name, segment, s, x[chosen])
-        return out[0] if np.ndim(given) == 0 else out
+        return out[0] if np.ndim(requested) == 0 else out
 
     @cached_property
     def _speeds(self) -> dict[str, int]:
@@ -245,14 +245,14 @@ class Solution(InTables):
         find_places(np.ascontiguousarray(times), *self._frame, sign, later, index, s)
         return index, s
 
-    def _pieces(
+    def _by_segment(
         self, times: np.ndarray, side: str
     ) -> tuple[np.ndarray, list[tuple[Segment, np.ndarray, np.ndarray]]]:
         """Return states (k, n) at some times, and (segment, indices, local times) for each segment."""
         index, s = self._segment_at(times, side)
         parts = [(i, np.flatnonzero(index == i)) for i in np.unique(index)]
-        pieces = [(self._segments[int(i)], chosen, s[chosen]) for i, chosen in parts]
-        return self._segments.states(index, s), pieces
+        by_segment = [(self._segments[int(i)], chosen, s[chosen]) for i, chosen in parts]
+        return self._segments.states(index, s), by_segment
 
     # -- events and modes -----------------------------------------------------------------------------------
 
@@ -352,8 +352,8 @@ class Solution(InTables):
             first = np.concatenate([[0], changed]) if len(numbers) else changed
             last = np.append(changed, len(numbers))[: len(first)] - 1
             names = [automaton.modes[m] for m in numbers[first, c].tolist()]
-            stretches = zip(names, self._starts[first].tolist(), ends[last].tolist(), strict=True)
-            result[automaton.name] = tuple(ModeInterval(*stretch) for stretch in stretches)
+            intervals = zip(names, self._starts[first].tolist(), ends[last].tolist(), strict=True)
+            result[automaton.name] = tuple(ModeInterval(*interval) for interval in intervals)
         return result
 
     def _modes_of_events(self) -> dict[str, tuple[ModeInterval, ...]]:
@@ -362,9 +362,9 @@ class Solution(InTables):
             changes = [e for e in self.events if e.component == automaton.name and e.source != e.target]
             times = [self.t_start, *(e.t for e in changes), self.t_end]
             names = [*(e.source for e in changes), automaton.modes[last]]
-            stretches = zip(names, times[:-1], times[1:], strict=True)
+            intervals = zip(names, times[:-1], times[1:], strict=True)
             result[automaton.name] = tuple(
-                ModeInterval(n, a, b) for n, a, b in stretches if a != b or b == times[-1]
+                ModeInterval(n, a, b) for n, a, b in intervals if a != b or b == times[-1]
             )
         return result
 
@@ -516,7 +516,7 @@ class Solution(InTables):
         return tabulated(self, points)
 
     def __repr__(self) -> str:
-        return in_words(self)
+        return as_text(self)
 
     def _repr_html_(self) -> str:
         """Return the HTML for notebooks: a summary, a strip of modes for each component, and the events."""

@@ -20,7 +20,7 @@ def kinds(solution: Solution) -> Counter[str]:
     return found
 
 
-def in_words(solution: Solution) -> str:
+def as_text(solution: Solution) -> str:
     """Return a summary as text: status, end state, events by kind, cost and warnings."""
     counted = ", ".join(f"{n} {kind}" for kind, n in sorted(kinds(solution).items())) or "none"
     counted = "not kept" if solution._save == "nothing" else counted

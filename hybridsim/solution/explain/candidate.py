@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from hybridsim.expr import Expression
     from hybridsim.solution.explain.recorded_settling import Decision, Look
 
-_WORDS = {FINE: "admissible", LEAVES: "not admissible"}
+_VERDICTS = {FINE: "admissible", LEAVES: "not admissible"}
 _OPEN = "a question of rounding"
 
 
@@ -115,7 +115,7 @@ def views(
         yield GuardView(
             f"{automaton.name} {automaton.modes[mode]}",
             automaton.guard_names[mode][j],
-            _in_words(declared.text, automaton.name),
+            _readable(declared.text, automaton.name),
             tuple(float(v) * f for v, f in zip(values, factorials, strict=True)),
             tuple(float(b) * f for b, f in zip(bounds, factorials, strict=True)),
             int(decreed[g]),
@@ -135,7 +135,7 @@ def as_in(system: System, z: np.ndarray, expression: Expression) -> Expression:
     return expression if tree is expression.tree else of_tree(tree, expression.place)
 
 
-def _in_words(text: str, component: str) -> str:
+def _readable(text: str, component: str) -> str:
     """Return the expression of a guard in words, without the program's internal names."""
     if text.startswith(ATTRACTION):
         return f"attraction of {component}, half the sum of the rates at which its two sides approach it"
@@ -147,7 +147,7 @@ def candidate(system: System, decision: Decision, look: Look) -> Candidate:
     guards = [g for c in look.components for g in system.automata[c].guards[look.z[c]]]
     shown = tuple(views(system, look.at, look.z, guards, look.decreed))
     modes = {system.automata[c].name: system.automata[c].modes[look.z[c]] for c in look.components}
-    return Candidate(modes, _WORDS.get(look.verdict, _OPEN), shown, decision.has_taken(look))
+    return Candidate(modes, _VERDICTS.get(look.verdict, _OPEN), shown, decision.has_taken(look))
 
 
 def way(system: System, look: Look) -> str:

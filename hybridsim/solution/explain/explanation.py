@@ -20,9 +20,9 @@ from hybridsim.presentation.readable import Readable
 from hybridsim.solution.event import Event
 from hybridsim.solution.explain.candidate import candidate, views
 from hybridsim.solution.explain.grazing import grazed
-from hybridsim.solution.explain.impact_words import errors_beside, is_struck
+from hybridsim.solution.explain.impact_text import errors_beside, is_struck
 from hybridsim.solution.explain.monitor_way import way_of_monitor
-from hybridsim.solution.explain.one_instant import BY_RESET, changes_in_words, fired_guards
+from hybridsim.solution.explain.one_instant import BY_RESET, changes_text, fired_guards
 from hybridsim.solution.explain.reason import reason
 from hybridsim.solution.explain.remarks import change_of_side, remarks
 from hybridsim.solution.explain.stages import place_of, situation
@@ -176,9 +176,11 @@ def _explained(solution: Solution, event: Event, happened: list[Occurrence], num
         if change is not None and is_struck(system, change)
         else at.x_error
     )
-    changed = changes_in_words(solution.names, x_minus, x_plus, error, texts)
-    blow = next((view for view in fired_views if view.mode == f"{event.component} {event.source}"), None)
-    why = reason(solution.model, occurrence, place, decision, changed, bool(choices), blow)
+    changed = changes_text(solution.names, x_minus, x_plus, error, texts)
+    impact_guard = next(
+        (view for view in fired_views if view.mode == f"{event.component} {event.source}"), None
+    )
+    why = reason(solution.model, occurrence, place, decision, changed, bool(choices), impact_guard)
     return Explanation(event, fired_views, candidates, why, state, choices)
 
 
@@ -210,10 +212,10 @@ def _of_accumulation(solution: Solution, event: Event) -> str:
     """Explain an accumulation: an instant that is the limit of a series of events and ends no segment."""
     times = [e.t for e in solution.events if e.kind == "transition" and e.t < event.t]
     gaps = [b - a for a, b in pairwise(times[-_SERIES:]) if b > a]
-    told = takewhile(
+    clear_gaps = takewhile(
         lambda gap: gap * SAME_FACTOR > math.ulp(event.t), gaps
     )  # smaller gaps are affected by rounding of the instants
-    turn, factor = turn_of(list(told), 3, 2.0 * SAME_FACTOR)
+    turn, factor = turn_of(list(clear_gaps), 3, 2.0 * SAME_FACTOR)
     shown = ", ".join(f"{gap:.3g}" for gap in gaps[-4:])
     every = "each" if turn == 1 else f"every {turn} of them"
     series = f", {every} shorter by the factor {factor:.6g}" if turn else ""
@@ -286,13 +288,13 @@ def _choices(solution: Solution, event: Event, at: Situation) -> tuple[str, ...]
     units = units_of(model) | {q.name: q.unit for q in model.parameters}
     lines = []
     for k, choice in enumerate(then):
-        said = "in all other cases"
+        condition = "in all other cases"
         if choice.when is not None:
             read = [n for n in sorted(choice.when.names) if n in known]
             values = ", ".join(f"{n} = {_with_unit(known[n], units.get(n, ''))}" for n in read)
-            said = f"when {choice.when.text}" + (f" ({values})" if values else "")
+            condition = f"when {choice.when.text}" + (f" ({values})" if values else "")
         came = "does not hold" if k < taken else "holds, and is taken" if k == taken else "is not reached"
-        lines.append(f"{said}: {came} -> {choice.to}")
+        lines.append(f"{condition}: {came} -> {choice.to}")
     return tuple(lines)
 
 

@@ -58,20 +58,20 @@ def fired_guards(
 def resets_before(settling: Settling, change: Change) -> str:
     """Describe the resets before a change at its instant, with the values that they set; empty without any."""
     system = settling.system
-    said: dict[str, None] = {}
+    resets: dict[str, None] = {}
     for one in settling.changes:
         if one is change:
             break
         automaton = system.automata[one.component]
         if automaton.has_surface or one.x_minus is change.x_minus:  # of the same round
             continue
-        moved = changes_in_words(system.names, one.x_minus, one.x_plus)
+        moved = changes_text(system.names, one.x_minus, one.x_plus)
         if moved:
-            said[f"the reset of guard {one.guard} of {automaton.name} ({moved})"] = None
-    return " and ".join(said)
+            resets[f"the reset of guard {one.guard} of {automaton.name} ({moved})"] = None
+    return " and ".join(resets)
 
 
-def changes_in_words(
+def changes_text(
     names: Sequence[str],
     before: np.ndarray,
     after: np.ndarray,

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from hybridsim.engine.events.choice.verdict import FINE
 from hybridsim.solution.explain.candidate import views, way
-from hybridsim.solution.explain.impact_words import errors_beside, friction, is_struck, restitution
-from hybridsim.solution.explain.one_instant import BY_RESET, changes_in_words, resets_before
+from hybridsim.solution.explain.impact_text import errors_beside, friction, is_struck, restitution
+from hybridsim.solution.explain.one_instant import BY_RESET, changes_text, resets_before
 
 if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Change
@@ -29,9 +29,9 @@ def reason(
     decision: Decision | None,
     changed: str,
     has_choices: bool,
-    blow: GuardView | None,
+    impact_guard: GuardView | None,
 ) -> str:
-    """Return the sentence; `changed` names the changed states, and `blow` is the gap as it reached zero."""
+    """Return the sentence; `changed` names the changed states, and `impact_guard` is the gap as it reached zero."""
     stage, change = place.stage, place.change
     settling, outcome = stage.settling, stage.outcome
     system = settling.system
@@ -53,16 +53,16 @@ def reason(
         # the run knew the rate to within the rounding of its own steps
         if after != occurrence.target and change is None:
             return f"an impact after which the gap opens by no more than rounding: {occurrence.target} from here on"
-        said = restitution(model, stage, c, blow) if blow else ""
-        said = f"an impact{said}: its impulses change {changed}{friction(stage, c)}; {occurrence.target} just after"
+        text = restitution(model, stage, c, impact_guard) if impact_guard else ""
+        text = f"an impact{text}: its impulses change {changed}{friction(stage, c)}; {occurrence.target} just after"
         if decision is not None and len(decision.fine) > 1:
-            said += f"; {_of_several(system, decision)}"
-        return said
+            text += f"; {_of_several(system, decision)}"
+        return text
     if not automaton.has_surface:
         reset = f", with {changed}" if changed else ""
         first = "the first choice of guard {} whose condition held leads" if has_choices else "guard {} leads"
         leads = f"{first.format(occurrence.guard)} to {occurrence.target}{reset}"
-        if blow is not None:
+        if impact_guard is not None:
             return leads
         subject = led.subject or "another event of this instant"
         return f"{subject} made the guard leave: it was not at zero before; {leads}"
@@ -80,15 +80,15 @@ class _Led(NamedTuple):
     @property
     def subject(self) -> str:
         """The causes as the subject of a sentence; empty without any."""
-        said = " and ".join([*self.clauses, *self.nouns])
-        return f"{said}, which" if self.clauses else said
+        text = " and ".join([*self.clauses, *self.nouns])
+        return f"{text}, which" if self.clauses else text
 
     @property
     def start(self) -> str:
         """The causes as the start of a sentence; empty without any."""
         after = [f"after {' and '.join(self.nouns)}"] if self.nouns else []
-        said = " and ".join([*self.clauses, *after])
-        return f"{said}: " if said else ""
+        text = " and ".join([*self.clauses, *after])
+        return f"{text}: " if text else ""
 
 
 def _led(place: Place) -> tuple[list[str], list[str]]:
@@ -105,7 +105,7 @@ def _led(place: Place) -> tuple[list[str], list[str]]:
     nouns = [resets] if resets else []
     if struck and is_decided:
         error = errors_beside(stage, change.component)
-        moved = changes_in_words(system.names, stage.before.x, stage.outcome.x, error)
+        moved = changes_text(system.names, stage.before.x, stage.outcome.x, error)
         nouns.append(f"the impact of {' and '.join(struck)}" + (f" ({moved})" if moved else ""))
     return clauses, nouns
 

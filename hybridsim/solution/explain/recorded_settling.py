@@ -91,7 +91,7 @@ class Decision:
         return self.with_verdict(UNDECIDED)
 
 
-class Watched(Settling):
+class RecordedSettling(Settling):
     """A resolution that judges all candidates, including those that the choice does not need."""
 
     is_thorough = True

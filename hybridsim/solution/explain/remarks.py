@@ -36,7 +36,7 @@ def remarks(solution: Solution, occurrence: Occurrence, everything: Sequence[Occ
         *_companions(occurrence, together),
         *(_changed(system, one, z) for one in changed if one is not occurrence),
         *_jump(system, occurrence, z),
-        *_standing_sides(system, occurrence, z, {one.component for one in changed}),
+        *_unchanged_sides(system, occurrence, z, {one.component for one in changed}),
         *_loads(solution, float(occurrence.instant)),
     )
 
@@ -87,7 +87,7 @@ def _jump(system: System, occurrence: Occurrence, z: np.ndarray) -> Iterator[str
             yield f"{component.name} jumps in the rates where {border} = 0, and switches like a component"
 
 
-def _standing_sides(
+def _unchanged_sides(
     system: System, occurrence: Occurrence, z: np.ndarray, changed: set[str]
 ) -> Iterator[str]:
     """Describe the sides of corners that an event depends on and that did not change."""

@@ -18,7 +18,7 @@ from hybridsim.engine.run.located import Located, with_evaluated
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.integrators.contract import Integrator
 from hybridsim.solution.explain.one_instant import LOCATED
-from hybridsim.solution.explain.recorded_settling import Watched
+from hybridsim.solution.explain.recorded_settling import RecordedSettling
 
 if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Change, Outcome
@@ -40,7 +40,7 @@ class Stage:
     """
 
     before: Situation
-    settling: Watched
+    settling: RecordedSettling
     outcome: Outcome
     fired: tuple[int, ...] = ()
     due: str = ""
@@ -179,19 +179,21 @@ class _Instant:
         system, model, at = self.system, self.system.model, found.at
         keys = [("monitor", k) for k in monitors] + [("schedule", k) for k in schedules]
         before = Situation(at.s, at.x.copy(), at.p.copy(), at.z.copy(), at.x_error.copy(), at.s_error)
-        said = [
+        causes = [
             f"{model.monitors[k].name} crossed zero{_set_by(system, ('monitor', k), at)}" for k in monitors
         ]
-        said += [
+        causes += [
             f"{model.schedules[k].name} was due at this instant{_set_by(system, ('schedule', k), at)}"
             for k in schedules
         ]
-        settling = Watched(system, at, at.z.copy(), self.task.forward, found.scope(system), found.inputs)
+        settling = RecordedSettling(
+            system, at, at.z.copy(), self.task.forward, found.scope(system), found.inputs
+        )
         if begins:
             settling.jumped = surfaces_jump(system, self.instant, at, self.task.forward)
-            said += _said_of(system, self.knots, self.instant, at, self.task.forward)
+            causes += _knots_text(system, self.knots, self.instant, at, self.task.forward)
         outcome = settling.run(found.fired, list(keys))
-        return Stage(before, settling, outcome, tuple(found.fired), " and ".join(said))
+        return Stage(before, settling, outcome, tuple(found.fired), " and ".join(causes))
 
 
 def situation(system: System, segment: Segment, fired: list[int]) -> Situation:
@@ -231,7 +233,9 @@ def _knots(system: System, segment: Segment, instant: Instant, forward: bool) ->
     return found
 
 
-def _said_of(system: System, names: list[str], instant: Instant, at: Situation, forward: bool) -> list[str]:
+def _knots_text(
+    system: System, names: list[str], instant: Instant, at: Situation, forward: bool
+) -> list[str]:
     """Describe the inputs that have a knot, and the values of those that jump there."""
     if not names:
         return []
@@ -249,5 +253,5 @@ def _said_of(system: System, names: list[str], instant: Instant, at: Situation, 
         for name in names
         if name in known and values[0][k := known.index(name)] != values[1][k]
     ]
-    said = f"an input has a knot here (of {', '.join(shown[name] for name in names)})"
-    return [said + (f", where {' and '.join(jumps)}" if jumps else "")]
+    text = f"an input has a knot here (of {', '.join(shown[name] for name in names)})"
+    return [text + (f", where {' and '.join(jumps)}" if jumps else "")]

@@ -109,10 +109,10 @@ def check_header(header: Header) -> None:
         raise ValueError("its block kinds are not strings")
     if header["save"] not in ("all", "events", "last-period", "nothing"):
         check_number("its save setting", header["save"], 0.0)
-    keep = header["keep"]
-    if not (isinstance(keep, list) and len(keep) == 2):
+    retention = header["keep"]
+    if not (isinstance(retention, list) and len(retention) == 2):
         raise ValueError("its retention is not a pair")
-    for value in keep:
+    for value in retention:
         if value is not None:
             check_number("a part of its retention", value, 0.0, is_finite=False)
 
@@ -143,8 +143,8 @@ def check_events(events: Arrays, hidden: object, system: System) -> None:
         "x_plus": (float, ("E", "n")),
     }
     known = check_forms("the events", events, lengths, sizes_of(system))
-    words = events.get("words")
-    if words is None or words.dtype.kind != "U" or words.shape != (known["E"], 5):
+    texts = events.get("words")
+    if texts is None or texts.dtype.kind != "U" or texts.shape != (known["E"], 5):
         raise ValueError("the texts of the events do not match the events")
     check_count("the number of events that are not shown", hidden, known["E"])
     check_finite("the time of an event", events["instants"])
@@ -155,7 +155,7 @@ def check_events(events: Arrays, hidden: object, system: System) -> None:
         kinds.setdefault(monitor, set()).add("monitor")
     for schedule in system.model.schedules:
         kinds.setdefault(schedule.name, set()).add("scheduled")
-    for kind, component, _, source, target in {tuple(row) for row in words.tolist()}:
+    for kind, component, _, source, target in {tuple(row) for row in texts.tolist()}:
         if kind not in kinds.get(component, ()):
             raise ValueError(f"there is no {kind} of {component!r} in the model")
         if component in modes and kind != "monitor" and not {source, target} <= modes[component]:

@@ -27,18 +27,18 @@ def tabulated(solution: Solution, points: int | None) -> Table:
     if own_steps:
         t, ends = solution.t, np.cumsum([len(g.s) for g in solution._segments], dtype=int)
         x = solution.y.T
-        pieces = [
+        parts = [
             (g, np.arange(end - len(g.s), end), g.s) for g, end in zip(solution._segments, ends, strict=True)
         ]
     else:
         t = solution.t if points is None else equal_steps(solution.t_start, solution.t_end, points)
-        x, pieces = solution._pieces(t, "+") if len(t) else (np.zeros((0, len(solution.names))), [])
+        x, parts = solution._by_segment(t, "+") if len(t) else (np.zeros((0, len(solution.names))), [])
     names = [d.name for d in model.discrete]
     names += [q for q in solution._system.quantities if " in " not in q]
     columns = {name: np.empty(len(t)) for name in (*solution.names, *names)}
     declared = solution._system.declared
     numbers = np.empty((len(declared), len(t)), dtype=np.int64)
-    for segment, chosen, s in pieces:
+    for segment, chosen, s in parts:
         found = solution._quantities(names, segment, s, x[chosen])
         for name, values in zip(columns, (*x[chosen].T, *found), strict=True):
             columns[name][chosen] = values

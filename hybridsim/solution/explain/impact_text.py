@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 _AT_LIMIT = 1e-9  # relative distance of an impulse to its limit; a closer impulse counts as at the limit
 
 
-def restitution(model: Model, stage: Stage, c: int, blow: GuardView) -> str:
+def restitution(model: Model, stage: Stage, c: int, impact_guard: GuardView) -> str:
     """Describe the speeds at which a gap closed and opens, and the coefficient of restitution."""
     settling, outcome = stage.settling, stage.outcome
     system, automaton = settling.system, settling.system.automata[c]
@@ -32,7 +32,7 @@ def restitution(model: Model, stage: Stage, c: int, blow: GuardView) -> str:
     guard = automaton.guards[z[c]][0]
     at = replace(settling.at, x=outcome.x)
     (after,) = views(system, at, z, [guard], np.zeros(system.guard_count, int))
-    before, unit = -blow.derivatives[1], blow.units[1]
+    before, unit = -impact_guard.derivatives[1], impact_guard.units[1]
     known = model.parameter_values() | {SPEED: before}
     value = number_of(declared.tree, known, {n: expr.tree for n, expr in model.definitions}.get)
     e = declared.text if value is None or not declared.names else f"{declared.text} = {value:.6g}"
@@ -88,7 +88,7 @@ def friction(stage: Stage, c: int) -> str:
     # This bounds the effect of the states' rounding on an impulse.
     errors = np.abs(inverse) @ (4.0 * at.x_error + 8.0 * UNIT * np.abs(at.x))
     pushes = impulses[: len(normal)]
-    said = []
+    clauses = []
     for k, impulse, error in zip(rubbing, impulses[len(normal) :], errors[len(normal) :], strict=True):
         before, after = series.surfaces[place[k], 0], series.surfaces[place[k], 0] + slopes[place[k]] @ moved
         rest = 8.0 * (series.surface_bounds[place[k], 0] + np.abs(slopes[place[k]]) @ at.x_error)
@@ -105,12 +105,12 @@ def friction(stage: Stage, c: int) -> str:
             abs(after) > rest
             and abs(abs(impulse) - limit) <= _AT_LIMIT * limit + error + shares @ errors[: len(normal)]
         ):
-            said.append(f"the impulse of {name} is at its limit, {bound} = {limit:.6g}")
+            clauses.append(f"the impulse of {name} is at its limit, {bound} = {limit:.6g}")
         elif abs(after) > rest:
-            said.append(f"the impulse of {name} is {size}, at most {bound} = {limit:.6g}")
+            clauses.append(f"the impulse of {name} is {size}, at most {bound} = {limit:.6g}")
         else:
             does = "stops it" if abs(before) > rest else "keeps it at rest"
             is_all = abs(abs(impulse) - limit) <= _AT_LIMIT * limit
             where = "just at" if is_all and limit else "within"
-            said.append(f"the impulse of {name}, {size}, {does} {where} its limit {bound} = {limit:.6g}")
-    return f"; {' and '.join(said)}" if said else ""
+            clauses.append(f"the impulse of {name}, {size}, {does} {where} its limit {bound} = {limit:.6g}")
+    return f"; {' and '.join(clauses)}" if clauses else ""
