@@ -176,8 +176,8 @@ def two_numbers(value: Any, what: str, remedy: str, but: str = "") -> tuple[floa
         raise UsageError(f"{what} is {value!r}", remedy=remedy)
     ends = [number(t, f"a value of {what}", remedy) for t in value]
     if len(ends) != 2:
-        given = repr(value) if len(ends) < 5 else f"{len(ends)} numbers from {ends[0]!r} to {ends[-1]!r}"
-        raise UsageError(f"{what} is {given}", remedy=remedy)
+        shown = repr(value) if len(ends) < 5 else f"{len(ends)} numbers from {ends[0]!r} to {ends[-1]!r}"
+        raise UsageError(f"{what} is {shown}", remedy=remedy)
     if not all(map(math.isfinite, ends)):
         raise UsageError(f"{what} is {value!r}", remedy=f"use two finite numbers{but}")
     return ends[0], ends[1]
@@ -234,9 +234,9 @@ def integrator_name(integrator: Any) -> str:
     return integrator
 
 
-def refuse_unused(method: Integrator, **given: Any) -> None:
+def refuse_unused(method: Integrator, **tolerances: Any) -> None:
     """Reject tolerances that a fixed-step method would ignore; None means not set."""
-    unused = [name for name, value in given.items() if value is not None]
+    unused = [name for name, value in tolerances.items() if value is not None]
     if unused and "adaptive" in method.lacks:
         raise UsageError(
             f"{method.name} does not accept {', '.join(unused)}: {method.lacks['adaptive']}",
@@ -321,9 +321,9 @@ def retention_of(save: Any, system: System) -> Retention:
     """Return the parts of the run to store, from a word or from a length of time before its end."""
     from hybridsim.engine.record.retention import ALL, EVENTS, NOTHING, Retention
 
-    words = {"all": ALL, "events": EVENTS, "nothing": NOTHING}
-    if isinstance(save, str) and save in words:
-        return words[save]
+    retentions = {"all": ALL, "events": EVENTS, "nothing": NOTHING}
+    if isinstance(save, str) and save in retentions:
+        return retentions[save]
     if isinstance(save, str) and save == "last-period":
         from hybridsim.engine.system.period import system_period
 

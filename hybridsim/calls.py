@@ -9,15 +9,15 @@ from typing import Any, ParamSpec, TypeVar
 
 from hybridsim.errors import UsageError, near
 
-Given = ParamSpec("Given")
+Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
 
-def refusing(function: Callable[Given, Result]) -> Callable[Given, Result]:
+def refusing(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
     """Wrap a function or method so that unknown or missing arguments raise `UsageError` with a remedy."""
 
     @wraps(function)
-    def call(*args: Given.args, **keywords: Given.kwargs) -> Result:
+    def call(*args: Arguments.args, **keywords: Arguments.kwargs) -> Result:
         try:
             return function(*args, **keywords)
         except TypeError:
@@ -38,10 +38,10 @@ def refuse_unless_taken(
         takes.bind(*args, **keywords)
     except TypeError as error:
         names = [name for name in takes.parameters if name != unsaid]
-        said = f"arguments: {', '.join(names)}"
+        takes_text = f"arguments: {', '.join(names)}"
         for name in keywords:
             if name not in takes.parameters:
                 close = near(name, names)
-                remedy = f"did you mean '{close[0]}'? {said}" if close else said
+                remedy = f"did you mean '{close[0]}'? {takes_text}" if close else takes_text
                 raise UsageError(f"{title}() has no argument '{name}'", remedy=remedy) from None
-        raise UsageError(f"{title}(): {error}", remedy=said) from None
+        raise UsageError(f"{title}(): {error}", remedy=takes_text) from None

@@ -37,14 +37,14 @@ def whole_file(path: str | PathLike[str]) -> Iterator[str]:
     >>> with whole_file("table.csv") as partly, open(partly, "w") as file:  # doctest: +SKIP
     ...     file.write("t,x\\n")
     """
-    given = path_text(path)
+    named = path_text(path)
     try:
-        before = _found(given)
+        before = _found(named)
         is_other = before is not None and not stat.S_ISREG(before.st_mode)
-        if is_other or given.startswith("/dev/"):
-            yield given
+        if is_other or named.startswith("/dev/"):
+            yield named
             return
-        final = os.path.realpath(given)
+        final = os.path.realpath(named)
         if before is not None and not os.access(final, os.W_OK):
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
         partly = _new_file(final, 0o666 if before is None else 0o600)
@@ -59,7 +59,7 @@ def whole_file(path: str | PathLike[str]) -> Iterator[str]:
     except BrokenPipeError:
         raise
     except OSError as fault:
-        raise cannot_write(given, fault) from fault
+        raise cannot_write(named, fault) from fault
 
 
 def _found(path: str) -> os.stat_result | None:

@@ -134,9 +134,9 @@ def _state(x: Any) -> np.ndarray:
     return np.ascontiguousarray(x, dtype=float)
 
 
-def _modes(system: Any, given: Mapping[str, str] | None) -> np.ndarray:
+def _modes(system: Any, declared: Mapping[str, str] | None) -> np.ndarray:
     names = [a.name for a in system.automata]
-    z: object = {} if given is None else given
+    z: object = {} if declared is None else declared
     if not isinstance(z, Mapping):
         raise UsageError(f"z is {z!r}", remedy="use a dict of component names and mode names")
     for name in z:

@@ -30,17 +30,17 @@ from hybridsim.model import Model
 from hybridsim.model.laws.velocity_powers import velocity_powers
 from hybridsim.solution.run import Run
 
-_MOST = 16  # prepared runs stored per system; a loop usually repeats one or a few
+_MAX_RUNS = 16  # prepared runs stored per system; a loop usually repeats one or a few
 _PLAIN = frozenset({int, float, np.float64, str, type(None)})  # types whose equal values are interchangeable
 
 
-def _question(t_span: Any, words: tuple[Any, ...]) -> tuple[Any, ...] | None:
+def _run_key(t_span: Any, settings: tuple[Any, ...]) -> tuple[Any, ...] | None:
     """Return the arguments as a key that identifies an equal run, or None if they are not all plain values.
 
     Checking the arguments costs up to a tenth of a short run, and loops often repeat the same arguments.
     """
-    question = (*t_span, *words) if type(t_span) is tuple else (t_span,)
-    return question if _PLAIN.issuperset(map(type, question)) else None
+    run_key = (*t_span, *settings) if type(t_span) is tuple else (t_span,)
+    return run_key if _PLAIN.issuperset(map(type, run_key)) else None
 
 
 def prepared(
@@ -61,14 +61,14 @@ def prepared(
     keywords: Sequence[str],
 ) -> tuple[Run, float]:
     """Return the run and the compile time in seconds; `keywords` are suggested for unknown options."""
-    question = None
+    run_key = None
     if x0 is z0 is limits is None:
-        words: tuple[Any, ...] = (integrator, rtol, atol, max_step, first_step, save)
+        settings: tuple[Any, ...] = (integrator, rtol, atol, max_step, first_step, save)
         if options:  # an integer option rejects 16.0, which equals 16
-            words += (*chain(*options.items()), *(type(value).__name__ for value in options.values()))
-        question = _question(t_span, words)
+            settings += (*chain(*options.items()), *(type(value).__name__ for value in options.values()))
+        run_key = _run_key(t_span, settings)
         known = known_system(model)
-        run = None if known is None else known.runs.get(question)
+        run = None if known is None else known.runs.get(run_key)
         if run is not None and type(run.method) is integrator_class(run.method.name):  # still registered
             span = run.task.t0, run.task.t1
             return run.on_grid(arguments.time_grid(t_eval, span, run.task.retention, save)), 0.0
@@ -109,10 +109,10 @@ def prepared(
     )  # fmt: skip
     require_dissipation(system, span[0], start, discrete, modes)
     run = Run(model, system, method, task, None, save, reason)
-    if question is not None and not isinstance(system.code, PythonCode):  # a Python function may change
-        if len(system.runs) >= _MOST:
+    if run_key is not None and not isinstance(system.code, PythonCode):  # a Python function may change
+        if len(system.runs) >= _MAX_RUNS:
             system.runs.clear()
-        system.runs[question] = run
+        system.runs[run_key] = run
     return run.on_grid(grid), compile_time
 
 
@@ -155,9 +155,9 @@ def _refuse_lacking(method: Integrator, model: Model, system: System, span: tupl
     }
     for capability in needs:
         if capability in method.lacks and needs[capability]():
-            needed = [other for other, is_needed in needs.items() if is_needed()]
+            required = [other for other, is_required in needs.items() if is_required()]
             # exclude methods for linear models, since nonlinearity is only checked later
-            able = [one.name for one in list_integrators() if not {"nonlinear", *needed} & one.lacks.keys()]
+            able = [one.name for one in list_integrators() if not {"nonlinear", *required} & one.lacks.keys()]
             such = (
                 f"use an integrator that supports it, such as {', '.join(able[:3])}"
                 if able

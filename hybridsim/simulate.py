@@ -136,7 +136,7 @@ def simulate(
     from hybridsim.preparation import prepared
 
     model = arguments.chosen_model(model, params)
-    told = arguments.callback(progress)
+    on_progress = arguments.callback(progress)
     run, compile_time = prepared(
         model,
         t_span,
@@ -153,7 +153,7 @@ def simulate(
         options=options,
         keywords=KEYWORDS,
     )
-    return run.carried_out(told, compile_time)
+    return run.carried_out(on_progress, compile_time)
 
 
 _DECLARED = signature(simulate)

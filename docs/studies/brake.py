@@ -103,7 +103,7 @@ def picture(growth: dict[float, np.ndarray], sizes: dict[float, np.ndarray]) -> 
         left.plot(FRICTION, growth[c][0], "s", ms=7, mfc="none", color=colour)
         left.plot(FRICTION, growth[c][1], ".", ms=5, color=style.INK)
         left.axvline(threshold(c), color=colour, lw=0.9, ls=":")
-    left.plot([], [], "s", ms=7, mfc="none", color=style.FAINT, label="linearize")
+    left.plot([], [], "s", ms=7, mfc="none", color=style.GREY, label="linearize")
     left.plot([], [], ".", ms=5, color=style.INK, label="simulation")
     left.axhline(0.0, color=style.INK, lw=0.8)
     left.set(xlabel="coefficient of friction mu", ylabel="growth of a small shake")
@@ -118,7 +118,7 @@ def picture(growth: dict[float, np.ndarray], sizes: dict[float, np.ndarray]) -> 
             color=colour,
             label=f"after a shake of {shake:g}",
         )
-    right.axvline(threshold(SQUEALING), color=style.FAINT, lw=0.9, ls=":", label="onset, closed form")
+    right.axvline(threshold(SQUEALING), color=style.GREY, lw=0.9, ls=":", label="onset, closed form")
     right.set(xlabel="coefficient of friction mu", ylabel=f"amplitude of x that is left, c = {SQUEALING:g}")
     right.legend(fontsize=8, loc="upper left")
     for axes in (left, right):

@@ -149,14 +149,14 @@ def picture(groups: tuple[list[Found], list[Found]]) -> None:
                 [min(f.steps[-1] / f.scene.end for f in found), max(f.steps[0] / f.scene.end for f in found)]
             )
             for level in (0.3, 30.0):
-                axes.loglog(ends, level * ends, color=style.FAINT, lw=1.0, ls="--", zorder=1)
+                axes.loglog(ends, level * ends, color=style.GREY, lw=1.0, ls="--", zorder=1)
             axes.set_title(f"{title}: {text}", fontsize=10, loc="left")
             style.dress(axes)
             if column == 0:
                 axes.set_ylabel("relative error")
                 handles = [
                     *axes.get_legend_handles_labels()[0],
-                    Line2D([], [], color=style.FAINT, ls="--", lw=1.0),
+                    Line2D([], [], color=style.GREY, ls="--", lw=1.0),
                 ]
                 axes.legend(
                     handles, [*(f.scene.name for f in found), "first order"], fontsize=8, loc="lower right"

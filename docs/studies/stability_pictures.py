@@ -153,13 +153,13 @@ def chatter(found: dict[str, tuple[np.ndarray, np.ndarray]], path: Path) -> None
             steps,
             size,
             style.MARKERS[k] + "-",
-            color=style.INK if name == "belt" else (*style.PALETTE, style.FAINT)[k],
+            color=style.INK if name == "belt" else (*style.PALETTE, style.GREY)[k],
             ms=4,
             lw=1.2,
             label=name,
         )
     panel.axhline(TOLERATED, color="black", lw=1.6, label="1 %")
-    panel.axvline(PAPER_STEPS, color=style.FAINT, lw=1.6, ls=":", label="T/1200")
+    panel.axvline(PAPER_STEPS, color=style.GREY, lw=1.6, ls=":", label="T/1200")
     steps = np.array([300.0, 6000.0])
     panel.plot(steps, 40.0 / steps, "--", color=style.INK, lw=1.0, label="first order in the step")
     panel.set(xlabel="steps per period, T/h", ylabel="relative error of the amplitude, worst of 50 periods")

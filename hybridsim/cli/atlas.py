@@ -62,12 +62,12 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         raise UsageError(
             "Scene names and --class cannot be combined", remedy="use either the scene names or --class"
         )
-    from hybridsim.testing.atlas import atlas, listing, scenes_named, told
+    from hybridsim.testing.atlas import atlas, described, listing, scenes_named
 
     scenes = scenes_named(args.scenes, args.trouble)
     if args.list:
         if args.json:
-            print_json([told(scene) for scene in scenes])
+            print_json([described(scene) for scene in scenes])
         else:
             say(listing(scenes))
         return 0

@@ -125,9 +125,9 @@ def _model(args: argparse.Namespace, folder: Path | None, session: Session) -> i
 
 
 def _suite(args: argparse.Namespace, folder: Path, session: Session) -> int:
-    given = {"MODEL": args.model, "-p": args.param, "--x0": args.x0, "--t-end": args.t_end}
-    given |= {"--regularized": args.regularized, "--v0": args.v0}
-    for option, value in given.items():
+    of_one_model = {"MODEL": args.model, "-p": args.param, "--x0": args.x0, "--t-end": args.t_end}
+    of_one_model |= {"--regularized": args.regularized, "--v0": args.v0}
+    for option, value in of_one_model.items():
         if value:
             raise UsageError(
                 f"{option} cannot be combined with --suite, which has its own models",

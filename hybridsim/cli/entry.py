@@ -59,7 +59,7 @@ COMMANDS: tuple[ModuleType, ...] = (
 )
 
 PIPE_CLOSED = 141  # 128 + SIGPIPE, as shells report it
-_NO_ROOM = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS}
+_DISK_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS}
 
 
 def build_parser() -> Parser:
@@ -103,19 +103,19 @@ def main(argv: Sequence[str] | None = None) -> int:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return PIPE_CLOSED
         except HybridsimError as error:
-            _show_traceback_if_wanted()
+            _show_traceback_if_asked()
             complain(str(error))
             return error.exit_code
         except MemoryError:
             complain(f"out of memory{lighter and f'; use {lighter}'}")
             return HybridsimError.exit_code
         except Exception as bug:  # every other exception is a bug of hybridsim
-            if isinstance(bug, OSError) and bug.errno in _NO_ROOM:
+            if isinstance(bug, OSError) and bug.errno in _DISK_FULL:
                 complain(str(cannot_write(bug.filename or "the output", bug)))
                 return UsageError.exit_code
             if session.interrupted:  # compiled code may turn Ctrl-C into another exception
                 return _interrupted(session)
-            if not _show_traceback_if_wanted():
+            if not _show_traceback_if_asked():
                 complain(
                     f"internal error, please report it: {type(bug).__name__}: {bug}\n"
                     "set HYBRIDSIM_TRACEBACK=1 to print the traceback"
@@ -141,15 +141,15 @@ def command() -> NoReturn:
 
 
 def _interrupted(session: Session) -> int:
-    complain(f"interrupted; {session.kept()}")
+    complain(f"interrupted; {session.summary_of_written()}")
     return session.interrupted_code
 
 
-def _show_traceback_if_wanted() -> bool:
-    wanted = os.environ.get("HYBRIDSIM_TRACEBACK", "0") not in ("", "0")
-    if wanted:
+def _show_traceback_if_asked() -> bool:
+    is_asked = os.environ.get("HYBRIDSIM_TRACEBACK", "0") not in ("", "0")
+    if is_asked:
         traceback.print_exc()
-    return wanted
+    return is_asked
 
 
 def _show_warning(

@@ -107,8 +107,10 @@ def as_far_as_it_came(run: Callable[[], Solution]) -> Solution:
         return found
 
 
-def deliver(solution: Solution, args: argparse.Namespace, session: Session, told: Container[str] = ()) -> int:
-    """Write the files, print the summary and return the exit code. Warnings in `told` are not repeated."""
+def deliver(
+    solution: Solution, args: argparse.Namespace, session: Session, already_reported: Container[str] = ()
+) -> int:
+    """Write the files, print the summary and return the exit code. Warnings in `already_reported` are not repeated."""
     explanations, unexplained = _explanations(solution, args.explain)
     try:  # write files first: printing fails if the reader of the pipe, such as `head`, has gone
         if solution.t.size:  # a run that stopped before its first step has nothing to write
@@ -122,21 +124,23 @@ def deliver(solution: Solution, args: argparse.Namespace, session: Session, told
             print_json(_record(solution) | more)
         else:
             say("\n".join([*_summary(solution), *map(str, explanations)]))
-    for warning in (one for one in solution.warnings if one not in told):
+    for warning in (one for one in solution.warnings if one not in already_reported):
         complain(f"warning: {warning}")
     if unexplained is not None:
         raise unexplained
     if solution.success:
         return 0
     begins = solution.message.startswith(solution.status)
-    said = solution.message if begins else f"{solution.status}: {solution.message}"
+    reason = solution.message if begins else f"{solution.status}: {solution.message}"
     if solution.status in ("limit", "interrupted"):
-        said = said.removesuffix(", and sol.resume() continues the run").removesuffix(
+        reason = reason.removesuffix(", and sol.resume() continues the run").removesuffix(
             "; the results so far are kept"
         )
         resume = f"'hybridsim resume {args.save}' continues the run"
-        said += f"; {resume if args.save else 'with --save FILE.hsol, hybridsim resume can continue the run'}"
-    complain(said)
+        reason += (
+            f"; {resume if args.save else 'with --save FILE.hsol, hybridsim resume can continue the run'}"
+        )
+    complain(reason)
     return session.interrupted_code if solution.status == "interrupted" else SimulationError.exit_code
 
 

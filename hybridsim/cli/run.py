@@ -86,7 +86,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
                 **settings,
             )
         )
-    return outcome.deliver(solution, args, session, told=cautions)
+    return outcome.deliver(solution, args, session, already_reported=cautions)
 
 
 def _settings(args: argparse.Namespace) -> dict[str, Any]:
@@ -95,7 +95,7 @@ def _settings(args: argparse.Namespace) -> dict[str, Any]:
         name: getattr(args, name) for name in ("rtol", "atol", "max_step") if getattr(args, name) is not None
     }
     if args.keep is not None:
-        settings["save"] = _kept(args)
+        settings["save"] = _save_setting(args)
     for name, text in args.option:
         if name in settings:
             raise UsageError(f"--option {name} occurs twice", remedy=f"set {name} once")
@@ -103,7 +103,7 @@ def _settings(args: argparse.Namespace) -> dict[str, Any]:
     return settings
 
 
-def _kept(args: argparse.Namespace) -> str | float:
+def _save_setting(args: argparse.Namespace) -> str | float:
     """Return the value of `save` for the run, and reject outputs that it cannot serve."""
     if args.keep in ("events", "nothing"):
         for option in ("plot", "csv", "npz"):

@@ -31,7 +31,7 @@ class Session:
         self.written.append(path)
         complain(f"wrote {path}")
 
-    def kept(self) -> str:
+    def summary_of_written(self) -> str:
         """Describe in words the files written before an interruption."""
         return "kept " + ", ".join(map(str, self.written)) if self.written else "nothing was written"
 

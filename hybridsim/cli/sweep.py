@@ -98,11 +98,11 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         )
     if len(axes) > _MOST_DRAWN and not args.list:
         complain("no picture is drawn, because more than two parameters are swept")
-    given: dict[str, Any] = {
+    settings: dict[str, Any] = {
         name: getattr(args, name) for name in ("integrator", "rtol") if getattr(args, name) is not None
     }
     if any(word.partition(".")[0] == "final" for word in args.measure):
-        given["t_span"] = (0.0, _end_of_all(model, args.t_end, axes))
+        settings["t_span"] = (0.0, _end_of_all(model, args.t_end, axes))
         if args.after is not None:
             raise UsageError(
                 "--after cannot be combined with --measure final", remedy="remove --after or measure a period"
@@ -111,12 +111,12 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         raise UsageError("--t-end requires --measure final", remedy="remove --t-end or add --measure final")
 
     if args.after is not None:
-        given["after"] = args.after
+        settings["after"] = args.after
 
     is_new = not folder.exists()
     folder.mkdir(parents=True, exist_ok=True)
     with held(folder, f"Another sweep is writing to {folder}"):
-        return _fill(args, session, model, axes, given, folder, is_new)
+        return _fill(args, session, model, axes, settings, folder, is_new)
 
 
 def _fill(
@@ -124,7 +124,7 @@ def _fill(
     session: Session,
     model: Model,
     axes: dict[str, list[Any]],
-    given: dict[str, Any],
+    settings: dict[str, Any],
     folder: Path,
     is_new: bool,
 ) -> int:
@@ -145,7 +145,7 @@ def _fill(
                 warm_start=args.warm_start,
                 journal=journal,
                 progress=progress.of_steps,
-                **given,
+                **settings,
             )
     except UsageError:
         if is_new and not any(folder.iterdir()):

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 # Range of the error axis: at least _NEAR and at most _FAR times the tolerance on both sides, with a margin
 # factor.
-_NEAR, _FAR, _ROOM = 30.0, 1e5, 2.0
+_NEAR, _FAR, _MARGIN = 30.0, 1e5, 2.0
 _TOP_LINE = -0.75  # above the first rung, in rungs
 _NOTHING = "#d8d8d8"  # grey is not the colour of any rung
 _COLOURS = {
@@ -60,11 +60,11 @@ def _ladder(found: Advice, axes: Axes) -> None:
     for k, step in enumerate(steps):
         if step.value is None:
             word = "no value" if step.verdict == NOT_ADEQUATE else step.verdict
-            axes.text(1.1 * found.tol, k, word, va="center", fontsize=8, color=style.FAINT)
+            axes.text(1.1 * found.tol, k, word, va="center", fontsize=8, color=style.GREY)
             continue
         _draw(axes, k, step, found.tol, (low, high))
         _beside(axes, k, f"{_short(step.error)}, {duration(step.seconds)}", style.INK)
-    _beside(axes, _TOP_LINE, "error, cost", style.FAINT)
+    _beside(axes, _TOP_LINE, "error, cost", style.GREY)
     axes.text(
         found.tol / 1.1, _TOP_LINE, f"adequate: up to {found.tol:g}", ha="right", va="center", fontsize=8
     )
@@ -79,7 +79,7 @@ def _ladder(found: Advice, axes: Axes) -> None:
 def _window(errors: Iterable[float], tol: float) -> tuple[float, float]:
     """Return the ends of the axis, which contain the tolerance and all errors near enough to compare."""
     near = [e for e in errors if tol / _FAR <= e <= tol * _FAR]
-    return min([tol / _NEAR, *near]) / _ROOM, max([tol * _NEAR, *near]) * _ROOM
+    return min([tol / _NEAR, *near]) / _MARGIN, max([tol * _NEAR, *near]) * _MARGIN
 
 
 def _draw(axes: Axes, k: int, step: Step, tol: float, ends: tuple[float, float]) -> None:
@@ -116,22 +116,22 @@ def _map(found: Advice, axes: Axes) -> None:
     numbers = np.full(region.status.shape, len(names), dtype=float)
     for k, name in enumerate(names):
         numbers[(region["simplest"] == name) & ~region.failed] = k
-    places = []
+    coordinates = []
     up, across = region.axes
     for dimension, parameter in enumerate((up, across)):
         where = positions(region.axes[parameter])
         order = np.argsort(where, kind="stable")
         numbers = np.take(numbers, order, axis=dimension)
-        places.append(where[order])
+        coordinates.append(where[order])
     colours = ListedColormap([*(_COLOURS[name] for name in names), _NOTHING])
     axes.pcolormesh(
-        places[1], places[0], numbers, cmap=colours, vmin=-0.5, vmax=len(names) + 0.5, shading="nearest",
+        coordinates[1], coordinates[0], numbers, cmap=colours, vmin=-0.5, vmax=len(names) + 0.5, shading="nearest",
         rasterized=True,
     )  # fmt: skip
     label_parameter(axes.yaxis, region, up)
     label_parameter(axes.xaxis, region, across)
-    axes.tick_params(color=style.FAINT, labelsize=9)
-    axes.spines[:].set_color(style.FAINT)
+    axes.tick_params(color=style.GREY, labelsize=9)
+    axes.spines[:].set_color(style.GREY)
     shown = [
         Patch(color=_COLOURS[name], label=style.literal(name))
         for k, name in enumerate(names)

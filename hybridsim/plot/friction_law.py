@@ -48,8 +48,8 @@ def friction_law(
         )
     if not speed > 0 or not amplitude > 0:
         raise UsageError(f"speed is {speed!r}, amplitude is {amplitude!r}", remedy="give numbers above zero")
-    given = {name: parse(value) for name, value in (arguments or {}).items()}
-    contact = Contact("f", parse("v"), parse(normal), found, given)
+    law_arguments = {name: parse(value) for name, value in (arguments or {}).items()}
+    contact = Contact("f", parse("v"), parse(normal), found, law_arguments)
     panels = 1 + bool(found.states)
     figure = style.figure(0.6 + 3.4 * panels, 2.8)
     axes = list(np.atleast_1d(figure.subplots(1, panels, sharey=True)))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from hybridsim.errors import UsageError
 from hybridsim.plot.orbit import draw_orbit
-from hybridsim.plot.pieces import refuse_arrays
+from hybridsim.plot.smooth_parts import refuse_arrays
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

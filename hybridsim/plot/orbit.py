@@ -12,8 +12,8 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from hybridsim.plot import style
-from hybridsim.plot.pieces import Piece, extent, pieces_of, unit_of, window_of
 from hybridsim.plot.scale import label_axis
+from hybridsim.plot.smooth_parts import SmoothPart, extent, smooth_parts_of, unit_of, window_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -24,35 +24,36 @@ Points = NDArray[np.float64]
 
 _HELD, _FREE = 3.0, 1.2  # line widths if a surface holds (stick), and otherwise
 _DOT = 5.0  # size of an interval that stays at a point
-_VISIBLE = 1e-3  # of the range: a smaller piece is a point, a smaller jump is not drawn
+_VISIBLE = 1e-3  # of the range: a smaller part is a point, a smaller jump is not drawn
 
 
 def draw_orbit(
     solution: Solution, across: str, up: str, t_span: tuple[float, float] | None, axes: Axes | None
 ) -> Axes:
-    """Draw `up` against `across` in the colours of the modes, with thick held pieces and dashed jumps.
+    """Draw `up` against `across` in the colours of the modes, with thick held parts and dashed jumps.
 
     The colours show the modes of the components that belong to the quantities, such as a contact whose force
     or velocity is drawn. If there is no such component, or several, the colour shows the mode of the first
-    one, and a piece is held if any component holds.
+    one, and a part is held if any component holds.
     """
     units = unit_of(solution, across), unit_of(solution, up)
     window = window_of(solution, t_span)
-    pieces = pieces_of(solution, (across, up), window)
+    smooth_parts = smooth_parts_of(solution, (across, up), window)
     if axes is None:
         axes = style.figure(6.2, 4.6).subplots()
     concerned = _concerned(solution, {across, up})
-    pieces = [
-        replace(piece, modes={c: m for c, m in piece.modes.items() if c in concerned}) for piece in pieces
+    smooth_parts = [
+        replace(smooth_part, modes={c: m for c, m in smooth_part.modes.items() if c in concerned})
+        for smooth_part in smooth_parts
     ]
     colours = style.mode_colours(solution.components)
     surfaces = {c.name: c.surface.hold for c in solution.components if c.surface}
     held_modes = set(surfaces.values())
-    spans = [extent(pieces, name) for name in (across, up)]
+    spans = [extent(smooth_parts, name) for name in (across, up)]
     least = np.array([_VISIBLE * ((high - low) or 1.0) for low, high in spans])
     lines: dict[str, list[Points]] = {}
     dots: dict[str, list[Points]] = {}
-    stretches, jumps = _stretches(pieces, across, up, surfaces, least)
+    stretches, jumps = _stretches(smooth_parts, across, up, surfaces, least)
     for mode, points in stretches:
         stays = bool(np.all(np.ptp(points, axis=0) < least))
         (dots if stays else lines).setdefault(mode, []).append(points)
@@ -66,7 +67,7 @@ def draw_orbit(
             x, y = np.array([points[0] for points in dots[mode]]).T
             axes.plot(x, y, "o", color=colour, markersize=_DOT)
     axes.add_collection(
-        LineCollection(jumps, colors=style.FAINT, linewidths=0.9, linestyles=[(0, (3, 2))], zorder=1.5)
+        LineCollection(jumps, colors=style.GREY, linewidths=0.9, linestyles=[(0, (3, 2))], zorder=1.5)
     )
     axes.autoscale_view()
     style.dress(axes)
@@ -87,7 +88,7 @@ def draw_orbit(
         if mode in lines or mode in dots
     ]
     if jumps:
-        handles.append(Line2D([], [], color=style.FAINT, linewidth=0.9, linestyle=(0, (3, 2)), label="jump"))
+        handles.append(Line2D([], [], color=style.GREY, linewidth=0.9, linestyle=(0, (3, 2)), label="jump"))
     if handles:
         axes.legend(handles=handles, loc="center left", bbox_to_anchor=(1.01, 0.5), frameon=False, fontsize=9)
     model = solution.model
@@ -103,15 +104,15 @@ def _concerned(solution: Solution, drawn: set[str]) -> list[str]:
 
 
 def _stretches(
-    pieces: Sequence[Piece], across: str, up: str, surfaces: Mapping[str, str], least: Points
+    smooth_parts: Sequence[SmoothPart], across: str, up: str, surfaces: Mapping[str, str], least: Points
 ) -> tuple[list[tuple[str, Points]], list[tuple[Points, Points]]]:
     """Return the continuous intervals of one mode, merged over other events, and the jumps between them."""
     stretches: list[tuple[str, list[Points]]] = []
     jumps = []
-    for piece in pieces:
-        points = np.column_stack([piece.values[across], piece.values[up]])
-        held = [mode for component, mode in piece.modes.items() if surfaces.get(component) == mode]
-        mode = (held or [*piece.modes.values(), ""])[0]
+    for smooth_part in smooth_parts:
+        points = np.column_stack([smooth_part.values[across], smooth_part.values[up]])
+        held = [mode for component, mode in smooth_part.modes.items() if surfaces.get(component) == mode]
+        mode = (held or [*smooth_part.modes.values(), ""])[0]
         if stretches:
             last_mode, parts = stretches[-1]
             last = parts[-1][-1]

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from hybridsim.errors import UsageError
 from hybridsim.plot.orbit import draw_orbit
-from hybridsim.plot.pieces import refuse_arrays
+from hybridsim.plot.smooth_parts import refuse_arrays
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,8 +35,8 @@ def phase_portrait(
     names = [state.name for state in solution.model.states]
     if x is None or y is None:
         rest = [name for name in names if name not in (x, y)]
-        needed = (x is None) + (y is None)
-        if len(rest) < needed:
+        missing = (x is None) + (y is None)
+        if len(rest) < missing:
             raise UsageError(
                 f"a phase portrait needs two states; {solution.model.name} has {', '.join(names) or 'none'}",
                 remedy="draw a time history",

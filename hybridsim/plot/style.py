@@ -18,7 +18,7 @@ from hybridsim.presentation.colours import mode_colours as mode_colours
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FAINT = "#9a9a9a"
+GREY = "#9a9a9a"
 MARK = "#c4c4c4"
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p")
 SUFFIXES = (".png", ".pdf", ".svg")
@@ -29,8 +29,8 @@ _LETTERS = 13.0  # of a title per inch: the default font at 10 points has about 
 def dress(axes: Axes) -> None:
     """Style the frame and the grid so that they stay behind the data."""
     axes.spines[["top", "right"]].set_visible(False)
-    axes.spines[["left", "bottom"]].set_color(FAINT)
-    axes.tick_params(color=FAINT, labelsize=9)
+    axes.spines[["left", "bottom"]].set_color(GREY)
+    axes.tick_params(color=GREY, labelsize=9)
     axes.grid(True, color="#e6e6e6", linewidth=0.6)
     axes.set_axisbelow(True)
 

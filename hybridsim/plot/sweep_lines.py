@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
     from hybridsim.analysis import Sweep
 
-_FEW = 30  # points of a line up to which each is marked
+_MARKED_POINTS = 30  # points of a line up to which each is marked
 _DOT = 5.0  # size of the items of an array, for the first line
 _CROWD = 12  # lines up to which the legend names each; of more lines it names some
 _WIDTH, _HEIGHT, _MORE = 7.2, 2.0, 1.1  # inches of a panel, and of the space above and below
@@ -90,7 +90,7 @@ def _draw(
             size = _DOT * 0.6**k  # dots under other dots remain visible around them
             panel.plot(dots.ravel(), y.ravel(), ".", color=colour, markersize=max(size, 1.5), label=label)
         else:
-            marker = "o" if len(x) <= _FEW else ""
+            marker = "o" if len(x) <= _MARKED_POINTS else ""
             panel.plot(
                 x[order], y[order], color=colour, marker=marker, markersize=3, linewidth=1.3, label=label
             )

@@ -70,23 +70,28 @@ def sweep_map(result: Sweep, *names: str, axes: tuple[Axes, ...] | None = None) 
 def _draw(panel: Axes, result: Sweep, name: str) -> None:
     values = numbers_of(result, name)
     up, across = result.axes
-    places = []
+    coordinates = []
     for dimension, parameter in enumerate((up, across)):
         numbers = positions(result.axes[parameter])
         order = np.argsort(numbers, kind="stable")
         values = np.take(values, order, axis=dimension)
-        places.append(numbers[order])
+        coordinates.append(numbers[order])
     shades = matplotlib.colormaps["viridis"].with_extremes(bad=_NOTHING)
     mesh = panel.pcolormesh(
-        places[1], places[0], np.ma.masked_invalid(values), cmap=shades, shading="nearest", rasterized=True
+        coordinates[1],
+        coordinates[0],
+        np.ma.masked_invalid(values),
+        cmap=shades,
+        shading="nearest",
+        rasterized=True,
     )
     label_parameter(panel.yaxis, result, up)
     label_parameter(panel.xaxis, result, across)
-    panel.tick_params(color=style.FAINT, labelsize=9)
-    panel.spines[:].set_color(style.FAINT)
+    panel.tick_params(color=style.GREY, labelsize=9)
+    panel.spines[:].set_color(style.GREY)
     bar = panel.figure.colorbar(mesh, ax=panel, pad=0.02)
     bar.outline.set_visible(False)
-    bar.ax.tick_params(color=style.FAINT, labelsize=9)
+    bar.ax.tick_params(color=style.GREY, labelsize=9)
     label_axis(bar.ax.yaxis, label_of(result, name), result.units.get(name, ""), *range_of(values))
     if not np.isfinite(values).all():
         panel.legend(handles=[Patch(color=_NOTHING, label=NO_RESULT)], fontsize=8, loc="upper right")

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from hybridsim.analysis import Sweep
 
-_MOST = 6  # panels that fit on a page
+_MAX_PANELS = 6  # panels that fit on a page
 _RATHER = (
     "amplitude",
     "stick_fraction",
@@ -34,12 +34,12 @@ def chosen_names(result: Sweep, names: Sequence[str], arrays: bool) -> tuple[str
     UsageError
         For unknown names, or readings that cannot be drawn.
     """
-    kept = [name for name in result.values if _drawable(result, name, arrays)]
+    drawable = [name for name in result.values if _drawable(result, name, arrays)]
     for name in names:
-        if result[name] is not None and name not in kept:
+        if result[name] is not None and name not in drawable:
             what = "text" if result[name].dtype.hasobject else "an array at each point"
-            raise UsageError(f"{name} is {what}, which cannot be drawn", remedy=f"draw one of {kept}")
-    found = tuple(names) or _first_asked_for(kept)
+            raise UsageError(f"{name} is {what}, which cannot be drawn", remedy=f"draw one of {drawable}")
+    found = tuple(names) or _first_asked_for(drawable)
     if not found:
         raise UsageError(
             "the sweep has no reading that can be drawn", remedy="see its status for the reasons"
@@ -47,22 +47,22 @@ def chosen_names(result: Sweep, names: Sequence[str], arrays: bool) -> tuple[str
     return found
 
 
-def _first_asked_for(kept: Sequence[str]) -> tuple[str, ...]:
+def _first_asked_for(drawable: Sequence[str]) -> tuple[str, ...]:
     """Return as many readings as fit on a page, one of each kind above before a second, in the order of the sweep."""
 
     def rank(name: str) -> tuple[int, int]:
         kind = name.partition(".")[0]
-        before = [other for other in kept[: kept.index(name)] if other.partition(".")[0] == kind]
-        return len(before) if kind in _RATHER else len(kept), kept.index(name)
+        before = [other for other in drawable[: drawable.index(name)] if other.partition(".")[0] == kind]
+        return len(before) if kind in _RATHER else len(drawable), drawable.index(name)
 
-    chosen = sorted(kept, key=rank)[:_MOST]
-    return tuple(name for name in kept if name in chosen)
+    chosen = sorted(drawable, key=rank)[:_MAX_PANELS]
+    return tuple(name for name in drawable if name in chosen)
 
 
 def not_drawn(result: Sweep, arrays: bool) -> tuple[str, ...]:
     """Return the readings that can be drawn but are drawn only on request."""
-    kept = [name for name in result.values if _drawable(result, name, arrays)]
-    return tuple(name for name in kept if name not in _first_asked_for(kept))
+    drawable = [name for name in result.values if _drawable(result, name, arrays)]
+    return tuple(name for name in drawable if name not in _first_asked_for(drawable))
 
 
 def _drawable(result: Sweep, name: str, arrays: bool) -> bool:

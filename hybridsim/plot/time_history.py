@@ -14,8 +14,16 @@ from matplotlib.patches import Patch
 from hybridsim.errors import UsageError
 from hybridsim.model.checks.units import time_unit, units_of
 from hybridsim.plot import style
-from hybridsim.plot.pieces import Piece, Window, extent, pieces_of, refuse_arrays, unit_of, window_of
 from hybridsim.plot.scale import label_axis
+from hybridsim.plot.smooth_parts import (
+    SmoothPart,
+    Window,
+    extent,
+    refuse_arrays,
+    smooth_parts_of,
+    unit_of,
+    window_of,
+)
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,14 +72,14 @@ def time_history(
     names = _unasked(model) if quantities is None else list(quantities)
     units = [unit_of(solution, name) for name in names]
     window = window_of(solution, t_span)
-    pieces = pieces_of(solution, names, window)
+    smooth_parts = smooth_parts_of(solution, names, window)
     history = _axes(len(names), len(solution.modes), axes)
     events = [e for e in solution.events if window.t0 <= e.t <= window.t1 and e.kind != "near-grazing"]
     for axis, name, unit in zip(history.quantities, names, units):
-        _draw(axis, pieces, name)
+        _draw(axis, smooth_parts, name)
         _mark(axis, events)
         style.dress(axis)
-        label_axis(axis.yaxis, name, unit, *extent(pieces, name))
+        label_axis(axis.yaxis, name, unit, *extent(smooth_parts, name))
         axis.set_xlim(window.t0, window.t1)
     if history.modes is not None:
         _strip(history.modes, solution, window)
@@ -93,10 +101,10 @@ def _unasked(model: Model) -> list[str]:
 def _axes(quantities: int, components: int, axes: Sequence[Axes] | None) -> TimeHistoryAxes:
     count = quantities + bool(components)
     if axes is not None:
-        given = tuple(axes)
-        if len(given) != count:
-            raise UsageError(f"{len(given)} axes for {quantities} quantities", remedy=f"give {count} axes")
-        return TimeHistoryAxes(given[:quantities], given[quantities] if components else None)
+        all_axes = tuple(axes)
+        if len(all_axes) != count:
+            raise UsageError(f"{len(all_axes)} axes for {quantities} quantities", remedy=f"give {count} axes")
+        return TimeHistoryAxes(all_axes[:quantities], all_axes[quantities] if components else None)
     heights = [_ROW] * quantities + [0.1 + _STRIP * components] * bool(components)
     figure = style.figure(9.0, 0.7 + sum(heights))
     grid = figure.subplots(count, 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights})
@@ -105,11 +113,11 @@ def _axes(quantities: int, components: int, axes: Sequence[Axes] | None) -> Time
     return TimeHistoryAxes(made[:quantities], made[quantities] if components else None)
 
 
-def _draw(axis: Axes, pieces: Sequence[Piece], name: str) -> None:
+def _draw(axis: Axes, smooth_parts: Sequence[SmoothPart], name: str) -> None:
     """Draw the curve as one line, interrupted at jumps, which are a second, dashed line."""
-    low, high = extent(pieces, name)
-    t, y, jump_t, jump_y = [pieces[0].t], [pieces[0].values[name]], [], []
-    for before, after in itertools.pairwise(pieces):
+    low, high = extent(smooth_parts, name)
+    t, y, jump_t, jump_y = [smooth_parts[0].t], [smooth_parts[0].values[name]], [], []
+    for before, after in itertools.pairwise(smooth_parts):
         left, right = before.values[name][-1], after.values[name][0]
         if abs(right - left) > _VISIBLE * (high - low):
             t.append(np.array([np.nan]))
@@ -161,9 +169,9 @@ def _strip(axis: Axes, solution: Solution, window: Window) -> None:
     axis.set_ylim(len(components) - 0.5, -0.5)
     axis.set_yticks(range(len(components)), [style.literal(name) for name in components])
     axis.tick_params(axis="y", length=0, labelsize=9)
-    axis.tick_params(axis="x", color=style.FAINT, labelsize=9)
+    axis.tick_params(axis="x", color=style.GREY, labelsize=9)
     axis.spines[["top", "right", "left"]].set_visible(False)
-    axis.spines["bottom"].set_color(style.FAINT)
+    axis.spines["bottom"].set_color(style.GREY)
     axis.set_xlim(window.t0, window.t1)
     handles = [Patch(color=colours[name], label=style.literal(name)) for name in colours if name in seen]
     axis.legend(

@@ -96,7 +96,7 @@ def draw_panel(
         )
     style.dress(panel)
     if not panel.lines:
-        panel.text(0.5, 0.5, "no run to show", transform=panel.transAxes, ha="center", color=style.FAINT)
+        panel.text(0.5, 0.5, "no run to show", transform=panel.transAxes, ha="center", color=style.GREY)
         panel.set_xticks([])
         panel.set_yticks([])
         return

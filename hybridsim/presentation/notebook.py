@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from hybridsim.model.parts.component import Component
 
 # Limits of the size of the HTML: rectangles in all strips, strips, first and last rows of the table, warnings.
-_RECTANGLES, _STRIPS, _FIRST, _LAST, _WARNINGS = 1000, 20, 20, 5, 10
+_RECTANGLES, _MAX_BARS, _FIRST, _LAST, _WARNINGS = 1000, 20, 20, 5, 10
 _WIDTH, _HEIGHT = 1000, 24  # size of a strip in its own units; the page stretches its width
 _OVERLAP = 0.3  # added width of a rectangle, so that no gap is visible between neighbours
 _GOOD, _BAD = "#009E73", "#D55E00"  # readable on black and on white
@@ -55,9 +55,9 @@ def run_html(
         f'<div style="margin-bottom:.4em"><span style="color:{colour}">{mark}</span> '
         f"<b>{escape(first)}</b> {escape(text)}</div>"
     ]
-    parts += [f"<div>{_faint(escape(name))} {escape(value)}</div>" for name, value in rest]
+    parts += [f"<div>{_dimmed(escape(name))} {escape(value)}</div>" for name, value in rest]
     if span is not None and modes and span[0] != span[1]:
-        parts += _strips(mode_colours(components), modes, *sorted(span))
+        parts += _mode_bars(mode_colours(components), modes, *sorted(span))
     if events:
         parts += _event_table(events)
     parts += [f'<div style="color:{_BAD}">⚠ {escape(text)}</div>' for text in warnings[:_WARNINGS]]
@@ -66,18 +66,18 @@ def run_html(
     return '<div style="max-width:72em;line-height:1.5">' + "\n".join(parts) + "</div>"
 
 
-def _faint(text: str) -> str:
+def _dimmed(text: str) -> str:
     return f'<span style="opacity:.65">{text}</span>'
 
 
 # -- strips -----------------------------------------------------------------------------------------------------
 
 
-def _strips(
+def _mode_bars(
     colours: Mapping[str, str], modes: Mapping[str, Sequence[Interval]], t0: float, t1: float
 ) -> Iterator[str]:
     """Yield one strip per component, the times at its ends, and a legend."""
-    shown = dict(list(modes.items())[:_STRIPS])
+    shown = dict(list(modes.items())[:_MAX_BARS])
     most = _RECTANGLES // len(shown)
     yield '<table style="width:100%;border-collapse:collapse;background:none;margin:.5em 0 0 0">'
     for component, intervals in shown.items():
@@ -90,11 +90,11 @@ def _strips(
         yield from _rectangles(intervals, colours, t0, t1, most)
         yield "</svg></td></tr>"
     crowded = any(len(intervals) > most for intervals in shown.values())
-    note = _faint("each column shows the fraction of time in each mode") if crowded else ""
+    note = _dimmed("each column shows the fraction of time in each mode") if crowded else ""
     yield (
         f'<tr style="background:none"><td style="border:none"></td><td style="padding:0;border:none">'
         f'<div style="display:flex;justify-content:space-between">'
-        f"{_faint(f'{t0:.6g}')}{note}{_faint(f'{t1:.6g}')}</div>"
+        f"{_dimmed(f'{t0:.6g}')}{note}{_dimmed(f'{t1:.6g}')}</div>"
         f"</td></tr></table>"
     )
     occurring = {interval.mode for intervals in shown.values() for interval in intervals}
@@ -104,8 +104,8 @@ def _strips(
         for mode, colour in colours.items()
         if mode in occurring
     ]
-    more = f" {_faint(f'and {len(modes) - _STRIPS} more components')}" if len(modes) > _STRIPS else ""
-    yield f'<div style="margin-bottom:.4em">{"".join(squares[:_STRIPS])}{more}</div>'
+    more = f" {_dimmed(f'and {len(modes) - _MAX_BARS} more components')}" if len(modes) > _MAX_BARS else ""
+    yield f'<div style="margin-bottom:.4em">{"".join(squares[:_MAX_BARS])}{more}</div>'
 
 
 def _fill(colour: str) -> str:
@@ -129,10 +129,12 @@ def _rectangles(
     names = [mode for mode in colours if any(interval.mode == mode for interval in intervals)]
     columns = max(most // len(names), 1)
     for k, shares in enumerate(_shares(intervals, names, t0, t1, columns)):
-        said = ", ".join(
+        shares_text = ", ".join(
             f"{mode} {100 * share:.3g} %" for mode, share in zip(names, shares, strict=True) if share
         )
-        title = f"{t0 + k * (t1 - t0) / columns:.9g} to {t0 + (k + 1) * (t1 - t0) / columns:.9g}: {said}"
+        title = (
+            f"{t0 + k * (t1 - t0) / columns:.9g} to {t0 + (k + 1) * (t1 - t0) / columns:.9g}: {shares_text}"
+        )
         top = 0.0
         for mode, share in zip(names, shares, strict=True):
             if share:
@@ -174,7 +176,7 @@ def _event_table(events: Sequence[Any]) -> Iterator[str]:
     yield from map(_event_row, events[:_FIRST] if many else events)
     if many:
         hidden = len(events) - _FIRST - _LAST
-        yield f'<tr style="background:none"><td colspan="5" style="{_CELL}">{_faint(f"… {hidden} more …")}</td></tr>'
+        yield f'<tr style="background:none"><td colspan="5" style="{_CELL}">{_dimmed(f"… {hidden} more …")}</td></tr>'
         yield from map(_event_row, events[-_LAST:])
     yield "</table></details>"
 

@@ -79,14 +79,14 @@ def equals(t: float, **values: float) -> Check:
     return check
 
 
-def says(*words: str) -> Check:
+def says(*texts: str) -> Check:
     """Return a check that the message of a stopped run contains these words."""
 
     def check(solution: Any) -> list[str]:
         return [
-            f"the message does not say {word!r}: {solution.message}"
-            for word in words
-            if word not in solution.message
+            f"the message does not say {text!r}: {solution.message}"
+            for text in texts
+            if text not in solution.message
         ]
 
     return check

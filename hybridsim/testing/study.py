@@ -10,7 +10,7 @@ from typing import Any
 import hybridsim as hs
 from hybridsim.errors import HybridsimError
 from hybridsim.integrators.contract import Integrator
-from hybridsim.testing import judge
+from hybridsim.testing import measuring
 from hybridsim.testing.clock import Endless, bounded_work
 from hybridsim.testing.scene import Scene
 
@@ -61,7 +61,7 @@ class Study:
     failure : the setting that failed and its exception, or None.
     """
 
-    done: tuple[tuple[Setting, judge.Measured], ...]
+    done: tuple[tuple[Setting, measuring.Measured], ...]
     tolerances: tuple[float, float]
     failure: tuple[str, Exception] | None = None
 
@@ -72,7 +72,7 @@ class Study:
             text, error = self.failure
             how = "refused: " if isinstance(error, HybridsimError) else f"raised {type(error).__name__}: "
             wrong.append(f"{text}: {'' if isinstance(error, Endless) else how}{error}")
-        return wrong or judge_errors(self.done, self.tolerances)
+        return wrong or error_faults(self.done, self.tolerances)
 
     def errors(self) -> tuple[tuple[str, float, float], ...]:
         """Return the setting, the error of event times and the error of states of each run."""
@@ -144,15 +144,15 @@ def carry_out(
     **options: Any,
 ) -> Study:
     """Run a scene at all useful settings; `seconds` of processor time limit each run."""
-    done: list[tuple[Setting, judge.Measured]] = []
+    done: list[tuple[Setting, measuring.Measured]] = []
     waiting = list(settings)
     while waiting:
         setting = waiting.pop(0)
         try:
-            judge.prepare(scene, name, **setting.options, **options)
+            measuring.prepare(scene, name, **setting.options, **options)
             with bounded_work(seconds):
-                run = judge.run(scene, name, **setting.options, **options)
-                measured = judge.measure(scene, run, lacks)
+                run = measuring.run(scene, name, **setting.options, **options)
+                measured = measuring.measure(scene, run, lacks)
         except Exception as error:  # a user would see the same exception
             return Study(tuple(done), tolerances, (setting.text, error))
         if measured.status == "limit" and done and measured.steps < RUNAWAY * done[-1][1].steps:
@@ -176,13 +176,13 @@ def cut_short(tolerances: tuple[float, float], last: Setting) -> tuple[float, fl
     return max(tolerances[0], allowed), max(tolerances[1], allowed)
 
 
-def within(measured: judge.Measured, tolerances: tuple[float, float]) -> bool:
+def within(measured: measuring.Measured, tolerances: tuple[float, float]) -> bool:
     """Return whether both errors are within their tolerances."""
     return measured.time_error <= tolerances[0] and measured.state_error <= tolerances[1]
 
 
-def judge_errors(
-    done: tuple[tuple[Setting, judge.Measured], ...], tolerances: tuple[float, float]
+def error_faults(
+    done: tuple[tuple[Setting, measuring.Measured], ...], tolerances: tuple[float, float]
 ) -> list[str]:
     """Check that the errors decrease from setting to setting and end within the tolerances."""
     wrong = []

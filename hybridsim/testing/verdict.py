@@ -7,8 +7,8 @@ import re
 
 from hybridsim.errors import HybridsimError
 from hybridsim.testing.clock import Endless
-from hybridsim.testing.judge import ENDED, Measured
-from hybridsim.testing.study import Setting, Study, judge_errors, within
+from hybridsim.testing.measuring import ENDED, Measured
+from hybridsim.testing.study import Setting, Study, error_faults, within
 
 RIGHT = "right"
 WRONG_ANSWER = "wrong answer"
@@ -44,7 +44,7 @@ def verdict(study: Study) -> tuple[str, str]:
         return found, f"{text}: {one_line(refusal(error))}"
     if within(study.done[-1][1], study.tolerances):
         return RIGHT, ""
-    faults = judge_errors(study.done, study.tolerances)
+    faults = error_faults(study.done, study.tolerances)
     return (WRONG_ANSWER, faults[-1]) if faults else (RIGHT, "")
 
 

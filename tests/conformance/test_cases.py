@@ -9,7 +9,7 @@ import pytest
 import hybridsim as hs
 from conformance.native import mechanism
 from hybridsim.errors import HybridsimError
-from hybridsim.testing import judge
+from hybridsim.testing import measuring
 from hybridsim.testing.catalogue import SCENES
 from hybridsim.testing.scene import VOCABULARY, Scene
 from hybridsim.testing.study import integrator
@@ -58,7 +58,7 @@ def test_scene(scene: Scene, name: str) -> None:
         if missing:
             reasons = integrator(name).lacks
             with pytest.raises(HybridsimError) as refusal:
-                judge.run(scene, name)
+                measuring.run(scene, name)
             assert any(reasons[capability] in str(refusal.value) for capability in missing)
 
 

@@ -8,8 +8,8 @@ import hybridsim as hs
 from conformance import recompute
 from hybridsim.testing.catalogue import SCENES
 from hybridsim.testing.facts import CASES, TRUTHS
-from hybridsim.testing.judge import SCENES as FOLDER
-from hybridsim.testing.judge import load
+from hybridsim.testing.measuring import SCENES as FOLDER
+from hybridsim.testing.measuring import load
 
 DIGITS = 2e-11  # the facts are printed with twelve or thirteen digits
 

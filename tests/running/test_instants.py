@@ -13,7 +13,7 @@ import pytest
 import hybridsim as hs
 from hybridsim.expr import evaluate, parse, rounding_of
 from hybridsim.testing.catalogue import SCENES
-from hybridsim.testing.judge import load
+from hybridsim.testing.measuring import load
 
 LOCATING = ("dop853", "tsit5", "rodas5p", "exact", "taylor", "scipy-dop853", "cvode-adams", "cvode-bdf")
 

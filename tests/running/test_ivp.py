@@ -11,7 +11,7 @@ from reference.dfcs_closed_form import Oscillator
 from scipy.integrate import solve_ivp
 
 import hybridsim as hs
-from hybridsim.testing.judge import SCENES
+from hybridsim.testing.measuring import SCENES
 
 MODELS = [info.name for info in hs.list_models()] + [str(path) for path in sorted(SCENES.glob("*.toml"))]
 

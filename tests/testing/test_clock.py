@@ -11,7 +11,7 @@ import pytest
 
 from hybridsim.engine.record.limits import LimitReached
 from hybridsim.engine.system import modules
-from hybridsim.testing import SCENES, Truth, judge
+from hybridsim.testing import SCENES, Truth, measuring
 from hybridsim.testing.clock import BACKSTOP, Endless, ProcessorTime, bounded_work
 
 needs_signals = pytest.mark.skipif(not hasattr(signal, "SIGPROF"), reason="the platform has no such signals")
@@ -63,7 +63,7 @@ def test_a_run_is_stopped_by_its_own_work_alone() -> None:
 
 def test_a_run_that_is_stopped_so_says_limit() -> None:
     (scene,) = (one for one in SCENES if one.name == "FREE-1")
-    assert judge.run(scene, "scipy-rk45", processor_seconds=1e-9).status == "limit"
+    assert measuring.run(scene, "scipy-rk45", processor_seconds=1e-9).status == "limit"
 
 
 def test_a_model_that_nobody_has_seen_is_compiled_before_its_clock_starts(
@@ -81,8 +81,8 @@ def test_a_model_that_nobody_has_seen_is_compiled_before_its_clock_starts(
         return usual(self, name)
 
     monkeypatch.setattr(modules.Compiled, "address", noting)
-    judge.prepare(scene, "dop853")
+    measuring.prepare(scene, "dop853")
     assert "flow" in compiled
     compiled.clear()
-    assert judge.run(scene, "dop853").stats["steps"] > 0
+    assert measuring.run(scene, "dop853").stats["steps"] > 0
     assert compiled == []

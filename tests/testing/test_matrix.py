@@ -16,7 +16,7 @@ import hybridsim as hs
 from hybridsim.errors import UsageError
 from hybridsim.plot.atlas import matrix
 from hybridsim.plot.atlas import scene as picture
-from hybridsim.testing import SCENES, conformance_failures, judge, outcome
+from hybridsim.testing import SCENES, conformance_failures, measuring, outcome
 from hybridsim.testing import suite as suites
 from hybridsim.testing.atlas import Atlas, atlas, configurations, example, pages, scenes_named
 from hybridsim.testing.atlas import cell as cells
@@ -170,7 +170,7 @@ def test_ctrl_c_ends_a_picture_too(small: Atlas, monkeypatch: pytest.MonkeyPatch
     def interrupt(fraction: float) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(judge, "ProcessorTime", lambda seconds: interrupt)
+    monkeypatch.setattr(measuring, "ProcessorTime", lambda seconds: interrupt)
     with pytest.raises(KeyboardInterrupt):
         example(small, small.scenes[0])
     stopped = atlas(small.scenes, ("scipy-rk45",))

@@ -10,7 +10,7 @@ import pytest
 from hybridsim.errors import UsageError
 from hybridsim.testing import verdict as v
 from hybridsim.testing.clock import Endless
-from hybridsim.testing.judge import Measured
+from hybridsim.testing.measuring import Measured
 from hybridsim.testing.study import RUNAWAY, Setting, Study, cut_short
 
 

@@ -52,7 +52,7 @@ def matrix(result: Atlas) -> Axes:
     axes = figure.add_axes((_LEFT / width, below / height, inner / width, rows * _CELL / height))
     axes.set_xlim(0, inner / _CELL)
     axes.set_ylim(rows, 0)
-    y, places, names = 0, [], []
+    y, heights, names = 0, [], []
     for trouble, scenes in groups.items():
         axes.text(0.0, y + 0.72, trouble or "scenes", fontsize=9, fontweight="bold", va="baseline")
         y += 1
@@ -70,10 +70,10 @@ def matrix(result: Atlas) -> Axes:
                     va="center",
                     fontweight="bold",
                 )
-            places.append(y + 0.5)
+            heights.append(y + 0.5)
             names.append(scene.name)
             y += 1
-    axes.set_yticks(places, [style.literal(name) for name in names], fontsize=7)
+    axes.set_yticks(heights, [style.literal(name) for name in names], fontsize=7)
     labels = [style.literal(one.name) for one in result.configurations]
     axes.set_xticks([x + 0.5 for x in range(columns)], labels, fontsize=8, rotation=90)
     axes.xaxis.tick_top()

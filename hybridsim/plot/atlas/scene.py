@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from hybridsim.testing.atlas.example import Example, Line
 
 _RIGHT, _WRONG = style.INK, style.PALETTE[1]
-_MOST = 400  # ticks of events; more are drawn as a band
+_MAX_TICKS = 400  # ticks of events; more are drawn as a band
 _SMALL = 0.04  # of the motion: a smaller error gets its own scale
 _BEYOND = 1.5  # a diverging run is cut at this multiple of the true motion's height
 
@@ -60,7 +60,7 @@ def scene(example: Example) -> Axes:
     )
     for line, bottom, colour in ((right, 0.55, _RIGHT), (failing, 0.05, _WRONG)):
         if line is not None and line.events.size:
-            times = line.events[:: -(-line.events.size // _MOST)]
+            times = line.events[:: -(-line.events.size // _MAX_TICKS)]
             strip.vlines(times, bottom, bottom + 0.4, color=colour, linewidth=1.1)
         if line is not None:
             where = strip.get_yaxis_transform()

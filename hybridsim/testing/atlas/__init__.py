@@ -3,7 +3,7 @@
 from hybridsim.testing.atlas.cell import Cell, Row
 from hybridsim.testing.atlas.configurations import Configuration, configurations
 from hybridsim.testing.atlas.example import Example, example
-from hybridsim.testing.atlas.matrix import Atlas, atlas, listing, scenes_named, told
+from hybridsim.testing.atlas.matrix import Atlas, atlas, described, listing, scenes_named
 from hybridsim.testing.atlas.pages import pages
 from hybridsim.testing.verdict import VERDICTS
 
@@ -16,9 +16,9 @@ __all__ = [
     "Row",
     "atlas",
     "configurations",
+    "described",
     "example",
     "listing",
     "pages",
     "scenes_named",
-    "told",
 ]

@@ -11,7 +11,7 @@ from typing import Any
 
 from hybridsim.integrators.registry import registered
 from hybridsim.testing.atlas.configurations import RIVALS, Configuration
-from hybridsim.testing.judge import Measured
+from hybridsim.testing.measuring import Measured
 from hybridsim.testing.scene import Scene, Truth
 from hybridsim.testing.study import Setting, carry_out
 from hybridsim.testing.verdict import NOT_RUN, order, verdict

@@ -9,7 +9,7 @@ from typing import Any
 import hybridsim as hs
 from hybridsim.errors import UsageError, nearest
 from hybridsim.integrators.contract import Integrator
-from hybridsim.testing import judge
+from hybridsim.testing import measuring
 from hybridsim.testing.atlas.cooldown import CooldownRK45
 from hybridsim.testing.scene import Scene
 from hybridsim.testing.study import (
@@ -106,7 +106,7 @@ class Configuration:
 
     def applies(self, scene: Scene) -> str:
         """Return the reason why a scene is not run, or an empty string."""
-        if self.form and not judge.load(scene).contacts:
+        if self.form and not measuring.load(scene).contacts:
             return "the model has no friction contact to regularise"
         if self.form and not scene.truth.states:
             return "only the modes of the motion are known, and a regularised contact has no modes"

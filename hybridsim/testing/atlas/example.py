@@ -11,7 +11,7 @@ import numpy as np
 from hybridsim.errors import HybridsimError
 from hybridsim.integrators.registry import registered
 from hybridsim.model.checks.units import time_unit
-from hybridsim.testing import judge
+from hybridsim.testing import measuring
 from hybridsim.testing.atlas.cell import SECONDS, STEPS, Cell
 from hybridsim.testing.atlas.configurations import RIVALS, Configuration
 from hybridsim.testing.atlas.matrix import Atlas
@@ -110,9 +110,11 @@ def solution(scene: Scene, configuration: Configuration, setting: str) -> Any:
         settings = {"form": configuration.form, **options, **configuration.options}
         with warnings.catch_warnings(), registered(rival) as name:
             warnings.simplefilter("ignore")  # warnings of naive methods are expected
-            judge.prepare(scene, name, **settings)
+            measuring.prepare(scene, name, **settings)
             with bounded_work(2 * SECONDS):
-                return judge.run(scene, name, processor_seconds=SECONDS, limits={"steps": STEPS}, **settings)
+                return measuring.run(
+                    scene, name, processor_seconds=SECONDS, limits={"steps": STEPS}, **settings
+                )
     except (HybridsimError, Endless, ArithmeticError, ValueError):
         return None
 

@@ -69,7 +69,7 @@ class Atlas:
         """Return plain data: scenes, methods, and a cell for each pair."""
         return {
             "limits": {"seconds": SECONDS, "steps": STEPS},
-            "scenes": [told(scene) for scene in self.scenes],
+            "scenes": [described(scene) for scene in self.scenes],
             "integrators": [asdict(one) for one in self.configurations],
             "cells": [cell.to_plain() for scene in self.scenes for cell in self.row(scene)],
         }
@@ -137,7 +137,7 @@ def atlas(
     jobs = [(scene, one) for scene in selected for one in methods]
     cells: dict[tuple[str, str], Cell] = {}
 
-    def keep(cell: Cell) -> None:
+    def store(cell: Cell) -> None:
         # first, because the cell may contain an error that Ctrl-C caused in compiled code
         if progress is not None:
             progress((len(cells) + 1) / len(jobs), cell.scene)
@@ -145,12 +145,12 @@ def atlas(
 
     try:
         if workers > 1:
-            _in_processes(jobs, quick, min(workers, len(jobs)), keep)
+            _in_processes(jobs, quick, min(workers, len(jobs)), store)
         else:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore")  # warnings of naive methods are expected
                 for scene, one in jobs:
-                    keep(run_cell(scene, one, quick))
+                    store(run_cell(scene, one, quick))
     except KeyboardInterrupt:
         done = tuple(s for s in selected if all((s.name, one.name) in cells for one in methods))
         return Atlas(done, methods, cells, interrupted=True)
@@ -177,7 +177,7 @@ def by_class(scenes: Sequence[Scene]) -> dict[str, list[Scene]]:
     return {trouble: those for trouble, those in found.items() if those}
 
 
-def told(scene: Scene) -> dict[str, str]:
+def described(scene: Scene) -> dict[str, str]:
     """Return the description of a scene as plain data."""
     return {"name": scene.name, "class": scene.trouble, "title": scene.title, "cause": scene.cause}
 
@@ -195,7 +195,7 @@ def listing(scenes: Sequence[Scene]) -> str:
 
 
 def _in_processes(
-    jobs: Sequence[tuple[Scene, Configuration]], quick: bool, workers: int, keep: Callable[[Cell], None]
+    jobs: Sequence[tuple[Scene, Configuration]], quick: bool, workers: int, store: Callable[[Cell], None]
 ) -> None:
     others = set(multiprocessing.active_children())
     pool = ProcessPoolExecutor(
@@ -205,7 +205,7 @@ def _in_processes(
         with _signals_later():  # starts the workers
             futures = [pool.submit(_by_name, scene.name, one, quick) for scene, one in jobs]
         for future in as_completed(futures):
-            keep(future.result())
+            store(future.result())
     except BaseException:  # mainly Ctrl-C: end the workers, then raise it again
         pool.shutdown(wait=False, cancel_futures=True)
         for worker in set(multiprocessing.active_children()) - others:

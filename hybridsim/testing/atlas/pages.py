@@ -128,8 +128,8 @@ def verdicts(cells: list[Cell], configurations: Sequence[Configuration] = ()) ->
                 for one in cells
                 if (one.verdict, one.reason) == (verdict, reason)
             ]
-            said = _own_words(reason, own[0]) if verdict == WRONG_SEQUENCE and len(own) == 1 else ""
-            lines.append(f"| **{verdict}** | {', '.join(names)}: {_safe(reason)}{said} |")
+            note = _note_on_design(reason, own[0]) if verdict == WRONG_SEQUENCE and len(own) == 1 else ""
+            lines.append(f"| **{verdict}** | {', '.join(names)}: {_safe(reason)}{note} |")
     left_out = [cell.configuration for cell in cells if cell.verdict == NOT_RUN]
     return [*lines, *([f"| {NOT_RUN} | {', '.join(left_out)} |"] if left_out else [])]
 
@@ -158,7 +158,7 @@ def _safe(reason: str) -> str:
     return _NUMBER.sub(lambda number: f"{float(number[0]):.{_DIGITS}g}", reason).replace("|", r"\|")
 
 
-def _own_words(reason: str, lacks: Mapping[str, str]) -> str:
+def _note_on_design(reason: str, lacks: Mapping[str, str]) -> str:
     """Return a note if a method stops falsely because, by design, it does not locate events."""
     is_stop = re.search(r"and is (\w+):stick at", reason) is not None
     return f" (by design: {lacks['located']})" if is_stop and "located" in lacks else ""

@@ -30,12 +30,12 @@ def scenes() -> tuple[Scene, ...]:
         )
 
     events, states = recomputed("MSL-stribeck")
-    resting = (("exact-stick", exact_stick("f", {"v": 0.0}, rest=("x",))),)
+    at_rest = (("exact-stick", exact_stick("f", {"v": 0.0}, rest=("x",))),)
     stribeck = Scene(
         "MSL-stribeck",
         "stribeck",
         (0.0, 5.0),
-        Truth(events, states, checks=resting),
+        Truth(events, states, checks=at_rest),
         needs("contacts", "exact-stick"),
         unit=4.0,
         start_is_event=False,
@@ -94,15 +94,15 @@ def turning_belt() -> Scene:
     )
 
 
-def sequence(wanted: list[str]) -> Any:
+def sequence(expected: list[str]) -> Any:
     """Return a check of the mode sequence; the states test its times."""
 
     def check(solution: Any) -> list[str]:
         found = [f"{e.component}:{e.target}" for e in solution.events if e.component]
         return (
             []
-            if found == wanted
-            else [f"the modes follow as {', '.join(found)} instead of {', '.join(wanted)}"]
+            if found == expected
+            else [f"the modes follow as {', '.join(found)} instead of {', '.join(expected)}"]
         )
 
     return check

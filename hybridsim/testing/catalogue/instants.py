@@ -12,7 +12,15 @@ from hybridsim.testing.scene import Scene, Truth, needs
 
 def scenes() -> tuple[Scene, ...]:
     """Return scenes of additive resets, zeros at clock ticks, touches, copied values and chains of zeros."""
-    return _doses(), _counting_balls(), _guard_and_tick(), _carried_back(), _samples(), _copied(), _chain()
+    return (
+        _doses(),
+        _counting_balls(),
+        _guard_and_tick(),
+        _carried_back(),
+        _samples(),
+        _copied(),
+        _successive_zeros(),
+    )
 
 
 def _doses() -> Scene:
@@ -138,7 +146,7 @@ def _copied() -> Scene:
     )
 
 
-def _chain() -> Scene:
+def _successive_zeros() -> Scene:
     """Guards of two successive modes are zero at 0.87/0.7 together with the first guard."""
     at = 0.87 / 0.7
     return Scene(

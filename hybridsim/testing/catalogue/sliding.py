@@ -56,8 +56,8 @@ def _published() -> tuple[Scene, ...]:
     """Return cases published with other tools, and cases that are declared a second time with modes."""
     exact: dict[str, Any] = {"tol_t": 1e-9, "tol_x": 1e-9}
     at_rest = (("", equals(1.0, x1=0.0, x2=0.0)),)
-    crossings = CASES["SIC-filippov"]["expected"]["first_crossings"]
-    spiral = tuple((t, tuple(x)) for t, x in crossings)
+    passages = CASES["SIC-filippov"]["expected"]["first_crossings"]
+    spiral = tuple((t, tuple(x)) for t, x in passages)
     relay = TRUTHS["SIC-relayosc"]
     events = tuple((t, f"s:{'above' if mode == 'plus' else 'below'}") for t, _, mode in relay["events"])
     states = tuple((row[0], tuple(row[1:])) for row in relay["states"])

@@ -16,7 +16,7 @@ STICK = needs("contacts", "exact-stick")
 
 def scenes() -> tuple[Scene, ...]:
     """Return all scenes of this file."""
-    return _micro_slip(), _fading(), _many_stops(), _half(), _small(), _resting()
+    return _micro_slip(), _fading(), _many_stops(), _half(), _small(), _at_rest()
 
 
 def _swing(name: str, periods: float, **changes: Any) -> Scene:
@@ -91,7 +91,7 @@ def _small() -> Scene:
     return _swing("small-speeds", 10, F0=1e-3, Fs=3e-4, Fk=3e-4, w=0.75, c=0.1)
 
 
-def _resting() -> Scene:
+def _at_rest() -> Scene:
     """A spring pulls with half of the limit, so nothing moves."""
     samples = tuple((t, (0.5, 0.0)) for t in (1.0, 30.0, 100.0))
     return Scene(

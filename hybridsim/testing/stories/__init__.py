@@ -16,15 +16,15 @@ def read() -> dict[str, dict[str, Any]]:
     """Read the files, and return class, title, cause and description of each scene."""
     found: dict[str, dict[str, Any]] = {}
     for trouble in TROUBLES:
-        for name, told in tomllib.loads((HERE / f"{trouble}.toml").read_text("utf-8")).items():
+        for name, fields in tomllib.loads((HERE / f"{trouble}.toml").read_text("utf-8")).items():
             if name in found:
                 raise ValueError(f"{trouble}.toml tells of {name}, and so does {found[name]['trouble']}.toml")
-            found[name] = {"trouble": trouble, **told}
+            found[name] = {"trouble": trouble, **fields}
     return found
 
 
 def with_stories(scenes: tuple[Scene, ...]) -> tuple[Scene, ...]:
     """Return the scenes with their titles, causes and descriptions, in the order of the classes."""
-    told = read()
-    known = [replace(scene, **told[scene.name]) if scene.name in told else scene for scene in scenes]
+    stories = read()
+    known = [replace(scene, **stories[scene.name]) if scene.name in stories else scene for scene in scenes]
     return tuple(sorted(known, key=lambda scene: list(TROUBLES).index(scene.trouble or "events")))

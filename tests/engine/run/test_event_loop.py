@@ -14,7 +14,7 @@ from hybridsim.engine.roots.first_exit import FOUND, NEVER, OPEN, first_exit, to
 from hybridsim.engine.run import mode_loop
 from hybridsim.integrators.taylor.method import Taylor
 from hybridsim.testing.catalogue import SCENES
-from hybridsim.testing.judge import load
+from hybridsim.testing.measuring import load
 from hybridsim.testing.scene import Scene
 
 PERIOD = 2 * math.pi / hs.load("dfcs").parameter_values()["omega"]

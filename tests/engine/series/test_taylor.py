@@ -15,7 +15,7 @@ from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.series_at import SeriesRun, series_order
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
-from hybridsim.testing.judge import SCENES
+from hybridsim.testing.measuring import SCENES
 
 MODELS = [info.name for info in hs.list_models()] + [str(path) for path in sorted(SCENES.glob("*.toml"))]
 

@@ -17,7 +17,7 @@ from hybridsim.integrators.runge_kutta.dop853 import Dop853
 from hybridsim.integrators.runge_kutta.segments import first_length
 from hybridsim.integrators.runge_kutta.step import forget, next_length
 from hybridsim.testing.catalogue import SCENES
-from hybridsim.testing.judge import load
+from hybridsim.testing.measuring import load
 from hybridsim.testing.scene import Scene
 
 METHODS = ("dop853", "tsit5")

@@ -8,7 +8,7 @@ import pytest
 
 import hybridsim as hs
 from hybridsim.model.checks.doubtful import Caution, warnings_of
-from hybridsim.testing.judge import SCENES as FOLDER
+from hybridsim.testing.measuring import SCENES as FOLDER
 
 SCENES = sorted(FOLDER.glob("*.toml"))
 PLAIN = '[states]\nx = { start = 0, der = "v" }\nv = { start = 1, der = "-x" }\n'

@@ -175,8 +175,8 @@ def claim(found: Maps, quantity: str, study: StepStudy) -> Claim:
         f"the exact motion, where the paper's falls."
     )
     text = (
-        f"{quantity}_D >= 10 % for F0/N {_words(box10['F0/N'])}, r {_words(box10['r'])}; >= 5 % for "
-        f"{_words(box5['F0/N'])}, {_words(box5['r'])}; maximum {100 * published['maximum']:.2f} % at "
+        f"{quantity}_D >= 10 % for F0/N {_range_text(box10['F0/N'])}, r {_range_text(box10['r'])}; >= 5 % for "
+        f"{_range_text(box5['F0/N'])}, {_range_text(box5['r'])}; maximum {100 * published['maximum']:.2f} % at "
         f"F0/N = {where[0]}, r = {where[1]}"
     )
     exact_rows = {name: row for name, row in readings.items() if name.endswith(EXACT)}
@@ -190,5 +190,5 @@ def _percent(value: float) -> str:
     return f"{100 * value:.3g} %"
 
 
-def _words(ends: tuple[float, float]) -> str:
+def _range_text(ends: tuple[float, float]) -> str:
     return f"{ends[0]} to {ends[1]}"

@@ -14,14 +14,14 @@ from hybridsim.model import load
 from hybridsim.studies.he2026.measured import (
     convergence,
     deviation,
-    needed,
-    race,
     readings,
     reduction,
+    required_settings,
     response,
     run_times,
     step_study,
     stick_share,
+    timed_map,
     truth,
 )
 from hybridsim.studies.he2026.measured.pool import Pool
@@ -60,8 +60,8 @@ class Study:
     maps: deviation.Maps
     steps: step_study.StepStudy
     truth: truth.Truth
-    needed: needed.Needed
-    race: race.Race
+    required_settings: required_settings.RequiredSettings
+    timed_map: timed_map.TimedMap
     seconds: dict[str, float]
     workers: int
 
@@ -94,8 +94,8 @@ class Study:
             "claims": [claim.to_plain() for claim in claims],
             "what is left open": self.readings.to_plain(),
             "what is true": self.truth.to_plain(),
-            "what setting is needed": self.needed.to_plain(),
-            "a map, timed": self.race.to_plain(),
+            "what setting is needed": self.required_settings.to_plain(),
+            "a map, timed": self.timed_map.to_plain(),
             "seconds": self.seconds,
             "threads": self.workers,
             "provenance": provenance(load("dfcs")),
@@ -128,7 +128,7 @@ def he2026(
         return result
 
     times = timed(run_times.run_times)
-    timed_map = timed(race.race)
+    map_timing = timed(timed_map.time_map)
     open_ = timed(readings.readings)
     motions = timed(lambda size, pool: [response.responses(point, size, pool) for point in response.POINTS])
     over_steps, over_eps = timed(convergence.over_steps), timed(convergence.over_eps)
@@ -136,7 +136,7 @@ def he2026(
     maps = timed(deviation.maps)
     steps = timed(step_study.step_study)
     true = timed(truth.truth)
-    settings = timed(needed.needed)
+    settings = timed(required_settings.required_settings)
     return Study(
         size,
         open_,
@@ -151,7 +151,7 @@ def he2026(
         steps,
         true,
         settings,
-        timed_map,
+        map_timing,
         seconds,
         pool.workers,
     )

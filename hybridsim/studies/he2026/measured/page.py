@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from hybridsim.studies.he2026.measured.needed import EPS, STEPS
+from hybridsim.studies.he2026.measured.required_settings import EPS, STEPS
 from hybridsim.studies.he2026.measured.settings import SOURCE
 
 if TYPE_CHECKING:
@@ -52,8 +52,8 @@ def page(study: Study, image: Callable[[str], str]) -> str:
     parts += [
         _readings(study),
         _truth(study, image),
-        _needed(study, image("needed")),
-        _race(study, image("timed-map")),
+        _required_settings(study, image("needed")),
+        _timed_map(study, image("timed-map")),
         _how(study),
     ]
     return "\n\n".join(_wrapped(block) for part in parts for block in part.split("\n\n")) + "\n"
@@ -118,7 +118,7 @@ def _percent(value: float) -> str:
 
 
 def _readings(study: Study) -> str:
-    places = list(next(iter(study.readings.table.values())))
+    columns = list(next(iter(study.readings.table.values())))
     rows = []
     for name, row in study.readings.table.items():
         cells = [
@@ -133,8 +133,8 @@ def _readings(study: Study) -> str:
             "choices that the text does not settle one matters: whether a sticking body keeps the velocity at which",
             "the dichotomy stopped, as Eq. 4 reads. A motion that does not repeat has a range, not a value.",
             "",
-            "| reading | " + " | ".join(places) + " |",
-            "| --- |" + " --- |" * len(places),
+            "| reading | " + " | ".join(columns) + " |",
+            "| --- |" + " --- |" * len(columns),
             *rows,
         ]
     )
@@ -175,8 +175,8 @@ def _truth(study: Study, image: Callable[[str], str]) -> str:
     )
 
 
-def _needed(study: Study, picture: str) -> str:
-    facts = study.needed.to_plain()
+def _required_settings(study: Study, picture: str) -> str:
+    facts = study.required_settings.to_plain()
     rows = [
         f"| {name} | {_percent(row['published setting is enough on this share of the map'])} | "
         f"{_percent(row['the finest is not enough on this share'])} |"
@@ -200,20 +200,20 @@ def _needed(study: Study, picture: str) -> str:
     )  # fmt: skip
 
 
-def _race(study: Study, picture: str) -> str:
-    facts: dict[str, Any] = study.race.to_plain()
+def _timed_map(study: Study, picture: str) -> str:
+    facts: dict[str, Any] = study.timed_map.to_plain()
     ratios = facts["time over that of exact"]
     rows = [
         f"| {name} | {1e3 * entry.seconds:.3g} | {entry.points} | {facts[name]['error of A, median']:.1e} | "
         f"{facts[name]['error of A, largest']:.1e} | {facts[name]['error of E, largest']:.1e} | "
         f"{'' if name == 'exact' else f'{ratios[name]:.3g}'} |"
-        for name, entry in study.race.entries.items()
+        for name, entry in study.timed_map.entries.items()
     ]
     return "\n".join(
         [
             "## A whole map, timed",
             "",
-            f"Steady amplitude and energy on {study.race.side} x {study.race.side} points, "
+            f"Steady amplitude and energy on {study.timed_map.side} x {study.timed_map.side} points, "
             f"{facts['settling']}, the same",
             "threads in the same run; all that a point costs is in its time. `exact` runs the whole map, as one",
             "`hs.sweep(..., after=100)`; the others run a random sample of it, point by point, which is a millisecond",

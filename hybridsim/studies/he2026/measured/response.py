@@ -19,7 +19,7 @@ from hybridsim.studies.he2026.measured.settings import (
     Variant,
 )
 from hybridsim.studies.he2026.measured.steady import CONTACT, declared, settling_periods, solve_by_steps
-from hybridsim.studies.he2026.measured.step_study import PLACES, STEPS, StepStudy
+from hybridsim.studies.he2026.measured.step_study import LOADS_AND_RATIOS, STEPS, StepStudy
 from hybridsim.studies.he2026.measured.verdicts import Claim, Verdict
 
 FIGURE_3 = Point(0.6, 30.0 / 40.0)
@@ -69,27 +69,27 @@ def responses(point: Point, size: Size, pool: Pool) -> dict[str, Response]:
 
 
 def _response(point: Point, variant: Variant | None, size: Size) -> Response:
-    kept = _HARMONIC_PERIODS
+    last_periods = _HARMONIC_PERIODS
     if variant is None:
-        periods = settling_periods(point) + kept
+        periods = settling_periods(point) + last_periods
         solution = simulate(
             declared("dfcs"),
             (0.0, periods * point.period),
             params=point.params,
             integrator="exact",
-            save=kept * point.period,
+            save=last_periods * point.period,
         )
     else:
         periods = size.periods
-        solution = solve_by_steps(point, variant, periods, kept)
-    start = (periods - kept) * point.period
-    times = start + point.period * np.arange(kept * _SAMPLES) / _SAMPLES
+        solution = solve_by_steps(point, variant, periods, last_periods)
+    start = (periods - last_periods) * point.period
+    times = start + point.period * np.arange(last_periods * _SAMPLES) / _SAMPLES
     x = solution(np.clip(times, solution.t_start, solution.t_end))[0]
     amplitude = 0.5 * (x.max() - x.min())
-    lines = np.abs(np.fft.rfft(x)) / abs(np.fft.rfft(x)[kept])
-    whole = lines[: (_HIGHEST + 1) * kept : kept]
-    rest = np.delete(lines[: _HIGHEST * kept], np.arange(0, _HIGHEST * kept, kept))
-    folded = x.reshape(kept, _SAMPLES)
+    lines = np.abs(np.fft.rfft(x)) / abs(np.fft.rfft(x)[last_periods])
+    whole = lines[: (_HIGHEST + 1) * last_periods : last_periods]
+    rest = np.delete(lines[: _HIGHEST * last_periods], np.arange(0, _HIGHEST * last_periods, last_periods))
+    folded = x.reshape(last_periods, _SAMPLES)
     shown = times[-_SHOWN * _SAMPLES :: 4]
     reversals = sum(
         {e.source, e.target} == {"slip+", "slip-"} for e in solution.events if e.component == CONTACT
@@ -102,8 +102,9 @@ def _response(point: Point, variant: Variant | None, size: Size) -> Response:
         between=float(rest.max()),
         repeats=float(np.abs(np.diff(folded, axis=0)).max() / amplitude),
         amplitude=float(0.5 * np.ptp(folded, axis=1).mean()),
-        stick=sum(i.t1 - i.t0 for i in solution.modes[CONTACT] if i.mode == "stick") / (kept * point.period),
-        jumps=reversals / kept,
+        stick=sum(i.t1 - i.t0 for i in solution.modes[CONTACT] if i.mode == "stick")
+        / (last_periods * point.period),
+        jumps=reversals / last_periods,
     )
 
 
@@ -150,7 +151,7 @@ def _spectrum(run: Response) -> dict[str, float | bool]:
 def claim_figure_12(runs: dict[str, Response], study: StepStudy) -> Claim:
     """Judge the claim of A_D = 15 %, and of a friction force that jumps around zero velocity."""
     ours, exact, closest = _deviations(runs, 0.15)
-    place = PLACES.index((FIGURE_12.ratio, FIGURE_12.r))
+    place = LOADS_AND_RATIOS.index((FIGURE_12.ratio, FIGURE_12.r))
     falls = {v.name: study.by_step[v.name]["A"][place] for v in SIGNS}
     first = STEPS.index(STEPS_PER_PERIOD)
     shrinks = all(row[-1] < 0.5 * max(row[first], 0.01) for row in falls.values())

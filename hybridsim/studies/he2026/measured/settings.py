@@ -96,7 +96,8 @@ class Size:
     periods, last : periods of a run of a fixed-step method, and number of periods at its end for A and E.
     ratios, r : grid of Figures 10 and 11.
     map_count : points along each side of the maps of the exact motion.
-    race_count, race_sample : points along each side of the timed map, and size of the sample for the published method.
+    timed_count, timed_sample : points along each side of the timed map, and size of the sample for the published
+        method.
     ladder_count : points along each side of the maps of the needed setting.
     timed_periods, repeats : length of a timed run, and number of runs for the mean; the paper uses five.
     """
@@ -107,8 +108,8 @@ class Size:
     ratios: tuple[float, ...]
     r: tuple[float, ...]
     map_count: int
-    race_count: int
-    race_sample: int
+    timed_count: int
+    timed_sample: int
     ladder_count: int
     steps: tuple[int, ...]
     eps: tuple[float, ...]
@@ -132,8 +133,8 @@ FULL = Size(
     ratios=_range(0.51, 0.66, 0.01) + _range(0.70, 1.0, 0.05),
     r=_range(0.5, 1.5, 0.02),
     map_count=121,
-    race_count=101,
-    race_sample=400,
+    timed_count=101,
+    timed_sample=400,
     ladder_count=15,
     steps=_range(100, 2400, 100),  # type: ignore[arg-type]  # whole numbers, made as floats
     eps=_intervals(-1.5, 0.25),
@@ -145,8 +146,8 @@ QUICK = Size(
     ratios=_range(0.52, 0.64, 0.02) + (0.7, 0.8),
     r=_range(0.5, 1.0, 0.05) + _range(1.1, 1.5, 0.1),
     map_count=31,
-    race_count=31,
-    race_sample=60,
+    timed_count=31,
+    timed_sample=60,
     ladder_count=5,
     steps=(100, 200, 400, 600, 800, 1000, 1200, 1400, 2000, 2400),
     eps=_intervals(-2.0, 0.5),

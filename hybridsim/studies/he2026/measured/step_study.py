@@ -13,7 +13,7 @@ from hybridsim.studies.he2026.measured.settings import MATTERING, SIGNS, STEPS_P
 from hybridsim.studies.he2026.measured.steady import ExactState, by_steps, exact
 
 # Places along the published ridge, including the paper's two maxima, and its two example points.
-PLACES = (
+LOADS_AND_RATIOS = (
     (0.54, 0.55),
     (0.54, 0.58),
     (0.55, 0.60),
@@ -74,7 +74,7 @@ class StepStudy:
     def to_plain(self, quantity: str) -> dict[str, Any]:
         """Return the entries for the file of verdicts."""
         return {
-            "places": [{"F0/N": a, "r": b} for a, b in PLACES],
+            "places": [{"F0/N": a, "r": b} for a, b in LOADS_AND_RATIOS],
             "h0": list(STEPS),
             "deviation without stick from exact, root mean square over the places": {
                 v.name: self.along(v.name, quantity) for v in SIGNS
@@ -91,7 +91,7 @@ class StepStudy:
 
 def step_study(size: Size, pool: Pool) -> StepStudy:
     """Run the ridge at every step and every interval."""
-    points = [Point(r, ratio) for ratio, r in PLACES]
+    points = [Point(r, ratio) for ratio, r in LOADS_AND_RATIOS]
     truth = pool.map(exact, points, 0.0, 0.01)
     one = list(itertools.product(SIGNS, points, STEPS))
     two = list(itertools.product(MATTERING, points, EPS))

@@ -8,7 +8,12 @@ from typing import TYPE_CHECKING
 from hybridsim.studies.he2026.measured.settings import EPS_V, STEPS_PER_PERIOD
 from hybridsim.studies.he2026.pictures.convergence import convergence
 from hybridsim.studies.he2026.pictures.deviations import deviation_maps, step_lines
-from hybridsim.studies.he2026.pictures.maps import needed_settings, simpler_models, stick_and_stops, timed_map
+from hybridsim.studies.he2026.pictures.maps import (
+    required_settings_map,
+    simpler_models,
+    stick_and_stops,
+    timed_map,
+)
 from hybridsim.studies.he2026.pictures.motions import motions
 from hybridsim.studies.he2026.pictures.reduction import reduction
 from hybridsim.studies.he2026.pictures.run_times import interval_cost, stick_cost
@@ -42,6 +47,6 @@ def pictures(study: Study) -> dict[str, Callable[[], Figure]]:
         "step-study": lambda: step_lines(study.steps),
         "stick": lambda: stick_and_stops(study.truth),
         "simpler-models": lambda: simpler_models(study.truth),
-        "needed": lambda: needed_settings(study.needed),
-        "timed-map": lambda: timed_map(study.race),
+        "needed": lambda: required_settings_map(study.required_settings),
+        "timed-map": lambda: timed_map(study.timed_map),
     }

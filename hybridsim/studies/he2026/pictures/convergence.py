@@ -46,7 +46,7 @@ def convergence(curves: Curves, title: str, label: str, published: float) -> Fig
                             labels=["−100", "−10", "−1", "−0.1", "0", "0.1", "1", "10", "100"])  # fmt: skip
             style.dress(axes)
             axes.minorticks_off()
-            axes.axhline(0.0, color=style.FAINT, linewidth=0.8)
+            axes.axhline(0.0, color=style.GREY, linewidth=0.8)
         panels[0, j].set_title(_title(method), fontsize=9, loc="left")
         panels[1, j].set_xlabel(label, fontsize=9)
         if curves.name == "eps_v":

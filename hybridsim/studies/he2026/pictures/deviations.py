@@ -103,7 +103,7 @@ def step_lines(study: StepStudy) -> Figure:
         left.loglog(STEPS, worst, color=colour, linestyle=":", label=f"{sign.name}, worst period and place")
     base = 100.0 * study.along(SIGNS[0].name, "A")[0]
     left.loglog(
-        STEPS, base * STEPS[0] / np.array(STEPS), color=style.FAINT, linestyle="--", label="first order"
+        STEPS, base * STEPS[0] / np.array(STEPS), color=style.GREY, linestyle="--", label="first order"
     )
     left.set_xlabel("steps per period, h0", fontsize=9)
     left.set_xticks(STEPS, labels=[str(s) for s in STEPS])

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.plot import style
-from hybridsim.studies.he2026.measured.needed import EPS, STEPS, Needed
-from hybridsim.studies.he2026.measured.race import Race
+from hybridsim.studies.he2026.measured.required_settings import EPS, STEPS, RequiredSettings
+from hybridsim.studies.he2026.measured.timed_map import TimedMap
 from hybridsim.studies.he2026.measured.truth import MODELS, Truth
 from hybridsim.studies.he2026.pictures.deviations import edges
 from hybridsim.studies.he2026.pictures.motions import column_title, plain_log
@@ -77,7 +77,7 @@ def simpler_models(truth: Truth) -> Figure:
     return figure
 
 
-def needed_settings(needed: Needed) -> Figure:
+def required_settings_map(required: RequiredSettings) -> Figure:
     """Draw the coarsest step and the largest interval for an error of the amplitude below 1 %."""
     figure = style.figure(9.6, 7.4)
     figure.suptitle(
@@ -85,11 +85,11 @@ def needed_settings(needed: Needed) -> Figure:
         fontsize=11, x=0.01, ha="left",
     )  # fmt: skip
     panels = figure.subplots(2, 2, sharex=True, sharey=True)
-    rows = ((needed.steps, STEPS, "steps per period, h0"), (needed.eps, EPS, "eps_v [m/s]"))
+    rows = ((required.steps, STEPS, "steps per period, h0"), (required.eps, EPS, "eps_v [m/s]"))
     for line, (tables, ladder, label) in zip(panels, rows, strict=True):
         mesh: Any = None
         for axes, (name, table) in zip(line, tables.items(), strict=True):
-            mesh = _ladder(axes, needed, table, ladder)
+            mesh = _ladder(axes, required, table, ladder)
             axes.set_title(column_title(name), fontsize=10, loc="left")
         bar = figure.colorbar(mesh, ax=line, label=label)
         ticks = range(len(ladder)) if len(ladder) < 10 else range(0, len(ladder), 2)
@@ -101,15 +101,15 @@ def needed_settings(needed: Needed) -> Figure:
     return figure
 
 
-def timed_map(race: Race) -> Figure:
+def timed_map(timing: TimedMap) -> Figure:
     """Draw the error of the amplitude against the time per point, as median and largest over the sample."""
     figure = style.figure(7.6, 4.2)
     figure.suptitle(
-        f"Steady amplitude over a map: {race.side} x {race.side} points, error against time of a point",
+        f"Steady amplitude over a map: {timing.side} x {timing.side} points, error against time of a point",
         fontsize=11, x=0.01, ha="left",
     )  # fmt: skip
     axes = figure.subplots()
-    for k, (name, entry) in enumerate(race.entries.items()):
+    for k, (name, entry) in enumerate(timing.entries.items()):
         colour = style.INK if name == "exact" else style.PALETTE[k]
         low, high = (max(float(f(entry.A)), 1e-16) for f in (np.median, np.max))
         ms = 1e3 * entry.seconds
@@ -154,16 +154,16 @@ def _percents(bar: Any) -> None:
     bar.ax.minorticks_off()
 
 
-def _ladder(axes: Axes, needed: Needed, table: np.ndarray, ladder: tuple[float, ...]) -> Any:
+def _ladder(axes: Axes, required: RequiredSettings, table: np.ndarray, ladder: tuple[float, ...]) -> Any:
     from matplotlib.colors import BoundaryNorm
 
     steps = np.argmin(np.abs(np.log(np.nan_to_num(table, nan=1.0)[..., None] / np.array(ladder))), axis=-1)
-    rungs = np.where(np.isnan(table), np.nan, steps)
+    levels = np.where(np.isnan(table), np.nan, steps)
     norm = BoundaryNorm(np.arange(-0.5, len(ladder), 1.0).tolist(), 256)
     axes.set_facecolor("white")
-    x, y = edges(needed.r), edges(needed.ratios)
-    mesh = axes.pcolormesh(x, y, rungs, cmap=_COLOURS, norm=norm, rasterized=True)
-    axes.patch.set(hatch="///", edgecolor=style.FAINT)
+    x, y = edges(required.r), edges(required.ratios)
+    mesh = axes.pcolormesh(x, y, levels, cmap=_COLOURS, norm=norm, rasterized=True)
+    axes.patch.set(hatch="///", edgecolor=style.GREY)
     return mesh
 
 

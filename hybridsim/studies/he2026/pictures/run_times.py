@@ -55,15 +55,15 @@ def stick_cost(times: RunTimes) -> Figure:
     )
     axes = figure.subplots()
     names = [*(v.name for v in SIGNS), *(v.name for v in WITH), "exact"]
-    places = list(range(len(CASES)))
+    rows = list(range(len(CASES)))
     for k, name in enumerate(names):
         colour = style.INK if name == "exact" else style.PALETTE[k]
         values = [1e3 * times.by_method[name][case].seconds for case in CASES]
         title = "exact, with stick" if name == "exact" else column_title(name)
-        axes.plot(values, places, style.MARKERS[k], color=colour, markersize=6, label=title)
+        axes.plot(values, rows, style.MARKERS[k], color=colour, markersize=6, label=title)
     base = [1e3 * 3.25 * times.by_method[SIGNS[0].name][case].seconds for case in CASES]
-    axes.plot(base, places, "|", color=style.FAINT, markersize=12, label="paper: +225 % on sign by step")
-    axes.set_yticks(places, labels=list(CASES))
+    axes.plot(base, rows, "|", color=style.GREY, markersize=12, label="paper: +225 % on sign by step")
+    axes.set_yticks(rows, labels=list(CASES))
     axes.invert_yaxis()
     plain_log(axes.xaxis)
     axes.set_xlabel(f"time of {times.periods} periods [ms]", fontsize=9)

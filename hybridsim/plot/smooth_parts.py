@@ -1,4 +1,4 @@
-"""This module cuts a solution at its events into smooth pieces, with a bounded number of sample points."""
+"""This module cuts a solution at its events into smooth parts, with a bounded number of sample points."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ from hybridsim.model.checks.units import units_of
 if TYPE_CHECKING:
     from hybridsim.solution import Solution
 
-# Points of a whole picture, about four per horizontal pixel, and the fewest per piece, so that a short slip
+# Points of a whole picture, about four per horizontal pixel, and the fewest per part, so that a short slip
 # among long ones remains a curve.
 _POINTS, _LEAST = 6_000, 9
 # If there are more periods than a picture can resolve, only the last few are drawn, without the transient.
-_MANY, _FEW = 24, 4
-_MANY_EVENTS, _FEW_EVENTS = 300, 24  # the same for events of a motion without a period
+_MAX_PERIODS, _LAST_PERIODS = 24, 4
+_MAX_EVENTS, _LAST_EVENTS = 300, 24  # the same for events of a motion without a period
 # A number of periods that differs from a whole one by this fraction is whole, because an end such as 100T is
 # rounded.
 _WHOLE = 1e-9
 
 
 @dataclass(frozen=True)
-class Piece:
-    """A smooth piece: times (k,), the values of each quantity (k,), and the mode of each component in it."""
+class SmoothPart:
+    """A smooth part of a run: times (k,), the values of each quantity (k,), and the mode of each component in it."""
 
     t: NDArray[np.float64]
     values: Mapping[str, NDArray[np.float64]]
@@ -75,19 +75,23 @@ def window_of(solution: Solution, t_span: tuple[float, float] | None) -> Window:
     period = forcing_period(solution.model)
     if period is None:
         return _last_events(solution, start, end)
-    if end - start <= _MANY * period:
+    if end - start <= _MAX_PERIODS * period:
         return Window(start, end)
-    return Window(end - _FEW * period, end, f"the last {_FEW} periods of {_short((end - start) / period)}")
+    return Window(
+        end - _LAST_PERIODS * period,
+        end,
+        f"the last {_LAST_PERIODS} periods of {_short((end - start) / period)}",
+    )
 
 
 def _last_events(solution: Solution, start: float, end: float) -> Window:
     """Return all, or the last of very many events that are spread over the run, as in a limit cycle."""
     times = np.array([event.t for event in solution.events if event.kind == "transition"])
-    if len(times) <= _MANY_EVENTS:
+    if len(times) <= _MAX_EVENTS:
         return Window(start, end)
-    first = end - (end - start) * _FEW_EVENTS / len(times)
+    first = end - (end - start) * _LAST_EVENTS / len(times)
     count = int((times >= first).sum())
-    if not 0.5 * _FEW_EVENTS <= count <= 2 * _FEW_EVENTS:
+    if not 0.5 * _LAST_EVENTS <= count <= 2 * _LAST_EVENTS:
         return Window(start, end)
     return Window(first, end, f"the last {count} of {len(times)} events")
 
@@ -112,14 +116,14 @@ def unit_of(solution: Solution, name: str) -> str:
     return units.get(name, "")
 
 
-def extent(pieces: Sequence[Piece], name: str) -> tuple[float, float]:
+def extent(smooth_parts: Sequence[SmoothPart], name: str) -> tuple[float, float]:
     """Return the least and largest value of a quantity."""
-    values = [piece.values[name] for piece in pieces]
+    values = [smooth_part.values[name] for smooth_part in smooth_parts]
     return float(min(map(np.min, values))), float(max(map(np.max, values)))
 
 
-def pieces_of(solution: Solution, names: Sequence[str], window: Window) -> list[Piece]:
-    """Return the pieces of a window in order of time; at an event one ends at x- and the next begins at x+."""
+def smooth_parts_of(solution: Solution, names: Sequence[str], window: Window) -> list[SmoothPart]:
+    """Return the smooth parts of a window in order of time; at an event one ends at x- and the next begins at x+."""
     inner = {e.t for e in solution.events if e.kind != "near-grazing" and window.t0 < e.t < window.t1}
     cuts = np.array([window.t0, *sorted(inner), window.t1])
     lengths = np.diff(cuts)
@@ -136,7 +140,7 @@ def pieces_of(solution: Solution, names: Sequence[str], window: Window) -> list[
         values[name] = [np.append(part, value) for part, value in zip(parts, last)]
     modes_at = _mode_lookup(solution)
     return [
-        Piece(grid, {name: values[name][i] for name in names}, modes_at((grid[0] + grid[-1]) / 2))
+        SmoothPart(grid, {name: values[name][i] for name in names}, modes_at((grid[0] + grid[-1]) / 2))
         for i, grid in enumerate(grids)
     ]
 

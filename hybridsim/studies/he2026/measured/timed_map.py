@@ -48,7 +48,7 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class Race:
+class TimedMap:
     """The methods by name, over a map of side x side points."""
 
     side: int
@@ -67,15 +67,15 @@ class Race:
         }
 
 
-def race(size: Size, pool: Pool) -> Race:
+def time_map(size: Size, pool: Pool) -> TimedMap:
     """Time all methods on the same threads: `exact` on the whole map, the others on a random sample of its points."""
-    side = size.race_count
+    side = size.timed_count
     grid = [
         [Point(float(r), float(q)) for r in np.linspace(*R_SPAN, side)]
         for q in np.linspace(*RATIO_SPAN, side)
     ]
     points = [point for row in grid for point in row]
-    chosen = np.random.default_rng(_SEED).choice(len(points), size.race_sample, replace=False)
+    chosen = np.random.default_rng(_SEED).choice(len(points), size.timed_sample, replace=False)
     sample = [points[i] for i in chosen]
     _map(grid[:2], pool, 0.0, 0.0)  # one-time compiling and caching does not count
     for variant in (LITERAL, ZEROED):
@@ -100,7 +100,7 @@ def race(size: Size, pool: Pool) -> Race:
     settled = pool.map(exact, sample, 0.95, 1.0)
     for name, (seconds, count, values) in found.items():
         entries[name] = Entry(seconds, count, *_errors(values, settled))
-    return Race(side, entries)
+    return TimedMap(side, entries)
 
 
 def _map(

@@ -30,7 +30,7 @@ _PERIODS, _LAST = 60, 40
 
 
 @dataclass(frozen=True)
-class Needed:
+class RequiredSettings:
     """For each method, a map of the coarsest setting from which on all periods are within 1 %.
 
     nan if the finest one is not enough.
@@ -56,7 +56,7 @@ class Needed:
         return result
 
 
-def needed(size: Size, pool: Pool) -> Needed:
+def required_settings(size: Size, pool: Pool) -> RequiredSettings:
     """Try the settings at every point from coarse to fine."""
     ratios, r = np.linspace(*RATIO_SPAN, size.ladder_count), np.linspace(*R_SPAN, size.ladder_count)
     points = [Point(float(b), float(a)) for a in ratios for b in r]
@@ -66,7 +66,7 @@ def needed(size: Size, pool: Pool) -> Needed:
     table = np.array(found).reshape(-1, len(ratios), len(r))
     names = [v.name for v in (*SIGNS, LITERAL, ZEROED)]
     count = len(SIGNS)
-    return Needed(
+    return RequiredSettings(
         ratios,
         r,
         dict(zip(names[:count], table[:count], strict=True)),
