@@ -58,13 +58,13 @@ def _fields(part: Any, *names: str) -> dict[str, Any]:
     return {name: getattr(part, name) for name in names}
 
 
-def _given(value: Any) -> bool:
+def _is_set(value: Any) -> bool:
     return value is not None and value is not False and value not in ("", (), {}, [])
 
 
 def _short(key: str, entries: dict[str, dict[str, Any]]) -> dict[str, Any]:
     """Return plain values if no entry has further fields; a mixture would be written in another order."""
-    if all(not _given(value) for entry in entries.values() for name, value in entry.items() if name != key):
+    if all(not _is_set(value) for entry in entries.values() for name, value in entry.items() if name != key):
         return {name: entry[key] for name, entry in entries.items()}
     return entries
 
@@ -141,7 +141,7 @@ def _plain(value: Any) -> Any:
         number = _number(value.text)
         return value.text if number is None else number
     if isinstance(value, Mapping):
-        return {key: _plain(item) for key, item in value.items() if _given(item)}
+        return {key: _plain(item) for key, item in value.items() if _is_set(item)}
     return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
 
 
