@@ -36,8 +36,8 @@ SERIES, ELEMENTARY = "series of states and guards", "sine, cosine, exponential, 
 MODEL, PYTHON = "functions of the model, other kernels", "Python, NumPy and the memory they take"
 PARTS = {
     "first_zero": ZEROS, "earliest_exit": ZEROS, "first_exit": ZEROS, "bernstein": ZEROS,
-    "exact_leap": MOTION, "leap": MOTION,
-    "judge_candidate": MODES, "settle_event": MODES, "settle_clearly": MODES, "bounds": MODES,
+    "linear_event_loop": MOTION, "event_loop": MOTION,
+    "candidate_verdict": MODES, "resolve_event": MODES, "resolve_clear": MODES, "bounds": MODES,
     "series": SERIES, "values": SERIES, "ahead": SERIES, "sizes": SERIES, "advance": SERIES, "expand": SERIES,
 }  # fmt: skip
 

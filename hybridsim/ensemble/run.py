@@ -6,21 +6,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.events.compiled.scratch import LEAP
+from hybridsim.engine.events.compiled.scratch import EVENT_LOOP
 from hybridsim.engine.linear.motion_summary import sum_up
 from hybridsim.engine.native.kernels import call_kernel, inlined, kernel
 from hybridsim.engine.native.loop_hints import fill, put
 from hybridsim.engine.native.struct_pack import pack_at
 from hybridsim.engine.run.event_loop import AT_TARGET, FULL
 from hybridsim.engine.system.instant import two_sum
-from hybridsim.ensemble.start import plain_start, rests_for_ever
+from hybridsim.ensemble.start import keeps_holding, plain_start
 
 SEGMENTS = 1024  # largest number of segments in one compiled call
 # A compiled call ends if events follow each other ever faster, because they may accumulate. A few shrinking intervals
 # are not an accumulation, so the run is resumed up to this many times.
-_RESUMED = 4
-_AT_ONCE = 8192  # approximate number of segments (some milliseconds) between checks for interruption
-NEXT, BEGUN, KEPT, RESUMED = range(4)  # indices of `Runs.at`
+_MAX_RESUMPTIONS = 4
+_SEGMENTS_PER_CHECK = 8192  # between checks for interruption: some milliseconds
+NEXT, BEGUN, STORED, RESUMED = range(4)  # indices of `Runs.at`
 
 
 class Runs(NamedTuple):
@@ -34,7 +34,7 @@ class Runs(NamedTuple):
     periods: np.ndarray  # periods (m,)
     longest: np.ndarray  # longest segments (m,)
     done: np.ndarray  # whether each run (m,) is finished
-    extremes: np.ndarray  # results of each run as in `hybridsim.engine.linear.motion_summary.Stretch`
+    extremes: np.ndarray  # results of each run as in `hybridsim.engine.linear.motion_summary.MotionSummary`
     integrals: np.ndarray
     sides: np.ndarray
     held: np.ndarray
@@ -43,13 +43,13 @@ class Runs(NamedTuple):
 
 
 @kernel
-def run_fleet(
+def run_ensemble(
     automata: Any,
     tapes: Any,
     inputs: Any,
     none: Any,
     lin: Any,
-    places: Any,
+    vector_positions: Any,
     surfaces: Any,
     hold: Any,
     rule: Any,
@@ -57,21 +57,21 @@ def run_fleet(
     slopes: Any,
     state: Any,
     work: Any,
-    room: Any,
+    scratch: Any,
     late: Any,
     record: Any,
     found: Any,
 ) -> None:
     """Run one after the other, from the current one on, until all are done or some milliseconds have passed.
 
-    lin: tables of the common type. places: positions of the origin, the phases and the pin in p. hold: holding mode of
-    each component. rule: nodes and weights. slopes (3, n): scratch for `sum_up`. record: twice as many segments as one
-    compiled call has; late: its second half.
+    lin: tables of the common type. vector_positions: positions of the origin, the phases and the pin in p. hold:
+    holding mode of each component. rule: nodes and weights. slopes (3, n): scratch for `sum_up`. record: twice as
+    many segments as one compiled call has; late: its second half.
     """
-    origin_at, phases_at, pin_at = places
-    at, clock, target = runs.at, room.times[2:], room.times[:2]
+    origin_at, phases_at, pin_at = vector_positions
+    at, clock, target = runs.at, scratch.times[2:], scratch.times[:2]
     segments = 0
-    while at[NEXT] < runs.ends.shape[0] and segments < _AT_ONCE:
+    while at[NEXT] < runs.ends.shape[0] and segments < _SEGMENTS_PER_CHECK:
         i = at[NEXT]
         tables, rates = pack_at(runs.tables[i], lin), runs.rates[i]
         if at[BEGUN] == 0:
@@ -84,44 +84,46 @@ def run_fleet(
             ):  # fmt: skip
                 at[NEXT] += 1
                 continue
-            if rests_for_ever(tapes, tables, state, work, room.c):
+            if keeps_holding(tapes, tables, state, work, scratch.c):
                 _take_rest(hold, runs.periods[i], state, found)
-                _keep(found, runs, i)
+                _store_results(found, runs, i)
                 at[NEXT] += 1
                 continue
-            put(rates, room.rates)
-            for k in range(room.hints.shape[0]):
-                fill(room.hints[k], 0.0)
+            put(rates, scratch.rates)
+            for k in range(scratch.hints.shape[0]):
+                fill(scratch.hints[k], 0.0)
             clock[0], clock[1], target[0], target[1] = 0.0, 0.0, runs.ends[i], 0.0
-            room.longest[0] = runs.longest[i]
-            at[BEGUN], at[KEPT], at[RESUMED] = 1, 0, 0
-        code = call_kernel(work.reached[LEAP], (automata, tapes, inputs, tables, state, work, room, late))
-        count = room.committed[0]
-        segments += count if code != FULL else _AT_ONCE
+            scratch.longest[0] = runs.longest[i]
+            at[BEGUN], at[STORED], at[RESUMED] = 1, 0, 0
+        code = call_kernel(
+            work.entry_points[EVENT_LOOP], (automata, tapes, inputs, tables, state, work, scratch, late)
+        )
+        count = scratch.committed[0]
+        segments += count if code != FULL else _SEGMENTS_PER_CHECK
         if code == AT_TARGET:
-            first, begin = _begin(record, at[KEPT], count, runs.ends[i] - runs.periods[i])
+            first, begin = _begin(record, at[STORED], count, runs.ends[i] - runs.periods[i])
             if first >= 0:
                 _clear(found)
                 if sum_up(
                     tables, hold, (record.ends, record.rows, record.modes, record.coordinates, record.jumps),
-                    first, SEGMENTS + count, begin, rule[0], rule[1], (room.v, slopes), found,
+                    first, SEGMENTS + count, begin, rule[0], rule[1], (scratch.v, slopes), found,
                 ):  # fmt: skip
-                    _keep(found, runs, i)
+                    _store_results(found, runs, i)
             count = 0
         elif count > 0:
             at[RESUMED] += 0 if code == FULL else 1
-            at[KEPT] = min(at[KEPT] + count, SEGMENTS)
-            _make_room(record, at[KEPT], count)
-        if count == 0 or at[RESUMED] > _RESUMED:
+            at[STORED] = min(at[STORED] + count, SEGMENTS)
+            _shift_back(record, at[STORED], count)
+        if count == 0 or at[RESUMED] > _MAX_RESUMPTIONS:
             at[NEXT] += 1
             at[BEGUN] = 0
 
 
 @inlined
-def _begin(record: Any, kept: int, count: int, since: float) -> tuple[int, float]:
+def _begin(record: Any, stored: int, count: int, since: float) -> tuple[int, float]:
     """Return the segment that contains an instant, and the local time; -1 if it is before all segments."""
     first = SEGMENTS + count - 1
-    while first >= SEGMENTS - kept:
+    while first >= SEGMENTS - stored:
         high, low = record.clocks[first, 0], record.clocks[first, 1]
         if (high - since) + low <= 0.0:
             high, error = two_sum(since, -high)
@@ -131,9 +133,9 @@ def _begin(record: Any, kept: int, count: int, since: float) -> tuple[int, float
 
 
 @inlined
-def _make_room(record: Any, kept: int, count: int) -> None:
+def _shift_back(record: Any, stored: int, count: int) -> None:
     """Move the last segments before the second half of a record, which is then free again."""
-    for i in range(SEGMENTS - kept, SEGMENTS):
+    for i in range(SEGMENTS - stored, SEGMENTS):
         record.ends[i], record.rows[i] = record.ends[i + count], record.rows[i + count]
         put(record.clocks[i + count], record.clocks[i])
         put(record.modes[i + count], record.modes[i])
@@ -166,7 +168,7 @@ def _take_rest(hold: Any, period: float, state: Any, found: Any) -> None:
 
 
 @inlined
-def _keep(found: Any, runs: Any, i: int) -> None:
+def _store_results(found: Any, runs: Any, i: int) -> None:
     runs.done[i] = True
     for side in range(2):
         put(found.extremes[side], runs.extremes[i, side])

@@ -14,27 +14,27 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.events.compiled.scratch import MOST, work_space
+from hybridsim.engine.events.compiled.scratch import MAX_JOINT_COMPONENTS, work_space
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.linear.modes import holds_constants, is_always_linear
-from hybridsim.engine.linear.motion_summary import NODES, WEIGHTS, Stretch
+from hybridsim.engine.linear.motion_summary import NODES, WEIGHTS, MotionSummary
 from hybridsim.engine.native.kernels import ENABLED, Precompiled
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.run.call_arrays import CallArrays, buffer_of
 from hybridsim.engine.run.compiled_loop import NOT_LINEAR
 from hybridsim.engine.system.period import common_multiple
-from hybridsim.engine.system.programs.mode_tables import automata_of, shelf_of
+from hybridsim.engine.system.programs.mode_tables import automata_of, tape_cache_of
 from hybridsim.engine.system.system import System
-from hybridsim.ensemble.run import NEXT, SEGMENTS, Runs, run_fleet
+from hybridsim.ensemble.run import NEXT, SEGMENTS, Runs, run_ensemble
 from hybridsim.ensemble.start import opposing
 from hybridsim.ensemble.tables import EnsembleTables, ensemble_tables
-from hybridsim.integrators.closed_form.segments import Record, reach_leap, room_for
+from hybridsim.integrators.closed_form.segments import Record, link_event_loop, scratch_for
 
-_TOGETHER = 128  # runs whose tables are made together, so that they fit in the processor's cache
+_GROUP_SIZE = 128  # runs whose tables are made together, so that they fit in the processor's cache
 _RENEWAL_TURNS = 100  # longest segment in turns of the fastest angle, as in `hybridsim.engine.run.setup`
-_FULLY = 2.0 * math.pi
+_FULL_TURN = 2.0 * math.pi
 
-_run, _opposing = Precompiled(run_fleet), Precompiled(opposing)
+_run, _opposing = Precompiled(run_ensemble), Precompiled(opposing)
 
 
 class LastPeriods(NamedTuple):
@@ -42,7 +42,7 @@ class LastPeriods(NamedTuple):
 
     numbers: np.ndarray  # numbers (m,) of the runs
     periods: np.ndarray  # lengths (m,) of the periods
-    stretch: Stretch  # the motion over the period, one row of each array per run
+    summary: MotionSummary  # the motion over the period, one row of each array per run
 
 
 def can_run_together(system: System) -> bool:
@@ -58,7 +58,7 @@ def can_run_together(system: System) -> bool:
         and system.n > 0
         and not parts
         and all(a.has_surface and not (a.is_unique or a.is_unilateral) for a in system.automata)
-        and len(system.automata) <= MOST  # all tapes exist from the start
+        and len(system.automata) <= MAX_JOINT_COMPONENTS  # all tapes exist from the start
         and is_always_linear(system)
         and holds_constants(system)
     )
@@ -77,9 +77,9 @@ class Ensemble:
         self.system, self.automata, self.may_continue = system, automata_of(system), may_continue
         self.inputs = system.registers.inputs
         self.first = np.zeros(len(system.automata), dtype=np.int64)
-        shelf = shelf_of(system)
-        shelf.surround(self.first)
-        self.tapes = shelf.tapes
+        tape_cache = tape_cache_of(system)
+        tape_cache.surround(self.first)
+        self.tapes = tape_cache.tapes
         tape, layout = system.optimised_tape(self.first), system.layout
         self.surfaces = (
             tape.constant_rows,
@@ -88,7 +88,7 @@ class Ensemble:
             tape.surfaces,
             np.array(system.surface_of, dtype=np.int64),
         )
-        self.places = layout.origin_at, layout.phases_at, layout.pin_at
+        self.vector_positions = layout.origin_at, layout.phases_at, layout.pin_at
         self.hold = np.array([a.hold for a in system.automata], dtype=np.int64)
 
     def runs(self, parameters: np.ndarray, starts: np.ndarray, periods: int) -> Iterator[LastPeriods]:
@@ -97,8 +97,8 @@ class Ensemble:
         parameters (N, P), in the order of the model; starts (N, n). The iteration ends early if `may_continue` returns
         False.
         """
-        for first in range(0, len(parameters), _TOGETHER):
-            here = slice(first, first + _TOGETHER)
+        for first in range(0, len(parameters), _GROUP_SIZE):
+            here = slice(first, first + _GROUP_SIZE)
             for last in self._runs(parameters[here], starts[here], periods):
                 yield last._replace(numbers=first + last.numbers)
             if not self.may_continue():
@@ -114,7 +114,7 @@ class Ensemble:
         times = np.array([_period(row) for row in known])[which.reshape(-1)]
         fastest = np.abs(rates).max(axis=1, initial=0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            longest = _RENEWAL_TURNS * _FULLY / fastest
+            longest = _RENEWAL_TURNS * _FULL_TURN / fastest
             horizons = np.minimum(periods * times, longest)
         fit = np.flatnonzero(np.isfinite(times) & self._may_begin(starts, vectors))
         groups = ensemble_tables(
@@ -140,9 +140,11 @@ class Ensemble:
                 at=np.zeros(4, dtype=np.int64),
             )
             self._run_group(group, runs)
-            stretch = Stretch(runs.extremes, runs.integrals, runs.sides, runs.held, runs.holding)
+            summary = MotionSummary(runs.extremes, runs.integrals, runs.sides, runs.held, runs.holding)
             yield LastPeriods(
-                numbers[runs.done], runs.periods[runs.done], Stretch(*(part[runs.done] for part in stretch))
+                numbers[runs.done],
+                runs.periods[runs.done],
+                MotionSummary(*(part[runs.done] for part in summary)),
             )
 
     def _run_group(self, group: EnsembleTables, runs: Runs) -> None:
@@ -155,7 +157,7 @@ class Ensemble:
         under_way = packed(runs)
         while True:
             _run(
-                self.automata, self.tapes, self.inputs, NOT_LINEAR, group.first, self.places,
+                self.automata, self.tapes, self.inputs, NOT_LINEAR, group.first, self.vector_positions,
                 self.surfaces, self.hold, (NODES, WEIGHTS), under_way, group_scratch.slopes, *group_scratch.packs,
             )  # fmt: skip
             if runs.at[NEXT] == len(runs.ends) or not self.may_continue():
@@ -172,7 +174,7 @@ class Ensemble:
 
 def _period(rates: np.ndarray) -> float:
     """Return the common period of angles with these rates, or NaN."""
-    return common_multiple((_FULLY / abs(rates[rates != 0.0])).tolist()) or math.nan
+    return common_multiple((_FULL_TURN / abs(rates[rates != 0.0])).tolist()) or math.nan
 
 
 class _GroupScratch:
@@ -187,7 +189,7 @@ class _GroupScratch:
             np.zeros(n), p.copy(), np.zeros(count, dtype=whole), np.ones(guards, dtype=whole),
             np.zeros(guards, dtype=whole), none, none, np.zeros(n), np.zeros(guards), np.zeros(0),
         )  # fmt: skip
-        call_arrays = CallArrays.of(buffer_of(blank, p), work, room_for(system, tables))
+        call_arrays = CallArrays.of(buffer_of(blank, p), work, scratch_for(system, tables))
         size = 2 * SEGMENTS
         record = Record(
             ends=np.empty(size),
@@ -199,7 +201,7 @@ class _GroupScratch:
             fires=np.empty(size, dtype=whole),
             jumps=np.empty((size, 3, n)),
         )
-        found = Stretch(
+        found = MotionSummary(
             extremes=np.empty((2, n)),
             integrals=np.empty((2, n)),
             ends=np.empty((2, n)),
@@ -207,15 +209,15 @@ class _GroupScratch:
             holding=np.empty((2, count), dtype=np.bool_),
         )
         late = packed(Record(*(part[SEGMENTS:] for part in record)))
-        reach_leap(
+        link_event_loop(
             ensemble.automata,
             ensemble.tapes,
             ensemble.inputs,
             tables,
             call_arrays.as_packed,
             work,
-            call_arrays.room,
+            call_arrays.scratch,
             late,
         )
-        self.packs = call_arrays.as_packed, work, call_arrays.room, late, packed(record), packed(found)
+        self.packs = call_arrays.as_packed, work, call_arrays.scratch, late, packed(record), packed(found)
         self.slopes = np.zeros((3, n))

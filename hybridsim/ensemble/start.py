@@ -9,10 +9,15 @@ import math
 from typing import Any
 
 from hybridsim.engine.events.choice.verdict import FINE, choose
-from hybridsim.engine.events.compiled.scratch import AT, AT_ERROR, Before, called_by
-from hybridsim.engine.events.compiled.verdicts import cluster_of, guard_series, judge_candidate, judge_members
+from hybridsim.engine.events.compiled.scratch import AT, AT_ERROR, LocatedEvent, called_by
+from hybridsim.engine.events.compiled.verdicts import (
+    candidate_verdict,
+    cluster_of,
+    guard_series,
+    members_verdict,
+)
 from hybridsim.engine.linear.motion import functions_of_time, to_modal
-from hybridsim.engine.native.kernels import call, call_apart, kernel, merged
+from hybridsim.engine.native.kernels import call, call_noinline, inline_always, kernel
 from hybridsim.engine.native.loop_hints import put
 from hybridsim.engine.native.simd_products import LANES
 from hybridsim.engine.run.event_loop import set_origin
@@ -28,7 +33,7 @@ def plain_start(
     tapes: Any,
     inputs: Any,
     none: Any,
-    places: Any,
+    vector_positions: Any,
     surfaces: Any,
     t0: float,
     state: Any,
@@ -36,11 +41,11 @@ def plain_start(
 ) -> bool:
     """Decide all modes at t0 from the state, whose p holds the parameters. Return False if the outcome is uncertain.
 
-    none: empty tables, so that guards are judged by the tape. places: rates, and the positions of the origin, the
-    phases and the pin in p. surfaces: from the tape of the first modes, the constant rows, the rows, the registers of
-    the rates and of the surfaces, and the component of each surface.
+    none: empty tables, so that guards are judged by the tape. vector_positions: rates, and the positions of the origin,
+    the phases and the pin in p. surfaces: from the tape of the first modes, the constant rows, the rows, the
+    registers of the rates and of the surfaces, and the component of each surface.
     """
-    rates, origin_at, phases_at, pin_at = places
+    rates, origin_at, phases_at, pin_at = vector_positions
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     set_origin((origin_at, phases_at), rates, t0, 0.0, p)
     for i in range(x.shape[0]):
@@ -50,15 +55,15 @@ def plain_start(
     if not _take_sides(automata, inputs, surfaces, pin_at, state, work):
         return False
     for c in range(z.shape[0]):
-        if z[c] == _UNKNOWN and not _decide_cluster(automata, tapes, inputs, none, state, c, work):
+        if z[c] == _UNKNOWN and not _choose_cluster(automata, tapes, inputs, none, state, c, work):
             return False
     k = find_modes(tapes, z)
     if k < 0:
         return False
-    at = Before(0.0, 0.0, x, x_error, p, z)
+    at = LocatedEvent(0.0, 0.0, x, x_error, p, z)
     guard_series(tapes, inputs, none, k, at, x, x_error, work)
-    verdict = call_apart(
-        judge_members,
+    verdict = call_noinline(
+        members_verdict,
         (
             automata, none, k, at, x, x_error, z, work.everything, -1, False, False, work, state.sides, state.orders,
             state.floors,
@@ -67,7 +72,7 @@ def plain_start(
     return verdict == FINE
 
 
-@merged
+@inline_always
 def _take_sides(automata: Any, inputs: Any, surfaces: Any, pin_at: int, state: Any, work: Any) -> bool:
     """Set each component to the mode of its side, or to _UNKNOWN on its surface. Return False if a value is NaN."""
     constant, rows, derivatives, registers, owners = surfaces
@@ -87,8 +92,8 @@ def _take_sides(automata: Any, inputs: Any, surfaces: Any, pin_at: int, state: A
     return True
 
 
-@merged
-def _decide_cluster(
+@inline_always
+def _choose_cluster(
     automata: Any, tapes: Any, inputs: Any, none: Any, state: Any, first: int, work: Any
 ) -> bool:
     """Set the one motion that `choose` prefers for a component on its surface. Return whether it is certain."""
@@ -115,7 +120,7 @@ def _decide_cluster(
             held = automata.pin[members[i], j]
             if held >= 0:
                 x_error[held] = UNIT * abs(x[held])
-    work.real[AT] = work.real[AT_ERROR] = 0.0
+    work.float_slots[AT] = work.float_slots[AT_ERROR] = 0.0
     put(x, work.x_after)
     put(x_error, work.slopes)
     total = 3**count
@@ -126,8 +131,8 @@ def _decide_cluster(
             rest //= 3
         for i in range(count):
             trial[members[i]] = candidates[number, i]
-        verdicts[number] = call_apart(
-            judge_candidate, (automata, tapes, inputs, none, state, work, -1, False, first, number)
+        verdicts[number] = call_noinline(
+            candidate_verdict, (automata, tapes, inputs, none, state, work, -1, False, first, number)
         )
         if verdicts[number] < -1:  # modes without tapes
             return False
@@ -140,7 +145,7 @@ def _decide_cluster(
 
 
 @kernel
-def rests_for_ever(tapes: Any, lin: Any, state: Any, work: Any, c: Any) -> bool:
+def keeps_holding(tapes: Any, lin: Any, state: Any, work: Any, c: Any) -> bool:
     """Return whether nothing moves from here on: all states are constant, and no guard ever passes zero.
 
     A guard that reaches zero and turns back there, within its rounding, leaves the mode unchanged. Functions of time
@@ -179,10 +184,10 @@ def rests_for_ever(tapes: Any, lin: Any, state: Any, work: Any, c: Any) -> bool:
 
 
 @kernel
-def opposing(effects: Any, x: Any, p: Any, z: Any, room: Any, out: Any) -> None:
-    """Write to out (N,) whether every contact opposes its own velocity at starts x (N, n), p (N, P); room (C,)."""
+def opposing(effects: Any, x: Any, p: Any, z: Any, scratch: Any, out: Any) -> None:
+    """Write to out (N,) whether every contact opposes its own velocity at starts x (N, n), p (N, P); scratch (C,)."""
     for i in range(x.shape[0]):
-        call(effects, 0.0, x[i], p[i], z, room)
+        call(effects, 0.0, x[i], p[i], z, scratch)
         out[i] = True
-        for c in range(room.shape[0]):
-            out[i] = out[i] and room[c] < 0.0
+        for c in range(scratch.shape[0]):
+            out[i] = out[i] and scratch[c] < 0.0

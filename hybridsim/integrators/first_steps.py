@@ -15,9 +15,8 @@ from hybridsim.integrators.runge_kutta.dop853 import Dop853
 _LATE = 3
 # In tolerances of the states: errors of the first steps of a multistep method are tens of tolerances.
 _CLEAR = 100.0
-_MOST = (
-    100  # most first steps; in a stiff mode explicit steps may be too short, and the method then takes over
-)
+# Largest number of first steps; in a stiff mode explicit steps may be too short, and the method then takes over.
+_MAX_FIRST_STEPS = 100
 
 
 def with_first_steps(
@@ -60,7 +59,7 @@ class FirstSteps:
         step = self.stepper.step()
         if not self.is_over:
             self.count += 1
-            if step.s1 != self.bound and (self.count >= _MOST or self._is_clear(step.s1, step.x1)):
+            if step.s1 != self.bound and (self.count >= _MAX_FIRST_STEPS or self._is_clear(step.s1, step.x1)):
                 self.stepper, self.is_over, self.early = self.make(step.s1, step.x1), True, self.stepper
                 self.last = step
         return step

@@ -17,9 +17,9 @@ from hybridsim.engine.record.trajectory import PiecewiseDense
 from hybridsim.engine.run.stepping import Flow, Step
 from hybridsim.engine.system.failures import Collapsed, StepFailure
 from hybridsim.engine.system.tolerances import Tolerances
-from hybridsim.integrators.runge_kutta.step import SMALLEST, STRETCH, next_length
+from hybridsim.integrators.runge_kutta.step import LAST_STEP_FACTOR, SMALLEST, next_length
 
-_MOST_PARTS = 64  # most parts of a step that is repeated up to an event
+_MAX_PARTS = 64  # most parts of a step that is repeated up to an event
 _SHORTER = 0.5  # factor on a step whose error up to an event is above the tolerance
 
 
@@ -101,7 +101,7 @@ class OneStepStepper(ABC):
         while True:
             h = min(self.h, self.tolerances.max_step)
             # the rest would be too short for another step
-            last = h * STRETCH >= abs(self.bound - start.s) - SMALLEST * math.ulp(self.bound)
+            last = h * LAST_STEP_FACTOR >= abs(self.bound - start.s) - SMALLEST * math.ulp(self.bound)
             h = abs(self.bound - start.s) if last else abs(on_the_grid(start.s, direction * h))
             if not h > 0.0:
                 raise Collapsed(f"the step fell to {h:.3g}")
@@ -146,7 +146,7 @@ class OneStepStepper(ABC):
             for a, b in pairwise(knots.tolist()):
                 trials.append(self._attempt(points[-1], b - a))
                 points.append(self._point(b, trials[-1].x))
-            if count == _MOST_PARTS or all(trial.error <= 1.0 for trial in trials):
+            if count == _MAX_PARTS or all(trial.error <= 1.0 for trial in trials):
                 break
             self.flow.counters.rejected += 1
             count *= 2

@@ -16,7 +16,7 @@ import numpy as np
 from hybridsim.engine.native.kernels import kernel
 from hybridsim.engine.record.segments import Dense
 
-MOST = 6  # most points, since the highest order of backward differentiation formulas is five
+MAX_PAST_POINTS = 6  # most points, since the highest order of backward differentiation formulas is five
 # Taylor series to third order that miss the other end of their step by more than this share of their largest term
 # do not converge on the step.
 _CONVERGES = 0.1
@@ -44,7 +44,7 @@ def through(s: np.ndarray, x: np.ndarray) -> Dense:
     Of the polynomials through the last 2, 3, ... points it is the one for which the next point changes the
     middle of the step least.
     """
-    order = slice(None, -MOST - 1, -1)
+    order = slice(None, -MAX_PAST_POINTS - 1, -1)
     s, x = s[order], x[order]  # latest point first
     differences = x.copy()
     for k in range(1, len(s)):

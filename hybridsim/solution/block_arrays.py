@@ -9,7 +9,7 @@ import numpy as np
 
 from hybridsim.engine.linear.closed_form_block import ClosedFormBlock
 from hybridsim.engine.linear.tables import LinearTables, no_tables
-from hybridsim.engine.native.simd_products import panels_of
+from hybridsim.engine.native.simd_products import row_blocks_of
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.record.array_forms import (
     Form,
@@ -180,8 +180,8 @@ def _checked_tables(title: str, arrays: Arrays, sizes: dict[str, int]) -> Linear
     check_ascending(f"{title}: the places of its terms", arrays["term_start"])
     check_range(f"{title}: a source", arrays["sources"], 0, sizes["P"] - 1)
     check_range(f"{title}: a factor", arrays["factors"], 0, 2 * known["A"])
-    panels = panels_of(np.zeros((1, sizes["n"], 2 * widest))).shape[1:]
-    check_forms(title, arrays, {"states": (float, (count, *panels))}, {})
+    row_blocks = row_blocks_of(np.zeros((1, sizes["n"], 2 * widest))).shape[1:]
+    check_forms(title, arrays, {"states": (float, (count, *row_blocks))}, {})
     counts, ends = arrays["counts"], arrays["ends"]
     check_range(f"{title}: a number of coordinates", counts, 0, widest)
     used = np.arange(widest) < counts[:, None]

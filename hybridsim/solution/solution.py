@@ -11,7 +11,7 @@ import numpy as np
 
 from hybridsim.arguments import as_times, side_of_event, text
 from hybridsim.calls import refusing
-from hybridsim.engine.record.time_lookup import Frame, find_places
+from hybridsim.engine.record.time_lookup import Frame, locate_times
 from hybridsim.errors import UsageError, nearest
 from hybridsim.presentation.tables import Table
 from hybridsim.solution.by_name import ByName
@@ -242,7 +242,7 @@ class Solution(InTables):
         # Right-continuous in time: at an event time take the later segment forward, the earlier one backward.
         later = (side == "+") == (sign > 0)
         index, s = np.empty(len(times), dtype=np.int64), np.empty(len(times))
-        find_places(np.ascontiguousarray(times), *self._frame, sign, later, index, s)
+        locate_times(np.ascontiguousarray(times), *self._frame, sign, later, index, s)
         return index, s
 
     def _by_segment(

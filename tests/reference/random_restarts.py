@@ -16,7 +16,7 @@ import numpy as np
 from numpy.polynomial.polynomial import polyder, polyfromroots, polyval
 
 import hybridsim as hs
-from hybridsim.engine.events.choice.verdict import judge
+from hybridsim.engine.events.choice.verdict import guard_verdict
 from hybridsim.engine.roots.first_exit import FOUND, NEVER, first_exit
 from hybridsim.engine.system.instant import Instant, phase
 from hybridsim.engine.system.system import System
@@ -57,7 +57,7 @@ def held(tally: Verdicts, restart: Restart) -> None:
     kind, d = restart.kind, restart.decreed
     side, order = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
     series, bounds = restart.series[None], restart.bounds[None]
-    judge(series, bounds, np.array([d]), np.ones(1, dtype=bool), False, side, order)
+    guard_verdict(series, bounds, np.array([d]), np.ones(1, dtype=bool), False, side, order)
     true = [real(c) for c in restart.true]
     first = next((k for k in range(d, ORDERS) if true[k] != 0), None)
     for k in range(d, ORDERS):

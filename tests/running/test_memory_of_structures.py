@@ -20,7 +20,7 @@ def model(k: int) -> hs.Model:
 def test_the_code_of_those_that_were_asked_for_last_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     """What is in use stays; what was asked for long ago goes, with its machine code."""
     monkeypatch.setattr(modules, "_STRUCTURES", 3)
-    monkeypatch.setattr(system_cache, "_MOST", 2)
+    monkeypatch.setattr(system_cache, "_MAX_SYSTEMS", 2)
     first, used = model(0), model(1)
     gone = weakref.ref(system_of(first).code.module)
     code = system_of(used).code

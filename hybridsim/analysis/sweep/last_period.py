@@ -147,16 +147,16 @@ def _reader(word: str, system: Any) -> Callable[[LastPeriods], np.ndarray] | Non
     if head in _OF_CONTACTS and rest in contacts:
         c = contacts.index(rest)
         if head == "stick_fraction":
-            return lambda last: last.stretch.held[:, 0, c] / last.periods
+            return lambda last: last.summary.held[:, 0, c] / last.periods
         # an interval across the end of the period counts once, permanent stick counts zero
-        return lambda last: last.stretch.held[:, 1, c] - last.stretch.holding[:, :, c].all(axis=1)
+        return lambda last: last.summary.held[:, 1, c] - last.summary.holding[:, :, c].all(axis=1)
     return None
 
 
 def _of_state(head: str, i: int) -> Callable[[LastPeriods], np.ndarray]:
     def read(last: LastPeriods) -> np.ndarray:
-        low, high = last.stretch.extremes[:, :, i].T
-        whole, squares = last.stretch.integrals[:, :, i].T
+        low, high = last.summary.extremes[:, :, i].T
+        whole, squares = last.summary.integrals[:, :, i].T
         if head == "amplitude":
             return np.asarray(0.5 * (high - low))
         if head == "peak":
@@ -169,7 +169,7 @@ def _of_state(head: str, i: int) -> Callable[[LastPeriods], np.ndarray]:
 
 
 def _residuals(last: LastPeriods) -> np.ndarray:
-    extremes, ends = last.stretch.extremes, last.stretch.ends
+    extremes, ends = last.summary.extremes, last.summary.ends
     return _residual(extremes[:, 0], extremes[:, 1], ends[:, 0], ends[:, 1])
 
 

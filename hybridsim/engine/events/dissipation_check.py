@@ -8,7 +8,7 @@ from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
 from hybridsim.errors import ModelError
 
-_MOST = 64  # starts that a system remembers to have been looked at
+_MAX_ACCEPTED_STARTS = 64  # starts that a system remembers to have been looked at
 
 
 def require_dissipation(
@@ -41,5 +41,5 @@ def require_dissipation(
                 place=place,
                 remedy=f"write '- {name}' in the derivative of the velocity, or reverse the sign of the velocity",
             )
-    if len(system.opposed) < _MOST:
+    if len(system.opposed) < _MAX_ACCEPTED_STARTS:
         system.opposed.add(start)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from hybridsim.engine.system.system import System
 
 
-_MOST_FLOWS = 3**4  # combinations of modes examined at most; each costs a Taylor series
+_MAX_FLOWS = 3**4  # combinations of modes examined at most; each costs a Taylor series
 
 
 def as_read_by_conditions(system: System, at: Situation, jumped: bool = False) -> Situation:
@@ -65,7 +65,7 @@ def certainly_leaving(settling: Settling) -> set[int]:
         return set()
     z, on = _modes_on_sides(settling)
     modes = [range(len(system.automata[c].modes)) for c in on]
-    if math.prod(map(len, modes)) > _MOST_FLOWS:
+    if math.prod(map(len, modes)) > _MAX_FLOWS:
         free = system.code.shared("guards without forces", lambda: _without_forces(system))
         negative = {g for g in _negative(settling, owners, z, order=0) if free[g][z[system.owner[g]]]}
     else:

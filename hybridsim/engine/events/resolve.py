@@ -29,8 +29,8 @@ from hybridsim.engine.events.choice.verdict import (
     UNDECIDED,
     choose,
     decree_orders,
+    guard_verdict,
     joint_candidates,
-    judge,
     side_after,
 )
 from hybridsim.engine.events.corner_sides import sides_along, take_corners
@@ -49,8 +49,8 @@ from hybridsim.engine.system.system import Series, System
 # A legitimate cascade changes each component a few times. A model that needs more than this many rounds for each of
 # its modes is in an endless cycle.
 _ROUNDS_PER_MODE = 8
-_SEVERAL = "several motions are admissible"
-_MOST_CANDIDATES = 3**8  # a cluster of more components needs a complementarity solver, not enumeration
+_SEVERAL_MOTIONS = "several motions are admissible"
+_MAX_CANDIDATES = 3**8  # a cluster of more components needs a complementarity solver, not enumeration
 
 
 class Settling:
@@ -255,7 +255,9 @@ class Settling:
         for c in components:
             active[table[c][table[c] >= 0]] = True
         sides, orders = np.empty_like(self.sides), np.empty_like(self.orders)
-        verdict = judge(series.guards, series.guard_bounds, decreed, active, not self.forward, sides, orders)
+        verdict = guard_verdict(
+            series.guards, series.guard_bounds, decreed, active, not self.forward, sides, orders
+        )
         self.sides[active], self.orders[active] = sides[active], orders[active]
         return int(verdict)
 
@@ -340,7 +342,7 @@ class Settling:
         for c in taking_part:
             self.on_surface[c] = True
         sizes = [len(automata[c].modes) for c in taking_part]
-        if math.prod(sizes) > _MOST_CANDIDATES:
+        if math.prod(sizes) > _MAX_CANDIDATES:
             names = ", ".join(automata[c].name for c in taking_part)
             return (
                 "inconsistent",
@@ -359,7 +361,9 @@ class Settling:
             candidates = caused
         rival = rivals(self, taking_part, candidates, verdicts)
         if len(rival):
-            return f"{'' if self.forward else 'backward-'}nonunique", self._say(taking_part, rival, _SEVERAL)
+            return f"{'' if self.forward else 'backward-'}nonunique", self._say(
+                taking_part, rival, _SEVERAL_MOTIONS
+            )
         number = int(choose(candidates, verdicts, current, holds))
         if number == NONUNIQUE:
             verdicts = verdicts if is_whole else all_verdicts(self, taking_part, candidates, cluster)
@@ -371,7 +375,9 @@ class Settling:
             return refused(self, taking_part, self._say(taking_part, candidates, "no motion is admissible"))
         others = other_outcomes(self, taking_part, candidates, number, open_, cluster)
         if len(others):
-            return "nonunique", self._say(taking_part, np.vstack([candidates[number], others]), _SEVERAL)
+            return "nonunique", self._say(
+                taking_part, np.vstack([candidates[number], others]), _SEVERAL_MOTIONS
+            )
         source, x_minus = at.z.copy(), at.x.copy()
         if reason := keeps_nothing(self, taking_part, self.with_modes(taking_part, candidates[number])):
             return "nonunique", self._say(taking_part, candidates[number : number + 1], reason)
@@ -404,7 +410,7 @@ class Settling:
             lost = rates_without_value(self.system, at.s, at.x, at.p, self.with_modes(components, modes))
             if lost:
                 return "step-failure", lost
-        return "nonunique", self._say(components, candidates, _SEVERAL)
+        return "nonunique", self._say(components, candidates, _SEVERAL_MOTIONS)
 
     def pinned_states(self, components: list[int]) -> np.ndarray:
         mask = np.zeros(self.system.n, dtype=np.bool_)

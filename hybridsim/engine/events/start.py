@@ -19,7 +19,8 @@ from hybridsim.expr import rounding_of
 _CLOSE = (
     1e-9  # distance from a surface, relative to the largest state, that a holding mode at the start may have
 )
-_MOST = 64  # starts cached by a system; runs that differ in method, tolerance or span often start alike
+# Largest number of starts cached by a system; runs that differ in method, tolerance or span often start alike.
+_MAX_CACHED_STARTS = 64
 
 
 def settled_start(system: System, task: Task, origin: Instant, due: tuple[int, ...]) -> Outcome:
@@ -34,7 +35,7 @@ def settled_start(system: System, task: Task, origin: Instant, due: tuple[int, .
         # the first side of a corner is not a change
         known.changes = [change for change in known.changes if not system.is_corner[change.component]]
         known.warnings = [*known.warnings, *_contradictions(system, task, p, known.z)]
-        if len(system.starts) >= _MOST:
+        if len(system.starts) >= _MAX_CACHED_STARTS:
             system.starts.clear()
         system.starts[key] = known
     return known

@@ -19,15 +19,15 @@ from hybridsim.engine.system.system import System
 
 @kernel
 def closed_form_states(
-    project: Any, pinned: bool, lin: Any, index: Any, s: Any, record: Any, room: Any, out: Any
+    project: Any, pinned: bool, lin: Any, index: Any, s: Any, record: Any, scratch: Any, out: Any
 ) -> None:
     """Compute states out (m, n) at local times s (m,) in the segments with the given numbers; see `ClosedFormBlock`.
 
-    room: scratch arrays for modal coordinates, states, values of atoms, functions of time, and terms near a
+    scratch: scratch arrays for modal coordinates, states, values of atoms, functions of time, and terms near a
     start.
     """
     ends, rows, coordinates, modes, vectors, jumps = record
-    c, x, factors, w, terms = room
+    c, x, factors, w, terms = scratch
     for m in range(s.shape[0]):
         i = index[m]
         if s[m] == 0.0 or s[m] >= ends[i]:
@@ -95,12 +95,12 @@ class ClosedFormBlock(Sequence[Segment]):
             index,
             s,
             (self.ends, self.rows, self.coordinates, self.modes, self.vectors, self.jumps),
-            self._room(),
+            self._scratch(),
             out,
         )
         return out
 
-    def _room(self) -> tuple[np.ndarray, ...]:
+    def _scratch(self) -> tuple[np.ndarray, ...]:
         lin, n = self.tables, self.system.n
         factors = np.ones((2 * len(lin.kinds) + 1, 2))
         return (

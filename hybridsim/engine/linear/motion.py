@@ -13,8 +13,8 @@ import numpy as np
 from hybridsim.engine.linear.form import ANGLE, GROWTH, TIME
 from hybridsim.engine.linear.guards import FARTHEST
 from hybridsim.engine.native.constants import BOUND_TERMS
-from hybridsim.engine.native.kernels import allocating_kernel, call_apart, inlined, kernel
-from hybridsim.engine.native.loop_hints import few
+from hybridsim.engine.native.kernels import allocating_kernel, call_noinline, inlined, kernel
+from hybridsim.engine.native.loop_hints import short_loop
 from hybridsim.engine.native.simd_products import LANES, dot, product, times
 from hybridsim.engine.native.simd_vectors import WIDTH, load, splat, store
 from hybridsim.engine.roots.certify import (
@@ -63,7 +63,7 @@ def functions_of_time(lin: Any, s: float, p: Any, factors: Any, w: Any) -> None:
         error = UNIT * abs(angle)
         first = lin.term_start[a]
         for i in range(first, lin.term_start[a + 1]):
-            few()
+            short_loop()
             source, weight = lin.sources[i], lin.weights[i]
             term = weight * p[source]
             angle += term
@@ -83,10 +83,10 @@ def functions_of_time(lin: Any, s: float, p: Any, factors: Any, w: Any) -> None:
         else:
             value[0] = angle
     for m in range(w.shape[0]):
-        few()
+        short_loop()
         product, row = 1.0, lin.factors[m]
         for i in range(row.shape[0]):
-            few()
+            short_loop()
             product *= factors[row[i], 0]
         w[m] = product
 
@@ -109,10 +109,10 @@ def errors_of_time(lin: Any, s_error: float, factors: Any, w_error: Any) -> None
         else:
             value[1] = error
     for m in range(w_error.shape[0]):
-        few()
+        short_loop()
         product, error, row = 1.0, 0.0, lin.factors[m]
         for i in range(row.shape[0]):
-            few()
+            short_loop()
             factor = factors[row[i]]
             v, e = factor[0], factor[1]
             error = error * (abs(v) + e) + abs(product) * e
@@ -129,13 +129,13 @@ def linear_coefficient(
     """Return a Taylor coefficient of a guard of the modes in row k at y = (x, w), with its bound."""
     w, w_error, sizes, w_sizes, bound = work.w, work.w_error, work.sizes, work.w_sizes, 0.0
     for m in range(x.shape[0]):
-        few()
+        short_loop()
         sizes[m] = abs(x[m]) + x_error[m]
         bound += abs(lin.series[k, g, order, m]) * x_error[m]
     n = lin.series.shape[3] - w.shape[0]
     n -= n % LANES
     for m in range(w.shape[0]):
-        few()
+        short_loop()
         w_sizes[m] = abs(w[m]) + w_error[m]
         bound += abs(lin.series[k, g, order, n + m]) * w_error[m]
     value = dot(lin.series, (k, g, order), (x, w))
@@ -147,10 +147,10 @@ def size_of_point(x: Any, x_error: Any, w: Any, w_error: Any) -> float:
     """Return the size of y = (x, w); a coefficient's bound is at most its largest rounding times this size."""
     size = 0.0
     for m in range(x.shape[0]):
-        few()
+        short_loop()
         size += abs(x[m]) + _IN_UNITS * x_error[m]
     for m in range(w.shape[0]):
-        few()
+        short_loop()
         size += abs(w[m]) + _IN_UNITS * w_error[m]
     return size
 
@@ -190,7 +190,7 @@ def linear_side(
 def to_modal(lin: Any, k: int, x: Any, w: Any, c: Any) -> None:
     """Compute the modal coordinates of y = (x, w)."""
     for q in range(lin.inverse.shape[1]):
-        few()
+        short_loop()
         a, b, d, e = times(lin.inverse, (k, q), (x, w))
         c[2 * q], c[2 * q + 1] = complex(a, b), complex(d, e)
 
@@ -201,7 +201,7 @@ def moved(lin: Any, k: int, c: Any, d: float, out: Any) -> None:
     j = 0
     values, ends, count = lin.values[k], lin.ends[k], lin.counts[k]
     while j < count:
-        few()
+        short_loop()
         end = ends[j]
         if end == j + 1:
             value = values[j]
@@ -212,10 +212,10 @@ def moved(lin: Any, k: int, c: Any, d: float, out: Any) -> None:
                 angle = value.imag * d
                 out[j] = c[j] * complex(size * math.cos(angle), size * math.sin(angle))
         else:
-            call_apart(_move_block, (lin, k, j, end, c, d, out))
+            call_noinline(_move_block, (lin, k, j, end, c, d, out))
         j = end
     while j < out.shape[0]:  # clear old values
-        few()
+        short_loop()
         out[j] = 0.0
         j += 1
 
@@ -310,7 +310,7 @@ def state_sizes(lin: Any, k: int, before: Any, after: Any, larger: Any, scale: A
     larger: scratch space for the sizes of the coordinates.
     """
     for j in range(before.shape[0]):
-        few()
+        short_loop()
         larger[j] = max(size_of(before[j]), size_of(after[j]))
     product(lin.spreads, k, (larger,), scale)
 
@@ -326,7 +326,7 @@ def guard_terms(lin: Any, k: int, g: int, c: Any, terms: Any) -> tuple[float, fl
     first, second = splat(0.0), splat(0.0)  # BOUND_TERMS are two vectors
     at = (k * lin.terms.shape[1] + g) * lin.terms.shape[2] * 2 * BOUND_TERMS
     for j in range(lin.counts[k]):
-        few()
+        short_loop()
         real, imaginary = c[j].real, c[j].imag
         modulus = abs(real) + abs(imaginary)
         size += lin.sizes[k, g, j] * modulus
@@ -367,7 +367,7 @@ def first_zero_of_wave(lin: Any, k: int, g: int, c: Any, bound: float) -> tuple[
 
 
 @kernel
-def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, room: Any) -> tuple[int, float]:
+def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, scratch: Any) -> tuple[int, float]:
     """Find when a guard first becomes negative on (0, bound]: (NEVER, bound), (FOUND, s), or (OPEN, s).
 
     OPEN means that rounding leaves the zero undecided. The guard is positive just after 0; its first `orders`
@@ -379,12 +379,12 @@ def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, room:
     """
     side, order, floor = state.sides[g], state.orders[g], state.floors[g]
     c, v, start, hint, terms, lower = (
-        room.c,
-        room.v,
-        room.starts[i],
-        room.hints[k, g],
-        room.terms[0],
-        room.terms[1],
+        scratch.c,
+        scratch.v,
+        scratch.starts[i],
+        scratch.hints[k, g],
+        scratch.terms[0],
+        scratch.terms[1],
     )
     size, rest = start[BOUND_TERMS], start[BOUND_TERMS + 1]
     if not size < math.inf:
@@ -417,7 +417,7 @@ def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, room:
     for j in range(lin.counts[k]):
         widest = max(widest, lin.ends[k, j] - j)
     for _ in range(POINTS // (widest * widest)):
-        room.points[0] += widest * widest
+        scratch.points[0] += widest * widest
         reach = min(bound - s, farthest)
         d = past_dip(terms, order, reach, error, lower)
         if d == 0.0 or not stays_positive(terms, order, grown * rest, d, margin * size):

@@ -13,14 +13,14 @@ from hybridsim.engine.native.kernels import inlined, kernel
 # Gauss quadrature integrates the square of the fastest coordinate to rounding on pieces with this angle. The error of
 # n nodes is below (angle/2)**(2n) 2**(2n) (n!)**4/((2n + 1) (2n)!**3), 2e-16 here.
 _TURN, _NODES = 8.0, 16
-_MOST_PIECES = 4096  # a longer interval is left to sampling
+_MAX_PARTS = 4096  # a longer interval is left to sampling
 _GROWN = 4.0  # largest growth of the coordinates between nodes, which are less than 0.8 of a rate apart
 _UNSEEN = 1e-15  # relative to a state's size: smaller extrema are ignored
 _ITERATIONS = 60  # most iterations of a secant method that bisects in the worst case
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(_NODES)
 
 
-class Stretch(NamedTuple):
+class MotionSummary(NamedTuple):
     """Accumulated measures of the states and the holding modes over several segments."""
 
     extremes: np.ndarray  # (2, n) smallest and largest value of each state
@@ -48,7 +48,7 @@ def _turn(
     lin: Any, k: int, i: int, c: Any, low: float, high: float, at_low: float, at_high: float, v: Any
 ) -> float:
     """Return a state's value at the zero of its rate between two times at which the rate has different signs."""
-    value, kept = 0.0, 0
+    value, same_end = 0.0, 0
     for _ in range(_ITERATIONS):
         s = low - at_low * (high - low) / (at_high - at_low)
         if not low < s < high:
@@ -60,12 +60,12 @@ def _turn(
             return value
         if (slope > 0.0) == (at_high > 0.0):
             high, at_high = s, slope
-            at_low *= 0.5 if kept == 1 else 1.0  # the other end is used a second time (Illinois method)
-            kept = 1
+            at_low *= 0.5 if same_end == 1 else 1.0  # the other end is used a second time (Illinois method)
+            same_end = 1
         else:
             low, at_low = s, slope
-            at_high *= 0.5 if kept == 2 else 1.0
-            kept = 2
+            at_high *= 0.5 if same_end == 2 else 1.0
+            same_end = 2
     return value
 
 
@@ -140,16 +140,17 @@ def _between(
 
 @kernel
 def sum_up(
-    lin: Any, hold: Any, record: Any, first: int, last: int, begin: float, nodes: Any, weights: Any, room: Any, out: Any
+    lin: Any, hold: Any, record: Any, first: int, last: int, begin: float, nodes: Any, weights: Any, scratch: Any,
+    out: Any,
 ) -> bool:  # fmt: skip
-    """Add segments first to last - 1 of a record to a `Stretch`, starting at local time `begin` in the first segment.
+    """Add segments first to last - 1 of a record to a `MotionSummary`, from local time `begin` in the first segment on.
 
     record: ends, rows, modes, coordinates, jumps as written by `hybridsim.integrators.closed_form.segments`;
-    hold: holding mode of each component. room: v (J,); slopes and bounds of third derivatives (3, n). Return
+    hold: holding mode of each component. scratch: v (J,); slopes and bounds of third derivatives (3, n). Return
     False if a segment oscillates too often.
     """
     ends, rows, modes, coordinates, jumps = record
-    v, slopes = room
+    v, slopes = scratch
     extremes, integrals = out.extremes, out.integrals
     n, begun = extremes.shape[1], False
     for segment in range(first, last):
@@ -177,10 +178,10 @@ def sum_up(
         fastest = 0.0
         for j in range(lin.counts[k]):
             fastest = max(fastest, abs(lin.values[k, j]))
-        pieces = math.ceil((s1 - s0) * fastest / _TURN) if (s1 - s0) * fastest > _TURN else 1
-        if pieces > _MOST_PIECES:
+        parts = math.ceil((s1 - s0) * fastest / _TURN) if (s1 - s0) * fastest > _TURN else 1
+        if parts > _MAX_PARTS:
             return False
-        length = (s1 - s0) / pieces
+        length = (s1 - s0) / parts
         for i in range(n):
             side = out.ends[0, i] if segment == first else jumps[segment, 0, i]
             extremes[0, i] = min(extremes[0, i], side, jumps[segment, 1, i])
@@ -191,12 +192,12 @@ def sum_up(
             slopes[0, i] = _state_and_slope(lin, k, i, v)[1]
             slopes[2, i] = _bend(lin, k, i, v, is_shrinking)[1]
         before = s0
-        for piece in range(pieces):
+        for part in range(parts):
             for node in range(nodes.shape[0] + 1):
                 is_end = node == nodes.shape[0]
-                if is_end and piece < pieces - 1:
+                if is_end and part < parts - 1:
                     continue
-                s = s1 if is_end else s0 + length * (piece + 0.5 * (1.0 + nodes[node]))
+                s = s1 if is_end else s0 + length * (part + 0.5 * (1.0 + nodes[node]))
                 moved(lin, k, c, s, v)
                 for i in range(n):
                     value, slope = _state_and_slope(lin, k, i, v)

@@ -12,20 +12,20 @@ from hybridsim.engine.linear.guards import guard_series, modal_guards
 from hybridsim.engine.linear.matrix_template import template_of
 from hybridsim.engine.linear.modal import modals
 from hybridsim.engine.native.constants import BOUND_TERMS
-from hybridsim.engine.native.simd_products import LANES, panels_of, rows_of
+from hybridsim.engine.native.simd_products import LANES, row_blocks_of, rows_of
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.bounded import ORDER
 from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
 
 _LARGEST = 1e150  # its square is still finite
-_MOST_GROWTH = 300.0  # exponent within a segment: doubles go from exp(-745) to exp(709)
+_MAX_GROWTH_EXPONENT = 300.0  # exponent within a segment: doubles go from exp(-745) to exp(709)
 _PARTING = 2.0  # exponent by which coordinates of one block may grow apart
 # In units of the fastest rate: within this time of its start, a state that grows from zero is lost to cancellation in
 # modal coordinates, and the first terms of its series suffice.
 _NEAR, _SLOWEST = 0.125, 1e-300
 _MAX_CACHED = 64  # most tables per structure, one for each set of parameter values
-_MOST_BYTES = 1 << 28  # most bytes of all these tables except the last
+_MAX_BYTES = 1 << 28  # most bytes of all these tables except the last
 
 
 _lock = SharedLock()
@@ -234,10 +234,10 @@ def of_matrices(
         "upper": flows.upper,
         "ends": flows.ends,
         "basis": basis,
-        "inverse": panels_of(inverse, parts),
-        "states": panels_of(np.stack([basis.real, -basis.imag], axis=-1).reshape(count, n, 2 * widest)),
-        "spreads": panels_of(np.abs(basis.real) + np.abs(basis.imag)),
-        "slopes": panels_of(A[:, :n], parts),
+        "inverse": row_blocks_of(inverse, parts),
+        "states": row_blocks_of(np.stack([basis.real, -basis.imag], axis=-1).reshape(count, n, 2 * widest)),
+        "spreads": row_blocks_of(np.abs(basis.real) + np.abs(basis.imag)),
+        "slopes": row_blocks_of(A[:, :n], parts),
         "terms": terms,
         "sizes": sizes,
         "rests": rests,
@@ -264,7 +264,7 @@ def _lasting(rates: np.ndarray, ends: np.ndarray, count: int) -> float:
         block = rates[j : ends[j]]
         fastest, slowest = block.max(), max(block.min(), 0.0)
         if fastest > 0.0:
-            lasting = min(lasting, _MOST_GROWTH / fastest)
+            lasting = min(lasting, _MAX_GROWTH_EXPONENT / fastest)
         if fastest > slowest:
             lasting = min(lasting, _PARTING / (fastest - slowest))
         j = ends[j]
@@ -317,7 +317,7 @@ def _made(
                 del cached[other]  # tables of fewer modes at the same values
             cached[key] = found
             while len(cached) > _MAX_CACHED or (
-                len(cached) > 1 and sum(made.rows.size for made in cached.values()) > _MOST_BYTES
+                len(cached) > 1 and sum(made.rows.size for made in cached.values()) > _MAX_BYTES
             ):
                 del cached[next(iter(cached))]
     return found

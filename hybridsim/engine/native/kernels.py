@@ -173,7 +173,7 @@ if ENABLED:
         """Inline a short kernel into its callers."""
         return _compiled(function, forceinline=True, _nrt=False)
 
-    def merged(function: Callable[..., Any]) -> Callable[..., Any]:
+    def inline_always(function: Callable[..., Any]) -> Callable[..., Any]:
         """Inline a function into the one kernel that calls it; it is never compiled separately."""
         return _compiled(function, inline="always", _nrt=False)
 
@@ -246,9 +246,9 @@ if ENABLED:
 
         return signature, generate
 
-    def _type_by_address(given: Any) -> Any:
+    def _type_by_address(value: Any) -> Any:
         """Return the type of a pack, a number, or the elements of an array, for a kernel called by address."""
-        found = numba.typeof(given)
+        found = numba.typeof(value)
         return types.CPointer(found.dtype) if isinstance(found, types.Array) else found
 
     def _kernel_at(function: Callable[..., int], key: tuple[Any, ...]) -> int:
@@ -273,14 +273,14 @@ if ENABLED:
         signature = types.int64(types.int64, arguments)
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-            given = [
+            passed = [
                 context.make_array(ty)(context, builder, value).data if isinstance(ty, types.Array) else value
                 for ty, value in zip(
                     arguments, cgutils.unpack_tuple(builder, args[1], len(arguments)), strict=True
                 )
             ]
-            kind = ir.FunctionType(ir.IntType(64), [value.type for value in given])
-            return builder.call(builder.inttoptr(args[0], ir.PointerType(kind)), given)
+            kind = ir.FunctionType(ir.IntType(64), [value.type for value in passed])
+            return builder.call(builder.inttoptr(args[0], ir.PointerType(kind)), passed)
 
         return signature, generate
 
@@ -298,7 +298,7 @@ if ENABLED:
         return kind(elements, types.intp), generate
 
     @intrinsic
-    def call_apart(typingctx: Any, kernel: Any, arguments: Any) -> Any:
+    def call_noinline(typingctx: Any, kernel: Any, arguments: Any) -> Any:
         """Call a kernel with a tuple of arguments and prevent its inlining.
 
         LLVM inlines even long kernels into all callers and compiles each copy again.
@@ -307,8 +307,8 @@ if ENABLED:
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             target = context.get_function(kernel, called)
-            given = cgutils.unpack_tuple(builder, args[1], len(arguments))
-            casts = zip(given, arguments.types, called.args, strict=True)
+            values = cgutils.unpack_tuple(builder, args[1], len(arguments))
+            casts = zip(values, arguments.types, called.args, strict=True)
             before = {id(i) for block in builder.function.blocks for i in block.instructions}
             result = target(
                 builder, [context.cast(builder, value, have, want) for value, have, want in casts]
@@ -356,7 +356,7 @@ else:
         """Return the function itself, because its caller is a Python function."""
         return function
 
-    merged = polynomial_kernel = inlined
+    inline_always = polynomial_kernel = inlined
     allocating_kernel = kernel
 
     def seconds_compiling() -> float:
@@ -386,7 +386,7 @@ else:
         """Raise an error: without a compiler this is never called."""
         raise NotImplementedError
 
-    def _type_by_address(given: Any) -> Any:
+    def _type_by_address(value: Any) -> Any:
         """Return no type, because nothing is compiled."""
         return None
 
@@ -420,7 +420,7 @@ else:
         """Return no texts, because nothing is compiled."""
         return []
 
-    def call_apart(kernel: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    def call_noinline(kernel: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
         """Call a kernel."""
         return kernel(*arguments)
 
@@ -432,7 +432,7 @@ else:
 _addresses: dict[tuple[Any, ...], int] = {}  # addresses of kernels, by their argument types
 
 
-def kernel_address(function: Callable[..., int], *given: Any) -> int:
+def kernel_address(function: Callable[..., int], *examples: Any) -> int:
     """Return the address of a kernel that returns an integer, for arguments of the given types; see `call_kernel`.
 
     The kernel is compiled if necessary. A kernel that calls others directly is compiled together with them,
@@ -440,7 +440,7 @@ def kernel_address(function: Callable[..., int], *given: Any) -> int:
     elements of an array are passed: see `array_at`. Without a compiler the address is a number that
     identifies the function.
     """
-    key = tuple(map(_type_by_address, given))
+    key = tuple(map(_type_by_address, examples))
     if (function, key) not in _addresses:
         _addresses[function, key] = _kernel_at(function, key)
     return _addresses[function, key]

@@ -22,7 +22,7 @@ if ENABLED:
         call.attributes.add("readnone")
 
     @intrinsic
-    def few(typingctx: Any) -> Any:
+    def short_loop(typingctx: Any) -> Any:
         """Mark the loop around this call as short."""
 
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -33,7 +33,7 @@ if ENABLED:
 
 else:
 
-    def few() -> None:
+    def short_loop() -> None:
         """Do nothing."""
 
 
@@ -41,7 +41,7 @@ else:
 def put(source: Any, out: Any) -> None:
     """Copy a short array; a slice assignment takes ten times as long for a few numbers."""
     for i in range(source.shape[0]):
-        few()
+        short_loop()
         out[i] = source[i]
 
 
@@ -49,5 +49,5 @@ def put(source: Any, out: Any) -> None:
 def fill(out: Any, value: Any) -> None:
     """Write one value to all elements of a short array."""
     for i in range(out.shape[0]):
-        few()
+        short_loop()
         out[i] = value

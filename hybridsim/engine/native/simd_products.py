@@ -1,6 +1,6 @@
 """Products of small matrices and vectors in compiled code, four numbers at a time.
 
-A matrix is stored in panels of four rows, or row by row for single rows. Vectors are padded with zeros up to
+A matrix is stored in blocks of four rows, or row by row for single rows. Vectors are padded with zeros up to
 the next multiple of four, and so are the columns that they multiply.
 """
 
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.native.kernels import ENABLED, inlined
-from hybridsim.engine.native.loop_hints import few
+from hybridsim.engine.native.loop_hints import short_loop
 
 LANES = 4  # rows of a panel, and columns processed at once
 
@@ -38,8 +38,8 @@ def rows_of(matrix: np.ndarray, parts: Sequence[int] = ()) -> np.ndarray:
     return out
 
 
-def panels_of(matrix: np.ndarray, parts: Sequence[int] = ()) -> np.ndarray:
-    """Arrange matrices (..., rows, columns) in zero-padded panels (..., rows/4, columns, 4)."""
+def row_blocks_of(matrix: np.ndarray, parts: Sequence[int] = ()) -> np.ndarray:
+    """Arrange matrices (..., rows, columns) in zero-padded blocks (..., rows/4, columns, 4)."""
     wide = rows_of(matrix, parts)
     *lead, rows, columns = wide.shape
     out = np.zeros((*lead, filled_up(rows), columns))
@@ -111,7 +111,7 @@ if ENABLED:
         return after, builder.gep(row, [builder.mul(turns, _WORD(LANES * wide))])
 
     @intrinsic
-    def times(typingctx: Any, panels: Any, at: Any, vectors: Any) -> Any:
+    def times(typingctx: Any, row_blocks: Any, at: Any, vectors: Any) -> Any:
         """Multiply a panel by the concatenated vectors of a tuple: four sums; `at` holds the panel's indices."""
         result = types.UniTuple(types.float64, LANES)
 
@@ -128,7 +128,7 @@ if ENABLED:
             place = _address(
                 context,
                 builder,
-                panels,
+                row_blocks,
                 arguments[0],
                 at,
                 cgutils.unpack_tuple(builder, arguments[1], len(at)),
@@ -143,7 +143,7 @@ if ENABLED:
             lanes = [builder.extract_element(total, ir.IntType(32)(i)) for i in range(LANES)]
             return context.make_tuple(builder, result, lanes)
 
-        return result(panels, at, vectors), generate
+        return result(row_blocks, at, vectors), generate
 
     @intrinsic
     def dot(typingctx: Any, rows: Any, at: Any, vectors: Any) -> Any:
@@ -176,10 +176,10 @@ else:
             np.concatenate([v.view(float) for v in vectors]), [v.view(float).size for v in vectors]
         )
 
-    def times(panels: Any, at: tuple[int, ...], vectors: tuple[Any, ...]) -> tuple[float, ...]:
+    def times(row_blocks: Any, at: tuple[int, ...], vectors: tuple[Any, ...]) -> tuple[float, ...]:
         """Compute the four sums."""
         entries = _entries(vectors)
-        return tuple((entries @ panels[at][: len(entries)]).tolist())
+        return tuple((entries @ row_blocks[at][: len(entries)]).tolist())
 
     def dot(rows: Any, at: tuple[int, ...], vectors: tuple[Any, ...]) -> float:
         """Compute the sum."""
@@ -188,12 +188,12 @@ else:
 
 
 @inlined
-def product(panels: Any, k: int, vectors: Any, out: Any) -> None:
+def product(row_blocks: Any, k: int, vectors: Any, out: Any) -> None:
     """Multiply matrix k of an array (K, Q, m, 4) by the vectors of a tuple; compute only the rows of `out`."""
     i = 0
     while i < out.shape[0]:
-        few()
-        a, b, c, d = times(panels, (k, i // LANES), vectors)
+        short_loop()
+        a, b, c, d = times(row_blocks, (k, i // LANES), vectors)
         out[i] = a
         if i + 1 < out.shape[0]:
             out[i + 1] = b

@@ -40,8 +40,8 @@ class Powers:
         if k not in self._fours and k > 4:
             self._fours[k] = self._of_two("fmul", self.four(k - 4), self._fourth)
         elif k not in self._fours:
-            places = ", ".join(f"i32 {k - 1 + i}" for i in range(4))
-            form = "shufflevector <4 x double> {}, <4 x double> {}, <4 x i32> <" + places + ">"
+            indices = ", ".join(f"i32 {k - 1 + i}" for i in range(4))
+            form = "shufflevector <4 x double> {}, <4 x double> {}, <4 x i32> <" + indices + ">"
             self._fours[k] = self.code.value(form, self.four(1), self.four(5))
         return self._fours[k]
 

@@ -26,17 +26,17 @@ if ENABLED:
 
     _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 
-    class EightType(types.Type):
+    class Vec8Type(types.Type):
         """The numba type of eight doubles."""
 
         def __init__(self) -> None:
             super().__init__(name="Eight")
 
-    _eight = EightType()
+    _vec8 = Vec8Type()
 
-    @register_model(EightType)
-    class _EightModel(models.PrimitiveModel):
-        def __init__(self, manager: Any, kind: EightType) -> None:
+    @register_model(Vec8Type)
+    class _Vec8Model(models.PrimitiveModel):
+        def __init__(self, manager: Any, kind: Vec8Type) -> None:
             super().__init__(manager, kind, _VECTOR)
 
     def _binary(symbol: Any, instruction: str) -> None:
@@ -44,9 +44,9 @@ if ENABLED:
 
         @infer_global(symbol)
         class _Typed(ConcreteTemplate):
-            cases = [signature(_eight, _eight, _eight)]  # noqa: RUF012 (numba's own form)
+            cases = [signature(_vec8, _vec8, _vec8)]  # noqa: RUF012 (numba's own form)
 
-        @lower_builtin(symbol, EightType, EightType)
+        @lower_builtin(symbol, Vec8Type, Vec8Type)
         def _lowered(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             return getattr(builder, instruction)(*args, flags=("contract",))
 
@@ -66,7 +66,7 @@ if ENABLED:
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             return builder.load(_place(context, builder, sig.args[0], *args), align=8)
 
-        return signature(_eight, array, types.int64), generate
+        return signature(_vec8, array, types.int64), generate
 
     @intrinsic
     def store(typingctx: Any, array: Any, at: Any, value: Any) -> Any:
@@ -76,7 +76,7 @@ if ENABLED:
             builder.store(args[2], _place(context, builder, sig.args[0], *args[:2]), align=8)
             return context.get_dummy_value()
 
-        return signature(types.void, array, types.int64, _eight), generate
+        return signature(types.void, array, types.int64, _vec8), generate
 
     @intrinsic
     def put(typingctx: Any, array: Any, at: Any, value: Any) -> Any:
@@ -98,7 +98,7 @@ if ENABLED:
             one = builder.insert_element(blank, args[0], ir.Constant(ir.IntType(32), 0))
             return builder.shuffle_vector(one, blank, ir.Constant(ir.VectorType(ir.IntType(32), WIDTH), None))
 
-        return signature(_eight, types.float64), generate
+        return signature(_vec8, types.float64), generate
 
     @intrinsic
     def choose(typingctx: Any, mask: Any, value: Any, other: Any) -> Any:
@@ -108,7 +108,7 @@ if ENABLED:
             is_set = builder.fcmp_unordered("!=", args[0], ir.Constant(_VECTOR, [0.0] * WIDTH))
             return builder.select(is_set, args[1], args[2])
 
-        return signature(_eight, _eight, _eight, _eight), generate
+        return signature(_vec8, _vec8, _vec8, _vec8), generate
 
     @intrinsic
     def larger(typingctx: Any, value: Any, other: Any) -> Any:
@@ -117,7 +117,7 @@ if ENABLED:
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             return builder.select(builder.fcmp_ordered(">", *args), *args)
 
-        return signature(_eight, _eight, _eight), generate
+        return signature(_vec8, _vec8, _vec8), generate
 
     @intrinsic
     def all_larger(typingctx: Any, value: Any, other: Any) -> Any:
@@ -127,7 +127,7 @@ if ENABLED:
             bits = builder.bitcast(builder.fcmp_ordered(">", *args), ir.IntType(WIDTH))
             return builder.icmp_unsigned("==", bits, ir.Constant(ir.IntType(WIDTH), (1 << WIDTH) - 1))
 
-        return signature(types.boolean, _eight, _eight), generate
+        return signature(types.boolean, _vec8, _vec8), generate
 
     @intrinsic
     def size(typingctx: Any, value: Any) -> Any:
@@ -138,7 +138,7 @@ if ENABLED:
             absolute = cgutils.get_or_insert_function(builder.module, kind, f"llvm.fabs.v{WIDTH}f64")
             return builder.call(absolute, args)
 
-        return signature(_eight, _eight), generate
+        return signature(_vec8, _vec8), generate
 
 else:
 
@@ -181,7 +181,7 @@ def whole_vectors(count: int) -> int:
     return (count + WIDTH - 1) & -WIDTH
 
 
-def room_for(rows: int, columns: int, before: int = 0) -> np.ndarray:
+def padded_rows(rows: int, columns: int, before: int = 0) -> np.ndarray:
     """Allocate zeros (rows, columns) aligned to a cache line, with padding for vectors at both ends."""
     ahead = -(-before // WIDTH) * WIDTH
     whole = np.zeros(ahead + rows * columns + 2 * WIDTH)

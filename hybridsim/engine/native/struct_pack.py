@@ -18,11 +18,11 @@ import numpy as np
 from hybridsim.engine.native.buffer_pool import BufferPool
 from hybridsim.engine.native.kernels import ENABLED, kernel
 
-_WORDS = 6  # words per array in the table: its address and up to five lengths
+_SLOTS_PER_ARRAY = 6  # words of 8 bytes per array in the table: its address and up to five lengths
 ALIGNED = 64  # bytes; suitable for numbers of any kind
 _LARGE, LARGEST = 1 << 18, 1 << 21  # bytes of blocks that go through a pool
 _RETURNED = 2  # first blocks that a layout keeps for reuse
-_REST = [(0,) * (_WORDS - 1 - dimensions) for dimensions in range(_WORDS)]
+_REST = [(0,) * (_SLOTS_PER_ARRAY - 1 - dimensions) for dimensions in range(_SLOTS_PER_ARRAY)]
 
 if ENABLED:
     from llvmlite import ir
@@ -85,8 +85,8 @@ if ENABLED:
             super().__init__(manager, kind, ir.IntType(64))
 
     @unbox(PackType)
-    def _unbox(kind: PackType, given: Any, c: Any) -> Any:
-        attribute = c.pyapi.object_getattr_string(given, "address")
+    def _unbox(kind: PackType, packed_object: Any, c: Any) -> Any:
+        attribute = c.pyapi.object_getattr_string(packed_object, "address")
         address = c.pyapi.long_as_longlong(attribute)
         c.pyapi.decref(attribute)
         return NativeValue(address, is_error=cgutils.is_not_null(c.builder, c.pyapi.err_occurred()))
@@ -101,7 +101,7 @@ if ENABLED:
     @lower_getattr_generic(PackType)
     def _field(context: Any, builder: Any, kind: PackType, address: Any, name: str) -> Any:
         array_type, word = kind.array(name), ir.IntType(64)
-        row = kind.place(name) * _WORDS
+        row = kind.place(name) * _SLOTS_PER_ARRAY
         constant = builder.module.add_metadata([])
 
         def loaded(i: int) -> Any:
@@ -138,22 +138,22 @@ def packed(arrays: Any) -> Any:
     """Pack a named tuple of arrays for kernels; return the tuple itself if the compiler is off."""
     if not ENABLED:
         return arrays
-    words: list[int] = []
+    entries: list[int] = []
     for array in arrays:
         assert array.flags.c_contiguous
-        words += (array.__array_interface__["data"][0], *array.shape, *_REST[array.ndim])
+        entries += (array.__array_interface__["data"][0], *array.shape, *_REST[array.ndim])
     kind: Any = type(arrays)
     form = _type_of_arrays(kind, tuple((a.dtype.char, a.ndim) for a in arrays))
-    table = np.array(words, dtype=np.int64)
+    table = np.array(entries, dtype=np.int64)
     return Packed(arrays, table, form, table.__array_interface__["data"][0])
 
 
 @kernel
-def _lay_out(words: Any, steps: Any, owners: Any, skipped: Any, blocks: Any, table: Any) -> int:
+def _lay_out(entries: Any, steps: Any, owners: Any, skipped: Any, blocks: Any, table: Any) -> int:
     """Fill the table of arrays that lie in some blocks and return its address; see `ArrayLayout`."""
-    for k in range(words.shape[0]):
-        for i in range(words.shape[1]):
-            table[k, i] = words[k, i] + skipped[k] * steps[k, i]
+    for k in range(entries.shape[0]):
+        for i in range(entries.shape[1]):
+            table[k, i] = entries[k, i] + skipped[k] * steps[k, i]
         table[k, 0] += blocks[owners[k]].ctypes.data
     address: int = table.ctypes.data
     return address
@@ -179,21 +179,21 @@ class ArrayLayout:
 
     def __init__(self, kind: Any, fields: Sequence[tuple[Any, tuple[int, ...], int]]) -> None:
         self._kind = kind
-        self._places: list[tuple[tuple[int, ...], np.dtype[Any], int, int]] = []
+        self._specs: list[tuple[tuple[int, ...], np.dtype[Any], int, int]] = []
         self._sizes = [0] * (1 + max(block for *_, block in fields))
         # the table without the addresses of the blocks
-        self._words = np.zeros((len(fields), _WORDS), dtype=np.int64)
-        self._steps = np.zeros_like(self._words)  # change of the table per skipped row
+        self._entries = np.zeros((len(fields), _SLOTS_PER_ARRAY), dtype=np.int64)
+        self._steps = np.zeros_like(self._entries)  # change of the table per skipped row
         self._owners = np.array([block for *_, block in fields], dtype=np.int64)
         for k, (name, shape, block) in enumerate(fields):
             dtype, offset = np.dtype(name), self._sizes[block]
             row = dtype.itemsize * math.prod(shape[1:])
-            self._places.append((shape, dtype, block, offset))
-            self._words[k, : 1 + len(shape)] = offset, *shape
+            self._specs.append((shape, dtype, block, offset))
+            self._entries[k, : 1 + len(shape)] = offset, *shape
             self._steps[k, :2] = row, -1
             self._sizes[block] += -(-row * shape[0] // ALIGNED) * ALIGNED
         self._pools = [BufferPool(size) if _LARGE <= size <= LARGEST else None for size in self._sizes]
-        form = tuple((dtype.char, len(shape)) for shape, dtype, *_ in self._places)
+        form = tuple((dtype.char, len(shape)) for shape, dtype, *_ in self._specs)
         self._type: Any = _type_of_arrays(kind, form) if ENABLED else None
         self._returned: list[np.ndarray] = []
         self._from_the_first = np.zeros(len(fields), dtype=np.int64)
@@ -222,8 +222,8 @@ class ArrayLayout:
             first = skipped or self._from_the_first
             return self._kind(*(a[k:] for a, k in zip(arrays, first, strict=True)))
         rows = self._from_the_first if skipped is None else _whole_numbers(tuple(skipped))
-        table = np.empty_like(self._words)
-        address = _lay_out(self._words, self._steps, self._owners, rows, blocks, table)
+        table = np.empty_like(self._entries)
+        address = _lay_out(self._entries, self._steps, self._owners, rows, blocks, table)
         return Packed(None, table, self._type, address)
 
     def rows(self, blocks: tuple[np.ndarray | None, ...]) -> Any:
@@ -231,11 +231,11 @@ class ArrayLayout:
         return self._kind(
             *[
                 None if blocks[k] is None else np.ndarray(shape, dtype, blocks[k], offset)
-                for shape, dtype, k, offset in self._places
+                for shape, dtype, k, offset in self._specs
             ]
         )
 
     def row(self, blocks: tuple[np.ndarray, ...], name: str, i: int) -> np.ndarray:
         """Return a copy of row i of the array with this name."""
-        shape, dtype, k, offset = self._places[self._kind._fields.index(name)]
+        shape, dtype, k, offset = self._specs[self._kind._fields.index(name)]
         return np.ndarray(shape, dtype, blocks[k], offset)[i].copy()

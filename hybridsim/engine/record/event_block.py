@@ -19,43 +19,43 @@ if TYPE_CHECKING:
 
 @kernel
 def _taking_part(
-    fired: Any, before: Any, after: Any, owner: Any, has_surface: Any, places: Any
+    fired: Any, before: Any, after: Any, owner: Any, has_surface: Any, participants: Any
 ) -> tuple[int, bool]:
     """Return the number of mode changes and resets without one, and whether each event has exactly one.
 
-    places (2, m): receives event and component of each, up to its length.
+    participants (2, m): receives event and component of each, up to its length.
     """
     count, is_plain = 0, True
     for e in range(fired.shape[0]):
         for c in range(before.shape[1]):
             if before[e, c] != after[e, c] or (c == owner[fired[e]] and not has_surface[c]):
-                if count < places.shape[1]:
-                    places[0, count], places[1, count] = e, c
+                if count < participants.shape[1]:
+                    participants[0, count], participants[1, count] = e, c
                 count += 1
         is_plain = is_plain and count == e + 1
     return count, is_plain
 
 
 @kernel
-def _times_at(instants: Any, places: Any, first: int, component: int, times: Any) -> int:
+def _times_at(instants: Any, participants: Any, first: int, component: int, times: Any) -> int:
     """Write the times of the events of a component from a number on, and return how many there are."""
     count = 0
-    for i in range(first, places.shape[1]):
-        if places[1, i] == component:
-            e = places[0, i]
+    for i in range(first, participants.shape[1]):
+        if participants[1, i] == component:
+            e = participants[0, i]
             times[count] = instants[e, 0] + instants[e, 1]
             count += 1
     return count
 
 
 @kernel
-def _states_at(states: Any, places: Any, first: int, component: int, side: int, out: Any) -> int:
+def _states_at(states: Any, participants: Any, first: int, component: int, side: int, out: Any) -> int:
     """Write the states at the events of a component on one side, and return how many there are."""
     count = 0
-    for i in range(first, places.shape[1]):
-        if places[1, i] == component:
+    for i in range(first, participants.shape[1]):
+        if participants[1, i] == component:
             for j in range(out.shape[1]):
-                out[count, j] = states[places[0, i], side, j]
+                out[count, j] = states[participants[0, i], side, j]
             count += 1
     return count
 
@@ -86,21 +86,21 @@ class EventBlock(Sequence[Occurrence]):
         self._system, self._instants, self._fired = system, instants, fired
         self._before, self._after, self._states = before, after, states
         self._first = 0
-        places = np.empty((2, len(fired)), dtype=np.int64)
-        found = _take_part(fired, before, after, system.owner, system.has_surface, places)
+        participants = np.empty((2, len(fired)), dtype=np.int64)
+        found = _take_part(fired, before, after, system.owner, system.has_surface, participants)
         self._count, self._is_plain = found
         if self._count != len(fired):
-            places = np.empty((2, self._count), dtype=np.int64)
-            _take_part(fired, before, after, system.owner, system.has_surface, places)
-        self._all_places = places
+            participants = np.empty((2, self._count), dtype=np.int64)
+            _take_part(fired, before, after, system.owner, system.has_surface, participants)
+        self._all_participants = participants
 
     def __len__(self) -> int:
         return self._count - self._first
 
     @property
-    def _places(self) -> np.ndarray:
+    def _participants(self) -> np.ndarray:
         """Return event and component (2, events) of each recorded event."""
-        return self._all_places[:, self._first :]
+        return self._all_participants[:, self._first :]
 
     @property
     def until(self) -> Instant:
@@ -111,14 +111,14 @@ class EventBlock(Sequence[Occurrence]):
     def times(self) -> np.ndarray:
         """Return the times, rounded to doubles."""
         times = self._instants[:, 0] + self._instants[:, 1]
-        return times[self._first :] if self._is_plain else times[self._places[0]]
+        return times[self._first :] if self._is_plain else times[self._participants[0]]
 
     def times_of(self, component: str, kind: str | None) -> np.ndarray:
         """Return the times of the events of a component; all are transitions or changes of a corner."""
         for c, automaton in enumerate(self._system.automata):
             if automaton.name == component and kind in (None, automaton.kind):
                 times = np.empty(len(self))
-                count = _times_of_one(self._instants, self._all_places, self._first, c, times)
+                count = _times_of_one(self._instants, self._all_participants, self._first, c, times)
                 return times if count == len(times) else times[:count]
         return np.empty(0)
 
@@ -128,14 +128,14 @@ class EventBlock(Sequence[Occurrence]):
             if automaton.name == component and kind in (None, automaton.kind):
                 states = np.empty((len(self), self._system.n))
                 # called directly, because the states of some loops are not contiguous
-                count = _states_at(self._states, self._all_places, self._first, c, side, states)
+                count = _states_at(self._states, self._all_participants, self._first, c, side, states)
                 return states if count == len(states) else states[:count]
         return np.empty((0, self._system.n))
 
     def kinds(self) -> Counter[str]:
         """Return the number of events of each kind."""
         found: Counter[str] = Counter()
-        for automaton, count in zip(self._system.automata, np.bincount(self._places[1]).tolist()):
+        for automaton, count in zip(self._system.automata, np.bincount(self._participants[1]).tolist()):
             found[automaton.kind] += count
         return +found
 
@@ -144,7 +144,7 @@ class EventBlock(Sequence[Occurrence]):
         has_corners = len(self._system.declared) < len(self._system.automata)
         if self._is_plain and not has_corners:
             return self._instants[self._first + first :], self._states[self._first + first :]
-        events, components = self._places[:, first:]
+        events, components = self._participants[:, first:]
         if has_corners:
             events = events[~self._system.is_corner[components]]
         return self._instants[events], self._states[events]
@@ -158,7 +158,7 @@ class EventBlock(Sequence[Occurrence]):
     def __getitem__(self, i: Any, /) -> Any:
         if isinstance(i, slice):
             return list(self._made(i))
-        e, c = self._places[:, range(len(self))[i]].tolist()
+        e, c = self._participants[:, range(len(self))[i]].tolist()
         fired, source, target = int(self._fired[e]), int(self._before[e, c]), int(self._after[e, c])
         x_minus, x_plus = self._states[e]
         return self._occurrence(c, fired, source, target, self._instants[e].tolist(), x_minus, x_plus)
@@ -167,7 +167,7 @@ class EventBlock(Sequence[Occurrence]):
         return self._made(slice(None))
 
     def _made(self, chosen: slice) -> Iterator[Occurrence]:
-        e, c = (places[chosen] for places in self._places)
+        e, c = (participants[chosen] for participants in self._participants)
         rows = zip(
             c.tolist(),
             self._fired[e].tolist(),

@@ -64,7 +64,7 @@ def _search(t: float, starts: Any, sign: float, is_later: bool) -> int:
 
 
 @kernel
-def find_places(
+def locate_times(
     times: Any,
     starts: Any,
     ends: Any,

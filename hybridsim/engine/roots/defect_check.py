@@ -1,7 +1,7 @@
 """The end of a Taylor step of length d: the state there, its rates, and whether the series are still accurate.
 
 The results are in one array: the powers d**k, k = 0..order; for n states their values, their rates, the
-slopes of their series times d, and sum_k |c_k| d**k, k > 0; for the watched functions their values and those
+slopes of their series times d, and sum_k |c_k| d**k, k > 0; for the guards their values and those
 of their series.
 """
 
@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hybridsim.engine.native.kernels import call_apart, call_series, fused, inlined, kernel
+from hybridsim.engine.native.kernels import call_noinline, call_series, fused, inlined, kernel
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.series.interpreter import advance, tabulate
 
@@ -18,7 +18,7 @@ _DEFECT = 100.0  # as in the taylor integrator
 BETWEEN = (0.618, 0.236, 0.854, 0.472, 0.09, 0.708, 0.326, 0.944)
 
 
-def room_ahead(order: int, n: int, guards: int) -> int:
+def ahead_size(order: int, n: int, guards: int) -> int:
     """Return the length of this array."""
     return order + 1 + 4 * n + 2 * guards
 
@@ -48,30 +48,38 @@ def sum_at(U: Any, r: int, order: int, powers: Any) -> float:
 
 @inlined
 def values_at(
-    code: int, rows: Any, places: Any, s: float, x: Any, watched: Any, W: Any, values: Any, rates: Any
+    code: int,
+    rows: Any,
+    flow_registers: Any,
+    s: float,
+    x: Any,
+    guard_registers: Any,
+    W: Any,
+    values: Any,
+    rates: Any,
 ) -> None:
-    """Compute rates of the states and values of the watched functions at (s, x), by compiled code if available."""
+    """Compute rates of the states and values of the guards at (s, x), by compiled code if available."""
     if code != 0:
         call_series(code, s, 0.0, x, values, W, rates)
     else:
-        call_apart(_interpreted_values, (rows, places, s, x, watched, W, values, rates))
+        call_noinline(_interpreted_values, (rows, flow_registers, s, x, guard_registers, W, values, rates))
 
 
 @kernel
 def _interpreted_values(
-    rows: Any, places: Any, s: float, x: Any, watched: Any, W: Any, values: Any, rates: Any
+    rows: Any, flow_registers: Any, s: float, x: Any, guard_registers: Any, W: Any, values: Any, rates: Any
 ) -> None:
     """Compute the same as `values_at` with the interpreter of tapes."""
-    time, states, derivatives = places
+    time, states, derivatives = flow_registers
     if time >= 0:
         W[time, 0] = s
     for i in range(states.shape[0]):
         W[states[i], 0] = x[i]
-    call_apart(advance, (rows, W, 0))
+    call_noinline(advance, (rows, W, 0))
     for i in range(states.shape[0]):
         rates[i] = W[derivatives[i], 0]
-    for j in range(watched.shape[0]):
-        values[j] = W[watched[j], 0]
+    for j in range(guard_registers.shape[0]):
+        values[j] = W[guard_registers[j], 0]
 
 
 @inlined
@@ -84,17 +92,17 @@ def _together(four: tuple[float, float, float, float]) -> float:
 def look_ahead(
     code: int,
     rows: Any,
-    places: Any,
+    flow_registers: Any,
     order: int,
     s: float,
     d: float,
-    watched: Any,
+    guard_registers: Any,
     series: Any,
     U: Any,
     W: Any,
     ahead: Any,
 ) -> None:
-    """Fill the array from series (n, order + 1) of states and U of the watched functions from local time s.
+    """Fill the array from series (n, order + 1) of states and U of the guards from local time s.
 
     code: address of a function that does the same; 0 for none. W: the registers of the tape with its
     constants.
@@ -102,7 +110,7 @@ def look_ahead(
     if code != 0:
         call_series(code, s, d, series, U, W, ahead)
         return
-    n, count = series.shape[0], watched.shape[0]
+    n, count = series.shape[0], guard_registers.shape[0]
     tabulate(d, order, ahead)
     x, rates, values, sums = parts_of(ahead, order, n, count)
     for i in range(n):
@@ -127,7 +135,7 @@ def look_ahead(
         ahead[order + 1 + 3 * n + i] = size
     for j in range(count):
         sums[j] = sum_at(U, j, order, ahead)
-    call_apart(_interpreted_values, (rows, places, s + d, x, watched, W, values, rates))
+    call_noinline(_interpreted_values, (rows, flow_registers, s + d, x, guard_registers, W, values, rates))
 
 
 @inlined
@@ -159,11 +167,11 @@ def seems_straight(computed: Any, series: Any, order: int, powers: Any, rtol: fl
 
 
 @kernel
-def keeps_up(U: Any, watched: Any, order: int, powers: Any, rtol: float, values: Any, sums: Any) -> bool:
-    """Return whether the series of the watched functions still agree with their values."""
+def keeps_up(U: Any, monitored: Any, order: int, powers: Any, rtol: float, values: Any, sums: Any) -> bool:
+    """Return whether the series of the guards still agree with their values."""
     share = _DEFECT * rtol + 64.0 * UNIT
-    for j in range(watched.shape[0]):
-        r = watched[j]
+    for j in range(monitored.shape[0]):
+        r = monitored[j]
         off, largest = abs(sums[j] - values[j]), abs(U[r, 0])
         if off <= share * largest:
             continue

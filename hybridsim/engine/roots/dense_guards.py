@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.engine.native.kernels import call_apart, call_series, inlined, kernel
+from hybridsim.engine.native.kernels import call_noinline, call_series, inlined, kernel
 from hybridsim.engine.record.hermite import fit_in_time
 from hybridsim.engine.roots.defect_check import keeps_up, sum_at
 from hybridsim.engine.roots.earliest_exit import earliest_exit, parts_for_exit
@@ -17,9 +17,8 @@ _SHORTER = 0.25
 _LONGER = 4.0
 _ROUNDING = 16.0 * UNIT  # of a Bernstein coefficient, relative to the sum of the sizes of its terms
 _SHORTEST = 2.0**-40  # of a step: shortest piece, on which a guard's series is useless
-_MOST_STRETCHES = (
-    4096  # most pieces of a step; they become very short near a point at which the guard is undefined
-)
+# Largest number of subintervals of a step; they become very short near a point at which the guard is undefined.
+_MAX_SUBINTERVALS = 4096
 
 
 @inlined
@@ -39,9 +38,9 @@ def shifted(coefficients: Any, q: float, out: Any) -> None:
 
 @inlined
 def series_along(
-    code: int, rows: Any, inputs: Any, s: float, x: Any, watched: Any, V: Any, W: Any, out: Any
+    code: int, rows: Any, inputs: Any, s: float, x: Any, guard_registers: Any, V: Any, W: Any, out: Any
 ) -> None:
-    """Compute the series of the watched functions, a row each, from local time s along states with coefficients x.
+    """Compute the series of the guards, a row each, from local time s along states with coefficients x.
 
     rows: tape rows that the functions need. V, W: registers that hold the tape's constants. code: address of
     a function that does the same (`along` of `hybridsim.engine.series.emit_series`); 0 for none.
@@ -56,17 +55,17 @@ def series_along(
     if time >= 0:
         V[time, 0], V[time, 1] = s, 1.0
     for j in range(size):
-        call_apart(advance, (rows, V, j))
-    for i in range(watched.shape[0]):
+        call_noinline(advance, (rows, V, j))
+    for i in range(guard_registers.shape[0]):
         for j in range(size):
-            out[i, j] = V[watched[i], j]
+            out[i, j] = V[guard_registers[i], j]
 
 
 @inlined
 def guards_at(
-    code: int, rows: Any, inputs: Any, s: float, x: Any, watched: Any, W: Any, rates: Any, out: Any
+    code: int, rows: Any, inputs: Any, s: float, x: Any, guard_registers: Any, W: Any, rates: Any, out: Any
 ) -> None:
-    """Compute the values of the watched functions at (s, x), by compiled code if available.
+    """Compute the values of the guards at (s, x), by compiled code if available.
 
     The code also writes rates, as `values` of `hybridsim.engine.series.emit_series` does.
     """
@@ -78,9 +77,9 @@ def guards_at(
         W[states[i], 0] = x[i]
     if time >= 0:
         W[time, 0] = s
-    call_apart(advance, (rows, W, 0))
-    for j in range(watched.shape[0]):
-        out[j] = W[watched[j], 0]
+    call_noinline(advance, (rows, W, 0))
+    for j in range(guard_registers.shape[0]):
+        out[j] = W[guard_registers[j], 0]
 
 
 @inlined
@@ -117,15 +116,15 @@ def stays_positive(left: Any, right: Any, order: int, floor: float, d: float, we
 
 @kernel
 def first_linear_guard(
-    tapes: Any, k: int, count: int, d: float, hermite: Any, room: Any
+    tapes: Any, k: int, count: int, d: float, hermite: Any, scratch: Any
 ) -> tuple[int, int, float]:
     """Do the same as `first_guard` for guards that are linear in states and time, which are polynomials along a step.
 
-    room: the indices of the watched guards, their Taylor coefficients at the ends of the step, `guards_left`
+    scratch: the indices of the active guards, their Taylor coefficients at the ends of the step, `guards_left`
     and `guards_right` (G, K), and their sides, orders and floors.
     """
-    left, right, numbers = room.guards_left, room.guards_right, room.numbers
-    sides, orders, floors = room.sides, room.orders, room.floors
+    left, right, numbers = scratch.guards_left, scratch.guards_right, scratch.numbers
+    sides, orders, floors = scratch.sides, scratch.orders, scratch.floors
     is_positive = True
     for i in range(count):
         g = numbers[i]
@@ -136,31 +135,31 @@ def first_linear_guard(
         )
     outcome, g, at = NEVER, -1, d
     if not is_positive:
-        polynomials, watched, V = room.polynomials, room.watched, room.V
+        polynomials, guard_registers, V = scratch.polynomials, scratch.guard_registers, scratch.V
         left, right = left[:count], right[:count]
-        if not fit_in_time(left, right, d, hermite.shift, hermite.inverse, room.lack, polynomials[:count]):
+        if not fit_in_time(left, right, d, hermite.shift, hermite.inverse, scratch.lack, polynomials[:count]):
             return OPEN, -1, 0.0
         degree = polynomials.shape[1] - 1
         for i in range(count):
             for j in range(degree + 1):
-                V[watched[i], j] = polynomials[i, j]
+                V[guard_registers[i], j] = polynomials[i, j]
             for j in range(degree + 1, degree + 3):  # nothing is omitted: the error of a series is zero
-                V[watched[i], j] = 0.0
-        tabulate(d, degree + 2, room.powers)
-        watched = watched[:count]
+                V[guard_registers[i], j] = 0.0
+        tabulate(d, degree + 2, scratch.powers)
+        guard_registers = guard_registers[:count]
         for i in range(count):
-            room.totals[i] = sum_sizes(V, watched[i], degree + 2, room.powers)
+            scratch.totals[i] = sum_sizes(V, guard_registers[i], degree + 2, scratch.powers)
         outcome, g, at = earliest_exit(
             tapes,
             k,
             degree + 2,
             d,
             V,
-            watched,
-            room.powers,
-            room.totals,
-            parts_for_exit(room),
-            room.bernstein,
+            guard_registers,
+            scratch.powers,
+            scratch.totals,
+            parts_for_exit(scratch),
+            scratch.bernstein,
         )
     if outcome == NEVER:
         begin_positive(sides, orders, floors)
@@ -168,11 +167,11 @@ def first_linear_guard(
 
 
 @kernel
-def likely_reach(V: Any, watched: Any, order: int, rtol: float) -> float:
+def likely_reach(V: Any, guard_registers: Any, order: int, rtol: float) -> float:
     """Return a length somewhat beyond the range of the functions' series; the search for the range starts there."""
     longest = math.inf
-    for j in range(watched.shape[0]):
-        r = watched[j]
+    for j in range(guard_registers.shape[0]):
+        r = guard_registers[j]
         for k in (0, 1):
             if V[r, k] != 0.0 and V[r, order] != 0.0:
                 w = (rtol * abs(V[r, k] / V[r, order])) ** (1.0 / (order - k))
@@ -192,36 +191,51 @@ def first_guard(
     s: float,
     d: float,
     atol: Any,
-    watched: Any,
-    room: Any,
+    guard_registers: Any,
+    scratch: Any,
 ) -> tuple[int, int, float]:
     """Find the guard of mode row k that first becomes negative on a step: (FOUND, guard, time), (NEVER, -1, d), OPEN.
 
-    The time counts from s. rows: tape rows that the guards need; codes: `EndsCodes`. room: `polynomial` (n,
+    The time counts from s. rows: tape rows that the guards need; codes: `EndsCodes`. scratch: `polynomial` (n,
     m), the states in powers of the time from s; V and W with the constants of the tape in their registers;
     sides, orders and floors of the guards just after s, as in `earliest_exit`, which are updated. The series
     of a guard is used as long as its last terms stay below rtol of its largest one and it agrees with the
     guard at its end. There the next piece begins.
     """
     along, values_code = codes.along[k], codes.values[k]
-    x, U, values, y, rates = room.states, room.guard_series, room.values, room.ahead, room.rates
-    everyone = room.everyone[: watched.shape[0]]
+    x, U, values, y, rates = (
+        scratch.states,
+        scratch.guard_series,
+        scratch.values,
+        scratch.ahead,
+        scratch.rates,
+    )
+    everyone = scratch.everyone[: guard_registers.shape[0]]
     none = everyone[:0]
     q = 0.0
-    for _ in range(_MOST_STRETCHES):
+    for _ in range(_MAX_SUBINTERVALS):
         if not q < d:
             return NEVER, -1, d
-        shifted(room.polynomial, q, x)
-        series_along(along, rows, inputs, s + q, x, watched, room.V, room.W, U)
+        shifted(scratch.polynomial, q, x)
+        series_along(along, rows, inputs, s + q, x, guard_registers, scratch.V, scratch.W, U)
         left = d - q
         longest = min(left, likely_reach(U, everyone, order, rtol))
-        w = call_apart(
-            reach, (0, U, none, U, everyone, order, rtol, atol, 1.0, longest, room.powers, room.totals)
+        w = call_noinline(
+            reach, (0, U, none, U, everyone, order, rtol, atol, 1.0, longest, scratch.powers, scratch.totals)
         )
         if not w > _SHORTEST * d:
             return OPEN, -1, q
         outcome, g, at = earliest_exit(
-            tapes, k, order, w, U, everyone, room.powers, room.totals, parts_for_exit(room), room.bernstein
+            tapes,
+            k,
+            order,
+            w,
+            U,
+            everyone,
+            scratch.powers,
+            scratch.totals,
+            parts_for_exit(scratch),
+            scratch.bernstein,
         )
         if outcome == OPEN:
             return OPEN, g, q + at
@@ -230,11 +244,11 @@ def first_guard(
                 y[i] = x[i, order]
                 for j in range(order - 1, -1, -1):
                     y[i] = y[i] * at + x[i, j]
-            guards_at(values_code, rows, inputs, s + q + at, y, watched, room.W, rates, values)
-            tabulate(at, order, room.powers)
-            for j in range(watched.shape[0]):
-                room.sums[j] = sum_at(U, j, order, room.powers)
-            if keeps_up(U, everyone, order, room.powers, rtol, values, room.sums):
+            guards_at(values_code, rows, inputs, s + q + at, y, guard_registers, scratch.W, rates, values)
+            tabulate(at, order, scratch.powers)
+            for j in range(guard_registers.shape[0]):
+                scratch.sums[j] = sum_at(U, j, order, scratch.powers)
+            if keeps_up(U, everyone, order, scratch.powers, rtol, values, scratch.sums):
                 break
             at, outcome = _SHORTER * at, NEVER
             if not at > _SHORTEST * d:
@@ -242,5 +256,5 @@ def first_guard(
         if outcome == FOUND:
             return FOUND, g, q + at
         q = d if at >= left else q + at
-        begin_positive(room.sides, room.orders, room.floors)
+        begin_positive(scratch.sides, scratch.orders, scratch.floors)
     return (OPEN, -1, q) if q < d else (NEVER, -1, d)

@@ -11,25 +11,26 @@ from hybridsim.engine.series.bounded import UNIT
 
 
 @inlined
-def parts_for_exit(room: Any) -> Any:
+def parts_for_exit(scratch: Any) -> Any:
     """Return the arrays of a room that `earliest_exit` needs: sides, orders and floors of guards, and scratch."""
-    return (room.sides, room.orders, room.floors), (room.a, room.b, room.stack)
+    return (scratch.sides, scratch.orders, scratch.floors), (scratch.a, scratch.b, scratch.stack)
 
 
 @kernel
 def earliest_exit(
-    tapes: Any, k: int, order: int, h: float, U: Any, watched: Any, powers: Any, totals: Any, parts: Any, bernstein: Any
+    tapes: Any, k: int, order: int, h: float, U: Any, monitored: Any, powers: Any, totals: Any, parts: Any,
+    bernstein: Any,
 ) -> tuple[int, int, float]:  # fmt: skip
     """Find the guard of the mode that first becomes negative in a step h: (FOUND, guard, time) or (NEVER, -1, h).
 
-    watched: rows of U with the series of the mode's guards. powers (order + 1,): h**k. totals: see `reach`.
+    monitored: rows of U with the series of the mode's guards. powers (order + 1,): h**k. totals: see `reach`.
     parts: see `parts_for_exit`. bernstein: functions for `first_exit`, by the number of leading zeros.
     """
     (sides, orders, floors), (a, b, stack) = parts
     found, best, begin = -1, 1.0, tapes.active_start[k]
-    for i in range(watched.shape[0]):
+    for i in range(monitored.shape[0]):
         g = tapes.active[begin + i]
-        r = watched[i]
+        r = monitored[i]
         total, first = totals[i], U[r, 0]
         if not total < math.inf:
             return OPEN, g, 0.0

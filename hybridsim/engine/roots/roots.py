@@ -31,7 +31,7 @@ _ACCEPT = 2.0**-30
 # a piece narrower than 2**-23. A few halvings later a piece is accepted with any bound.
 _DEEPEST = 26
 _ROUNDING_DEPTH = 4  # halvings after which the misfit of an unresolved piece may be rounding alone
-_MOST_PIECES = 200_000  # a guard that needs more oscillates about 20 000 times within one step
+_MAX_SUBDIVISIONS = 200_000  # a guard that needs more oscillates about 20 000 times within one step
 _CLOSEST = 40  # halvings toward the start of a step in the search for a value larger than rounding
 # of the largest value on a step: a lower dip is compared with the rounding of the values
 _TOUCHING = 2.0**-40
@@ -217,9 +217,9 @@ def _before(
     """
     if side * sample(np.array([theta]))[0] > 0.0:
         return theta
-    places = theta * 2.0 ** -np.arange(1.0, _CLOSEST)
-    certain = np.flatnonzero(side * sample(places) > rounding())
-    return float(places[certain[0]]) if len(certain) else theta
+    points = theta * 2.0 ** -np.arange(1.0, _CLOSEST)
+    certain = np.flatnonzero(side * sample(points) > rounding())
+    return float(points[certain[0]]) if len(certain) else theta
 
 
 def _with_touches(
@@ -287,7 +287,7 @@ def find_roots(
     crossings: list[Crossing] = []
     grazings: list[Grazing] = []
     last, open_from = side, -1.0  # last certain sign, and start of the undecided interval after it
-    low, pieces, undefined = math.inf, 0, math.inf
+    low, subdivisions, undefined = math.inf, 0, math.inf
     waiting: list[tuple[float, float, np.ndarray | None, int]] = [(0.0, 1.0, first, 0)]
     touching = _TOUCHING * np.abs(first[np.isfinite(first)]).max(initial=0.0)
 
@@ -300,11 +300,11 @@ def find_roots(
         a, b, samples, depth = waiting.pop()
         if samples is None:
             samples = sample(a + (b - a) * POINTS)
-        pieces += 1
-        if pieces > _MOST_PIECES:
+        subdivisions += 1
+        if subdivisions > _MAX_SUBDIVISIONS:
             raise StepFailure(
-                f"its zeros in one step could not be separated with {pieces} subintervals: lower max_step, or write it "
-                "so that it has no pole and is defined on both sides of its zero"
+                f"its zeros in one step could not be separated with {subdivisions} subintervals: lower max_step, or "
+                "write it so that it has no pole and is defined on both sides of its zero"
             )
         coefficients = np.empty(DEGREE + 1)
         error, largest = _represent(samples, coefficients)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hybridsim.engine.native.kernels import call_apart, call_series, inlined, kernel
+from hybridsim.engine.native.kernels import call_noinline, call_series, inlined, kernel
 from hybridsim.engine.roots.first_exit import halve, to_bernstein
 from hybridsim.engine.series.vanishing_kinds import EXPONENTIAL, ROOT
 
@@ -21,7 +21,7 @@ from hybridsim.engine.series.vanishing_kinds import EXPONENTIAL, ROOT
 _SEEN = 8.0
 # |u| above which exp(u) is negligible, and |u| at the end of a step that starts there. A step from farther away ends
 # at these shares of |u|, because near a multiple zero of u its series shows only rounding
-_FAINT, _NEAR = 7.0, 4.0
+_NEGLIGIBLE, _NEAR = 7.0, 4.0
 _FAR_SHARE, _NEAR_SHARE = 0.01, 0.005
 _NOTHING = 745.0  # exp(-745) is the smallest double
 _ERROR, _SHARE = (
@@ -31,8 +31,8 @@ _ERROR, _SHARE = (
 # smallest share to which they may shorten a step: u may have a pole that the rates do not have
 _SHORTEST = 1.0 / 64.0
 # halvings of a step, and most pieces: the number of extrema of u is at most its order
-_DEEPEST, _MOST_PIECES = 40, 400
-PIECES = _DEEPEST + 2  # most pieces on the stack
+_DEEPEST, _MAX_SUBDIVISIONS = 40, 400
+STACK_ROWS = _DEEPEST + 2  # most pieces on the stack
 _POLISHED, _CLOSE = 60, 1e-8  # most steps to an extremum, and its accuracy
 _HALVED = 40  # most bisections between two places
 
@@ -76,12 +76,12 @@ def may_end(u: Any, kind: int, size: float) -> bool:
 def where_it_ends(u: Any, kind: int, order: int, h: float, a: Any, stack: Any, code: int) -> float:
     """Return how far a step of length h may go for a function of u of this kind; u (order + 1,): its series.
 
-    h may be negative; order >= 2. a (order,) or longer, stack (PIECES, order + 2) or larger: scratch space.
+    h may be negative; order >= 2. a (order,) or longer, stack (STACK_ROWS, order + 2) or larger: scratch space.
     code: address of a function that does `to_bernstein` for as many coefficients as the order
     (`hybridsim.engine.series.emit_bernstein`), 0 for none.
     """
     if kind == ROOT:
-        return call_apart(where_a_root_ends, (u, order, h, a, stack, code))
+        return call_noinline(where_a_root_ends, (u, order, h, a, stack, code))
     change, turn, last = _sizes(u, order, h)
     if not change > _SEEN:
         return h
@@ -90,16 +90,16 @@ def where_it_ends(u: Any, kind: int, order: int, h: float, a: Any, stack: Any, c
     if last > error:
         h *= max(_SHORTEST, (error / last) ** (1.0 / (order - 1)))
         change, turn, last = _sizes(u, order, h)
-    high, low = max(_FAINT, _FAR_SHARE * start), max(_NEAR, _NEAR_SHARE * start)
-    comes_near = start > _FAINT and start - change < low
+    high, low = max(_NEGLIGIBLE, _FAR_SHARE * start), max(_NEAR, _NEAR_SHARE * start)
+    comes_near = start > _NEGLIGIBLE and start - change < low
     if not change > _SEEN or start - change > _NOTHING or (turn < abs(u[1] * h) and not comes_near):
         return h
     if turn < abs(u[1] * h):  # monotonic
         sign = 1.0 if u[0] > 0.0 else -1.0
         if sign * _value(u, order, h) < low:
-            return call_apart(_becomes_near, (u, order, sign, high, low, 0.0, h))
+            return call_noinline(_becomes_near, (u, order, sign, high, low, 0.0, h))
         return h
-    return call_apart(_first_place, (u, order, h, kind, high, low, a, stack, code))
+    return call_noinline(_first_place, (u, order, h, kind, high, low, a, stack, code))
 
 
 @kernel
@@ -109,7 +109,7 @@ def where_a_root_ends(u: Any, order: int, h: float, a: Any, stack: Any, code: in
     high, low = _FAR_SHARE * u[0], _NEAR_SHARE * u[0]
     if not (u[0] > 0.0 and u[0] - change < low):
         return h
-    return call_apart(_first_place, (u, order, h, ROOT, high, low, a, stack, code))
+    return call_noinline(_first_place, (u, order, h, ROOT, high, low, a, stack, code))
 
 
 @kernel
@@ -122,7 +122,7 @@ def _first_place(
     coefficients change their sign at most once, so does the slope.
     """
     start, sign = abs(u[0]), 1.0 if u[0] > 0.0 else -1.0
-    is_far = start > _FAINT and kind != ROOT
+    is_far = start > _NEGLIGIBLE and kind != ROOT
     power = 1.0
     for k in range(order):
         power *= h
@@ -133,7 +133,7 @@ def _first_place(
         to_bernstein(a[:order], stack[0, :order])
     stack[0, order], stack[0, order + 1] = 0.0, 1.0
     top = 1
-    for _ in range(_MOST_PIECES):
+    for _ in range(_MAX_SUBDIVISIONS):
         top -= 1
         if top < 0:
             return h

@@ -12,10 +12,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from hybridsim.engine.events.compiled.after_segment import reach_settling
+from hybridsim.engine.events.compiled.after_segment import link_event_resolution
 from hybridsim.engine.events.compiled.scratch import functions_of, work_space
 from hybridsim.engine.events.outcome import Outcome
-from hybridsim.engine.events.zeno.accumulation import MOST, leads_nowhere
+from hybridsim.engine.events.zeno.accumulation import MAX_EVENTS_PER_TURN, cannot_accumulate
 from hybridsim.engine.linear.tables import no_tables
 from hybridsim.engine.native.kernels import Precompiled
 from hybridsim.engine.native.struct_pack import ALIGNED, LARGEST, ArrayLayout, packed
@@ -24,24 +24,24 @@ from hybridsim.engine.record.checkpoint import damaged
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.series_block import SeriesBlock
 from hybridsim.engine.record.trajectory import Trajectory
-from hybridsim.engine.roots.defect_check import room_ahead
+from hybridsim.engine.roots.defect_check import ahead_size
 from hybridsim.engine.run.call_arrays import CallArrays, StateBuffer, buffer_of
-from hybridsim.engine.run.event_loop import LEAST, Record, Room, leap
+from hybridsim.engine.run.event_loop import MIN_STEPS_IN_PART, Record, Scratch, event_loop
 from hybridsim.engine.run.kernel_run import KernelRun
 from hybridsim.engine.run.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, CompiledLoop, LoopResult
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.instant import Instant
-from hybridsim.engine.system.programs.code_cache import CodeShelf
+from hybridsim.engine.system.programs.code_cache import CodeCache
 from hybridsim.engine.system.programs.mode_code import most_fading
-from hybridsim.engine.system.programs.mode_tables import automata_of, shelf_of
-from hybridsim.engine.system.programs.series_code import SeriesShelf
+from hybridsim.engine.system.programs.mode_tables import automata_of, tape_cache_of
+from hybridsim.engine.system.programs.series_code import SeriesCodeCache
 from hybridsim.engine.system.series_at import series_order
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
 
 _SEGMENTS = 1024  # largest number of segments in one call
-_ROOM = LARGEST // 8  # doubles for the steps of one call, in a reusable block of memory
-_NONE = np.zeros(0, dtype=np.int64)
+_CALL_DOUBLES = LARGEST // 8  # doubles for the steps of one call, in a reusable block of memory
+_NO_OWNERS = np.zeros(0, dtype=np.int64)
 _TIGHTEST = 1e-15
 NOT_LINEAR = no_tables()  # for kernels without tables of linear modes
 
@@ -77,7 +77,9 @@ def compile_loops(system: System, make: Maker) -> None:
     # a rate may not be a number here; the run reports such an error itself
     with suppress(StepFailure):
         compiled_loop.advance(nowhere, still, p, nowhere, Trajectory(system))
-        leads_nowhere(np.empty((0, 2)), none, system.owner, len(system.automata), np.empty((2, MOST)))
+        cannot_accumulate(
+            np.empty((0, 2)), none, system.owner, len(system.automata), np.empty((2, MAX_EVENTS_PER_TURN))
+        )
         _compiled.append(make)
 
 
@@ -91,15 +93,15 @@ class CompiledLoopBase(ABC):
     """
 
     is_looked_at: ClassVar[bool] = False  # whether steps are examined after a call, even if they are not kept
-    codes: CodeShelf  # machine code of the modes
+    codes: CodeCache  # machine code of the modes
     taken: tuple[Any, Any]  # tapes of the last call, and their machine code
 
     def __init__(self, system: System, columns: int, kind: str) -> None:
         self.system, self.columns, layout = system, columns, system.layout
-        self.shelf, self.automata = shelf_of(system), automata_of(system)
+        self.tape_cache, self.automata = tape_cache_of(system), automata_of(system)
         self.functions = functions_of(system)
         self.inputs = system.registers.inputs
-        self.places = (
+        self.phase_layout = (
             system.rates,
             layout.origin_at,
             layout.phases_at,
@@ -108,7 +110,7 @@ class CompiledLoopBase(ABC):
         self.kernel_run: KernelRun | None = None  # a call made beforehand, which `advance` takes first
         beside = (_SEGMENTS + 1) * (layout.size + 1) + ALIGNED
         # largest number of steps in one call
-        self.steps = max((_ROOM - beside) // (system.n * columns + 2), LEAST)
+        self.steps = max((_CALL_DOUBLES - beside) // (system.n * columns + 2), MIN_STEPS_IN_PART)
         self._renew()
 
     def fresh_copy(self) -> CompiledLoop:
@@ -118,7 +120,7 @@ class CompiledLoopBase(ABC):
         return other
 
     @abstractmethod
-    def _room(self) -> Any:
+    def _scratch(self) -> Any:
         """Return scratch arrays of the kernel for one call."""
 
     @abstractmethod
@@ -128,13 +130,13 @@ class CompiledLoopBase(ABC):
         clock: np.ndarray,
         state: Any,
         work: Any,
-        room: Any,
+        scratch: Any,
         rows: Any,
     ) -> tuple[int, int, int]:
         """Run the kernel on rows of the record. Return why it ended, and the numbers of steps and segments."""
 
     @abstractmethod
-    def _cost(self, room: Any) -> Any:
+    def _cost(self, scratch: Any) -> Any:
         """Return the cost of a call beyond its steps."""
 
     @abstractmethod
@@ -183,7 +185,7 @@ class CompiledLoopBase(ABC):
 
     @place.setter
     def place(self, place: np.ndarray) -> None:
-        if not (place.shape == (3,) and ((place >= 0.0) & (place <= max(_ROOM, self.steps))).all()):
+        if not (place.shape == (3,) and ((place >= 0.0) & (place <= max(_CALL_DOUBLES, self.steps))).all()):
             raise damaged("the row counts of the run")
         rows, segments, steps = (int(number) for number in place)
         if not (1 <= steps <= self.steps and rows <= steps and segments <= _SEGMENTS + 1):
@@ -195,14 +197,14 @@ class CompiledLoopBase(ABC):
 
     def go(self, origin: Instant, buffer: StateBuffer, target: Instant) -> KernelRun:
         """Call the kernel."""
-        self.shelf.surround(buffer.part("z"))
+        self.tape_cache.surround(buffer.part("z"))
         try:
             call_arrays = self.spare.pop()
         except IndexError:
-            call_arrays = CallArrays.of(buffer, work_space(self.system), self._room())
-            reach_settling(
+            call_arrays = CallArrays.of(buffer, work_space(self.system), self._scratch())
+            link_event_resolution(
                 self.automata,
-                self.shelf.tapes,
+                self.tape_cache.tapes,
                 self.inputs,
                 NOT_LINEAR,
                 call_arrays.as_packed,
@@ -213,19 +215,19 @@ class CompiledLoopBase(ABC):
         clock[0], clock[1] = origin
         to[0], to[1] = target
         # counted before the call, because another thread may add the modes that this call misses
-        known = len(self.shelf.tapes.modes)
+        known = len(self.tape_cache.tapes.modes)
         rows, began = self._rows(), perf_counter()
         code, steps, count = self._go(
-            to, clock, call_arrays.as_packed, call_arrays.work, call_arrays.room, rows
+            to, clock, call_arrays.as_packed, call_arrays.work, call_arrays.scratch, rows
         )
         seconds = perf_counter() - began
-        self.shelf.look()
+        self.tape_cache.look()
         self.codes.look(*self.taken)
-        cost = self._cost(call_arrays.room)
+        cost = self._cost(call_arrays.scratch)
         end, at = call_arrays.final_state(), clock.tolist()
         self.spare.append(call_arrays)
-        self.shelf.surround(end.part("z"))
-        has_news = len(self.shelf.tapes.modes) != known
+        self.tape_cache.surround(end.part("z"))
+        has_news = len(self.tape_cache.tapes.modes) != known
         assert self.memory is not None
         first_step, first = self.used
         return KernelRun(
@@ -268,7 +270,11 @@ class CompiledLoopBase(ABC):
             return LoopResult(Instant(*kernel_run.clock), kernel_run.after, end, instants[0], owners[0])
         all_instants = np.concatenate([np.empty((0, 2)), *instants])
         return LoopResult(
-            Instant(*kernel_run.clock), kernel_run.after, end, all_instants, np.concatenate([_NONE, *owners])
+            Instant(*kernel_run.clock),
+            kernel_run.after,
+            end,
+            all_instants,
+            np.concatenate([_NO_OWNERS, *owners]),
         )
 
     def count(self, kernel_run: KernelRun, counters: Counters) -> None:
@@ -321,7 +327,7 @@ class CompiledLoopBase(ABC):
             record.occurrences.add(kernel_run.event_block)
 
 
-_leap = Precompiled(leap)
+_event_loop = Precompiled(event_loop)
 
 
 class TaylorLoop(CompiledLoopBase):
@@ -331,20 +337,20 @@ class TaylorLoop(CompiledLoopBase):
         rtol = max(tolerances.rtol, _TIGHTEST)
         self.order = series_order(rtol, system.is_linear)
         super().__init__(system, self.order + 1, f"order {self.order}")
-        self.codes: SeriesShelf = system.code.shared(
-            f"series of order {self.order}", lambda: SeriesShelf(system, self.order)
+        self.codes: SeriesCodeCache = system.code.shared(
+            f"series of order {self.order}", lambda: SeriesCodeCache(system, self.order)
         )
         self.control = (rtol, tolerances.atol, self.order, tolerances.max_step, longest)
 
-    def _room(self) -> Any:
+    def _scratch(self) -> Any:
         system, order, n = self.system, self.order, self.system.n
         registers, guards = system.registers.count, system.guard_count
-        room: Room = packed(
-            Room(
+        scratch: Scratch = packed(
+            Scratch(
                 V=np.zeros((registers, order + 1)),
                 W=np.zeros((registers, order + 1)),
                 guard_series=np.zeros((guards + most_fading(system), order + 1)),
-                ahead=np.empty(room_ahead(order, n, guards)),
+                ahead=np.empty(ahead_size(order, n, guards)),
                 sizes=np.empty(order + 1 + guards + most_fading(system)),
                 numbers=np.arange(guards, dtype=np.int64),
                 everyone=np.arange(n, dtype=np.int64),
@@ -355,10 +361,10 @@ class TaylorLoop(CompiledLoopBase):
                 pace=np.empty(3),
                 largest=np.empty(guards),
                 scale=np.empty(n),
-                **{name: np.empty(guards, dtype=np.int64) for name in ("sides", "orders", "watched")},
+                **{name: np.empty(guards, dtype=np.int64) for name in ("sides", "orders", "guard_registers")},
             )
         )
-        return room
+        return scratch
 
     def _go(
         self,
@@ -366,19 +372,19 @@ class TaylorLoop(CompiledLoopBase):
         clock: np.ndarray,
         state: Any,
         work: Any,
-        room: Any,
+        scratch: Any,
         rows: Any,
     ) -> tuple[int, int, int]:
-        tapes = self.shelf.tapes  # read once, because another thread may replace them
+        tapes = self.tape_cache.tapes  # read once, because another thread may replace them
         codes = self.codes.of(tapes)
-        code, steps, count = _leap(
-            self.functions, self.automata, tapes, self.inputs, NOT_LINEAR, codes, self.places, self.control,
-            to, clock, state, work, room, rows,
+        code, steps, count = _event_loop(
+            self.functions, self.automata, tapes, self.inputs, NOT_LINEAR, codes, self.phase_layout, self.control,
+            to, clock, state, work, scratch, rows,
         )  # fmt: skip
         self.taken = tapes, codes
         return code, steps, count
 
-    def _cost(self, room: Any) -> None:
+    def _cost(self, scratch: Any) -> None:
         """Return None: Taylor steps have no further cost."""
 
     def _count(self, counters: Counters, steps: int, cost: None) -> None:

@@ -17,12 +17,12 @@ from hybridsim.engine.events.compiled.after_segment import (
     is_hidden,
     is_shallow,
     moved_on,
-    settle_and_move_on,
+    resolve_and_advance,
     state_errors,
 )
-from hybridsim.engine.events.compiled.at_end import is_clear, may_be_at_zero
+from hybridsim.engine.events.compiled.at_end import is_clear, may_vanish
 from hybridsim.engine.native.constants import IN_A_ROW, STANDSTILL
-from hybridsim.engine.native.kernels import call, call_apart, call_series, inlined, kernel
+from hybridsim.engine.native.kernels import call, call_noinline, call_series, inlined, kernel
 from hybridsim.engine.native.loop_hints import fill, put
 from hybridsim.engine.native.time_grid import on_the_grid
 from hybridsim.engine.roots.defect_check import (
@@ -46,10 +46,11 @@ from hybridsim.engine.system.programs.modes_index import find_modes
 AT_TARGET, STOPPED, FULL = 0, 1, 2
 _SHORTER = 0.25
 _TRIALS = 30
-LEAST = 64  # least number of steps in a part of a segment; with less space the next call takes the segment
+# Least number of steps in a part of a segment; with less space the next call takes the segment.
+MIN_STEPS_IN_PART = 64
 
 
-class Room(NamedTuple):
+class Scratch(NamedTuple):
     """Scratch arrays of the kernel, for R registers, order + 1 terms, and G guards."""
 
     V: np.ndarray  # Taylor coefficients (R, order + 1) of all registers
@@ -65,7 +66,7 @@ class Room(NamedTuple):
     sides: np.ndarray  # sides (G,) of the guards
     orders: np.ndarray  # their leading orders (G,)
     floors: np.ndarray  # their error bounds (G,)
-    watched: np.ndarray  # registers of the watched functions
+    guard_registers: np.ndarray  # registers of the guards
     everyone: np.ndarray  # 0, 1, ..., n - 1
     pace: np.ndarray  # (3,), see `is_crowded`
     largest: np.ndarray  # largest values (G,) of the guards on the segment
@@ -101,7 +102,7 @@ def load(inputs: Any, tapes: Any, k: int, p: Any, V: Any) -> None:
     for i in range(inputs.parameters.shape[0]):
         V[inputs.parameters[i], 0] = p[inputs.sources[i]]
     rows = tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]]
-    call_apart(advance, (rows, V, 0))
+    call_noinline(advance, (rows, V, 0))
 
 
 @inlined
@@ -110,17 +111,17 @@ def series_at(
     is_known: bool,
     rows: Any,
     high: Any,
-    places: Any,
+    flow_registers: Any,
     order: int,
     s: float,
     x: Any,
-    watched: Any,
+    guard_registers: Any,
     fading: Any,
     V: Any,
     U: Any,
     out: Any,
 ) -> None:
-    """Write coefficients of the states to out, and of watched and vanishing functions to U, from x at local time s.
+    """Write coefficients of the states to out, and of guards and vanishing functions to U, from x at local time s.
 
     code: address of a compiled function that does the same; 0 for none. is_known: `values_at` was called last at this
     state.
@@ -128,58 +129,58 @@ def series_at(
     if code != 0:
         call_series(code, s, 1.0 if is_known else 0.0, x, U, V, out)
         return
-    call_apart(expand, (rows, high, places, order, s, x, V))
-    states = places[1]
+    call_noinline(expand, (rows, high, flow_registers, order, s, x, V))
+    states = flow_registers[1]
     for i in range(states.shape[0]):
         for k in range(order + 1):
             out[i, k] = V[states[i], k]
-    for j in range(watched.shape[0]):
+    for j in range(guard_registers.shape[0]):
         for k in range(order + 1):
-            U[j, k] = V[watched[j], k]
+            U[j, k] = V[guard_registers[j], k]
     for j in range(fading.shape[0]):
         for k in range(order + 1):
-            U[watched.shape[0] + j, k] = V[register_of(fading[j]), k]
+            U[guard_registers.shape[0] + j, k] = V[register_of(fading[j]), k]
 
 
 @kernel
-def leap(
+def event_loop(
     functions: Any,
     automata: Any,
     tapes: Any,
     inputs: Any,
     lin: Any,
     codes: Any,
-    places: Any,
+    phase_layout: Any,
     control: Any,
     target: Any,
     clock: Any,
     state: Any,
     work: Any,
-    room: Any,
+    scratch: Any,
     record: Any,
 ) -> tuple[int, int, int]:
     """Run from event to event. Return why the call ended, and the numbers of committed steps and segments.
 
-    codes: machine code of the tapes, if there is any. places: rates, and the positions of origin and phases in p.
+    codes: machine code of the tapes, if there is any. phase_layout: rates, and the positions of origin and phases in p.
     control: rtol, atol, order, max_step, longest segment. target (2,): instant at which to stop. clock (2,): origin of
     the segment, advanced by the call. state: x, x_error, z, p, sides, orders, floors at the start of the segment,
-    advanced by the call. room: scratch arrays. record: receives the committed steps, segments and events. A segment
+    advanced by the call. scratch: scratch arrays. record: receives the committed steps, segments and events. A segment
     with more steps than fit is committed in parts.
     """
-    rates, origin_at, phases_at = places
+    rates, origin_at, phases_at = phase_layout
     rtol, atol, order, max_step, longest = control
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     sides, orders, floors = state.sides, state.orders, state.floors
-    V, W = room.V, room.W
-    guard_series, ahead = room.guard_series, room.ahead
-    powers, totals = room.sizes[: order + 1], room.sizes[order + 1 :]
-    y, y_error, scale = work.y, work.y_error, room.scale
-    side_now, order_now, floor_now = room.sides, room.orders, room.floors
+    V, W = scratch.V, scratch.W
+    guard_series, ahead = scratch.guard_series, scratch.ahead
+    powers, totals = scratch.sizes[: order + 1], scratch.sizes[order + 1 :]
+    y, y_error, scale = work.y, work.y_error, scratch.scale
+    side_now, order_now, floor_now = scratch.sides, scratch.orders, scratch.floors
     steps, series, segments, clocks = record.steps, record.series, record.segments, record.clocks
     modes, vectors, fires, jumps = record.modes, record.vectors, record.fires, record.jumps
     time, states = inputs.time[0], inputs.states
     n, n_steps, n_segments = x.shape[0], 0, 0
-    pace = room.pace
+    pace = scratch.pace
     pace[0], pace[1], pace[2] = math.inf, math.inf, 0.0
     while True:
         k, first_step = find_modes(tapes, z), n_steps
@@ -191,9 +192,9 @@ def leap(
         if n_segments >= segments.shape[0]:
             return FULL, n_steps, n_segments
         set_origin((origin_at, phases_at), rates, clock[0], clock[1], p)
-        rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
+        rows = tapes.optimised[tapes.optimised_start[k] : tapes.optimised_start[k + 1]]
         high = tapes.high[tapes.high_start[k] : tapes.high_start[k + 1]]
-        flow_places = (time, states, tapes.derivatives[k])
+        flow_registers = (time, states, tapes.derivatives[k])
         fading = tapes.fading[tapes.fading_start[k] : tapes.fading_start[k + 1]]
         code, values_code = codes.series[k], codes.values[k]
         ahead_code, sizes_code = codes.ahead[k], codes.sizes[k]
@@ -201,48 +202,54 @@ def leap(
         if code == 0:
             load(inputs, tapes, k, p, W)
         count = tapes.active_start[k + 1] - tapes.active_start[k]
-        watched, numbers = room.watched[:count], room.numbers[:count]
+        guard_registers, numbers = scratch.guard_registers[:count], scratch.numbers[:count]
         y1, rates_now, values, sums = parts_of(ahead, order, n, count)
         for i in range(count):
-            watched[i] = tapes.guards[k, tapes.active[tapes.active_start[k] + i]]
+            guard_registers[i] = tapes.guards[k, tapes.active[tapes.active_start[k] + i]]
         put(sides, side_now)
         put(orders, order_now)
         put(floors, floor_now)
         put(x, y)
         constants = V if code != 0 else W
-        s, fired, short, lands, holds = 0.0, -1, 0, landing(automata, z), holding(automata, z)
+        s, fired, short, is_projected, holds = (
+            0.0,
+            -1,
+            0,
+            any_projecting(automata, z),
+            any_holding(automata, z),
+        )
         for i in range(n):
             scale[i] = abs(x[i])
-        fill(room.largest, 0.0)
+        fill(scratch.largest, 0.0)
         while fired < 0 and s < bound:
             if n_steps >= steps.shape[0]:
-                if n_segments > 0 or n_steps < LEAST:
+                if n_segments > 0 or n_steps < MIN_STEPS_IN_PART:
                     return FULL, first_step, n_segments
                 break
             if s > longest:
                 return STOPPED, first_step, n_segments
             coefficients = series[n_steps]
-            is_known = n_steps > first_step and not lands
+            is_known = n_steps > first_step and not is_projected
             series_at(
                 code,
                 is_known,
                 rows,
                 high,
-                flow_places,
+                flow_registers,
                 order,
                 s,
                 y,
-                watched,
+                guard_registers,
                 fading,
                 V,
                 guard_series,
                 coefficients,
             )
             for i in range(count):
-                room.largest[i] = max(room.largest[i], abs(guard_series[i, 0]))
+                scratch.largest[i] = max(scratch.largest[i], abs(guard_series[i, 0]))
             left = bound - s
             h = reach(
-                sizes_code, coefficients, room.everyone, guard_series, numbers, order, rtol, atol, SLACK,
+                sizes_code, coefficients, scratch.everyone, guard_series, numbers, order, rtol, atol, SLACK,
                 min(left, max_step), powers, totals,
             )  # fmt: skip
             short = short + 1 if h < STANDSTILL * s else 0
@@ -257,7 +264,7 @@ def leap(
                 numbers,
                 powers,
                 totals,
-                parts_for_exit(room),
+                parts_for_exit(scratch),
                 codes.bernstein,
             )
             if outcome == OPEN:
@@ -271,8 +278,8 @@ def leap(
                     for j in range(order + 1):
                         u[j] *= power
                 if may_end(u, kind, totals[count + i]):
-                    end = call_apart(
-                        where_it_ends, (u, kind, order, d, room.a, room.stack, codes.bernstein[1])
+                    end = call_noinline(
+                        where_it_ends, (u, kind, order, d, scratch.a, scratch.stack, codes.bernstein[1])
                     )
                     if end < d:
                         d, outcome = end, NEVER
@@ -285,26 +292,26 @@ def leap(
                     d = on_the_grid(s, d)
                 if trials > _TRIALS or not d > 0.0:
                     return STOPPED, first_step, n_segments
-                look, holds_so_far = first_look, True
-                while holds_so_far and look <= len(BETWEEN):
+                look, passes = first_look, True
+                while passes and look <= len(BETWEEN):
                     e = d if look == len(BETWEEN) else BETWEEN[look] * d
                     look_ahead(
                         ahead_code,
                         rows,
-                        flow_places,
+                        flow_registers,
                         order,
                         s,
                         e,
-                        watched,
+                        guard_registers,
                         coefficients,
                         guard_series,
                         constants,
                         ahead,
                     )
-                    holds_so_far, look = flow_holds(ahead, order, n, e, y, rtol, atol), look + 1
-                if holds_so_far and (
+                    passes, look = flow_holds(ahead, order, n, e, y, rtol, atol), look + 1
+                if passes and (
                     keeps_up(guard_series, numbers, order, ahead, rtol, values, sums)
-                    or call_apart(
+                    or call_noinline(
                         differ_by_rounding, (automata, tapes, inputs, lin, k, s, values, sums, state, work)
                     )
                 ):
@@ -315,7 +322,7 @@ def leap(
             s = bound if outcome == NEVER and trials == 0 and d >= left else s + d
             if outcome == FOUND:
                 fired = g
-            if lands:
+            if is_projected:
                 call(functions.project, s, y1, p, z, y)
             else:
                 put(y1, y)
@@ -330,10 +337,10 @@ def leap(
             put(work.x_after, y)
         latest = max(abs(target[0]), abs(clock[0]))
         is_over = fired < 0 and s >= bound
-        if is_over and not is_clear(values, room.largest, s, latest):
+        if is_over and not is_clear(values, scratch.largest, s, latest):
             taken = n_steps - first_step
-            if call_apart(
-                may_be_at_zero,
+            if call_noinline(
+                may_vanish,
                 (automata, tapes, inputs, lin, k, s, latest, taken, scale, rates_now, state, work),
             ):
                 return STOPPED, first_step, n_segments
@@ -356,7 +363,7 @@ def leap(
             return STOPPED, first_step, n_segments
         s_error, slope, bend = 2.0 * 2.0**-52 * s, 0.0, 0.0
         if holds:
-            values_at(values_code, rows, flow_places, s, y, watched, constants, values, rates_now)
+            values_at(values_code, rows, flow_registers, s, y, guard_registers, constants, values, rates_now)
         for i in range(count):
             if tapes.active[tapes.active_start[k] + i] == fired:
                 slope = guard_series[i, 1]
@@ -370,7 +377,7 @@ def leap(
             automata, tapes, inputs, lin, fired, slope, bend, s, s_error, state, work
         ):
             return STOPPED, first_step, n_segments
-        if not settle_and_move_on(
+        if not resolve_and_advance(
             automata, tapes, inputs, lin, s, s_error, fired, n_steps - first_step, clock, state, work
         ):
             return STOPPED, first_step, n_segments
@@ -387,7 +394,7 @@ def move_on(s: float, clock: Any, sides: Any, orders: Any, floors: Any) -> None:
 
 
 @inlined
-def holding(automata: Any, z: Any) -> bool:
+def any_holding(automata: Any, z: Any) -> bool:
     """Return whether any component holds its surface."""
     for c in range(z.shape[0]):
         if automata.hold[c] >= 0 and z[c] == automata.hold[c]:
@@ -396,7 +403,7 @@ def holding(automata: Any, z: Any) -> bool:
 
 
 @inlined
-def landing(automata: Any, z: Any) -> bool:
+def any_projecting(automata: Any, z: Any) -> bool:
     """Return whether any component keeps its surface by projection, so that each step is projected."""
     for c in range(z.shape[0]):
         if automata.hold[c] >= 0 and z[c] == automata.hold[c] and automata.pin[c, 0] < 0:

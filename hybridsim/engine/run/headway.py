@@ -26,7 +26,8 @@ _HOPELESS = 1e5  # predicted seconds to the end after which a run is stopped: ab
 # number of further such intervals to the end.
 _TWICE, _FARTHER, _MORE = 3, 1.2, 20.0
 _CRAWLING = 30.0  # the same limit for a motion that alternates across an undeclared jump
-_LAST, _TURNS = 400, 0.2  # number of steps examined then, and least fraction of them with a reversal
+_EXAMINED_STEPS = 400  # number of last steps that are examined for reversals
+_REVERSAL_FRACTION = 0.2  # least fraction of them with a reversal
 _SOONER = 1.0  # predicted seconds by an explicit method above which a stiff method in Python is faster
 
 _JUMP = (
@@ -144,9 +145,9 @@ class Headway:
 
 def goes_back_and_forth(run: SegmentRun) -> bool:
     """Return whether a state reverses its direction in many of the last steps of a segment."""
-    states = np.array(run.states[-_LAST:])
-    if len(states) < _LAST or not states.size:
+    states = np.array(run.states[-_EXAMINED_STEPS:])
+    if len(states) < _EXAMINED_STEPS or not states.size:
         return False
     moves = np.diff(states, axis=0)
     turns = (moves[1:] * moves[:-1] < 0.0).mean(axis=0)
-    return bool((turns >= _TURNS).any())
+    return bool((turns >= _REVERSAL_FRACTION).any())

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 _EVENTS, _SHARE = 200, 1e-3
 _FASTER = 0.5  # intervals that shrink by more over these events are an accumulation instead
 # Stiffness: number of examined steps, how many must be near the stability limit, and the fraction that counts as near.
-_STEPS, _LOOKS, _MOST, _NEAR = 500, 8, 6, 0.6
+_STEPS, _LOOKS, _MIN_NEAR_LIMIT, _NEAR = 500, 8, 6, 0.6
 _DECAYING = 0.25  # least ratio of the decay rate to the magnitude of an eigenvalue
 _ITERATIONS, _ALIGNED = 12, 0.9  # of the power method, and the required alignment of its vector with a decay
 
@@ -152,7 +152,7 @@ class Notices:
             if rate < 0.0 and abs(h * rate) >= _NEAR * self.method.stable_to:
                 rate = self._fastest_turning(s, x, p, z)
             lengths.append(abs(h) * max(rate, 0.0))
-        if sum(length >= _NEAR * self.method.stable_to for length in lengths) < _MOST:
+        if sum(length >= _NEAR * self.method.stable_to for length in lengths) < _MIN_NEAR_LIMIT:
             return
         longest = int(np.argmax(lengths))
         i, s, h, *_ = samples[longest]

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from hybridsim.engine.events.zeno.accumulation import MOST, leads_nowhere
+from hybridsim.engine.events.zeno.accumulation import MAX_EVENTS_PER_TURN, cannot_accumulate
 from hybridsim.engine.events.zeno.hidden_bounces import may_be_hidden
 from hybridsim.engine.native.kernels import Precompiled
 from hybridsim.engine.record.block_list import BlockList, SegmentBlockList
@@ -99,7 +99,7 @@ class _FailedCall:
         raise self._error
 
 
-_leads_nowhere = Precompiled(leads_nowhere)
+_cannot_accumulate = Precompiled(cannot_accumulate)
 
 
 def _is_over(system: System, kernel_run: KernelRun) -> bool:
@@ -114,8 +114,8 @@ def _is_over(system: System, kernel_run: KernelRun) -> bool:
         system, kernel_run.after(), kernel_run.event_block or ()
     ):
         return False
-    work = np.empty((2, MOST))
-    return bool(_leads_nowhere(kernel_run.instants, fires, system.owner, len(system.automata), work))
+    work = np.empty((2, MAX_EVENTS_PER_TURN))
+    return bool(_cannot_accumulate(kernel_run.instants, fires, system.owner, len(system.automata), work))
 
 
 def run_task(

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.engine.native.kernels import call_apart, inlined, kernel
+from hybridsim.engine.native.kernels import call_noinline, inlined, kernel
 from hybridsim.engine.series.optimise import (
     ADD_CONSTANT,
     CONSTANT_SUB,
@@ -89,7 +89,7 @@ def _product(V: Any, E: Any, a: int, b: int, k: int) -> tuple[float, float]:
         total = V[a, 0] * V[b, 0]
         error = abs(V[a, 0]) * E[b, 0] + E[a, 0] * (abs(V[b, 0]) + E[b, 0]) + UNIT * abs(total)
         return total, error
-    inner, e = call_apart(_inner, (V, E, a, b, k, False))
+    inner, e = call_noinline(_inner, (V, E, a, b, k, False))
     ends, d = _pair(V, E, a, b, 0, k, 1.0, 1.0)
     total = inner + ends
     return total, e + d + UNIT * abs(total)
@@ -98,7 +98,7 @@ def _product(V: Any, E: Any, a: int, b: int, k: int) -> tuple[float, float]:
 @inlined
 def _slope(V: Any, E: Any, a: int, b: int, k: int) -> tuple[float, float]:
     """Compute sum_{i=1}^{k} i a_i b_{k-i} and its error bound; the sum is k times the integral of a' b."""
-    inner, error = call_apart(_inner, (V, E, a, b, k, True))
+    inner, error = call_noinline(_inner, (V, E, a, b, k, True))
     last = k * V[a, k] * V[b, 0]
     error += k * (abs(V[a, k]) * E[b, 0] + E[a, k] * (abs(V[b, 0]) + E[b, 0])) + 2.0 * UNIT * abs(last)
     return inner + last, error + UNIT * abs(inner + last)
@@ -211,7 +211,7 @@ def _higher(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) -
         _put(V, E, out + 1, k, w if b == 0 else -w, d)
     elif op == INTEGRAL and c != ANGLE:
         # y' a = b'  =>  k y_k a_0 = k b_k - sum_{j<k} j y_j a_{k-j}
-        s, e = call_apart(_inner, (V, E, out, a, k, True))
+        s, e = call_noinline(_inner, (V, E, out, a, k, True))
         n = V[b, k] - s * part
         _divide(V, E, out, k, n, E[b, k] + (e + 2.0 * UNIT * abs(s)) * part + UNIT * abs(n), a)
     elif op == INTEGRAL:
@@ -267,7 +267,7 @@ def _logic(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) ->
 
 @kernel
 def _with_constant(op: int, V: Any, E: Any, a: int, b: int, out: int, k: int) -> None:
-    """Compute order k of the lean tape's operations on a series and a constant, or of the sine of a linear angle."""
+    """Compute order k of an operation on a series and a constant, or of the sine of a linear angle."""
     u, du, v, dv = V[a, k], E[a, k], V[b, 0], E[b, 0]
     if op == SCALE:
         y = u * v
@@ -314,7 +314,7 @@ def _advance(row: Any, V: Any, E: Any, k: int) -> None:
     elif op == DIV and k == 0:
         _divide(V, E, out, 0, V[a, 0], E[a, 0], b)
     elif op == DIV:
-        y, e = call_apart(_inner, (V, E, out, b, k, False))
+        y, e = call_noinline(_inner, (V, E, out, b, k, False))
         first = V[out, 0] * V[b, k]
         e += abs(V[out, 0]) * E[b, k] + E[out, 0] * (abs(V[b, k]) + E[b, k]) + UNIT * abs(first)
         y += first
@@ -326,7 +326,7 @@ def _advance(row: Any, V: Any, E: Any, k: int) -> None:
             e = E[a, 0] / (2.0 * y) if y > 0.0 else math.sqrt(E[a, 0])
             _put(V, E, out, 0, y, e + UNIT * abs(y))
         else:
-            y, e = call_apart(_inner, (V, E, out, out, k, False))
+            y, e = call_noinline(_inner, (V, E, out, out, k, False))
             n = 0.5 * (V[a, k] - y)
             if V[out, 0] == 0.0 and n == 0.0 and E[a, k] + e == 0.0:
                 _put(V, E, out, k, 0.0, 0.0)
@@ -373,7 +373,7 @@ def run_series(
     V: Any,
     E: Any,
 ) -> None:
-    """Set the inputs of a lean tape and run it up to the order for which V and E have room.
+    """Set the inputs of an optimised tape and run it up to the order for which V and E have room.
 
     inputs: see `hybridsim.engine.system.system.Inputs`. derivatives: registers of the states' rates.
     """
@@ -397,5 +397,5 @@ def run_series(
         V[states[i], 0] = x[i]
         E[states[i], 0] = x_error[i]
     for r in range(constant_rows.shape[0]):
-        call_apart(_advance, (constant_rows[r], V, E, 0))
+        call_noinline(_advance, (constant_rows[r], V, E, 0))
     run_tape(rows, order, states, derivatives, V, E)

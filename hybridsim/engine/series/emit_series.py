@@ -1,4 +1,4 @@
-"""Straight-line code for the series of one vector of modes: every operation of its lean tape, order by order.
+"""Straight-line code for the series of one vector of modes: every operation of its optimised tape, order by order.
 
 An interpreter of a tape spends more time on dispatch than on arithmetic. Here each coefficient is a value
 of its own, equal values are computed once, and unused values are omitted. Each operation is that of
@@ -76,7 +76,7 @@ def _results(op: int) -> int:
 
 @dataclass(frozen=True)
 class ModeTape:
-    """The parts of a mode vector's lean tape that the code needs.
+    """The parts of a mode vector's optimised tape that the code needs.
 
     These are its rows, the rows of high orders, the registers of time, states, rates, active guards and
     arguments of fading functions, and the conditions that stay constant as time passes.

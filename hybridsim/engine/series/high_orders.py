@@ -39,7 +39,7 @@ _SAME, _TURNED = (ADD_CONSTANT, SUB_CONSTANT), (NEG, CONSTANT_SUB)  # copies and
 # latency in cycles; operations that are not listed are sums of products
 _WAITS = {ADD: 3, SUB: 3, NEG: 1, SCALE: 3, DIVIDE_BY: 3, DIV: 12, SQRT: 15}
 _PRODUCT = 6
-_MOST = 2  # constants of a factor
+_MAX_FACTOR_CONSTANTS = 2  # constants of a factor
 _EARLY = -(10**6)  # cycle of a value that does not depend on a state
 
 
@@ -117,7 +117,7 @@ class _Rewriting:
             if op in _TURNED:
                 form = replace(form, is_negative=not form.is_negative)
             elif op not in _SAME:
-                form = form if len(form.constants) < _MOST else _Scaled(a)
+                form = form if len(form.constants) < _MAX_FACTOR_CONSTANTS else _Scaled(a)
                 form = replace(form, constants=(*form.constants, (b, op == DIVIDE_BY)))
             self._forms[out] = form
             self.rows.append(row if row in self._unchanged else form.row(FACTOR, out))

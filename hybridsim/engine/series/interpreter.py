@@ -1,7 +1,7 @@
 """Taylor coefficients of any order along a flow, and the step size for which they are accurate.
 
 The recurrences are those of automatic differentiation (A. Jorba and M. Zou, Experimental Mathematics 14
-(2005) 99, doi:10.1080/10586458.2005.10128904). They use the lean tape, without the error bounds of
+(2005) 99, doi:10.1080/10586458.2005.10128904). They use the optimised tape, without the error bounds of
 `hybridsim.engine.series.bounded`.
 
 Sums run from the middle of a convolution outward. The newest coefficients, at both ends, are added last, so
@@ -19,7 +19,14 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.native.constants import EXACTLY
-from hybridsim.engine.native.kernels import call_apart, call_series, fused, inlined, kernel, polynomial_kernel
+from hybridsim.engine.native.kernels import (
+    call_noinline,
+    call_series,
+    fused,
+    inlined,
+    kernel,
+    polynomial_kernel,
+)
 from hybridsim.engine.series.high_orders import (
     FACTOR,
     HAS_B,
@@ -100,7 +107,7 @@ def _product(V: Any, a: int, b: int, k: int) -> float:
     """Compute sum_{i=0}^{k} a_i b_{k-i}."""
     if k == 0:
         return V[a, 0] * V[b, 0]
-    inner = call_apart(_inner, (V, a, b, k))
+    inner = call_noinline(_inner, (V, a, b, k))
     if k <= EXACTLY:
         return inner + (V[a, 0] * V[b, k] + V[a, k] * V[b, 0])
     if a == b:
@@ -128,13 +135,13 @@ def _rise(V: Any, a: int, b: int, k: int) -> float:
     """Compute coefficient k of the integral of a' b; at high orders the newest product is added last."""
     if k <= EXACTLY:
         return _slope(V, a, b, k) * (1.0 / k)
-    return fused(V[a, k], V[b, 0], call_apart(_weighted, (V, a, b, k)) * (1.0 / k))
+    return fused(V[a, k], V[b, 0], call_noinline(_weighted, (V, a, b, k)) * (1.0 / k))
 
 
 @inlined
 def _slope(V: Any, a: int, b: int, k: int) -> float:
     """Compute sum_{i=1}^{k} i a_i b_{k-i}, which is coefficient k - 1 of a' b."""
-    return call_apart(_weighted, (V, a, b, k)) + k * V[a, k] * V[b, 0]
+    return call_noinline(_weighted, (V, a, b, k)) + k * V[a, k] * V[b, 0]
 
 
 @kernel
@@ -181,7 +188,7 @@ def _higher(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
         w = _product(V, out, out, k)
         V[out + 1, k] = w if b == 0 else -w
     elif op == INTEGRAL and c != ANGLE:
-        V[out, k] = (V[b, k] - call_apart(_weighted, (V, out, a, k)) * (1.0 / k)) / V[a, 0]
+        V[out, k] = (V[b, k] - call_noinline(_weighted, (V, out, a, k)) * (1.0 / k)) / V[a, 0]
     elif op == INTEGRAL:
         total = _slope(V, b, a, k) - _slope(V, a, b, k)
         for j in range(1, k):
@@ -268,7 +275,7 @@ def advance(rows: Any, V: Any, k: int) -> None:
             if k == 0:
                 V[out, 0] = V[a, 0] / V[b, 0]
             else:
-                inner = call_apart(_inner, (V, out, b, k))
+                inner = call_noinline(_inner, (V, out, b, k))
                 if k <= EXACTLY:
                     rest = V[a, k] - (inner + V[out, 0] * V[b, k])
                 else:
@@ -280,12 +287,12 @@ def advance(rows: Any, V: Any, k: int) -> None:
             if k == 0:
                 V[out, 0] = math.sqrt(V[a, 0]) if V[a, 0] >= 0.0 else math.nan
             else:
-                rest = 0.5 * (V[a, k] - call_apart(_inner, (V, out, out, k)))
+                rest = 0.5 * (V[a, k] - call_noinline(_inner, (V, out, out, k)))
                 V[out, k] = 0.0 if V[out, 0] == 0.0 and rest == 0.0 else rest / V[out, 0]
         elif op >= RECIPROCAL:
             part = 1.0 / V[b, 0]
             factor = V[out, 0] * part * _factor((op - RECIPROCAL) ^ NEGATIVE, V, 0, c)
-            V[out, k] = fused(V[a, k], factor, -(call_apart(_inner, (V, out, b, k)) * part))
+            V[out, k] = fused(V[a, k], factor, -(call_noinline(_inner, (V, out, b, k)) * part))
         elif op >= INTEGRATE:
             if k + 1 < V.shape[1]:
                 V[out, k + 1] = V[a, k] * (_factor(op - INTEGRATE, V, b, c) * (1.0 / (k + 1)))
@@ -300,23 +307,23 @@ def advance(rows: Any, V: Any, k: int) -> None:
 
 
 @kernel
-def expand(rows: Any, high: Any, places: Any, order: int, s: float, x: Any, V: Any) -> None:
+def expand(rows: Any, high: Any, flow_registers: Any, order: int, s: float, x: Any, V: Any) -> None:
     """Compute the coefficients 0..order along the flow from x at local time s, of all registers or of those in `high`.
 
     high: rows for the orders beyond `EXACTLY` (`hybridsim.engine.series.high_orders`); if empty, all orders
-    use the same rows. places: registers of time (-1: none), of the states and of their derivatives. The
+    use the same rows. flow_registers: registers of time (-1: none), of the states and of their derivatives. The
     caller sets the constants.
     """
-    time, states, derivatives = places
+    time, states, derivatives = flow_registers
     if time >= 0:
         V[time, 0], V[time, 1] = s, 1.0
     for i in range(states.shape[0]):
         V[states[i], 0] = x[i]
     for k in range(order + 1):
         if k > EXACTLY and high.shape[0] > 0:
-            call_apart(advance, (high, V, k))
+            call_noinline(advance, (high, V, k))
             continue
-        call_apart(advance, (rows, V, k))
+        call_noinline(advance, (rows, V, k))
         if k < order:
             for i in range(states.shape[0]):
                 rate, j = V[derivatives[i], k], k + 1
@@ -347,8 +354,8 @@ def sum_sizes(U: Any, r: int, order: int, powers: Any) -> float:
 
 
 @inlined
-def measure(code: int, U: Any, watched: Any, order: int, h: float, powers: Any, totals: Any) -> None:
-    """Compute the powers of h and, for the series in the watched rows of U, the sums of `sum_sizes`.
+def measure(code: int, U: Any, monitored: Any, order: int, h: float, powers: Any, totals: Any) -> None:
+    """Compute the powers of h and, for the series in the monitored rows of U, the sums of `sum_sizes`.
 
     code: address of a function that does so for all rows, with the totals after the powers in memory (`sizes`
     of `hybridsim.engine.series.emit_series`); 0 for none.
@@ -357,8 +364,8 @@ def measure(code: int, U: Any, watched: Any, order: int, h: float, powers: Any, 
         call_series(code, h, 0.0, U, U, U, powers)
         return
     tabulate(h, order, powers)
-    for j in range(watched.shape[0]):
-        totals[j] = sum_sizes(U, watched[j], order, powers)
+    for j in range(monitored.shape[0]):
+        totals[j] = sum_sizes(U, monitored[j], order, powers)
 
 
 @inlined
@@ -409,7 +416,7 @@ def reach(
     V: Any,
     states: Any,
     U: Any,
-    watched: Any,
+    monitored: Any,
     order: int,
     rtol: float,
     atol: Any,
@@ -423,7 +430,7 @@ def reach(
     On return powers (order + 1,) are h**k and totals are those of `sum_sizes` for the functions; code: see
     `measure`.
 
-    states: rows of V with the series of the states, watched: rows of U with those of functions. The last two
+    states: rows of V with the series of the states, monitored: rows of U with those of functions. The last two
     terms of each state are below atol + rtol |x|, and those of each function below rtol of its largest term,
     times the slack. The result is NaN if a coefficient is not finite.
     """
@@ -438,9 +445,9 @@ def reach(
             scale = rtol * max(abs(V[r, 1]) * h, 1e-300)
         first, last = max(first, one / scale), max(last, two / scale)
     h = min(h, rough_inverse_root(first, order - 1), rough_inverse_root(last, order))
-    measure(code, U, watched, order, h, powers, totals)
-    for j in range(watched.shape[0]):
-        r = watched[j]
+    measure(code, U, monitored, order, h, powers, totals)
+    for j in range(monitored.shape[0]):
+        r = monitored[j]
         for _ in range(_TRIALS):
             if not totals[j] < math.inf:
                 return math.nan
@@ -459,7 +466,7 @@ def reach(
                 if term <= slack * rtol * max(max(largest, a), max(b, c)):
                     break
             h = shorter_reach(U, r, order, rtol, h, abs(U[r, order]) * powers[order] < term)
-            measure(code, U, watched, order, h, powers, totals)
+            measure(code, U, monitored, order, h, powers, totals)
     return h
 
 

@@ -7,16 +7,16 @@ from hybridsim.engine.native.kernels import inlined
 HYPERBOLIC, EXPONENTIAL, ROOT, KINDS = range(4)
 
 
-MOST_POWER = 64  # largest power that is distinguished
+MAX_POWER = 64  # largest power that is distinguished
 
 
 @inlined
 def register_of(number: int) -> int:
     """Return the register to which a number of `hybridsim.engine.system.programs.mode_code.fading` belongs."""
-    return number // (KINDS * MOST_POWER)
+    return number // (KINDS * MAX_POWER)
 
 
 @inlined
 def power_of(number: int) -> int:
     """Return the largest power to which the fading function is raised."""
-    return number // KINDS % MOST_POWER + 1
+    return number // KINDS % MAX_POWER + 1

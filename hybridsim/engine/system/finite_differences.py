@@ -179,7 +179,7 @@ def _path(flow: Any, s: float, t: float, x: Any, p: Any, z: Any, C: Any, E: Any,
 @allocating_kernel
 def _series(
     flow: Any,
-    watched: Any,
+    guards_and_monitors: Any,
     s: float,
     t: float,
     x: Any,
@@ -191,25 +191,25 @@ def _series(
     G: Any,
     GE: Any,
 ) -> None:
-    """Write coefficients of the states and the watched functions along the flow, with bounds for rounding and steps."""
+    """Write coefficients of the states and guards and monitors along the flow, with bounds for rounding and steps."""
     _path(flow, s, t, x, p, z, C, E, H)
     if G.shape[0]:
-        along(watched, s, t, 1.0, C, p, z, G, GE, np.empty_like(G))
+        along(guards_and_monitors, s, t, 1.0, C, p, z, G, GE, np.empty_like(G))
 
 
 @allocating_kernel
 def run_differences(
-    flow: Any, watched: Any, s: float, t: float, s_error: float, x: Any, x_error: Any, p: Any, z: Any, C: Any, G: Any,
-    GE: Any,
+    flow: Any, guards_and_monitors: Any, s: float, t: float, s_error: float, x: Any, x_error: Any, p: Any, z: Any,
+    C: Any, G: Any, GE: Any,
 ) -> None:  # fmt: skip
-    """Write coefficients C (n, 4) of the states and G (m, 4) of the watched functions along the flow, with bounds GE.
+    """Write coefficients C (n, 4) of the states and G (m, 4) of guards and monitors along the flow, with bounds GE.
 
     s: local time, t: absolute time. s_error, x_error: errors of time and states. Their effect on each coefficient is
     measured by small shifts. Without them the bounds contain only step and rounding errors.
     """
     n, m = x.shape[0], G.shape[0]
     E, H = np.empty((n, ORDER + 1)), np.empty((n, ORDER + 1))
-    _series(flow, watched, s, t, x, p, z, C, E, H, G, GE)
+    _series(flow, guards_and_monitors, s, t, x, p, z, C, E, H, G, GE)
     known_exactly = not s_error > 0.0
     for i in range(n):
         known_exactly = known_exactly and not x_error[i] > 0.0
@@ -227,10 +227,10 @@ def run_differences(
         d = d if d > 0.0 else _SMALLEST
         for sign in (1.0, -1.0):  # the second direction is for states at the edge of the domain
             if j < 0:
-                _series(flow, watched, s + sign * d, t + sign * d, x, p, z, C1, E1, H1, G1, GE1)
+                _series(flow, guards_and_monitors, s + sign * d, t + sign * d, x, p, z, C1, E1, H1, G1, GE1)
             else:
                 moved[j] = x[j] + sign * d
-                _series(flow, watched, s, t, moved, p, z, C1, E1, H1, G1, GE1)
+                _series(flow, guards_and_monitors, s, t, moved, p, z, C1, E1, H1, G1, GE1)
                 moved[j] = x[j]
             if np.isfinite(G1).all():
                 break

@@ -66,7 +66,7 @@ class Compiled:
 
 _loaded: dict[str, Compiled] = {}
 _STRUCTURES = 64  # most recently used modules kept in memory; others are read from disk again
-_MOST = 16  # models of Python functions kept in memory; these are not stored on disk
+_MAX_FUNCTION_MODELS = 16  # models of Python functions kept in memory; these are not stored on disk
 _of_functions: dict[tuple[Any, ...], PythonCode] = {}
 _lock = SharedLock()  # for both dictionaries
 
@@ -95,7 +95,7 @@ def _code_of_functions(model: Model) -> PythonCode:
         if key in _of_functions and not _of_functions[key].is_current:
             del _of_functions[key]
         code = _of_functions.pop(key, None) or PythonCode(model)
-        while len(_of_functions) >= _MOST:
+        while len(_of_functions) >= _MAX_FUNCTION_MODELS:
             del _of_functions[next(iter(_of_functions))]
         _of_functions[key] = code
         return code

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 # Ratios of periods closer than this to a whole number count as whole, because parameters are rounded.
 _COMMENSURATE = 1e-9
-_MOST = 64  # longest common period, in units of the longest single period
+_MAX_PERIOD_RATIO = 64  # longest common period, in units of the longest single period
 
 
 def system_period(system: System) -> float | None:
@@ -29,7 +29,7 @@ def common_period(system: System) -> float | None:
 
 def common_multiple(periods: list[float]) -> float | None:
     """Return the least multiple of the longest period that all other periods divide, or None."""
-    return _multiple_of_all(periods, _MOST) if periods else None
+    return _multiple_of_all(periods, _MAX_PERIOD_RATIO) if periods else None
 
 
 def all_periods(system: System) -> list[float]:

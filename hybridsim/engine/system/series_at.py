@@ -17,7 +17,7 @@ _LINEAR = 1.6
 _LITTLE = 2.0**-44  # step relative to the time so far that counts as none
 # Terms larger than this, or smaller than its inverse, are dropped from a series whose first terms are of moderate size.
 # They are multiplied by powers of the step, which must be doubles as well.
-_MOST, _MODERATE = 1e250, 1e100
+_LARGEST_TERM, _MODERATE = 1e250, 1e100
 _TIGHTEST = 1e-15  # tightest tolerance of series in double precision
 
 
@@ -80,8 +80,8 @@ class SeriesRun:
         if not len(sizes):
             return self.order
         began = sizes[:, :2].max(axis=1)
-        lost = (sizes > _MOST) & (began <= _MODERATE)[:, None]
-        lost |= (sizes > 0.0) & (sizes < 1.0 / _MOST) & (began >= 1.0 / _MODERATE)[:, None]
+        lost = (sizes > _LARGEST_TERM) & (began <= _MODERATE)[:, None]
+        lost |= (sizes > 0.0) & (sizes < 1.0 / _LARGEST_TERM) & (began >= 1.0 / _MODERATE)[:, None]
         lost[:, : _SMALLEST_ORDER + 1] = False
         far = np.flatnonzero(lost.any(axis=0))
         return int(far[0]) - 1 if len(far) else self.order

@@ -472,9 +472,9 @@ class System:
         if key in self._high:
             return self._high[key]
         tape = self.optimised_tape(z)
-        watched = (*tape.guards[self.active(z)].tolist(), *tape.monitors.tolist())
+        monitored = (*tape.guards[self.active(z)].tolist(), *tape.monitors.tolist())
         rows = list(map(tuple, tape.rows.tolist()))
-        self._high[key] = high_rows(rows, tape.states.tolist(), tape.derivatives.tolist(), watched)
+        self._high[key] = high_rows(rows, tape.states.tolist(), tape.derivatives.tolist(), monitored)
         return self._high[key]
 
     def series(

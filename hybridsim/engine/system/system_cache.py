@@ -10,7 +10,7 @@ from hybridsim.forks import SharedLock
 if TYPE_CHECKING:
     from hybridsim.model.parts.model import Model
 
-_MOST = 16  # largest number of cached systems, enough for loops over several models
+_MAX_SYSTEMS = 16  # largest number of cached systems, enough for loops over several models
 
 _systems: dict[int, System] = {}
 _lock = SharedLock()
@@ -35,7 +35,7 @@ def system_of(model: Model) -> System:
         return system
     system = System(model.validate())
     with _lock:
-        while len(_systems) >= _MOST:
+        while len(_systems) >= _MAX_SYSTEMS:
             del _systems[next(iter(_systems))]
         _systems[id(model)] = system
     return system

@@ -109,7 +109,7 @@ def run_tangents(
     rows: Any,
     inputs: Any,
     seeds: Any,
-    wanted: Any,
+    outputs: Any,
     s: Any,
     x: Any,
     p: Any,
@@ -145,10 +145,10 @@ def run_tangents(
         advance(rows, V, 0)
         for r in range(rows.shape[0]):
             _tangent(rows[r, 0], rows[r, 1], rows[r, 2], rows[r, 3], rows[r, 4], V, D)
-        for i in range(wanted.shape[0]):
-            values[m, i] = V[wanted[i], 0]
+        for i in range(outputs.shape[0]):
+            values[m, i] = V[outputs[i], 0]
             for j in range(D.shape[1]):
-                tangents[m, i, j] = D[wanted[i], j]
+                tangents[m, i, j] = D[outputs[i], j]
 
 
 class Tangents(NamedTuple):
@@ -193,8 +193,8 @@ class TangentTape:
 
     def __call__(self, s: np.ndarray, x: np.ndarray, p: np.ndarray, seeds: np.ndarray) -> Tangents:
         """Evaluate at local times s (m,) and states x (m, n), along the directions seeds (n + 1 + len(p), D)."""
-        count, wanted, directions = self._registers.count, len(self._outputs), seeds.shape[1]
-        values, slopes = np.empty((len(s), wanted)), np.empty((len(s), wanted, directions))
+        count, outputs, directions = self._registers.count, len(self._outputs), seeds.shape[1]
+        values, slopes = np.empty((len(s), outputs)), np.empty((len(s), outputs, directions))
         run_tangents(
             self._rows, self._registers.inputs, np.ascontiguousarray(seeds), self._outputs,
             np.ascontiguousarray(s, dtype=float), np.ascontiguousarray(x, dtype=float), p,

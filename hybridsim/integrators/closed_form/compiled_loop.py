@@ -21,15 +21,15 @@ from hybridsim.engine.run.call_arrays import CallArrays, StateBuffer, buffer_of
 from hybridsim.engine.run.kernel_run import KernelRun
 from hybridsim.engine.run.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, LoopResult
 from hybridsim.engine.system.instant import Instant
-from hybridsim.engine.system.programs.mode_tables import automata_of, shelf_of
+from hybridsim.engine.system.programs.mode_tables import automata_of, tape_cache_of
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
-from hybridsim.integrators.closed_form.segments import Record, leap_at_address, reach_leap, room_for
+from hybridsim.integrators.closed_form.segments import Record, call_event_loop, link_event_loop, scratch_for
 
 _SEGMENTS = 1024  # most segments of one call
-_NONE = np.zeros(0, dtype=np.int64)
+_NO_OWNERS = np.zeros(0, dtype=np.int64)
 
-_leap = Precompiled(leap_at_address)
+_event_loop = Precompiled(call_event_loop)
 
 
 class ClosedFormLoop:
@@ -38,9 +38,9 @@ class ClosedFormLoop:
     def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
         self.system, self.longest = system, longest
         self.horizon = 0.0  # longest segment that was possible so far
-        # as in `Room.hints` after the last call
+        # as in `Scratch.hints` after the last call
         self.hints = np.zeros((0, system.guard_count))
-        self.shelf, self.automata = shelf_of(system), automata_of(system)
+        self.tape_cache, self.automata = tape_cache_of(system), automata_of(system)
         self.tables: LinearTables | None = None  # tables for which the layout was made
         self.array_layout: ArrayLayout
         self.kernel_run: KernelRun | None = None  # a call made beforehand, which `advance` takes first
@@ -58,7 +58,7 @@ class ClosedFormLoop:
         The hints are stored with their mode vectors, because another process has these in other rows.
         """
         count = len(self.hints)
-        modes = self.shelf.tapes.modes[:count]
+        modes = self.tape_cache.tapes.modes[:count]
         return np.array([self.horizon, float(count)]), modes.ravel().astype(float), self.hints.ravel()
 
     @place.setter
@@ -80,15 +80,15 @@ class ClosedFormLoop:
         vectors = place[2 : 2 + count * components].reshape(count, components).astype(np.int64)
         hints = place[2 + count * components :].reshape(count, guards)
         is_known = (hints > 0.0).any(axis=1)
-        rows = self.shelf.rows_of(vectors[is_known])
+        rows = self.tape_cache.rows_of(vectors[is_known])
         self.hints = np.zeros((max(rows.tolist(), default=-1) + 1, guards))
         self.hints[rows] = hints[is_known]
 
     def go(self, origin: Instant, buffer: StateBuffer, target: Instant) -> KernelRun | None:
         """Call the kernel; return None without tables."""
-        system, shelf = self.system, self.shelf
-        shelf.surround(buffer.part("z"))
-        tapes, inputs = shelf.tapes, system.registers.inputs
+        system, tape_cache = self.system, self.tape_cache
+        tape_cache.surround(buffer.part("z"))
+        tapes, inputs = tape_cache.tapes, system.registers.inputs
         horizon = max(self.horizon, min(target.minus(origin), self.longest))
         found = tables_of(system, tapes.modes, buffer.part("p"), horizon)
         if found is None:
@@ -103,26 +103,26 @@ class ClosedFormLoop:
             call_arrays = spare.pop()
         except IndexError:
             work = work_space(system, len(tables.kinds), len(tables.factors))
-            call_arrays = CallArrays.of(buffer, work, room_for(system, tables))
-            reach_leap(
-                self.automata, tapes, inputs, tables, call_arrays.as_packed, work, call_arrays.room, rows
+            call_arrays = CallArrays.of(buffer, work, scratch_for(system, tables))
+            link_event_loop(
+                self.automata, tapes, inputs, tables, call_arrays.as_packed, work, call_arrays.scratch, rows
             )
         call_arrays.set_state(buffer)
-        room = call_arrays.room
-        room.rates[:], room.longest[0] = system.rates, self.longest
-        room.times[:] = *target, *origin
-        hints, known = room.hints, len(self.hints)
+        scratch = call_arrays.scratch
+        scratch.rates[:], scratch.longest[0] = system.rates, self.longest
+        scratch.times[:] = *target, *origin
+        hints, known = scratch.hints, len(self.hints)
         hints[:known], hints[known:] = self.hints, 0.0
         began = perf_counter()
-        code = _leap(
-            self.automata, tapes, inputs, tables, call_arrays.as_packed, call_arrays.work, room, rows
+        code = _event_loop(
+            self.automata, tapes, inputs, tables, call_arrays.as_packed, call_arrays.work, scratch, rows
         )
         seconds = perf_counter() - began
-        end, clock, count = call_arrays.final_state(), room.times[2:].tolist(), int(room.committed[0])
+        end, clock, count = call_arrays.final_state(), scratch.times[2:].tolist(), int(scratch.committed[0])
         beside = (tables, horizon, hints.copy())
         spare.append(call_arrays)
-        shelf.surround(end.part("z"))
-        has_news = count > 0 and len(shelf.tapes.modes) != len(tapes.modes)
+        tape_cache.surround(end.part("z"))
+        has_news = count > 0 and len(tape_cache.tapes.modes) != len(tapes.modes)
         return KernelRun(
             system, self.array_layout, memory, 0, code, count, count, clock, end, has_news, seconds, beside
         )
@@ -133,13 +133,13 @@ class ClosedFormLoop:
         """Advance through ordinary events as far as the buffers last."""
         kernel_run, self.kernel_run = self.kernel_run or self.go(origin, buffer_of(outcome, p), target), None
         if kernel_run is None:
-            return LoopResult(origin, outcome.copy, BEFORE_SOMETHING, np.zeros((0, 2)), _NONE)
+            return LoopResult(origin, outcome.copy, BEFORE_SOMETHING, np.zeros((0, 2)), _NO_OWNERS)
         _, self.horizon, self.hints = kernel_run.beside
         self.count(kernel_run, record.counters)
         if kernel_run.count:
             self._commit(kernel_run, record)
-        goes_on = kernel_run.is_full or kernel_run.has_news
-        end = ARRIVED if kernel_run.is_at_target else (PAUSED if goes_on else BEFORE_SOMETHING)
+        may_continue = kernel_run.is_full or kernel_run.has_news
+        end = ARRIVED if kernel_run.is_at_target else (PAUSED if may_continue else BEFORE_SOMETHING)
         return LoopResult(
             Instant(*kernel_run.clock), kernel_run.after, end, kernel_run.instants, kernel_run.owners
         )

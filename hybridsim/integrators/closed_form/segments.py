@@ -12,13 +12,13 @@ import numpy as np
 
 from hybridsim.engine.events.compiled.after_segment import (
     is_crowded,
+    link_event_resolution,
     moved_on,
-    reach_settling,
-    settle_and_move_on,
+    resolve_and_advance,
     state_errors,
 )
-from hybridsim.engine.events.compiled.at_end import may_be_at_zero_of_linear
-from hybridsim.engine.events.compiled.scratch import LEAP, ROW, called_by
+from hybridsim.engine.events.compiled.at_end import may_vanish_linear
+from hybridsim.engine.events.compiled.scratch import EVENT_LOOP, ROW, called_by
 from hybridsim.engine.linear.motion import (
     POINTS,
     errors_of_time,
@@ -36,30 +36,30 @@ from hybridsim.engine.linear.motion import (
 from hybridsim.engine.native.constants import BOUND_TERMS
 from hybridsim.engine.native.kernels import (
     call,
-    call_apart,
     call_kernel,
+    call_noinline,
+    inline_always,
     inlined,
     kernel,
     kernel_address,
-    merged,
 )
 from hybridsim.engine.native.loop_hints import put
 from hybridsim.engine.native.simd_products import dot, vector_of
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.roots.first_exit import FOUND, OPEN
-from hybridsim.engine.run.event_loop import AT_TARGET, FULL, STOPPED, holding, set_origin
+from hybridsim.engine.run.event_loop import AT_TARGET, FULL, STOPPED, any_holding, set_origin
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.programs.modes_index import find_modes
 
-_NONE, _OPEN = -1, -2  # no guard becomes negative; undecided because of rounding
+_NO_GUARD, _OPEN = -1, -2  # no guard becomes negative; undecided because of rounding
 _DONE = -1.0  # replaces a guard's size if its first zero is known
 
 
-class Room(NamedTuple):
+class Scratch(NamedTuple):
     """Task and scratch arrays of the compiled loop."""
 
     rates: np.ndarray  # (R,) rates of the angles
-    places: np.ndarray  # (2,) places in p of the origin and of the phases
+    layout_positions: np.ndarray  # (2,) places in p of the origin and of the phases
     longest: np.ndarray  # (1,) longest segment
     times: np.ndarray  # (4,) target, and clock, which is advanced
     committed: np.ndarray  # (1,) number of committed segments
@@ -89,18 +89,18 @@ class Record(NamedTuple):
     jumps: np.ndarray  # (., 3, n) state at the start, and before and after the end
 
 
-@merged
-def first_exit_of(lin: Any, tapes: Any, k: int, bound: float, state: Any, room: Any) -> tuple[int, float]:
-    """Find the guard of the modes in row k that first becomes negative, and when; (_NONE, bound), or (_OPEN, time).
+@inline_always
+def first_exit_of(lin: Any, tapes: Any, k: int, bound: float, state: Any, scratch: Any) -> tuple[int, float]:
+    """Find the guard of the modes in row k that first becomes negative, and when; (_NO_GUARD, bound), or (_OPEN, time).
 
     Waves have their zeros in closed form. Of the other guards the one with the earliest zero in the last
     visit of these modes comes first, or else the one that falls fastest. The rest need to be followed no
     farther than its zero. All are followed up to one horizon, and then up to four times as far, since most
     stay positive for long.
     """
-    c, starts, hints, sides, orders = room.c, room.starts, room.hints, state.sides, state.orders
+    c, starts, hints, sides, orders = scratch.c, scratch.starts, scratch.hints, state.sides, state.orders
     first, last = tapes.active_start[k], tapes.active_start[k + 1]
-    lead, soonest, horizon, known, until = first, math.inf, bound, _NONE, bound
+    lead, soonest, horizon, known, until = first, math.inf, bound, _NO_GUARD, bound
     for i in range(first, last):
         g = tapes.active[i]
         start = starts[i - first]
@@ -124,13 +124,13 @@ def first_exit_of(lin: Any, tapes: Any, k: int, bound: float, state: Any, room: 
     if not horizon > 0.0:
         return _OPEN, 0.0
     while True:
-        fired, s = (known, until) if until <= horizon else (_NONE, min(horizon, bound))
+        fired, s = (known, until) if until <= horizon else (_NO_GUARD, min(horizon, bound))
         for j in range(first, last):
             i = lead if j == first else (j - 1 if j <= lead else j)
             if starts[i - first, BOUND_TERMS] == _DONE:
                 continue
             g = tapes.active[i]
-            outcome, at = first_zero(lin, k, g, i - first, s, state, room)
+            outcome, at = first_zero(lin, k, g, i - first, s, state, scratch)
             if outcome == OPEN:
                 return _OPEN, at
             if outcome == FOUND:
@@ -141,13 +141,13 @@ def first_exit_of(lin: Any, tapes: Any, k: int, bound: float, state: Any, room: 
         horizon *= 4.0
 
 
-def room_for(system: Any, tables: Any) -> Room:
+def scratch_for(system: Any, tables: Any) -> Scratch:
     """Return scratch arrays for the compiled loop of a system with tables of this shape, packed for kernels."""
     n, widest, layout = system.n, tables.values.shape[1], system.layout
-    room: Room = packed(
-        Room(
+    scratch: Scratch = packed(
+        Scratch(
             rates=np.zeros(layout.phases),
-            places=np.array([layout.origin_at, layout.phases_at], dtype=np.int64),
+            layout_positions=np.array([layout.origin_at, layout.phases_at], dtype=np.int64),
             longest=np.zeros(1),
             times=np.zeros(4),
             committed=np.zeros(1, dtype=np.int64),
@@ -164,7 +164,7 @@ def room_for(system: Any, tables: Any) -> Room:
             pace=np.empty(3),
         )
     )
-    return room
+    return scratch
 
 
 @inlined
@@ -174,27 +174,32 @@ def stopped(hints: Any, k: int, former: Any) -> int:
     return STOPPED
 
 
-def exact_leap(
-    automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any, room: Any, record: Any
+def linear_event_loop(
+    automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any, scratch: Any, record: Any
 ) -> int:
     """Go from event to event and return why it ended; FULL also means a second of following guards, or growth.
 
     The kernel is called by address, so that it is compiled once for all callers. automata, tapes, inputs,
     state and work are as for `leap`; lin: tables of linear modes; record: output for segments and events.
     """
-    place, rates = (room.places[0], room.places[1]), room.rates
-    longest, target, clock, functions = room.longest[0], room.times[:2], room.times[2:], called_by(work)
-    committed = room.committed
-    committed[0] = room.points[0] = 0
+    place, rates = (scratch.layout_positions[0], scratch.layout_positions[1]), scratch.rates
+    longest, target, clock, functions = (
+        scratch.longest[0],
+        scratch.times[:2],
+        scratch.times[2:],
+        called_by(work),
+    )
+    committed = scratch.committed
+    committed[0] = scratch.points[0] = 0
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
-    c, v, scale = room.c, room.v, room.scale
+    c, v, scale = scratch.c, scratch.v, scratch.scale
     y, y1, y_error, slopes = work.y, work.x_after, work.y_error, work.slopes
     ends, clocks, rows, modes = record.ends, record.clocks, record.rows, record.modes
     vectors, coordinates, fires, jumps = record.vectors, record.coordinates, record.fires, record.jumps
     n, n_segments = x.shape[0], 0
-    pace = room.pace
+    pace = scratch.pace
     pace[0], pace[1], pace[2] = math.inf, math.inf, 0.0
-    hints, former = room.hints, room.former
+    hints, former = scratch.hints, scratch.former
     k, is_known = find_modes(tapes, z), False
     while True:
         bound = (target[0] - clock[0]) + (target[1] - clock[1])
@@ -202,7 +207,7 @@ def exact_leap(
             return AT_TARGET
         if k < 0:
             return STOPPED
-        if n_segments >= ends.shape[0] or room.points[0] > POINTS:
+        if n_segments >= ends.shape[0] or scratch.points[0] > POINTS:
             return FULL
         if not is_known:
             set_origin(place, rates, clock[0], clock[1], p)
@@ -210,7 +215,7 @@ def exact_leap(
         put(hints[k], former)
         to_modal(lin, k, x, work.w, c)
         until = min(bound, lin.lasting[k])
-        fired, s = first_exit_of(lin, tapes, k, until, state, room)
+        fired, s = first_exit_of(lin, tapes, k, until, state, scratch)
         if fired == _OPEN:
             return stopped(hints, k, former)
         if s > longest:
@@ -218,9 +223,9 @@ def exact_leap(
         moved(lin, k, c, s, v)
         states_of(lin, k, v, y)
         if s < lin.near[k]:
-            call_apart(states_near_start, (lin, k, x, work.w, s, room.series, y))
-        state_sizes(lin, k, c, v, room.sizes, scale)
-        if holding(automata, z):
+            call_noinline(states_near_start, (lin, k, x, work.w, s, scratch.series, y))
+        state_sizes(lin, k, c, v, scratch.sizes, scale)
+        if any_holding(automata, z):
             call(functions.project, s, y, p, z, y1)
             put(y1, y)
         for i in range(n):
@@ -228,7 +233,7 @@ def exact_leap(
                 return stopped(hints, k, former)
         if fired < 0 and until == bound:
             time = max(abs(target[0]), abs(clock[0]))
-            if may_be_at_zero_of_linear(lin, tapes, k, s, time, v, room.sizes, room.terms[0]):
+            if may_vanish_linear(lin, tapes, k, s, time, v, scratch.sizes, scratch.terms[0]):
                 return stopped(hints, k, former)
         ends[n_segments], clocks[n_segments, 0], clocks[n_segments, 1] = s, clock[0], clock[1]
         rows[n_segments], fires[n_segments] = k, fired
@@ -265,12 +270,12 @@ def exact_leap(
         errors_of_time(lin, s_error, work.factors, work.w_error)
         slopes_of(lin, k, y, work.w, slopes)
         state_errors(automata, s_error, y, scale, x_error, z, slopes, y_error)
-        work.whole[ROW] = k
-        if not settle_and_move_on(automata, tapes, inputs, lin, 0.0, s_error, fired, 1, clock, state, work):
+        work.int_slots[ROW] = k
+        if not resolve_and_advance(automata, tapes, inputs, lin, 0.0, s_error, fired, 1, clock, state, work):
             clock[0], clock[1] = high, low
             set_origin(place, rates, high, low, p)
             return stopped(hints, k, former)
-        k = work.whole[ROW] if work.whole[ROW] != k else find_modes(tapes, z)
+        k = work.int_slots[ROW] if work.int_slots[ROW] != k else find_modes(tapes, z)
         is_known = automata.hold[automata.owner[fired]] >= 0  # another event may have changed p
         put(y1, jumps[n_segments, 2])
         n_segments += 1
@@ -278,16 +283,20 @@ def exact_leap(
 
 
 @kernel
-def leap_at_address(
-    automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any, room: Any, record: Any
+def call_event_loop(
+    automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any, scratch: Any, record: Any
 ) -> int:
-    """Call `exact_leap` by its address."""
-    return call_kernel(work.reached[LEAP], (automata, tapes, inputs, lin, state, work, room, record))
+    """Call `linear_event_loop` by its address."""
+    return call_kernel(
+        work.entry_points[EVENT_LOOP], (automata, tapes, inputs, lin, state, work, scratch, record)
+    )
 
 
-def reach_leap(
-    automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any, room: Any, record: Any
+def link_event_loop(
+    automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any, scratch: Any, record: Any
 ) -> None:
     """Compile the kernels that a call needs, if necessary, and store their addresses for other kernels."""
-    reach_settling(automata, tapes, inputs, lin, state, work)
-    work.reached[LEAP] = kernel_address(exact_leap, automata, tapes, inputs, lin, state, work, room, record)
+    link_event_resolution(automata, tapes, inputs, lin, state, work)
+    work.entry_points[EVENT_LOOP] = kernel_address(
+        linear_event_loop, automata, tapes, inputs, lin, state, work, scratch, record
+    )

@@ -10,7 +10,7 @@ from hybridsim.engine.native.kernels import call, inlined
 
 # reasons why a sequence of steps ended
 BOUND, FULL, GUARD, MONITOR, NOT_FINITE, RESTITUTION, RESTED = 0, 1, 2, 3, 4, 5, 6
-GOES_ON = -1
+CONTINUES = -1
 
 
 @inlined
@@ -45,7 +45,7 @@ def passed(
     x1: Any,
     p: Any,
     z: Any,
-    watched: Any,
+    guard_numbers: Any,
     fresh: Any,
     is_first: bool,
     guards: Any,
@@ -53,24 +53,24 @@ def passed(
     after: Any,
     counts: Any,
 ) -> int:
-    """Return the reason to end the loop after a step to (s1, x1), or GOES_ON.
+    """Return the reason to end the loop after a step to (s1, x1), or CONTINUES.
 
-    functions: addresses of guards and monitors. watched: guards that must not be negative. fresh: monitors
+    functions: addresses of guards and monitors. guard_numbers: guards that must not be negative. fresh: monitors
     that have just fired, whose remaining zero on the first step is not a new one. before: monitor values at
     the start of the step. guards, after: scratch space.
     """
     for i in range(x1.shape[0]):
         if not np.isfinite(x1[i]):
             return NOT_FINITE
-    if watched.shape[0] > 0:
+    if guard_numbers.shape[0] > 0:
         call(functions[0], s1, x1, p, z, guards)
         counts[1] += 1
         leaves = False
-        for i in range(watched.shape[0]):
-            if watched[i] >= 0:
-                if np.isnan(guards[watched[i]]):
+        for i in range(guard_numbers.shape[0]):
+            if guard_numbers[i] >= 0:
+                if np.isnan(guards[guard_numbers[i]]):
                     return NOT_FINITE
-                leaves = leaves or guards[watched[i]] < 0.0
+                leaves = leaves or guards[guard_numbers[i]] < 0.0
         if leaves:
             return GUARD
     if fresh.shape[0] > 0:
@@ -78,4 +78,4 @@ def passed(
         for k in range(fresh.shape[0]):
             if leaves_side(before[k], after[k]) and not (is_first and fresh[k]):
                 return MONITOR
-    return GOES_ON
+    return CONTINUES

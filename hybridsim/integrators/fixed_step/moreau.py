@@ -14,7 +14,7 @@ from hybridsim.engine.system.system import System
 from hybridsim.errors import UsageError
 from hybridsim.integrators.contract import Integrator
 from hybridsim.integrators.fixed_step.moreau_impacts import UNILATERAL
-from hybridsim.integrators.fixed_step.moreau_kernels import moreau_step, moreau_steps, room_for
+from hybridsim.integrators.fixed_step.moreau_kernels import moreau_step, moreau_steps, scratch_for
 from hybridsim.integrators.fixed_step.moreau_loads import refuse_loads_of_friction
 from hybridsim.integrators.fixed_step.run import FixedStepRun, surface_table
 from hybridsim.integrators.fixed_step.step_length import fixed_step_length, refuse_longer
@@ -139,14 +139,14 @@ class MoreauMarch:
             evaluated[k, [*system.pins.get(c, ()), *system.projected.get(c, ())]] = 1
         nominal = np.array([s.nominal or 0.0 for s in system.model.states])
         sizes = np.where(nominal > 0.0, nominal, np.where(x0 != 0.0, np.abs(x0), 1.0))
-        self._room = room_for(
+        self._scratch = scratch_for(
             system.n, len(table), len(system.automata), len(system.quantities), system.guard_count,
             len(system.monitor_names), sizes, evaluated,
         )  # fmt: skip
 
     def run(
         self,
-        watched: np.ndarray,
+        guard_numbers: np.ndarray,
         bound: float,
         p: np.ndarray,
         start: tuple[np.ndarray, np.ndarray],
@@ -156,8 +156,8 @@ class MoreauMarch:
         """Step up to the bound, or until Python has to act."""
         x, z = start
         count, why = moreau_steps(
-            self._functions, self._settings, self.step, self._table, watched, bound, p, x.copy(), z.copy(), fresh,
-            *rows, self._room, np.empty(len(x)), self.counts,
+            self._functions, self._settings, self.step, self._table, guard_numbers, bound, p, x.copy(), z.copy(), fresh,
+            *rows, self._scratch, np.empty(len(x)), self.counts,
         )  # fmt: skip
         return count, why
 
@@ -165,18 +165,28 @@ class MoreauMarch:
         """Return the state after one step of length tau."""
         out = np.empty(len(x))
         moreau_step(
-            self._functions, self._settings, self._table, s, tau, x, p, z.copy(), out, self._room, self.counts
+            self._functions,
+            self._settings,
+            self._table,
+            s,
+            tau,
+            x,
+            p,
+            z.copy(),
+            out,
+            self._scratch,
+            self.counts,
         )
         return out
 
     def refused(self) -> str:
         """Return a message about the gap whose restitution is outside [0, 1], with its value."""
-        room, system = self._room, self.system
-        for k in np.flatnonzero(room.active):
-            e = float(room.restitution[k])
+        scratch, system = self._scratch, self.system
+        for k in np.flatnonzero(scratch.active):
+            e = float(scratch.restitution[k])
             if not -ROUNDING <= e <= 1.0 + ROUNDING:
                 name = system.automata[self._table[k, 0]].name
-                return message_on_restitution(name, e, float(room.approach[system.n + k]))
+                return message_on_restitution(name, e, float(scratch.approach[system.n + k]))
         return ""
 
     def warnings(self) -> list[str]:

@@ -15,46 +15,46 @@ _STEPPED = 6  # index of the function ``stepped`` among the functions of a step
 
 
 @kernel
-def add_impacts(functions: Any, table: Any, s: float, x: Any, p: Any, room: Any) -> None:
+def add_impacts(functions: Any, table: Any, s: float, x: Any, p: Any, scratch: Any) -> None:
     """Compute rates u of the surfaces with their gradients at (s, x), effects of unit forces, and loads of friction.
 
-    The loads are evaluated at the same point as the forces, see `take_apart`: `room.sides` are the modes at x
-    with all gaps open, and `room.y1` are the surface functions.
+    The loads are evaluated at the same point as the forces, see `take_apart`: `scratch.sides` are the modes at x
+    with all gaps open, and `scratch.y1` are the surface functions.
     """
-    n, m, sides, trial = x.shape[0], table.shape[0], room.sides, room.trial
+    n, m, sides, trial = x.shape[0], table.shape[0], scratch.sides, scratch.trial
     stepped = functions[_STEPPED]
-    call(stepped, s, x, p, sides, room.rows)
+    call(stepped, s, x, p, sides, scratch.rows)
     for k in range(m):
-        room.u[k] = room.rows[k]
+        scratch.u[k] = scratch.rows[k]
         for i in range(n):
-            room.S[k, i] = room.rows[m + k * n + i]
-            room.B[k, i] = room.rows[m + (m + k) * n + i]
-        is_above = room.y1[k] >= 0.0
-        _keep_loads(room, n, m, k, UP if is_above else DOWN)
+            scratch.S[k, i] = scratch.rows[m + k * n + i]
+            scratch.B[k, i] = scratch.rows[m + (m + k) * n + i]
+        is_above = scratch.y1[k] >= 0.0
+        _store_loads(scratch, n, m, k, UP if is_above else DOWN)
     for k in range(m):
         if table[k, UNILATERAL] != 0:
             continue
-        c, is_above = table[k, 0], room.y1[k] >= 0.0
+        c, is_above = table[k, 0], scratch.y1[k] >= 0.0
         put(sides, trial)
         trial[c] = table[k, 3]
-        call(functions[4], s, x, p, trial, room.on)
-        call(stepped, s, room.on, p, trial, room.rows)
-        _keep_loads(room, n, m, k, MOST)
-        _keep_loads(room, n, m, k, LEAST)
+        call(functions[4], s, x, p, trial, scratch.on)
+        call(stepped, s, scratch.on, p, trial, scratch.rows)
+        _store_loads(scratch, n, m, k, MOST)
+        _store_loads(scratch, n, m, k, LEAST)
         trial[c] = table[k, 2 if is_above else 1]
-        call(stepped, s, room.on, p, trial, room.rows)
-        _keep_loads(room, n, m, k, DOWN if is_above else UP)
+        call(stepped, s, scratch.on, p, trial, scratch.rows)
+        _store_loads(scratch, n, m, k, DOWN if is_above else UP)
 
 
 @kernel
-def _keep_loads(room: Any, n: int, m: int, k: int, bound: int) -> None:
+def _store_loads(scratch: Any, n: int, m: int, k: int, bound: int) -> None:
     first = m + 2 * m * n + (bound * m + k) * m
     for d in range(m):
-        room.loads[bound, k, d] = room.rows[first + d]
+        scratch.loads[bound, k, d] = scratch.rows[first + d]
 
 
 @kernel
-def approach(restitutions: Any, table: Any, s: float, h: float, x: Any, p: Any, z: Any, room: Any) -> bool:
+def approach(restitutions: Any, table: Any, s: float, h: float, x: Any, p: Any, z: Any, scratch: Any) -> bool:
     """Find the gaps that may push in a step from (s, x, z) and their least rates of separation; False: bad restitution.
 
     A gap takes part if it is closed, or would be closed by the middle of the step at its present rate. A
@@ -62,37 +62,37 @@ def approach(restitutions: Any, table: Any, s: float, h: float, x: Any, p: Any, 
     """
     n = x.shape[0]
     for i in range(n):
-        room.approach[i] = x[i]
+        scratch.approach[i] = x[i]
     for k in range(table.shape[0]):
         is_gap, is_closed = table[k, UNILATERAL] != 0, z[table[k, 0]] == table[k, 3]
-        speed = max(-room.u[k], 0.0) if is_gap and not is_closed else 0.0
-        room.approach[n + k] = speed
-        takes_part = is_gap and (is_closed or room.y1[k] + 0.5 * h * room.u[k] <= 0.0)
-        room.active[k] = 1 if takes_part else 0
-    call(restitutions, s, room.approach, p, room.sides, room.restitution)
+        speed = max(-scratch.u[k], 0.0) if is_gap and not is_closed else 0.0
+        scratch.approach[n + k] = speed
+        takes_part = is_gap and (is_closed or scratch.y1[k] + 0.5 * h * scratch.u[k] <= 0.0)
+        scratch.active[k] = 1 if takes_part else 0
+    call(restitutions, s, scratch.approach, p, scratch.sides, scratch.restitution)
     for k in range(table.shape[0]):
-        room.rebound[k] = 0.0
-        if room.active[k] != 0:
-            e = room.restitution[k]
+        scratch.rebound[k] = 0.0
+        if scratch.active[k] != 0:
+            e = scratch.restitution[k]
             if not -ROUNDING <= e <= 1.0 + ROUNDING:
                 return False
-            room.rebound[k] = min(max(e, 0.0), 1.0) * room.approach[n + k]
+            scratch.rebound[k] = min(max(e, 0.0), 1.0) * scratch.approach[n + k]
     return True
 
 
 @kernel
-def gap_rates(table: Any, X: Any, free: Any, room: Any) -> None:
-    """Compute the rates of the surfaces without forces, `room.y`, and the effects of unit forces, `room.G`.
+def gap_rates(table: Any, X: Any, free: Any, scratch: Any) -> None:
+    """Compute the rates of the surfaces without forces, `scratch.y`, and the effects of unit forces, `scratch.G`.
 
     The rates are linearised about X, the last iterate, and are exact when the iteration ends.
     """
     for k in range(table.shape[0]):
-        total = room.u[k]
+        total = scratch.u[k]
         for i in range(X.shape[0]):
-            total += room.S[k, i] * (free[i] - X[i])
-        room.y[k] = total
+            total += scratch.S[k, i] * (free[i] - X[i])
+        scratch.y[k] = total
         for j in range(table.shape[0]):
             total = 0.0
             for i in range(X.shape[0]):
-                total += room.S[k, i] * room.w[j, i]
-            room.G[k, j] = total
+                total += scratch.S[k, i] * scratch.w[j, i]
+            scratch.G[k, j] = total

@@ -12,8 +12,8 @@ from hybridsim.engine.native.loop_hints import put
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.integrators.fixed_step.kernels import (
     BOUND,
+    CONTINUES,
     FULL,
-    GOES_ON,
     NOT_FINITE,
     RESTED,
     RESTITUTION,
@@ -42,7 +42,7 @@ _HOLD, _ABOVE, _BELOW = 0, 1, 2  # meanings of a force
 _CONVERGED, _UNSETTLED, _AMISS = range(3)  # how a step ended
 
 
-class Room(NamedTuple):
+class Scratch(NamedTuple):
     """Scratch arrays for n states, m surfaces, C components, Q quantities, G guards."""
 
     sides: np.ndarray
@@ -83,7 +83,7 @@ class Room(NamedTuple):
     evaluated: np.ndarray  # (m, n) states that a closed gap evaluates
 
 
-def room_for(
+def scratch_for(
     n: int,
     surfaces: int,
     components: int,
@@ -96,7 +96,7 @@ def room_for(
     """Allocate the scratch arrays of one run.
 
     sizes (n,): sizes of the states, for difference quotients and convergence tests. evaluated (m, n): see
-    `Room`.
+    `Scratch`.
     """
     none = max(surfaces, 1)  # compiled functions write at least one element
     of_components = {name: np.zeros(components, dtype=np.int64) for name in ("sides", "trial")}
@@ -104,7 +104,7 @@ def room_for(
     names = ("up", "down", "most", "least", "y", "y1", "force", "u", "rebound", "restitution")
     of_surfaces = {name: np.zeros(none) for name in names}
     return packed(
-        Room(
+        Scratch(
             **of_components, **of_states, **of_surfaces, B=np.zeros((none, n)), w=np.zeros((none, n)),
             quantities=np.zeros(max(quantities, 1)), guards=np.zeros(max(guards, 1)), M=np.zeros((n, n)),
             pivots=np.zeros(n, dtype=np.int64), G=np.zeros((none, none)), meaning=np.zeros(none, dtype=np.int64),
@@ -118,24 +118,31 @@ def room_for(
 
 @kernel
 def take_apart(
-    functions: Any, table: Any, s: float, x: Any, p: Any, z: Any, room: Any, counts: Any, has_impacts: bool
+    functions: Any, table: Any, s: float, x: Any, p: Any, z: Any, scratch: Any, counts: Any, has_impacts: bool
 ) -> None:
     """Compute rates without the forces, the effect of each unit force, and the bounds of each force, at (s, x).
 
     The rates are linear in the forces: the difference of the rates above and below a surface is the effect of
     its force times the difference of the two forces. A slip force is evaluated at x if the surface is on its
     side, else on the surface, because a law may be undefined beyond it. functions: see `moreau_step`. table:
-    as in `surface_table`, plus the quantity and whether it is a gap. `room.sides` receives the modes at x
+    as in `surface_table`, plus the quantity and whether it is a gap. `scratch.sides` receives the modes at x
     with all gaps open: normal forces are separated, too.
     """
-    sides, trial, a, on, rates, q = room.sides, room.trial, room.a, room.on, room.rates, room.quantities
+    sides, trial, a, on, rates, q = (
+        scratch.sides,
+        scratch.trial,
+        scratch.a,
+        scratch.on,
+        scratch.rates,
+        scratch.quantities,
+    )
     put(z, sides)
     for k in range(table.shape[0]):
         sides[table[k, 0]] = table[k, _ABOVE]
     if table.shape[0] > 0:
-        call(functions[3], s, x, p, sides, room.y1)
+        call(functions[3], s, x, p, sides, scratch.y1)
     for k in range(table.shape[0]):
-        is_above = room.y1[k] >= 0.0 or table[k, UNILATERAL] != 0
+        is_above = scratch.y1[k] >= 0.0 or table[k, UNILATERAL] != 0
         sides[table[k, 0]] = table[k, _ABOVE if is_above else _BELOW]
     counts[0] += 1 + 2 * table.shape[0]
     counts[1] += table.shape[0]
@@ -147,62 +154,62 @@ def take_apart(
         trial[c] = table[k, 3]
         call(functions[4], s, x, p, trial, on)
         call(functions[2], s, on, p, trial, q)
-        call(functions[1], s, on, p, trial, room.guards)
-        room.most[k] = room.guards[table[k, 4]] + q[force]
-        room.least[k] = q[force] - room.guards[table[k, 5]]
+        call(functions[1], s, on, p, trial, scratch.guards)
+        scratch.most[k] = scratch.guards[table[k, 4]] + q[force]
+        scratch.least[k] = q[force] - scratch.guards[table[k, 5]]
         trial[c] = table[k, _ABOVE]
         call(functions[0], s, on, p, trial, a)
         call(functions[2], s, on, p, trial, q)
-        room.up[k] = q[force]
+        scratch.up[k] = q[force]
         trial[c] = table[k, _BELOW]
         call(functions[0], s, on, p, trial, rates)
         call(functions[2], s, on, p, trial, q)
-        room.down[k] = q[force]
-        difference = room.up[k] - room.down[k]
+        scratch.down[k] = q[force]
+        difference = scratch.up[k] - scratch.down[k]
         for i in range(x.shape[0]):
-            room.B[k, i] = (a[i] - rates[i]) / difference if difference != 0.0 else 0.0
+            scratch.B[k, i] = (a[i] - rates[i]) / difference if difference != 0.0 else 0.0
     if has_impacts:
-        add_impacts(functions, table, s, x, p, room)
+        add_impacts(functions, table, s, x, p, scratch)
     call(functions[0], s, x, p, sides, a)
     if table.shape[0] > 0:
         call(functions[2], s, x, p, sides, q)
     for k in range(table.shape[0]):
-        if room.y1[k] >= 0.0:
-            room.up[k] = q[table[k, 6]]
+        if scratch.y1[k] >= 0.0:
+            scratch.up[k] = q[table[k, 6]]
         else:
-            room.down[k] = q[table[k, 6]]
+            scratch.down[k] = q[table[k, 6]]
         for i in range(x.shape[0]):
-            a[i] -= room.B[k, i] * q[table[k, 6]]
+            a[i] -= scratch.B[k, i] * q[table[k, 6]]
 
 
 @inlined
 def implicit_matrix(
-    flow: Any, theta: float, h: float, s: float, x: Any, p: Any, room: Any, counts: Any
+    flow: Any, theta: float, h: float, s: float, x: Any, p: Any, scratch: Any, counts: Any
 ) -> bool:
-    """Factorise I - h theta da/dx from difference quotients; `room.a` and `room.sides` are at (s, x)."""
+    """Factorise I - h theta da/dx from difference quotients; `scratch.a` and `scratch.sides` are at (s, x)."""
     n = x.shape[0]
-    put(x, room.nudged)
-    call(flow, s, x, p, room.sides, room.rates)
+    put(x, scratch.nudged)
+    call(flow, s, x, p, scratch.sides, scratch.rates)
     for i in range(n):
-        room.free[i] = room.rates[i]
+        scratch.free[i] = scratch.rates[i]
     for j in range(n):
-        nudge = _NUDGE * max(abs(x[j]), room.sizes[j])
+        nudge = _NUDGE * max(abs(x[j]), scratch.sizes[j])
         for way in (1.0, -1.0):  # a law may be undefined on the other side of rest
-            room.nudged[j] = x[j] + way * nudge
-            step = room.nudged[j] - x[j]
-            call(flow, s, room.nudged, p, room.sides, room.rates)
-            if math.isfinite(np.sum(room.rates)):
+            scratch.nudged[j] = x[j] + way * nudge
+            step = scratch.nudged[j] - x[j]
+            call(flow, s, scratch.nudged, p, scratch.sides, scratch.rates)
+            if math.isfinite(np.sum(scratch.rates)):
                 break
         for i in range(n):
-            room.M[i, j] = -h * theta * (room.rates[i] - room.free[i]) / step
-        room.M[j, j] += 1.0
-        room.nudged[j] = x[j]
+            scratch.M[i, j] = -h * theta * (scratch.rates[i] - scratch.free[i]) / step
+        scratch.M[j, j] += 1.0
+        scratch.nudged[j] = x[j]
     counts[0] += n + 1
-    return factor(room.M, room.pivots)
+    return factor(scratch.M, scratch.pivots)
 
 
 @inlined
-def forces(table: Any, room: Any, m: int, tolerance: float, has_impacts: bool) -> bool:
+def forces(table: Any, scratch: Any, m: int, tolerance: float, has_impacts: bool) -> bool:
     """Compute the forces at the end of a step by projected Gauss-Seidel sweeps; return whether they converged.
 
     Each force holds its surface at zero if its limits allow; otherwise it is the slip force. The force of a
@@ -211,35 +218,35 @@ def forces(table: Any, room: Any, m: int, tolerance: float, has_impacts: bool) -
     for sweep in range(_SWEEPS):
         change = scale = 0.0
         for k in range(m):
-            y = room.y[k]
+            y = scratch.y[k]
             for j in range(m):
                 if j != k:
-                    y += room.G[k, j] * room.force[j]
-            own, meaning = room.G[k, k], _HOLD
-            up, down, most, least = room.up[k], room.down[k], room.most[k], room.least[k]
+                    y += scratch.G[k, j] * scratch.force[j]
+            own, meaning = scratch.G[k, k], _HOLD
+            up, down, most, least = scratch.up[k], scratch.down[k], scratch.most[k], scratch.least[k]
             if has_impacts:
                 for d in range(m):
-                    up += room.loads[UP, k, d] * room.force[d]
-                    down += room.loads[DOWN, k, d] * room.force[d]
-                    most += room.loads[MOST, k, d] * room.force[d]
-                    least += room.loads[LEAST, k, d] * room.force[d]
+                    up += scratch.loads[UP, k, d] * scratch.force[d]
+                    down += scratch.loads[DOWN, k, d] * scratch.force[d]
+                    most += scratch.loads[MOST, k, d] * scratch.force[d]
+                    least += scratch.loads[LEAST, k, d] * scratch.force[d]
             if has_impacts and table[k, UNILATERAL] != 0:
-                force = (room.rebound[k] - y) / own if room.active[k] != 0 and own > 0.0 else 0.0
+                force = (scratch.rebound[k] - y) / own if scratch.active[k] != 0 and own > 0.0 else 0.0
                 force = max(force, 0.0)
-                meaning = _HOLD if force > 0.0 and room.rebound[k] == 0.0 else _ABOVE
+                meaning = _HOLD if force > 0.0 and scratch.rebound[k] == 0.0 else _ABOVE
                 up = force
             else:
                 force = -y / own if own < 0.0 else 0.0
-                if sweep > _PATIENCE and room.meaning[k] != _HOLD:
+                if sweep > _PATIENCE and scratch.meaning[k] != _HOLD:
                     most, least = min(most, up), max(least, down)
                 if force > most or (own >= 0.0 and y > 0.0):
                     force, meaning = up, _ABOVE
                 elif force < least or (own >= 0.0 and y < 0.0):
                     force, meaning = down, _BELOW
-            room.meaning[k] = meaning
-            change = max(change, abs(force - room.force[k]))
+            scratch.meaning[k] = meaning
+            change = max(change, abs(force - scratch.force[k]))
             scale = max(scale, max(abs(up), abs(down)))
-            room.force[k] = force
+            scratch.force[k] = force
         if not change > tolerance * scale:
             return True
         if not change < math.inf:
@@ -258,7 +265,7 @@ def moreau_step(
     p: Any,
     z: Any,
     out: Any,
-    room: Any,
+    scratch: Any,
     counts: Any,
 ) -> int:
     """Take one step of the theta scheme, implicit in the forces; write the resulting modes to z; return how it ended.
@@ -271,48 +278,48 @@ def moreau_step(
     tolerance, iterations, whether there are impacts. counts: rates, guards.
     """
     theta, tolerance, iterations, has_impacts = settings
-    n, m, X, free = x.shape[0], table.shape[0], room.X, room.free
-    take_apart(functions, table, s, x, p, z, room, counts, has_impacts)
-    put(room.a, room.a_old)
-    if has_impacts and not approach(functions[7], table, s, h, x, p, z, room):
+    n, m, X, free = x.shape[0], table.shape[0], scratch.X, scratch.free
+    take_apart(functions, table, s, x, p, z, scratch, counts, has_impacts)
+    put(scratch.a, scratch.a_old)
+    if has_impacts and not approach(functions[7], table, s, h, x, p, z, scratch):
         return _AMISS
-    if not implicit_matrix(functions[0], theta, h, s, x, p, room, counts):
+    if not implicit_matrix(functions[0], theta, h, s, x, p, scratch, counts):
         out[:] = math.nan
         return _UNSETTLED
     put(x, X)
     is_done = False
     for iteration in range(iterations):
-        take_apart(functions, table, s + h, X, p, z, room, counts, has_impacts)
+        take_apart(functions, table, s + h, X, p, z, scratch, counts, has_impacts)
         if iteration % _RENEWED == _RENEWED - 1:
-            implicit_matrix(functions[0], theta, h, s + h, X, p, room, counts)
+            implicit_matrix(functions[0], theta, h, s + h, X, p, scratch, counts)
         for i in range(n):
-            free[i] = X[i] - x[i] - h * (theta * room.a[i] + (1.0 - theta) * room.a_old[i])
-        solve(room.M, room.pivots, free)
+            free[i] = X[i] - x[i] - h * (theta * scratch.a[i] + (1.0 - theta) * scratch.a_old[i])
+        solve(scratch.M, scratch.pivots, free)
         for i in range(n):
             free[i] = X[i] - free[i]
         if m > 0 and not has_impacts:
-            call(functions[3], s + h, free, p, room.sides, room.y)
+            call(functions[3], s + h, free, p, scratch.sides, scratch.y)
         for k in range(m):
             for i in range(n):
-                room.w[k, i] = h * room.B[k, i]
-            solve(room.M, room.pivots, room.w[k])
+                scratch.w[k, i] = h * scratch.B[k, i]
+            solve(scratch.M, scratch.pivots, scratch.w[k])
             if has_impacts:
                 continue
-            size = max(abs(room.up[k]), abs(room.down[k]))
+            size = max(abs(scratch.up[k]), abs(scratch.down[k]))
             for i in range(n):
-                room.nudged[i] = free[i] + size * room.w[k, i]
-            call(functions[3], s + h, room.nudged, p, room.sides, room.y1)
+                scratch.nudged[i] = free[i] + size * scratch.w[k, i]
+            call(functions[3], s + h, scratch.nudged, p, scratch.sides, scratch.y1)
             for j in range(m):
-                room.G[j, k] = (room.y1[j] - room.y[j]) / size if size > 0.0 else 0.0
+                scratch.G[j, k] = (scratch.y1[j] - scratch.y[j]) / size if size > 0.0 else 0.0
         if has_impacts:
-            gap_rates(table, X, free, room)
-        settled = forces(table, room, m, tolerance, has_impacts)
+            gap_rates(table, X, free, scratch)
+        settled = forces(table, scratch, m, tolerance, has_impacts)
         change, is_number = 0.0, True
         for i in range(n):
             moved = free[i]
             for k in range(m):
-                moved += room.w[k, i] * room.force[k]
-            change = max(change, abs(moved - X[i]) / max(abs(moved), room.sizes[i]))
+                moved += scratch.w[k, i] * scratch.force[k]
+            change = max(change, abs(moved - X[i]) / max(abs(moved), scratch.sizes[i]))
             X[i] = moved
             is_number = is_number and math.isfinite(moved)
         if not is_number:  # held states are set exactly below, which would hide it
@@ -323,7 +330,7 @@ def moreau_step(
             break
     is_held, is_closed = False, False
     for k in range(m):
-        meaning = room.meaning[k]
+        meaning = scratch.meaning[k]
         z[table[k, 0]] = table[k, 3] if meaning == _HOLD else table[k, meaning]
         is_held = is_held or meaning == _HOLD
         is_closed = is_closed or (meaning == _HOLD and table[k, UNILATERAL] != 0)
@@ -332,14 +339,14 @@ def moreau_step(
         return _CONVERGED if is_done else _UNSETTLED
     call(functions[4], s + h, X, p, z, out)
     # rates without forces, at unchanged held states, so that states at rest stay exactly constant
-    call(functions[0], s + h, out, p, z, room.rates)
+    call(functions[0], s + h, out, p, z, scratch.rates)
     for i in range(n):
         is_free = True
         for k in range(m):
-            is_free = is_free and room.B[k, i] == 0.0
-            is_free = is_free and not (room.meaning[k] == _HOLD and room.evaluated[k, i] != 0)
+            is_free = is_free and scratch.B[k, i] == 0.0
+            is_free = is_free and not (scratch.meaning[k] == _HOLD and scratch.evaluated[k, i] != 0)
         if is_free:
-            out[i] = x[i] + h * (theta * room.rates[i] + (1.0 - theta) * room.a_old[i])
+            out[i] = x[i] + h * (theta * scratch.rates[i] + (1.0 - theta) * scratch.a_old[i])
     if is_closed:  # the gap may depend on states that have just been set
         put(out, X)
         call(functions[4], s + h, X, p, z, out)
@@ -352,7 +359,7 @@ def moreau_steps(
     settings: Any,
     step: float,
     table: Any,
-    watched: Any,
+    guard_numbers: Any,
     bound: float,
     p: Any,
     x: Any,
@@ -361,7 +368,7 @@ def moreau_steps(
     times: Any,
     states: Any,
     modes: Any,
-    room: Any,
+    scratch: Any,
     out: Any,
     counts: Any,
 ) -> tuple[int, int]:
@@ -371,13 +378,15 @@ def moreau_steps(
     """
     n, s, planned, row = x.shape[0], 0.0, step, 0
     for k in range(table.shape[0]):  # a run that continues from here has no other values to begin with
-        room.force[k], room.meaning[k] = 0.0, _HOLD
+        scratch.force[k], scratch.meaning[k] = 0.0, _HOLD
     while True:
         times[row] = s
         put(x, states[row])
         put(z, modes[row])
         row += 1
-        if brought_to_zero(functions[5], s, x, p, z, fresh, row == 1, room.monitors, room.monitors_after):
+        if brought_to_zero(
+            functions[5], s, x, p, z, fresh, row == 1, scratch.monitors, scratch.monitors_after
+        ):
             return row, RESTED
         if s == bound:
             return row, BOUND
@@ -385,7 +394,7 @@ def moreau_steps(
             return row, FULL
         is_last = bound - s <= planned * (1.0 + 1e-12)
         h = bound - s if is_last else planned
-        ended = moreau_step(functions, settings, table, s, h, x, p, z, out, room, counts)
+        ended = moreau_step(functions, settings, table, s, h, x, p, z, out, scratch, counts)
         if ended == _AMISS:
             return row, RESTITUTION
         if ended == _UNSETTLED:
@@ -395,10 +404,10 @@ def moreau_steps(
             counts[2] += 1
         put(z, modes[row - 1])
         why = passed(
-            (functions[1], functions[5]), s + h, out, p, z, watched, fresh, row == 1, room.guards, room.monitors,
-            room.monitors_after, counts,
+            (functions[1], functions[5]), s + h, out, p, z, guard_numbers, fresh, row == 1, scratch.guards,
+            scratch.monitors, scratch.monitors_after, counts,
         )  # fmt: skip
-        if why != GOES_ON:
+        if why != CONTINUES:
             return row, why
         s = bound if is_last else s + h
         put(out, x)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.native.kernels import call, inlined, kernel
-from hybridsim.integrators.fixed_step.kernels import BOUND, FULL, GOES_ON, RESTED, brought_to_zero, passed
+from hybridsim.integrators.fixed_step.kernels import BOUND, CONTINUES, FULL, RESTED, brought_to_zero, passed
 
 # rules that choose the modes of surface components
 ZONE, SIGN = 0, 1
@@ -218,7 +218,7 @@ def run_steps(
     law: Any,
     flags: Any,
     table: Any,
-    watched: Any,
+    guard_numbers: Any,
     bound: float,
     p: Any,
     x: Any,
@@ -269,10 +269,10 @@ def run_steps(
         _step(addresses, law, table, s, h, x, p, z, trial, work)
         counters[0] += 4
         why = passed(
-            (addresses[2], addresses[3]), s + h, trial, p, z, watched, fresh, row == 1, guards, monitors,
+            (addresses[2], addresses[3]), s + h, trial, p, z, guard_numbers, fresh, row == 1, guards, monitors,
             monitors_after, counters,
         )  # fmt: skip
-        if why != GOES_ON:
+        if why != CONTINUES:
             return row, why
         if dichotomy:
             freed = False

@@ -43,7 +43,7 @@ class Rk4March:
 
     def run(
         self,
-        watched: np.ndarray,
+        guard_numbers: np.ndarray,
         bound: float,
         p: np.ndarray,
         start: tuple[np.ndarray, np.ndarray],
@@ -52,8 +52,8 @@ class Rk4March:
     ) -> tuple[int, int]:
         """Step up to the bound, or until Python has to act."""
         count, why = run_steps(
-            self._addresses, (self.step, self.halvings), self._law, self._flags, self._table, watched, bound, p, *start,
-            fresh, *rows, self._work, self.counts,
+            self._addresses, (self.step, self.halvings), self._law, self._flags, self._table, guard_numbers, bound, p,
+            *start, fresh, *rows, self._work, self.counts,
         )  # fmt: skip
         return count, why
 

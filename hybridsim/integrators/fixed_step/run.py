@@ -48,7 +48,7 @@ class March(Protocol):
 
     def run(
         self,
-        watched: np.ndarray,
+        guard_numbers: np.ndarray,
         bound: float,
         p: np.ndarray,
         start: tuple[np.ndarray, np.ndarray],
@@ -57,7 +57,7 @@ class March(Protocol):
     ) -> tuple[int, int]:
         """Step from local time 0 in start = (x, z) up to the bound, or until Python has to act.
 
-        watched: guards of components without a surface. fresh: monitors that have just fired. Row k of rows =
+        guard_numbers: guards of components without a surface. fresh: monitors that have just fired. Row k of rows =
         (times, states, modes) holds the start of step k and the modes during it; the last row is the end.
         Return (number of rows, reason).
         """

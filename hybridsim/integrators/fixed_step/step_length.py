@@ -8,7 +8,7 @@ from hybridsim.engine.system.period import system_period
 from hybridsim.engine.system.system import System
 from hybridsim.errors import UsageError
 
-_MOST_STEPS = 1e18  # thirty years at a nanosecond each; with fewer steps a monitor may still end the run
+_MAX_STEPS = 1e18  # thirty years at a nanosecond each; with fewer steps a monitor may still end the run
 
 
 def fixed_step_length(
@@ -42,8 +42,8 @@ def refuse_longer(step: float, max_step: float, name: str) -> None:
 def refuse_endless(step: float, span: tuple[float, float], name: str) -> None:
     """Refuse steps so short that the run would not end, which is probably a typing error."""
     count = abs(span[1] - span[0]) / step
-    if count > _MOST_STEPS:
+    if count > _MAX_STEPS:
         raise UsageError(
             f"{name} is {step!r}: a run from {span[0]:g} to {span[1]:g} would take {count:.0e} steps",
-            remedy=f"use a larger step: more than {_MOST_STEPS:.0e} steps would not end",
+            remedy=f"use a larger step: more than {_MAX_STEPS:.0e} steps would not end",
         )

@@ -77,7 +77,7 @@ class RosenbrockStepper(OneStepStepper):
         self._V[inputs.constants, 0] = inputs.values[:, 0]
         self._V[inputs.parameters, 0] = flow.p[inputs.sources]
         advance(tape.constant_rows, self._V, 0)
-        self._room = (np.empty((n, n)), np.empty(n, dtype=np.int64), np.empty(n))
+        self._scratch = (np.empty((n, n)), np.empty(n, dtype=np.int64), np.empty(n))
         super().__init__(flow, x0, bound, tolerances, first_step, tableau.order, tableau.error_order)
 
     def _point(self, s: float, x: np.ndarray) -> RosenbrockPoint:
@@ -105,7 +105,7 @@ class RosenbrockStepper(OneStepStepper):
             flow.p,
             flow.z,
             self.control,
-            *self._room,
+            *self._scratch,
             stages,
             out,
         )
@@ -122,7 +122,7 @@ class RosenbrockStepper(OneStepStepper):
         x = dense.middle()
         flow.counters.rhs_evaluations += 1
         missed = flow.rhs(0.5 * (start.s + end.s), x) - dense.middle_slope()
-        matrix, pivots, _ = self._room
+        matrix, pivots, _ = self._scratch
         solve(matrix, pivots, missed)
         rtol, atol = self.control
         size = np.maximum(np.abs(x), np.abs(start.x))

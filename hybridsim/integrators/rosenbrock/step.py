@@ -42,12 +42,12 @@ class RosenbrockTableau:
 
 
 @kernel
-def linearise(rows: Any, places: Any, s: float, x: Any, V: Any, jacobian: Any, rate: Any) -> None:
+def linearise(rows: Any, flow_registers: Any, s: float, x: Any, V: Any, jacobian: Any, rate: Any) -> None:
     """Compute the Jacobian (n, n) and the derivative with respect to time (n,) of the flow at (s, x).
 
     Both come from the tape at first order, one direction at a time; V (registers, 2) holds its constants.
     """
-    time, states, derivatives = places
+    time, states, derivatives = flow_registers
     n = states.shape[0]
     if time >= 0:
         V[time, 0], V[time, 1] = s, 1.0

@@ -18,12 +18,12 @@ from hybridsim.engine.record.hermite import (
 )
 from hybridsim.engine.record.hermite_block import TERMS, HermiteBlock
 from hybridsim.engine.run.compiled_loop import NOT_LINEAR, CompiledLoopBase
-from hybridsim.engine.system.programs.ends_code import EndsShelf
+from hybridsim.engine.system.programs.ends_code import EndsCodeCache
 from hybridsim.engine.system.programs.guard_parts import GuardParts
 from hybridsim.engine.system.series_at import short_order
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
-from hybridsim.integrators.runge_kutta.segments import rk_leap
+from hybridsim.integrators.runge_kutta.segments import rk_event_loop
 from hybridsim.integrators.runge_kutta.step import Tableau
 
 _HERMITE = packed(
@@ -31,7 +31,7 @@ _HERMITE = packed(
 )
 
 
-class Room(NamedTuple):
+class Scratch(NamedTuple):
     """Scratch arrays of the kernel: series of all registers, of guards, of the states at both ends, vectors."""
 
     V: np.ndarray
@@ -60,7 +60,7 @@ class Room(NamedTuple):
     dx: np.ndarray
     ahead: np.ndarray
     rates: np.ndarray
-    watched: np.ndarray
+    guard_registers: np.ndarray
     numbers: np.ndarray
     sides: np.ndarray
     orders: np.ndarray
@@ -70,7 +70,7 @@ class Room(NamedTuple):
     counts: np.ndarray
 
 
-_leap = Precompiled(rk_leap)
+_event_loop = Precompiled(rk_event_loop)
 
 
 class RungeKuttaLoop(CompiledLoopBase):
@@ -86,7 +86,9 @@ class RungeKuttaLoop(CompiledLoopBase):
         super().__init__(system, 2 * TERMS, f"{len(tableau.c)} stages, order {self.order}")
         self.parts: GuardParts = system.code.shared("guard parts", GuardParts)
         shape = (TERMS, first, self.order)
-        self.codes: EndsShelf = system.code.shared(f"ends of {shape}", lambda: EndsShelf(system, *shape))
+        self.codes: EndsCodeCache = system.code.shared(
+            f"ends of {shape}", lambda: EndsCodeCache(system, *shape)
+        )
         self.method = (tableau.packed, leading, tableau.error_order, _HERMITE)
         declared_step = np.array([tolerances.first_step or 0.0])
         self.control: tuple[Any, ...] = (
@@ -105,11 +107,11 @@ class RungeKuttaLoop(CompiledLoopBase):
         other.control = (*rest, declared_step.copy())
         return other
 
-    def _room(self) -> Room:
+    def _scratch(self) -> Scratch:
         system, n, columns = self.system, self.system.n, self.order + 1
         guards, registers = system.guard_count, system.registers.count
-        room: Room = packed(
-            Room(
+        scratch: Scratch = packed(
+            Scratch(
                 V=np.zeros((registers, columns)),
                 W=np.zeros((registers, columns)),
                 a=np.empty(columns),
@@ -133,7 +135,7 @@ class RungeKuttaLoop(CompiledLoopBase):
                 **{name: np.empty(n) for name in ("scale", "dx", "ahead", "rates")},
                 **{
                     name: np.empty(guards, dtype=np.int64)
-                    for name in ("watched", "numbers", "sides", "orders")
+                    for name in ("guard_registers", "numbers", "sides", "orders")
                 },
                 floors=np.empty(guards),
                 pace=np.empty(3),
@@ -141,7 +143,7 @@ class RungeKuttaLoop(CompiledLoopBase):
                 counts=np.zeros(2, dtype=np.int64),
             )
         )
-        return room
+        return scratch
 
     def _go(
         self,
@@ -149,21 +151,21 @@ class RungeKuttaLoop(CompiledLoopBase):
         clock: np.ndarray,
         state: Any,
         work: Any,
-        room: Any,
+        scratch: Any,
         rows: Any,
     ) -> tuple[int, int, int]:
-        room.counts[:] = 0
-        tapes = self.shelf.tapes  # the same tapes for both, since another thread may extend the shelf
+        scratch.counts[:] = 0
+        tapes = self.tape_cache.tapes  # the same tapes for both, since another thread may extend the cache
         codes = self.codes.of(tapes)
-        code, steps, count = _leap(
+        code, steps, count = _event_loop(
             self.functions, self.automata, tapes, self.parts.of(tapes), self.inputs, NOT_LINEAR, codes,
-            self.places, self.method, self.control, to, clock, state, work, room, rows,
+            self.phase_layout, self.method, self.control, to, clock, state, work, scratch, rows,
         )  # fmt: skip
         self.taken = tapes, codes
         return code, steps, count
 
-    def _cost(self, room: Any) -> tuple[int, int]:
-        tries, rejected = room.counts.tolist()
+    def _cost(self, scratch: Any) -> tuple[int, int]:
+        tries, rejected = scratch.counts.tolist()
         return tries, rejected
 
     def _count(self, counters: Counters, steps: int, cost: tuple[int, int]) -> None:

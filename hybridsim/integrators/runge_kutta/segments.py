@@ -11,15 +11,15 @@ import math
 from typing import Any
 
 from hybridsim.engine.events.compiled.after_segment import (
+    fill_guard_series,
     is_crowded,
     is_hidden,
     is_shallow,
-    judge,
-    settle_and_move_on,
+    resolve_and_advance,
     state_errors,
 )
-from hybridsim.engine.events.compiled.at_end import may_be_at_zero
-from hybridsim.engine.native.kernels import call, call_apart, call_series, inlined, kernel
+from hybridsim.engine.events.compiled.at_end import may_vanish
+from hybridsim.engine.native.kernels import call, call_noinline, call_series, inlined, kernel
 from hybridsim.engine.native.loop_hints import put
 from hybridsim.engine.native.time_grid import on_the_grid
 from hybridsim.engine.record.hermite import fit_in_time, holds_between
@@ -28,10 +28,10 @@ from hybridsim.engine.roots.first_exit import FOUND, OPEN
 from hybridsim.engine.run.event_loop import (
     AT_TARGET,
     FULL,
-    LEAST,
+    MIN_STEPS_IN_PART,
     STOPPED,
-    holding,
-    landing,
+    any_holding,
+    any_projecting,
     load,
     move_on,
     set_origin,
@@ -39,7 +39,14 @@ from hybridsim.engine.run.event_loop import (
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.series.interpreter import advance, expand
 from hybridsim.engine.system.programs.modes_index import find_modes
-from hybridsim.integrators.runge_kutta.step import SAFETY, SMALLEST, STRETCH, attempt, forget, next_length
+from hybridsim.integrators.runge_kutta.step import (
+    LAST_STEP_FACTOR,
+    SAFETY,
+    SMALLEST,
+    attempt,
+    forget,
+    next_length,
+)
 
 LANDED, UNSURE, REJECTED, LOST = 0, 1, 2, 3
 _NEIGHBOURHOOD = 0.125  # share of a step within which an event time is corrected
@@ -101,12 +108,12 @@ def is_finite(series: Any) -> bool:
 
 
 @kernel
-def expand_ends(rows: Any, guard_rows: Any, places: Any, s: float, x: Any, W: Any, out: Any) -> None:
+def expand_ends(rows: Any, guard_rows: Any, flow_registers: Any, s: float, x: Any, W: Any, out: Any) -> None:
     """Compute coefficients of the states (n, K) along the flow from (s, x), and in W those of all registers.
 
     rows: tape rows of the flow and of further wanted functions; guard_rows: those of them that guards need.
     """
-    time, states, derivatives = places
+    time, states, derivatives = flow_registers
     n, last = out.shape
     last -= 1
     if time >= 0:
@@ -114,10 +121,10 @@ def expand_ends(rows: Any, guard_rows: Any, places: Any, s: float, x: Any, W: An
     for i in range(n):
         W[states[i], 0] = x[i]
     for k in range(last):
-        call_apart(advance, (rows, W, k))
+        call_noinline(advance, (rows, W, k))
         for i in range(n):
             W[states[i], k + 1] = W[derivatives[i], k] / (k + 1)
-    call_apart(advance, (guard_rows, W, last))
+    call_noinline(advance, (guard_rows, W, last))
     gather(states, W, out)
 
 
@@ -126,23 +133,23 @@ def series_of(
     code: int,
     rows: Any,
     guard_rows: Any,
-    places: Any,
+    flow_registers: Any,
     s: float,
     x: Any,
-    watched: Any,
+    guard_registers: Any,
     W: Any,
     out: Any,
     guards: Any,
 ) -> bool:
-    """Compute coefficients of the states (n, K) along the flow from (s, x) and of the watched functions, a row each.
+    """Compute coefficients of the states (n, K) along the flow from (s, x) and of the guards, a row each.
 
     code: address of a function that does so; 0 for none. Return whether those of the states are finite.
     """
     if code != 0:
         call_series(code, s, 0.0, x, guards, W, out)
     else:
-        call_apart(expand_ends, (rows, guard_rows, places, s, x, W, out))
-        gather(watched, W, guards)
+        call_noinline(expand_ends, (rows, guard_rows, flow_registers, s, x, W, out))
+        gather(guard_registers, W, guards)
     return is_finite(out)
 
 
@@ -166,7 +173,7 @@ def land(
     guard_rows: Any,
     inputs: Any,
     code: int,
-    watched: Any,
+    guard_registers: Any,
     place: int,
     s: float,
     d: float,
@@ -174,35 +181,37 @@ def land(
     p: Any,
     z: Any,
     is_holding: bool,
-    room: Any,
+    scratch: Any,
     work: Any,
 ) -> tuple[int, float]:
-    """Repeat the step of length h up to the zero of a watched function, which the dense output places at d.
+    """Repeat the step of length h up to the zero of a guard, which the dense output places at d.
 
     place: index of the function. The step starts from work.y; its end is in work.x_after, the series there
     are in room.right and room.guards_right. code: see `series_of`. Newton's method corrects the time until it
     is accurate to rounding; a correction within the range of the series at the end needs no new step.
     """
-    W, right, y, y1, last = room.W, room.right, work.y, work.x_after, room.right.shape[1] - 1
-    rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
-    places = (inputs.time[0], inputs.states, tapes.derivatives[k])
+    W, right, y, y1, last = scratch.W, scratch.right, work.y, work.x_after, scratch.right.shape[1] - 1
+    rows = tapes.optimised[tapes.optimised_start[k] : tapes.optimised_start[k + 1]]
+    flow_registers = (inputs.time[0], inputs.states, tapes.derivatives[k])
     low, high = max(0.0, d - _NEIGHBOURHOOD * h), min(h, d + _NEIGHBOURHOOD * h)
     d = (s + d) - s
     if not d > 0.0:
         return LOST, d
     error = 0.0
-    if not is_still(room.stages):
-        error = attempt(functions.flow, tableau, s, d, y, room.dx, p, z, tolerances, room.stages, y1)
-        room.counts[0] += 1
+    if not is_still(scratch.stages):
+        error = attempt(functions.flow, tableau, s, d, y, scratch.dx, p, z, tolerances, scratch.stages, y1)
+        scratch.counts[0] += 1
     for _ in range(_CORRECTIONS):
         if not error <= 1.0:
             return REJECTED, d
         if is_holding:
             call(functions.project, s + d, y1, p, z, work.slopes)
             put(work.slopes, y1)
-        if not series_of(code, rows, guard_rows, places, s + d, y1, watched, W, right, room.guards_right):
+        if not series_of(
+            code, rows, guard_rows, flow_registers, s + d, y1, guard_registers, W, right, scratch.guards_right
+        ):
             return LOST, d
-        value, slope = room.guards_right[place, 0], room.guards_right[place, 1]
+        value, slope = scratch.guards_right[place, 0], scratch.guards_right[place, 1]
         move = -value / slope if slope != 0.0 else math.nan
         if not abs(move) < math.inf:
             return LOST, d
@@ -215,15 +224,17 @@ def land(
         move, d = moved - d, moved
         is_near = True
         for i in range(y.shape[0]):
-            is_near = is_near and abs(right[i, last] * move**last) <= UNIT * room.scale[i]
+            is_near = is_near and abs(right[i, last] * move**last) <= UNIT * scratch.scale[i]
         if is_near:
             for i in range(y.shape[0]):
                 y1[i] = right[i, last]
                 for k in range(last - 1, -1, -1):
                     y1[i] = y1[i] * move + right[i, k]
         else:
-            error = attempt(functions.flow, tableau, s, d, y, room.dx, p, z, tolerances, room.stages, y1)
-            room.counts[0] += 1
+            error = attempt(
+                functions.flow, tableau, s, d, y, scratch.dx, p, z, tolerances, scratch.stages, y1
+            )
+            scratch.counts[0] += 1
     return UNSURE, d
 
 
@@ -246,12 +257,12 @@ def is_zero(
     state_errors(automata, s_error, y, scale, state.x_error, state.z, work.slopes, work.y_error)
     for i in range(y.shape[0]):
         work.y_error[i] *= 2.0
-    judge(automata, tapes, inputs, lin, s, s_error, state, work)
+    fill_guard_series(automata, tapes, inputs, lin, s, s_error, state, work)
     return abs(work.judged[0, fired, 0]) <= work.judged[1, fired, 0]
 
 
 @kernel
-def rk_leap(
+def rk_event_loop(
     functions: Any,
     automata: Any,
     tapes: Any,
@@ -259,14 +270,14 @@ def rk_leap(
     inputs: Any,
     lin: Any,
     codes: Any,
-    places: Any,
+    phase_layout: Any,
     method: Any,
     control: Any,
     target: Any,
     clock: Any,
     state: Any,
     work: Any,
-    room: Any,
+    scratch: Any,
     record: Any,
 ) -> tuple[int, int, int]:
     """Go from event to event; return why it ended and how many steps and segments were committed.
@@ -276,20 +287,20 @@ def rk_leap(
     max_step, longest segment, and an array with the length of the first step (0: unknown), which is cleared
     after use. The others are as for `leap`.
     """
-    rates, origin_at, phases_at = places
+    rates, origin_at, phases_at = phase_layout
     tableau, leading, error_order, hermite = method
     rtol, atol, order, max_step, longest, first = control
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     sides, orders, floors = state.sides, state.orders, state.floors
-    W, left, right = room.W, room.left, room.right
-    scale, slopes, y, y1 = room.scale, work.slopes, work.y, work.x_after
-    side_now, order_now, floor_now = room.sides, room.orders, room.floors
+    W, left, right = scratch.W, scratch.left, scratch.right
+    scale, slopes, y, y1 = scratch.scale, work.slopes, work.y, work.x_after
+    side_now, order_now, floor_now = scratch.sides, scratch.orders, scratch.floors
     steps, series, segments, clocks = record.steps, record.series, record.segments, record.clocks
     modes, vectors, fires, jumps = record.modes, record.vectors, record.fires, record.jumps
     time, states = inputs.time[0], inputs.states
     n, terms, tolerances = x.shape[0], left.shape[1], (rtol, atol)
     n_steps, n_segments = 0, 0
-    pace = room.pace
+    pace = scratch.pace
     pace[0], pace[1], pace[2] = math.inf, math.inf, 0.0
     while True:
         k, first_step = find_modes(tapes, z), n_steps
@@ -305,57 +316,59 @@ def rk_leap(
         step_rows = parts.step_rows[parts.step_start[k] : parts.step_start[k + 1]]
         is_linear = parts.is_linear[k]
         step_guards = guard_rows if is_linear else guard_rows[:0]
-        flow_places = (time, states, tapes.derivatives[k])
+        flow_registers = (time, states, tapes.derivatives[k])
         ends_code, first_code = codes.ends[k], codes.first[k]
-        load(inputs, tapes, k, p, room.V)
+        load(inputs, tapes, k, p, scratch.V)
         load(inputs, tapes, k, p, W)
-        watched = room.watched[: tapes.active_start[k + 1] - tapes.active_start[k]]
-        for i in range(watched.shape[0]):
-            room.numbers[i] = tapes.active[tapes.active_start[k] + i]
-            watched[i] = tapes.guards[k, room.numbers[i]]
+        guard_registers = scratch.guard_registers[: tapes.active_start[k + 1] - tapes.active_start[k]]
+        for i in range(guard_registers.shape[0]):
+            scratch.numbers[i] = tapes.active[tapes.active_start[k] + i]
+            guard_registers[i] = tapes.guards[k, scratch.numbers[i]]
         put(sides, side_now)
         put(orders, order_now)
         put(floors, floor_now)
-        s, fired, is_holding, is_sure = 0.0, -1, holding(automata, z), True
-        lands = landing(automata, z)
+        s, fired, is_holding, is_sure = 0.0, -1, any_holding(automata, z), True
+        is_projected = any_projecting(automata, z)
         value, slope, bend, d = 0.0, 0.0, 0.0, 0.0
-        forget(room.memory)
+        forget(scratch.memory)
         put(x, y)
         for i in range(n):
             scale[i] = abs(x[i])
         if first_code != 0:
-            call_series(first_code, 0.0, 0.0, y, room.guards_left, W, room.first)
+            call_series(first_code, 0.0, 0.0, y, scratch.guards_left, W, scratch.first)
         else:
-            call_apart(expand, (step_rows, step_rows[:0], flow_places, leading[0] + 1, 0.0, y, W))
-            gather(states, W, room.first)
-            gather(watched, W, room.guards_left)
-        h = first_length(leading, y, tolerances, room.first, min(bound, max_step))
+            call_noinline(expand, (step_rows, step_rows[:0], flow_registers, leading[0] + 1, 0.0, y, W))
+            gather(states, W, scratch.first)
+            gather(guard_registers, W, scratch.guards_left)
+        h = first_length(leading, y, tolerances, scratch.first, min(bound, max_step))
         tried = math.inf  # last rejected length from this point
         if first[0] > 0.0:
             h, first[0] = first[0], 0.0
         for i in range(n):
             for j in range(terms):
-                left[i, j] = room.first[i, j]
+                left[i, j] = scratch.first[i, j]
         if not (is_finite(left) and h > 0.0):
             return STOPPED, n_steps, n_segments
         while fired < 0 and s < bound:
             if n_steps >= steps.shape[0]:
-                if n_segments > 0 or n_steps < LEAST:
+                if n_segments > 0 or n_steps < MIN_STEPS_IN_PART:
                     return FULL, first_step, n_segments
                 first[0] = h  # the next call continues with it
                 break
             # the rest would be too short for another step
-            is_last = h * STRETCH >= bound - s - SMALLEST * 2.0**-52 * bound
+            is_last = h * LAST_STEP_FACTOR >= bound - s - SMALLEST * 2.0**-52 * bound
             d = bound - s if is_last else on_the_grid(s, h)
             if s > longest or not 0.0 < d < tried:
                 return STOPPED, first_step, n_segments
             tried = d
             for i in range(n):
-                room.dx[i] = left[i, 1]
-            error = attempt(functions.flow, tableau, s, d, y, room.dx, p, z, tolerances, room.stages, y1)
-            room.counts[0] += 1
-            h = min(next_length(d, error, error_order, room.memory), max_step)
-            if lands:
+                scratch.dx[i] = left[i, 1]
+            error = attempt(
+                functions.flow, tableau, s, d, y, scratch.dx, p, z, tolerances, scratch.stages, y1
+            )
+            scratch.counts[0] += 1
+            h = min(next_length(d, error, error_order, scratch.memory), max_step)
+            if is_projected:
                 call(functions.project, s + d, y1, p, z, slopes)
                 put(slopes, y1)
             if not (
@@ -364,29 +377,31 @@ def rk_leap(
                     ends_code,
                     step_rows,
                     step_guards,
-                    flow_places,
+                    flow_registers,
                     s + d,
                     y1,
-                    watched,
+                    guard_registers,
                     W,
                     right,
-                    room.guards_right,
+                    scratch.guards_right,
                 )
             ):
-                room.counts[1] += 1
+                scratch.counts[1] += 1
                 h = min(h, _HALF * d) if error <= 1.0 else h
                 continue
             if not holds_between(
-                functions.flow, hermite.middle, s, d, left, right, p, z, tolerances, room.ahead, slopes
+                functions.flow, hermite.middle, s, d, left, right, p, z, tolerances, scratch.ahead, slopes
             ):
-                room.counts[1] += 1
+                scratch.counts[1] += 1
                 h = _HALF * d
                 continue
             if is_linear:
-                outcome, g, at = first_linear_guard(tapes, k, watched.shape[0], d, hermite, room)
-            elif fit_in_time(left, right, d, hermite.shift, hermite.inverse, room.lack, room.polynomial):
+                outcome, g, at = first_linear_guard(tapes, k, guard_registers.shape[0], d, hermite, scratch)
+            elif fit_in_time(
+                left, right, d, hermite.shift, hermite.inverse, scratch.lack, scratch.polynomial
+            ):
                 outcome, g, at = first_guard(
-                    tapes, k, guard_rows, inputs, codes, order, rtol, s, d, atol, watched, room
+                    tapes, k, guard_rows, inputs, codes, order, rtol, s, d, atol, guard_registers, scratch
                 )
             else:
                 outcome, g, at = OPEN, -1, 0.0
@@ -394,27 +409,37 @@ def rk_leap(
                 return STOPPED, first_step, n_segments
             if outcome == FOUND:
                 place = 0
-                while room.numbers[place] != g:
+                while scratch.numbers[place] != g:
                     place += 1
                 code, at = land(
-                    functions, tableau, tolerances, tapes, k, guard_rows, inputs, ends_code, watched, place, s, at, d,
-                    p, z, is_holding, room, work,
+                    functions, tableau, tolerances, tapes, k, guard_rows, inputs, ends_code, guard_registers, place,
+                    s, at, d, p, z, is_holding, scratch, work,
                 )  # fmt: skip
                 if code == LOST:
                     return STOPPED, first_step, n_segments
                 if code != REJECTED and not holds_between(
-                    functions.flow, hermite.middle, s, at, left, right, p, z, tolerances, room.ahead, slopes
+                    functions.flow,
+                    hermite.middle,
+                    s,
+                    at,
+                    left,
+                    right,
+                    p,
+                    z,
+                    tolerances,
+                    scratch.ahead,
+                    slopes,
                 ):
                     code = REJECTED
                 if code == REJECTED:
-                    room.counts[1] += 1
+                    scratch.counts[1] += 1
                     h = _HALF * at
                     if s == 0.0:
                         put(sides, side_now)
                         put(orders, order_now)
                         put(floors, floor_now)
                     continue
-                ahead = room.guards_right[place]
+                ahead = scratch.guards_right[place]
                 value, slope, bend = ahead[0], ahead[1], ahead[2]
                 d, is_last, fired, is_sure = at, False, g, code == LANDED
             steps[n_steps, 0], steps[n_steps, 1] = s, d
@@ -424,9 +449,9 @@ def rk_leap(
                     left[i, j] = right[i, j]
                 y[i] = y1[i]
                 scale[i] = max(scale[i], abs(y1[i]))
-            for i in range(watched.shape[0]):
+            for i in range(guard_registers.shape[0]):
                 for j in range(terms):
-                    room.guards_left[i, j] = room.guards_right[i, j]
+                    scratch.guards_left[i, j] = scratch.guards_right[i, j]
             n_steps += 1
             tried = math.inf
             s = bound if is_last else s + d
@@ -438,7 +463,7 @@ def rk_leap(
         if fired < 0 and s >= bound:
             latest = max(abs(target[0]), abs(clock[0]))
             call(functions.flow, s, y, p, z, slopes)
-            if may_be_at_zero(
+            if may_vanish(
                 automata, tapes, inputs, lin, k, s, latest, n_steps - first_step, scale, slopes, state, work
             ):
                 return STOPPED, first_step, n_segments
@@ -470,7 +495,7 @@ def rk_leap(
             automata, tapes, inputs, lin, fired, slope, bend, s, s_error, state, work
         ):
             return STOPPED, first_step, n_segments
-        if not settle_and_move_on(
+        if not resolve_and_advance(
             automata, tapes, inputs, lin, s, s_error, fired, n_steps - first_step, clock, state, work
         ):
             return STOPPED, first_step, n_segments

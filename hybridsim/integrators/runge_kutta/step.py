@@ -19,7 +19,7 @@ _NOTHING = 1e-9  # rounding of a coefficient that order conditions make zero
 SMALLEST = 10.0  # a rest of fewer ulps of the local time is merged into the last step
 # So is a rest of less than this share of the step: thousands of equal steps add up to their span up to
 # roundings of that size, and a step that is longer by it has the same error up to a part in 10**8.
-STRETCH = 1.0 + 2.0**-30
+LAST_STEP_FACTOR = 1.0 + 2.0**-30
 
 
 class Coefficients(NamedTuple):

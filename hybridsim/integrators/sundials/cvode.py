@@ -18,7 +18,7 @@ from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.integrators.contract import Integrator
 from hybridsim.integrators.first_steps import with_first_steps
-from hybridsim.integrators.past_steps import MOST, converges, through
+from hybridsim.integrators.past_steps import MAX_PAST_POINTS, converges, through
 
 _NOISE = {
     "accumulation": "it does not resolve events closer than its tolerances, since each restart is at order one"
@@ -113,7 +113,10 @@ class CvodeStepper:
     def _dense(self, s0: float, s1: float, x0: np.ndarray, x1: np.ndarray) -> Dense:
         """Return dense output that is computed at first use."""
         made: list[Dense] = []
-        self.past_times, self.past_states = [*self.past_times, s1][-MOST:], [*self.past_states, x1][-MOST:]
+        self.past_times, self.past_states = (
+            [*self.past_times, s1][-MAX_PAST_POINTS:],
+            [*self.past_states, x1][-MAX_PAST_POINTS:],
+        )
         times, states = np.array(self.past_times), np.array(self.past_states)
 
         def dense(s: np.ndarray) -> np.ndarray:

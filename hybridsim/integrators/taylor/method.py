@@ -11,7 +11,7 @@ import numpy as np
 from hybridsim.engine.native.time_grid import on_the_grid
 from hybridsim.engine.record.segments import Dense
 from hybridsim.engine.roots.defect_check import BETWEEN
-from hybridsim.engine.roots.vanishing_terms import PIECES, where_it_ends
+from hybridsim.engine.roots.vanishing_terms import STACK_ROWS, where_it_ends
 from hybridsim.engine.run.compiled_loop import TaylorLoop, compile_loops
 from hybridsim.engine.run.stepping import Flow, Step, Stepper, Watch
 from hybridsim.engine.series.interpreter import polynomials
@@ -48,7 +48,7 @@ class TaylorStepper:
         self.series = SeriesRun(flow.system, flow.p, flow.z, tolerances)
         self.computed = np.array(computed_rates(flow.system, flow.z))
         self.fading = np.array(fading(flow.system, flow.z), dtype=np.int64)
-        self.pieces = np.empty(self.series.order), np.empty((PIECES, self.series.order + 2))
+        self.stack_arrays = np.empty(self.series.order), np.empty((STACK_ROWS, self.series.order + 2))
         self.s, self.x = 0.0, x0
         self.longest = first_step or math.inf
         # consecutive steps that were shortened often and do not shrink further: count, start, and first length
@@ -67,7 +67,7 @@ class TaylorStepper:
         order = coefficients.shape[1] - 1
         for number in self.fading:
             u = power_of(number) * self.series.V[register_of(number)]
-            end = where_it_ends(u, number % KINDS, order, direction * h, *self.pieces, 0)
+            end = where_it_ends(u, number % KINDS, order, direction * h, *self.stack_arrays, 0)
             h = min(h, abs(end))
         smallest = _SMALLEST * math.ulp(abs(self.bound))
         before = self.flow.counters.rejected
@@ -112,11 +112,11 @@ class TaylorStepper:
         still = moves <= self.tolerances.atol + self.series.rtol * np.abs(self.x)
         if not (still & self.computed).any():
             return True
-        places = h * np.array(BETWEEN)
-        states = np.empty((len(places), len(self.x)))
-        polynomials(coefficients, places, states)
+        times = h * np.array(BETWEEN)
+        states = np.empty((len(times), len(self.x)))
+        polynomials(coefficients, times, states)
         return all(
-            self._holds(coefficients, self.x, x, self.s, d) for d, x in zip(places, states, strict=True)
+            self._holds(coefficients, self.x, x, self.s, d) for d, x in zip(times, states, strict=True)
         )
 
     def _holds(self, coefficients: np.ndarray, x0: np.ndarray, x1: np.ndarray, s0: float, d: float) -> bool:

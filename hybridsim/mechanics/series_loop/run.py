@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from hybridsim.engine.native.kernels import ENABLED, call_kernel, kernel, kernel_address, seconds_compiling
-from hybridsim.engine.native.simd_vectors import WIDTH, room_for
+from hybridsim.engine.native.simd_vectors import WIDTH, padded_rows
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.limits import UNLIMITED, LimitMonitor, LimitReached, Limits
@@ -222,7 +222,7 @@ def new_state(built: Built, order: int) -> State:
     leaves = 1 << max(m, 1).bit_length()
     ints: dict[str, Any] = {"dtype": np.int64}
     return State(
-        x=np.zeros((2, n)), series=room_for(order + 1, -(-n // WIDTH) * WIDTH), origin=np.zeros(nodes),
+        x=np.zeros((2, n)), series=padded_rows(order + 1, -(-n // WIDTH) * WIDTH), origin=np.zeros(nodes),
         mode=np.zeros(m, **ints), held=np.zeros(m, **ints), decree=np.zeros((m, 2), **ints), stamp=np.full(m, -1.0),
         until=np.full(m, OPEN_END), guard=np.zeros(m, **ints), pinv=np.zeros(max(len(arrays.g_val), 1)),
         holds=np.zeros(nodes, **ints), pin=np.full(n, -1, **ints), anchor=np.full(m, -1, **ints),
@@ -246,15 +246,15 @@ def new_scratch(built: Built, order: int) -> Scratch:
     return Scratch(
         nodes=np.zeros(nodes, **ints), dofs=np.zeros(n, **ints), cons=np.zeros(m, **ints), loc=np.zeros(n, **ints),
         lcon=np.zeros(m, **ints), stamp=np.zeros(nodes + 1, **ints),
-        Q=room_for(columns, wide, beside), R=room_for(columns, wide), F=room_for(columns, wide), acc=np.zeros(wide),
+        Q=padded_rows(columns, wide, beside), R=padded_rows(columns, wide), F=padded_rows(columns, wide), acc=np.zeros(wide),
         trig=np.zeros((len(arrays.rates), 2, columns)), lane=np.zeros(m, **ints), lane_ptr=np.zeros(tapes + 1, **ints),
         place=np.zeros(tapes + 1, **ints), poly=np.zeros(columns),
-        V=room_for(1, registers * columns * (m + WIDTH * tapes) + 1)[0],
+        V=padded_rows(1, registers * columns * (m + WIDTH * tapes) + 1)[0],
         bern=np.zeros(columns), stack=np.zeros((64, columns + 2)), before=np.zeros(m, **ints),
         zero=np.zeros(m, **ints), at_limit=np.zeros(m, **ints), next=np.zeros(m, **ints),
         err=np.zeros((columns, n)), err_f=np.zeros((columns + 8, m)), square=np.zeros((widest, widest)),
         tall=np.zeros((widest, widest)), order=np.zeros(widest, **ints), exits=np.zeros(m), kinds=np.zeros(m, **ints),
-        line=np.zeros(3 * TERMS), sums=room_for(4, wide), band_rows=room_for(1, (len(arrays.bands) + 3) * wide)[0],
+        line=np.zeros(3 * TERMS), sums=padded_rows(4, wide), band_rows=padded_rows(1, (len(arrays.bands) + 3) * wide)[0],
         band_first=np.zeros(wide // WIDTH, **ints),
-        W=room_for(1, (registers * columns + 1) * wide if len(arrays.offsets) else 1)[0],
+        W=padded_rows(1, (registers * columns + 1) * wide if len(arrays.offsets) else 1)[0],
     )  # fmt: skip

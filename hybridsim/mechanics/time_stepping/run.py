@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.engine.native.kernels import seconds_compiling
-from hybridsim.engine.native.simd_vectors import WIDTH, room_for
+from hybridsim.engine.native.simd_vectors import WIDTH, padded_rows
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.limits import UNLIMITED, LimitMonitor, LimitReached, Limits
@@ -166,5 +166,5 @@ def _new_scratch(n: int, nc: int, m: int, registers: int) -> SteppedScratch:
         **of,
         base=np.zeros((nc, 3)),
         lane=np.zeros(width, dtype=np.int64),
-        V=room_for(1, registers * width + 1)[0],
+        V=padded_rows(1, registers * width + 1)[0],
     )

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 _TERMS = 24  # terms of the velocity's series for arguments up to 1/2; the first omitted term is below 1e-30
-_MOST_STEPS = 100_000  # limit of the search for the end, which needs about fifty steps; only NaN exceeds it
+_MAX_STEPS = 100_000  # limit of the search for the end, which needs about fifty steps; only NaN exceeds it
 
 
 class SlipPhase:
@@ -87,7 +87,7 @@ class SlipPhase:
             s = abs(acceleration) / self.bound(3, 0.0)
         else:  # a tangential start: likewise
             s = 3 * abs(half_jerk) / self.bound(4, 0.0)
-        for _ in range(_MOST_STEPS):
+        for _ in range(_MAX_STEPS):
             v, slope = self._velocity_and_slope(s)
             if v <= 0:
                 return s

@@ -52,8 +52,8 @@ if TYPE_CHECKING:
     from hybridsim.expr import Expression
 
 
-_MOST_TOGETHER = 4  # contacts decided jointly; their 3^4 combinations are tried one by one
-_MOST_ROUNDS = 50  # rounds at one instant; a cascade of resets is far shorter
+_MAX_JOINT_CONTACTS = 4  # contacts decided jointly; their 3^4 combinations are tried one by one
+_MAX_ROUNDS = 50  # rounds at one instant; a cascade of resets is far shorter
 
 
 @dataclass
@@ -90,7 +90,7 @@ class Rules:
             fired = leaving if now != modes else self.sides.others(fired) | leaving
             fired -= self._cancelled(point, now, fired)
         modes, due, is_located = now, list(resets), bool(fired)
-        for _ in range(_MOST_ROUNDS):
+        for _ in range(_MAX_ROUNDS):
             names = {
                 c: self.components[c].mode(modes[c]).guards[j].name for c, j in sorted(fired, reverse=True)
             }
@@ -129,7 +129,7 @@ class Rules:
 
     def _leave_in_any_case(self, point: Point, modes: Modes, moves: list[Move]) -> tuple[Point, Modes]:
         """Change the modes of automata whose guards are negative whatever the undecided forces are."""
-        for _ in range(_MOST_ROUNDS if self._surfaces() else 0):
+        for _ in range(_MAX_ROUNDS if self._surfaces() else 0):
             leaving = self.sides.leaving_in_any_case(point, modes)
             if not leaving:
                 break
@@ -168,11 +168,11 @@ class Rules:
         deciding = {c for c in open_ if self._on_surface(c, point, modes)}
         while deciding:
             chosen = self._with_coupled(min(deciding), deciding, point, modes)
-            if len(chosen) > _MOST_TOGETHER:
+            if len(chosen) > _MAX_JOINT_CONTACTS:
                 coupled = ", ".join(self.components[c].name for c in chosen)
                 raise UsageError(
                     f"{len(chosen)} coupled contacts start or stop at once ({coupled}); the multiple-precision run "
-                    f"supports at most {_MOST_TOGETHER}",
+                    f"supports at most {_MAX_JOINT_CONTACTS}",
                     remedy="use reference='runs'",
                 )
             point = self.programs.program(self.programs.held(self.programs.decided(modes), chosen)).project(

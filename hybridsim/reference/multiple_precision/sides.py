@@ -13,7 +13,7 @@ from hybridsim.reference.multiple_precision.program import Point
 from hybridsim.reference.multiple_precision.programs import UNDECIDED, Modes, Programs
 from hybridsim.reference.multiple_precision.transitions import Move
 
-_MOST_AT_REST = 4  # contacts at rest whose combinations of modes are tried
+_MAX_CONTACTS_AT_REST = 4  # contacts at rest whose combinations of modes are tried
 _ROUNDS_PER_MODE = (
     4  # rounds per mode: a corner waits for the corners inside it, and for the series orders before its own
 )
@@ -79,7 +79,7 @@ class Sides:
         surfaces = [c for c, component in enumerate(self.components) if component.surface]
         expansion = self.programs.expand(point, tuple(trial))
         zero = [c for c, one in zip(surfaces, expansion.surfaces, strict=True) if expansion.is_zero(one)]
-        if len(zero) > _MOST_AT_REST:
+        if len(zero) > _MAX_CONTACTS_AT_REST:
             negative = self._negative(point, tuple(trial), by_value=True)
             return {(c, j) for c, j in negative if self._is_free(c, trial[c], j)}
         found: set[tuple[int, int]] = set()

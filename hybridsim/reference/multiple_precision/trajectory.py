@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from hybridsim.model import Model
 
 # With fewer digits, rounding comes too close to the size that counts as zero; more take ever longer.
-_FEWEST, _MOST = 20, 200
+_MIN_DIGITS, _MAX_DIGITS = 20, 200
 
 
 def multiple_precision_trajectory(
@@ -58,8 +58,8 @@ def multiple_precision_trajectory(
     from hybridsim.reference.multiple_precision.precision import Precision
     from hybridsim.reference.multiple_precision.run import Run
 
-    if not _FEWEST <= digits <= _MOST:
-        raise UsageError(f"digits is {digits!r}", remedy=f"give a number from {_FEWEST} to {_MOST}")
+    if not _MIN_DIGITS <= digits <= _MAX_DIGITS:
+        raise UsageError(f"digits is {digits!r}", remedy=f"give a number from {_MIN_DIGITS} to {_MAX_DIGITS}")
     if model.surfaces:
         names = ", ".join(surface.name for surface in model.surfaces)
         raise UsageError(

@@ -54,18 +54,18 @@ SCENES: dict[str, tuple[Any, float, int]] = {
 
 def found(model: Any, end: float) -> list[Any]:
     """All that a run has found, bit by bit, and how many events were settled at first sight."""
-    seen, settle = [0], resolve_ordinary.settle_clearly
+    seen, resolve = [0], resolve_ordinary.resolve_clear
 
     def counted(*arguments: Any) -> bool:
-        is_clear = bool(settle(*arguments))
+        is_clear = bool(resolve(*arguments))
         seen[0] += is_clear
         return is_clear
 
-    resolve_ordinary.settle_clearly = counted
+    resolve_ordinary.resolve_clear = counted
     try:
         sol = hs.simulate(model, (0, end), integrator="exact")
     finally:
-        resolve_ordinary.settle_clearly = settle
+        resolve_ordinary.resolve_clear = resolve
     events = [
         [e.t.hex(), e.component, e.source, e.target, *(float(v).hex() for v in e.x_plus)] for e in sol.events
     ]
@@ -76,7 +76,7 @@ def both(scene: str) -> None:
     """Print what is found with and without a first sight."""
     model, end, _ = SCENES[scene]
     at_first_sight = found(model, end)
-    resolve_ordinary.settle_clearly = lambda *_: False
+    resolve_ordinary.resolve_clear = lambda *_: False
     print(json.dumps([at_first_sight, found(model, end)]))
 
 

@@ -82,16 +82,16 @@ def by_the_letter(
 
 def as_computed(series: Any, bounds: Any, *rest: Any) -> int:
     """Every coefficient is taken for what rounding made of it."""
-    return judge(series, np.zeros_like(bounds), *rest)
+    return guard_verdict(series, np.zeros_like(bounds), *rest)
 
 
-decree_orders, judge = resolve.decree_orders, resolve.judge
+decree_orders, guard_verdict = resolve.decree_orders, resolve.guard_verdict
 
 
 @pytest.mark.parametrize(
     ("decree", "rule", "least", "most"),
     [
-        pytest.param(decree_orders, judge, 200, 200, id="as it is"),
+        pytest.param(decree_orders, guard_verdict, 200, 200, id="as it is"),
         pytest.param(decree_orders, by_the_letter, 200, 200, id="with Z, by the letter"),
         pytest.param(decree_orders, as_computed, 200, 200, id="with Z, no error bounds at all"),
         pytest.param(only_the_velocity, by_the_letter, 0, 100, id="without Z, by the letter"),
@@ -111,7 +111,7 @@ def test_releases_need_the_zeros_by_decree(
     stops for want of a motion where the sign of the computed acceleration is believed (106 of 600).
     """
     monkeypatch.setattr(resolve, "decree_orders", decree)
-    monkeypatch.setattr(resolve, "judge", rule)
+    monkeypatch.setattr(resolve, "guard_verdict", rule)
     assert least <= verdicts(200)["right"] <= most
 
 

@@ -14,7 +14,7 @@ from hybridsim.engine.linear.modal import Modal, modal
 from hybridsim.engine.linear.motion import moved, states_of, to_modal
 from hybridsim.engine.linear.tables import LinearTables, no_tables
 from hybridsim.engine.native.kernels import kernel
-from hybridsim.engine.native.simd_products import filled_up, panels_of, vector_of
+from hybridsim.engine.native.simd_products import filled_up, row_blocks_of, vector_of
 from hybridsim.engine.native.struct_pack import packed
 
 UNIT = 2.0**-53
@@ -52,8 +52,8 @@ def by_blocks(flow: Modal, y: np.ndarray, d: float) -> np.ndarray:
         fields[name] = getattr(flow, name)[None]
     width = filled_up(2 * len(flow.values)) // 2
     inverse, basis = flow.inverse, flow.full_basis
-    fields["inverse"] = panels_of(np.stack([inverse.real, inverse.imag], axis=1).reshape(1, -1, len(y)))
-    fields["states"] = panels_of(np.stack([basis.real, -basis.imag], axis=-1).reshape(1, len(y), -1))
+    fields["inverse"] = row_blocks_of(np.stack([inverse.real, inverse.imag], axis=1).reshape(1, -1, len(y)))
+    fields["states"] = row_blocks_of(np.stack([basis.real, -basis.imag], axis=-1).reshape(1, len(y), -1))
     c, v = np.zeros((2, width), dtype=complex)
     start, out = vector_of(len(y)), np.empty(len(y))
     start[:] = y

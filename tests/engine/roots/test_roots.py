@@ -342,7 +342,7 @@ def test_pure_rounding_is_accepted_as_such(offset: float) -> None:
 
 def test_an_endless_search_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """A function that is noise, without a bound that would say so."""
-    monkeypatch.setattr(roots, "_MOST_PIECES", 1000)
+    monkeypatch.setattr(roots, "_MAX_SUBDIVISIONS", 1000)
     rng = np.random.default_rng(1)
     with pytest.raises(StepFailure, match="max_step"):
         Search(lambda theta: rng.uniform(-1, 1, len(theta)), rounding=0.0)

@@ -18,7 +18,7 @@ OSCILLATOR = hs.Model("free", states=[hs.State("x", 1, der="v"), hs.State("v", 0
 @pytest.fixture
 def little_room(monkeypatch: pytest.MonkeyPatch) -> None:
     """Room for the least number of steps."""
-    monkeypatch.setattr(compiled_loop, "_ROOM", 0)
+    monkeypatch.setattr(compiled_loop, "_CALL_DOUBLES", 0)
 
 
 @pytest.mark.parametrize("integrator", ["dop853", "tsit5", "taylor"])

@@ -13,7 +13,7 @@ import pytest
 
 import hybridsim as hs
 from hybridsim.engine.native.kernels import ENABLED, call_series, compile_series, kernel
-from hybridsim.engine.roots.defect_check import look_ahead, room_ahead
+from hybridsim.engine.roots.defect_check import ahead_size, look_ahead
 from hybridsim.engine.roots.dense_guards import guards_at, series_along
 from hybridsim.engine.roots.first_exit import to_bernstein
 from hybridsim.engine.series.bounded import ORDER
@@ -23,9 +23,9 @@ from hybridsim.engine.series.emit_series import ends_text, series_text
 from hybridsim.engine.series.interpreter import expand, measure
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.programs import code_cache, mode_tables
-from hybridsim.engine.system.programs.code_cache import CodeShelf
+from hybridsim.engine.system.programs.code_cache import CodeCache
 from hybridsim.engine.system.programs.mode_code import constant_rows, constant_sources, mode_tape
-from hybridsim.engine.system.programs.mode_tables import shelf_of
+from hybridsim.engine.system.programs.mode_tables import tape_cache_of
 from hybridsim.engine.system.series_at import SeriesRun
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
@@ -54,38 +54,57 @@ def called(code: int, s: float, error: float, x: Any, guards: Any, constants: An
 
 @kernel
 def looked(
-    rows: Any, places: Any, order: int, s: float, d: float, watched: Any, C: Any, U: Any, W: Any, out: Any
+    rows: Any,
+    flow_registers: Any,
+    order: int,
+    s: float,
+    d: float,
+    guard_registers: Any,
+    C: Any,
+    U: Any,
+    W: Any,
+    out: Any,
 ) -> None:
     """What is ahead, by the interpreter."""
-    look_ahead(0, rows, places, order, s, d, watched, C, U, W, out)
+    look_ahead(0, rows, flow_registers, order, s, d, guard_registers, C, U, W, out)
 
 
 @kernel
-def sized(code: int, U: Any, watched: Any, order: int, h: float, powers: Any, totals: Any) -> None:
+def sized(code: int, U: Any, guard_registers: Any, order: int, h: float, powers: Any, totals: Any) -> None:
     """Sizes of series."""
-    measure(code, U, watched, order, h, powers, totals)
+    measure(code, U, guard_registers, order, h, powers, totals)
 
 
 @kernel
 def ended(
-    code: int, rows: Any, places: Any, s: float, x: Any, watched: Any, W: Any, out: Any, guards: Any
+    code: int,
+    rows: Any,
+    flow_registers: Any,
+    s: float,
+    x: Any,
+    guard_registers: Any,
+    W: Any,
+    out: Any,
+    guards: Any,
 ) -> bool:
     """Series at the end of a step."""
-    return series_of(code, rows, rows, places, s, x, watched, W, out, guards)
+    return series_of(code, rows, rows, flow_registers, s, x, guard_registers, W, out, guards)
 
 
 @kernel
-def went(code: int, rows: Any, inputs: Any, s: float, x: Any, watched: Any, V: Any, W: Any, out: Any) -> None:
+def went(
+    code: int, rows: Any, inputs: Any, s: float, x: Any, guard_registers: Any, V: Any, W: Any, out: Any
+) -> None:
     """Guards along a step."""
-    series_along(code, rows, inputs, s, x, watched, V, W, out)
+    series_along(code, rows, inputs, s, x, guard_registers, V, W, out)
 
 
 @kernel
 def met(
-    code: int, rows: Any, inputs: Any, s: float, x: Any, watched: Any, W: Any, rates: Any, out: Any
+    code: int, rows: Any, inputs: Any, s: float, x: Any, guard_registers: Any, W: Any, rates: Any, out: Any
 ) -> None:
     """Values of guards."""
-    guards_at(code, rows, inputs, s, x, watched, W, rates, out)
+    guards_at(code, rows, inputs, s, x, guard_registers, W, rates, out)
 
 
 def systems() -> dict[str, System]:
@@ -128,18 +147,18 @@ def test_series_and_what_is_ahead_of_them(name: str, tmp_path: Path) -> None:
             ("series_0", "values_0", "ahead_0", "sizes_0"),
             partial(series_text, tape, order),
         )
-        watched, fading = np.array(tape.guards, dtype=np.int64), np.array(tape.fading, dtype=np.int64)
+        guard_registers, fading = np.array(tape.guards, dtype=np.int64), np.array(tape.fading, dtype=np.int64)
         constants, interpreted = run.V.copy(), run.V.copy()
         run.expand(0.1, x, 1.0)
-        expected, guards = run.V[run.states], run.V[watched]
-        C, with_fading = np.empty((n, order + 1)), np.empty((len(watched) + len(fading), order + 1))
-        U = with_fading[: len(watched)]
+        expected, guards = run.V[run.states], run.V[guard_registers]
+        C, with_fading = np.empty((n, order + 1)), np.empty((len(guard_registers) + len(fading), order + 1))
+        U = with_fading[: len(guard_registers)]
         called(series, 0.1, 0.0, x, with_fading, constants, C)
         np.testing.assert_array_equal(C, expected)
         np.testing.assert_array_equal(U, guards)
-        np.testing.assert_array_equal(with_fading[len(watched) :], run.V[fading])
+        np.testing.assert_array_equal(with_fading[len(guard_registers) :], run.V[fading])
         d = 0.01
-        found, want = np.empty((2, room_ahead(order, n, len(watched))))
+        found, want = np.empty((2, ahead_size(order, n, len(guard_registers))))
         called(ahead, 0.1, d, C, U, constants, found)
         looked(
             run.optimised.rows,
@@ -147,7 +166,7 @@ def test_series_and_what_is_ahead_of_them(name: str, tmp_path: Path) -> None:
             order,
             0.1,
             d,
-            watched,
+            guard_registers,
             expected,
             guards,
             interpreted,
@@ -166,10 +185,10 @@ def test_series_and_what_is_ahead_of_them(name: str, tmp_path: Path) -> None:
         run.expand(0.1 + d, x1, 1.0)
         called(series, 0.1 + d, 1.0, x1, with_fading, constants, C)
         np.testing.assert_array_equal(C, run.V[run.states])
-        rates, at = np.empty(n), np.empty(len(watched))
+        rates, at = np.empty(n), np.empty(len(guard_registers))
         called(values, 0.1 + d, 0.0, x1, at, constants, rates)
         np.testing.assert_array_equal(rates, run.V[run.optimised.derivatives, 0])
-        np.testing.assert_array_equal(at, run.V[watched, 0])
+        np.testing.assert_array_equal(at, run.V[guard_registers, 0])
 
 
 @pytest.mark.parametrize("name", SYSTEMS)
@@ -209,8 +228,8 @@ def test_series_at_the_ends_of_steps_and_guards_along_them(name: str, tmp_path: 
     system, terms, first, order, s = SYSTEMS[name], 4, 7, 11, 0.1
     p, x = start_of(system)
     for i, z in enumerate(modes_of(system)):
-        tape, lean = mode_tape(system, z), system.optimised_tape(z)
-        watched = np.array(tape.guards, dtype=np.int64)
+        tape, optimised = mode_tape(system, z), system.optimised_tape(z)
+        guard_registers = np.array(tape.guards, dtype=np.int64)
         constants = SeriesRun(system, p, z, Tolerances(1e-9, np.zeros(system.n))).V
         V, W = (np.pad(constants[:, :1], ((0, 0), (0, order))) for _ in range(2))
         codes, _keep = compile_series(
@@ -218,29 +237,29 @@ def test_series_at_the_ends_of_steps_and_guards_along_them(name: str, tmp_path: 
             [f"{part}_0" for part in ("ends", "first", "along", "values")],
             partial(ends_text, tape, terms, first, order),
         )
-        inputs, n, count = system.registers.inputs, system.n, len(watched)
-        places = (inputs.time[0], inputs.states, lean.derivatives)
+        inputs, n, count = system.registers.inputs, system.n, len(guard_registers)
+        flow_registers = (inputs.time[0], inputs.states, optimised.derivatives)
         made = []
         for code in (0, codes[0]):
             out, guards = np.empty((n, terms)), np.empty((count, terms))
-            assert ended(code, lean.rows, places, s, x, watched, W, out, guards)
+            assert ended(code, optimised.rows, flow_registers, s, x, guard_registers, W, out, guards)
             made.append((out, guards))
         compare(*made)
         U, C = np.empty((count, terms)), np.empty((n, first + 1))
         called(codes[1], s, 0.0, x, U, W, C)
-        expand(lean.rows, lean.rows[:0], places, first, s, x, V)
-        compare((C, U), (V[inputs.states, : first + 1], V[watched, :terms]))
+        expand(optimised.rows, optimised.rows[:0], flow_registers, first, s, x, V)
+        compare((C, U), (V[inputs.states, : first + 1], V[guard_registers, :terms]))
         along = np.cos(np.arange(n * (order + 1.0)) ** 2).reshape(n, order + 1)
         made = []
         for code in (0, codes[2]):
             U = np.empty((count, order + 1))
-            went(code, lean.rows, inputs, s, along, watched, V, W, U)
+            went(code, optimised.rows, inputs, s, along, guard_registers, V, W, U)
             made.append((U,))
         compare(*made)
         made = []
         for code in (0, codes[3]):
             values = np.empty(count)
-            met(code, lean.rows, inputs, s, x, watched, W, np.empty(n), values)
+            met(code, optimised.rows, inputs, s, x, guard_registers, W, np.empty(n), values)
             made.append((values,))
         compare(*made)
 
@@ -265,9 +284,9 @@ def test_a_run_is_the_same_with_code_and_without(
                 monkeypatch.setattr(module, "KNOWN", steps)
                 monkeypatch.setattr(module, "WORTH", steps)
             runs.append(hs.simulate(model, (0, 0.1), integrator=integrator))
-        tapes, shelves = shelf_of(System(model)).tapes, code._shared.values()
+        tapes, shelves = tape_cache_of(System(model)).tapes, code._shared.values()
         made = [
-            kept.of(tapes).arrays[: len(kept.functions)] for kept in shelves if isinstance(kept, CodeShelf)
+            kept.of(tapes).arrays[: len(kept.functions)] for kept in shelves if isinstance(kept, CodeCache)
         ]
         assert any(np.all(addresses) for addresses in made) and tapes.bounds.all()
     assert len(runs[0].events) > 4

@@ -33,12 +33,12 @@ def test_the_lean_tape_is_the_tape(name: str) -> None:
         run = SeriesRun(system, p, z, Tolerances(1e-9, zero))
         run.expand(0.1, x, 1.0)
         active = system.active(z)
-        for places, expected in (
+        for flow_registers, expected in (
             (run.states, full.states),
             (run.optimised.guards[active], full.guards[active]),
             (run.optimised.monitors, full.monitors),
         ):
-            np.testing.assert_array_equal(run.V[places, :4], expected)
+            np.testing.assert_array_equal(run.V[flow_registers, :4], expected)
 
 
 # a scalar equation x' = f(x, t) whose solution is known, at t = 0.3

@@ -16,7 +16,7 @@ import pytest
 import hybridsim as hs
 from hybridsim.engine.linear.tables import LinearTables, linear_tables
 from hybridsim.engine.system.instant import Instant
-from hybridsim.engine.system.programs.mode_tables import TapeShelf, shelf_of
+from hybridsim.engine.system.programs.mode_tables import TapeCache, tape_cache_of
 from hybridsim.engine.system.programs.modes_index import find_modes, index_of
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.system_cache import system_of
@@ -24,11 +24,11 @@ from hybridsim.engine.system.system_cache import system_of
 COMPILED = ("exact", "taylor", "dop853", "tsit5")
 
 
-class Shelf(NamedTuple):
+class ModeVectors(NamedTuple):
     """What `find_modes` looks at."""
 
     modes: np.ndarray
-    places: np.ndarray
+    hash_slots: np.ndarray
 
 
 def cornered_chain() -> hs.Model:
@@ -89,7 +89,7 @@ def test_a_first_run_is_as_later_ones(integrator: str) -> None:
     model = cornered_chain()
     first, later = first_and_later(model, integrator, 40.0)
     assert (
-        len(shelf_of(system_of(model)).tapes.modes) > 27
+        len(tape_cache_of(system_of(model)).tapes.modes) > 27
     )  # those of three contacts alone are there from the first on
     assert len(first) > 60
     assert first == later
@@ -99,7 +99,7 @@ def test_a_first_run_is_as_later_ones(integrator: str) -> None:
 def test_more_vectors_of_modes_than_are_searched(integrator: str) -> None:
     model = seven_contacts()
     runs = [hs.simulate(model.with_(a=a), (0, 60), integrator=integrator) for a in (2.0, 2.1, 2.0)]
-    assert len(shelf_of(system_of(model)).tapes.modes) > 256
+    assert len(tape_cache_of(system_of(model)).tapes.modes) > 256
     assert [sol.status for sol in runs] == ["finished"] * 3
     assert bits(runs[0]) == bits(runs[2])
     # each body by itself: nothing joins them
@@ -120,28 +120,28 @@ def test_a_vector_is_found_where_it_is() -> None:
     for count, components, modes in ((1, 1, 3), (32, 5, 3), (33, 5, 3), (200, 5, 3), (3000, 9, 4)):
         vectors = np.array([np.unravel_index(i, (modes,) * components) for i in range(modes**components)])
         vectors = vectors[draw.permutation(len(vectors))]
-        shelf, others = vectors[:count], vectors[count : count + 300]
-        tapes = Shelf(shelf, index_of(shelf))
-        assert [find_modes(tapes, z) for z in shelf] == list(range(len(shelf)))
+        tape_cache, others = vectors[:count], vectors[count : count + 300]
+        tapes = ModeVectors(tape_cache, index_of(tape_cache))
+        assert [find_modes(tapes, z) for z in tape_cache] == list(range(len(tape_cache)))
         assert {find_modes(tapes, z) for z in others} <= {-1}
 
 
 def test_tables_that_grew_are_those_made_at_once() -> None:
     system = System(cornered_chain())
     p = system.vector(Instant(0.0), np.zeros(0))
-    shelf = TapeShelf(system)
+    tape_cache = TapeCache(system)
     made, steps = None, []
     for z in (
         np.zeros(len(system.automata), dtype=np.int64),
         *np.eye(len(system.automata), dtype=np.int64),
     ):
-        shelf.surround(z)
-        made = linear_tables(system, shelf.tapes.modes, p, 100.0, made)
+        tape_cache.surround(z)
+        made = linear_tables(system, tape_cache.tapes.modes, p, 100.0, made)
         assert made is not None
         steps.append(made)
     assert len({id(step.rows) for step in steps}) < len(steps)  # some found room behind the former ones
     system.code.shared("matrix templates", dict).clear()
-    whole = linear_tables(system, shelf.tapes.modes, p, 100.0)
+    whole = linear_tables(system, tape_cache.tapes.modes, p, 100.0)
     assert whole is not None
     for name in LinearTables._fields:
         np.testing.assert_array_equal(getattr(made.tables, name), getattr(whole.tables, name), err_msg=name)

@@ -11,7 +11,7 @@ import pytest
 import hybridsim as hs
 from hybridsim.engine.system import modules
 from hybridsim.engine.system.programs.guard_parts import GuardParts
-from hybridsim.engine.system.programs.mode_tables import TapeShelf
+from hybridsim.engine.system.programs.mode_tables import TapeCache
 from hybridsim.engine.system.system import System
 
 
@@ -49,7 +49,7 @@ def test_what_is_shared_is_the_same_for_all() -> None:
 def test_parts_are_those_of_the_tapes_asked_for_while_others_ask() -> None:
     """Parts of another vector of modes have another number of rows: a kernel would read beyond their end."""
     system = System(hs.load("belt"))
-    small, large = TapeShelf(system), TapeShelf(system)
+    small, large = TapeCache(system), TapeCache(system)
     large.surround(np.zeros(len(system.automata), dtype=np.int64))
 
     class Overtaken(GuardParts):

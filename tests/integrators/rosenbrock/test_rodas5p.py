@@ -100,17 +100,17 @@ def test_the_linearisation_is_exact() -> None:
     z = np.zeros(0, dtype=np.int64)
     p = system.vector(Instant(1.25), np.zeros(0))
     t = 1.25 + s
-    lean = system.optimised_tape(z)
+    optimised = system.optimised_tape(z)
     inputs = system.registers.inputs
     V = np.zeros((system.registers.count, 2))
     V[inputs.constants, 0], V[inputs.parameters, 0] = inputs.values[:, 0], p[inputs.sources]
     from hybridsim.engine.series.interpreter import advance
 
-    advance(lean.constant_rows, V, 0)
+    advance(optimised.constant_rows, V, 0)
     jacobian, rate = np.empty((3, 3)), np.empty(3)
     linearise(
-        lean.rows,
-        (int(inputs.time[0]), inputs.states, lean.derivatives),
+        optimised.rows,
+        (int(inputs.time[0]), inputs.states, optimised.derivatives),
         s,
         np.array([x, v, w]),
         V,

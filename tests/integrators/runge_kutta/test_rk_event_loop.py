@@ -211,11 +211,11 @@ def test_a_segment_of_more_steps_than_there_is_room_for(
     states = [hs.State("x", 1, "v"), hs.State("v", 0, "-x*(1 + 0.1*x**2)")]
     whole = hs.simulate(hs.Model("whole", states=states), (0, 200), integrator=integrator, rtol=1e-12)
     monkeypatch.setattr(
-        compiled_loop, "_ROOM", 0
+        compiled_loop, "_CALL_DOUBLES", 0
     )  # for loops that are made from now on: a known model keeps its own
     cramped = hs.simulate(hs.Model("cramped", states=states), (0, 200), integrator=integrator, rtol=1e-12)
     assert cramped.stats["steps"] == pytest.approx(whole.stats["steps"], rel=0.02)
     assert cramped(200.0) == pytest.approx(whole(200.0), abs=1e-9)
     kinds = {type(b).__name__ for b in cramped._trajectory.segments.blocks}
     assert kinds in ({"SeriesBlock"}, {"HermiteBlock"})
-    assert len(cramped._trajectory.segments.blocks) >= whole.stats["steps"] // compiled_loop.LEAST
+    assert len(cramped._trajectory.segments.blocks) >= whole.stats["steps"] // compiled_loop.MIN_STEPS_IN_PART

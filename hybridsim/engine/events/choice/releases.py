@@ -9,7 +9,7 @@ import numpy as np
 from hybridsim.engine.events.outcome import Situation
 from hybridsim.engine.system.system import System
 
-_NONE = -1  # no located guard releases the component
+_NO_GUARD = -1  # no located guard releases the component
 
 
 class Releases:
@@ -18,14 +18,14 @@ class Releases:
     def __init__(self, system: System, before: np.ndarray) -> None:
         self.system, self.before = system, before
         # first located guard of each component: 0 releases to above, 1 to below
-        self._by = [_NONE] * len(system.automata)
+        self._by = [_NO_GUARD] * len(system.automata)
 
     def locate(self, located: set[int]) -> None:
         """Store the guards at which the event was located."""
         for c, automaton in enumerate(self.system.automata):
             held = automaton.has_surface and self.before[c] == automaton.hold
             guards = automaton.guards[automaton.hold] if held else ()
-            self._by[c] = next((j for j, g in enumerate(guards) if g in located), _NONE)
+            self._by[c] = next((j for j, g in enumerate(guards) if g in located), _NO_GUARD)
 
     def has(self, c: int, z: np.ndarray) -> bool:
         """Return whether component c leaves its holding mode through the guard that was located for it."""

@@ -67,7 +67,7 @@ def verdict_with(verdict: int, series: Any, bounds: Any, decreed: int, side: int
 
 
 @inlined
-def judge(
+def guard_verdict(
     series: Any, bounds: Any, decreed: Any, active: Any, backward: bool, sides: Any, orders: Any
 ) -> int:
     """Judge the guards of one candidate: LEAVES if any becomes negative, UNDECIDED if any is open, else FINE.
@@ -92,11 +92,11 @@ def judge(
 @inlined
 def preference(modes: Any, current: Any, holds: Any, n: int) -> int:
     """Return the rank of a joint candidate: most modes kept, then most holding; n*(n + 1) or more if all are kept."""
-    kept, held = 0, 0
+    unchanged, held = 0, 0
     for i in range(n):
-        kept += modes[i] == current[i]
+        unchanged += modes[i] == current[i]
         held += modes[i] == holds[i]
-    return held + (n + 1) * kept
+    return held + (n + 1) * unchanged
 
 
 @inlined
@@ -172,8 +172,8 @@ def decree_orders(
         for j in range(guards_of.shape[1]):
             g = guards_of[c, j]
             if g >= 0:
-                smooth, at_zero = released[c] and continuous, fired[g] and is_decreed(holding[c], continuous)
-                decreed[g] = decreed_zeros(j == 0, on_surface[c], holding[c], smooth, at_zero, gaps[c])
+                smooth, is_zero = released[c] and continuous, fired[g] and is_decreed(holding[c], continuous)
+                decreed[g] = decreed_zeros(j == 0, on_surface[c], holding[c], smooth, is_zero, gaps[c])
 
 
 def joint_candidates(sizes: Iterable[int]) -> np.ndarray:

@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.events.compiled.resolve_ordinary import settle_event
-from hybridsim.engine.events.compiled.scratch import AT, AT_ERROR, FIRED, NOBODY, SERIES, SETTLE, SPREAD
+from hybridsim.engine.events.compiled.resolve_ordinary import resolve_event
+from hybridsim.engine.events.compiled.scratch import AT, AT_ERROR, FIRED, NOBODY, RESOLVE, SERIES, SPREAD
 from hybridsim.engine.events.compiled.verdicts import interpreted_series
 from hybridsim.engine.events.zeno.accumulation import CLOSING_IN
 from hybridsim.engine.native.kernels import call_kernel, inlined, kernel, kernel_address
@@ -78,12 +78,12 @@ def is_shallow(slope: float, bend: float, length: float) -> bool:
 
 
 @inlined
-def judge(
+def fill_guard_series(
     automata: Any, tapes: Any, inputs: Any, lin: Any, s: float, s_error: float, state: Any, work: Any
 ) -> None:
     """Write the series of the active guards with bounds to `judged` of the work space, at the state y, y_error."""
-    work.real[AT], work.real[AT_ERROR], work.whole[FIRED] = s, s_error, NOBODY
-    call_kernel(work.reached[SETTLE], (automata, tapes, inputs, lin, state, work))
+    work.float_slots[AT], work.float_slots[AT_ERROR], work.int_slots[FIRED] = s, s_error, NOBODY
+    call_kernel(work.entry_points[RESOLVE], (automata, tapes, inputs, lin, state, work))
 
 
 @inlined
@@ -104,7 +104,7 @@ def is_hidden(
 
     The state is that in the work space, at local time s.
     """
-    judge(automata, tapes, inputs, lin, s, s_error, state, work)
+    fill_guard_series(automata, tapes, inputs, lin, s, s_error, state, work)
     return slope * slope < _HIDDEN * bend * work.judged[1, g, 0]
 
 
@@ -128,7 +128,7 @@ def differ_by_rounding(
     """
     for i in range(work.y.shape[0]):
         work.y_error[i] = 4.0 * UNIT * abs(work.y[i])
-    judge(automata, tapes, inputs, lin, s, 0.0, state, work)
+    fill_guard_series(automata, tapes, inputs, lin, s, 0.0, state, work)
     for j in range(values.shape[0]):
         rounding = work.judged[1, tapes.active[tapes.active_start[k] + j], 0]
         if not abs(sums[j] - values[j]) <= 4.0 * rounding:
@@ -143,15 +143,17 @@ def moved_on(high: float, low: float, s: float) -> tuple[float, float]:
     return two_sum(high, rest + low)
 
 
-def reach_settling(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> None:
+def link_event_resolution(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> None:
     """Compile the kernel that resolves events and its callees if needed, and store their addresses."""
     x = work.y
-    work.reached[SERIES] = kernel_address(interpreted_series, tapes, inputs, 0, 0.0, 0.0, x, x, state.p, work)
-    work.reached[SETTLE] = kernel_address(settle_event, automata, tapes, inputs, lin, state, work)
+    work.entry_points[SERIES] = kernel_address(
+        interpreted_series, tapes, inputs, 0, 0.0, 0.0, x, x, state.p, work
+    )
+    work.entry_points[RESOLVE] = kernel_address(resolve_event, automata, tapes, inputs, lin, state, work)
 
 
 @inlined
-def settle_and_move_on(
+def resolve_and_advance(
     automata: Any,
     tapes: Any,
     inputs: Any,
@@ -169,9 +171,9 @@ def settle_and_move_on(
     y, y_error of the work space are the state at the event, after `steps` steps. lin: tables of linear modes, empty for
     others. state: `State`, advanced together with the clock.
     """
-    work.real[AT], work.real[AT_ERROR], work.whole[FIRED] = s, s_error, fired
-    work.real[SPREAD] = spread(steps, STAGES)
-    if call_kernel(work.reached[SETTLE], (automata, tapes, inputs, lin, state, work)) == 0:
+    work.float_slots[AT], work.float_slots[AT_ERROR], work.int_slots[FIRED] = s, s_error, fired
+    work.float_slots[SPREAD] = spread(steps, STAGES)
+    if call_kernel(work.entry_points[RESOLVE], (automata, tapes, inputs, lin, state, work)) == 0:
         return False
     clock[0], clock[1] = moved_on(clock[0], clock[1], s)
     return True

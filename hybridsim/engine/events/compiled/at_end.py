@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hybridsim.engine.events.compiled.after_segment import STAGES, judge
+from hybridsim.engine.events.compiled.after_segment import STAGES, fill_guard_series
 from hybridsim.engine.linear.motion import guard_terms
 from hybridsim.engine.native.kernels import inlined, kernel
 from hybridsim.engine.series.bounded import UNIT
@@ -28,7 +28,7 @@ def is_clear(values: Any, largest: Any, s: float, time: float) -> bool:
 
 
 @kernel
-def may_be_at_zero(
+def may_vanish(
     automata: Any,
     tapes: Any,
     inputs: Any,
@@ -51,7 +51,7 @@ def may_be_at_zero(
     for i in range(scale.shape[0]):
         rounded = UNIT * (16.0 * steps + STAGES) * (2.0 + steps) * scale[i]
         work.y_error[i] = 2.0 * state.x_error[i] + rounded + s_error * abs(slopes[i])
-    judge(automata, tapes, inputs, lin, s, s_error, state, work)
+    fill_guard_series(automata, tapes, inputs, lin, s, s_error, state, work)
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         series, bounds = work.judged[0, tapes.active[i]], work.judged[1, tapes.active[i]]
         is_still = True
@@ -63,7 +63,7 @@ def may_be_at_zero(
 
 
 @inlined
-def may_be_at_zero_of_linear(
+def may_vanish_linear(
     lin: Any, tapes: Any, k: int, s: float, time: float, v: Any, sizes: Any, terms: Any
 ) -> bool:
     """Return the same for linear modes at modal coordinates v, with `sizes` on the segment.

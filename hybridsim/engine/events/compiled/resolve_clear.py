@@ -14,7 +14,7 @@ from hybridsim.engine.events.compiled.scratch import FIRED, ROW, called_by, loca
 from hybridsim.engine.events.compiled.verdicts import is_continuous
 from hybridsim.engine.linear.motion import clear_sign, linear_coefficient, size_of_point
 from hybridsim.engine.native.kernels import call, inlined, kernel
-from hybridsim.engine.native.loop_hints import few, put
+from hybridsim.engine.native.loop_hints import put, short_loop
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.programs.modes_index import find_modes
 
@@ -35,7 +35,7 @@ def _verdict(
 ) -> int:
     """Return 1 if the trial modes of row k certainly last, -1 if c leaves them, else _UNCLEAR."""
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
-        few()
+        short_loop()
         g = tapes.active[i]
         zeros = _zeros_of(automata, work.trial, c, g, is_smooth)
         sign = clear_sign(lin, k, g, zeros, work.x_after, work.w, size)
@@ -48,7 +48,7 @@ def _verdict(
 def _is_alone(tapes: Any, lin: Any, k: int, fired: int, size: float, work: Any) -> bool:
     """Return whether the fired guard certainly becomes negative and no other guard in row k is near zero."""
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
-        few()
+        short_loop()
         g = tapes.active[i]
         sign = clear_sign(lin, k, g, 1 if g == fired else 0, work.x_after, work.w, size)
         if sign == _UNCLEAR or (g == fired and sign > 0):
@@ -57,23 +57,23 @@ def _is_alone(tapes: Any, lin: Any, k: int, fired: int, size: float, work: Any) 
 
 
 @kernel
-def settle_clearly(automata: Any, tapes: Any, lin: Any, state: Any, work: Any) -> bool:
+def resolve_clear(automata: Any, tapes: Any, lin: Any, state: Any, work: Any) -> bool:
     """Return whether the event in the work space is clear. If so, the state after it replaces the state.
 
     `ROW` of the work space is the row of the modes before the event, and then of those after it. If the event is not
     clear, other parts of the work space may have been overwritten.
     """
-    fired, at = work.whole[FIRED], located(state, work)
+    fired, at = work.int_slots[FIRED], located(state, work)
     c = automata.owner[fired]
     hold, now = automata.hold[c], at.z[c]
     if hold < 0 or automata.is_corner[c] or (now != hold and automata.place[fired] > 0):
         return False  # a guard on the load does not move the contact onto its surface
     for i in range(automata.cluster_start[c], automata.cluster_start[c + 1]):
-        few()
+        short_loop()
         d = automata.cluster[i]
         if automata.is_unilateral[d] or (d != c and at.z[d] == automata.hold[d]):
             return False  # such components are decided together
-    before = work.whole[ROW]
+    before = work.int_slots[ROW]
     x, x_error, trial = work.x_after, work.slopes, work.trial
     put(at.x_error, x_error)
     put(at.z, trial)
@@ -109,16 +109,16 @@ def settle_clearly(automata: Any, tapes: Any, lin: Any, state: Any, work: Any) -
     if found < 0:
         return False
     state.z[c] = trial[c] = found
-    work.whole[ROW] = after
+    work.int_slots[ROW] = after
     put(x, state.x)
     put(x_error, state.x_error)
     sides, orders, floors = state.sides, state.orders, state.floors
     for i in range(tapes.active_start[before], tapes.active_start[before + 1]):
-        few()
+        short_loop()
         g = tapes.active[i]
         sides[g], orders[g], floors[g] = 1, 0, 0.0
     for i in range(tapes.active_start[after], tapes.active_start[after + 1]):
-        few()
+        short_loop()
         g = tapes.active[i]
         zeros = _zeros_of(automata, trial, c, g, is_smooth)
         sides[g], orders[g], floors[g] = 1, zeros, 0.0

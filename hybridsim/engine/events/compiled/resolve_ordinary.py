@@ -11,15 +11,15 @@ import math
 from typing import Any
 
 from hybridsim.engine.events.choice.verdict import FINE
-from hybridsim.engine.events.compiled.resolve_clear import settle_clearly
-from hybridsim.engine.events.compiled.resolve_surface import decide_surface
+from hybridsim.engine.events.compiled.resolve_clear import resolve_clear
+from hybridsim.engine.events.compiled.resolve_surface import choose_surface_modes
 from hybridsim.engine.events.compiled.scratch import (
     DISCRETE,
     DISCRETE_AT,
     FIRED,
     NOBODY,
     SPREAD,
-    Before,
+    LocatedEvent,
     called_by,
     located,
 )
@@ -28,11 +28,11 @@ from hybridsim.engine.events.compiled.verdicts import (
     guard_side,
     is_continuous,
     is_linear,
-    judge_members,
+    members_verdict,
     size_at,
 )
 from hybridsim.engine.linear.motion import errors_of_time, functions_of_time
-from hybridsim.engine.native.kernels import call, call_apart, inlined, merged
+from hybridsim.engine.native.kernels import call, call_noinline, inline_always, inlined
 from hybridsim.engine.native.loop_hints import fill, put
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.programs.modes_index import find_modes
@@ -46,14 +46,14 @@ def is_alone(tapes: Any, lin: Any, k: int, fired: int, x: Any, x_error: Any, wor
         if g == fired:
             continue
         value, bound = size_at(lin, k, g, x, x_error, work)
-        if abs(value) > work.real[SPREAD] * bound:
+        if abs(value) > work.float_slots[SPREAD] * bound:
             continue
-        if abs(value) > bound or call_apart(guard_side, (lin, k, g, 1, x, x_error, work))[0] < 0:
+        if abs(value) > bound or call_noinline(guard_side, (lin, k, g, 1, x, x_error, work))[0] < 0:
             return False
     return True
 
 
-@merged
+@inline_always
 def take_choice(
     functions: Any,
     automata: Any,
@@ -70,7 +70,7 @@ def take_choice(
         if automata.hold[d] >= 0 and not automata.is_corner[automata.owner[fired]]:
             return False
     c, n, count = automata.owner[fired], x.shape[0], z.shape[0]
-    n_discrete, discrete_at = work.whole[DISCRETE], work.whole[DISCRETE_AT]
+    n_discrete, discrete_at = work.int_slots[DISCRETE], work.int_slots[DISCRETE_AT]
     mode, place = at.z[c], automata.place[fired]
     asked = work.asked
     put(at.z, asked)
@@ -101,15 +101,15 @@ def take_choice(
     return True
 
 
-@merged
-def settle_ordinary(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> bool:
+@inline_always
+def resolve_ordinary(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> bool:
     """Return whether the event is ordinary. If so, the state after it is in x_after, slopes and z_after.
 
     A transition of a component without a surface may change the run-time vector, which is then written to p_after.
     Sides, orders and floors of the guards in the new modes are in the work space as well. If the event is not ordinary,
     other parts of the work space may have been overwritten.
     """
-    functions, fired, at = called_by(work), work.whole[FIRED], located(state, work)
+    functions, fired, at = called_by(work), work.int_slots[FIRED], located(state, work)
     x, x_error, z, p = work.x_after, work.slopes, work.z_after, work.p_after
     put(at.x, x)
     put(at.x_error, x_error)
@@ -131,10 +131,10 @@ def settle_ordinary(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any
     if automata.hold[c] >= 0:
         if z[c] != automata.hold[c] and automata.place[fired] > 0:
             return False  # a guard on the load does not move the contact onto its surface
-        number = decide_surface(automata, tapes, inputs, lin, state, work, fired, k, is_known)
+        number = choose_surface_modes(automata, tapes, inputs, lin, state, work, fired, k, is_known)
         if number < 0:
             return False
-        # if the cluster has all components, `decide_surface` has judged all guards
+        # if the cluster has all components, `choose_surface_modes` has judged all guards
         if automata.cluster_start[c + 1] - automata.cluster_start[c] == z.shape[0]:
             put(work.all_sides[number], sides)
             put(work.all_orders[number], orders)
@@ -153,33 +153,33 @@ def settle_ordinary(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any
     k = find_modes(tapes, z)
     if k < 0:
         return False
-    after = Before(at.s, at.s_error, x, x_error, vector, at.z)
+    after = LocatedEvent(at.s, at.s_error, x, x_error, vector, at.z)
     guard_series(tapes, inputs, lin, k, after, x, x_error, work)
-    verdict = call_apart(
-        judge_members,
+    verdict = call_noinline(
+        members_verdict,
         (automata, lin, k, at, x, x_error, z, work.everything, fired, is_on, continuous, work, sides, orders, floors),
     )  # fmt: skip
     return verdict == FINE
 
 
-def settle_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> int:
+def resolve_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> int:
     """Resolve the event in the work space and replace the state. Return 1, or 0 if it is not ordinary.
 
     If no guard fired, only the series of the active guards are written to the work space. lin: tables of linear modes,
     empty for others. state: `hybridsim.engine.events.compiled.after_segment.State`.
     """
-    if work.whole[FIRED] == NOBODY:
+    if work.int_slots[FIRED] == NOBODY:
         at, k = located(state, work), find_modes(tapes, state.z)
         guard_series(tapes, inputs, lin, k, at, at.x, at.x_error, work)
         return 1
-    if is_linear(lin) and settle_clearly(automata, tapes, lin, state, work):
+    if is_linear(lin) and resolve_clear(automata, tapes, lin, state, work):
         return 1
-    if not settle_ordinary(automata, tapes, inputs, lin, state, work):
+    if not resolve_ordinary(automata, tapes, inputs, lin, state, work):
         return 0
     put(work.x_after, state.x)
     put(work.slopes, state.x_error)
     put(work.z_after, state.z)
-    if automata.hold[automata.owner[work.whole[FIRED]]] < 0:
+    if automata.hold[automata.owner[work.int_slots[FIRED]]] < 0:
         put(work.p_after, state.p)
     put(work.sides, state.sides)
     put(work.orders, state.orders)

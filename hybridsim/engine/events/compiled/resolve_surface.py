@@ -6,14 +6,14 @@ from typing import Any
 
 from hybridsim.engine.events.choice.verdict import FINE, LEAVES, NONE, NONUNIQUE, choose, preference
 from hybridsim.engine.events.compiled.scratch import called_by, located
-from hybridsim.engine.events.compiled.verdicts import UNKNOWN, cluster_of, goes_on, judge_candidate
-from hybridsim.engine.native.kernels import call, call_apart, merged
+from hybridsim.engine.events.compiled.verdicts import UNKNOWN, candidate_verdict, certainly_leaves, cluster_of
+from hybridsim.engine.native.kernels import call, call_noinline, inline_always
 from hybridsim.engine.native.loop_hints import put
 from hybridsim.engine.series.bounded import UNIT
 
 
-@merged
-def decide_single(
+@inline_always
+def choose_single_mode(
     automata: Any,
     tapes: Any,
     inputs: Any,
@@ -25,21 +25,21 @@ def decide_single(
     is_known: bool,
     c: int,
 ) -> int:
-    """Decide one component at its surface as `decide_surface` does, by judging its three modes one by one."""
+    """Decide one component at its surface as `choose_surface_modes` does, by judging its three modes one by one."""
     z, trial = work.z_after, work.trial
     now, hold = z[c], automata.hold[c]
-    if not goes_on(automata, lin, k, z, fired, is_known, work.x_after, work.slopes, work):
+    if not certainly_leaves(automata, lin, k, z, fired, is_known, work.x_after, work.slopes, work):
         trial[c] = now
-        verdict = call_apart(
-            judge_candidate, (automata, tapes, inputs, lin, state, work, fired, is_known, c, now)
+        verdict = call_noinline(
+            candidate_verdict, (automata, tapes, inputs, lin, state, work, fired, is_known, c, now)
         )
         if verdict != LEAVES:
             return now if verdict == FINE else -1
     if now != hold:
         for mode in (hold, 3 - hold - now):
             trial[c] = mode
-            verdict = call_apart(
-                judge_candidate, (automata, tapes, inputs, lin, state, work, fired, False, c, mode)
+            verdict = call_noinline(
+                candidate_verdict, (automata, tapes, inputs, lin, state, work, fired, False, c, mode)
             )
             if verdict == FINE:
                 z[c] = mode
@@ -52,8 +52,8 @@ def decide_single(
         if mode == hold:
             continue
         trial[c] = mode
-        verdict = call_apart(
-            judge_candidate, (automata, tapes, inputs, lin, state, work, fired, False, c, mode)
+        verdict = call_noinline(
+            candidate_verdict, (automata, tapes, inputs, lin, state, work, fired, False, c, mode)
         )
         if verdict == LEAVES:
             continue
@@ -65,8 +65,8 @@ def decide_single(
     return found
 
 
-@merged
-def decide_surface(
+@inline_always
+def choose_surface_modes(
     automata: Any,
     tapes: Any,
     inputs: Any,
@@ -89,7 +89,7 @@ def decide_surface(
     ranks = work.ranks
     c = automata.owner[fired]
     cluster = cluster_of(automata, c)
-    count, is_meeting = 0, False
+    count, is_intersection = 0, False
     for i in range(cluster.shape[0]):
         d = cluster[i]
         if d == c or z[d] == hold[d]:
@@ -98,8 +98,8 @@ def decide_surface(
             members[count], current[count], holds[count] = d, z[d], hold[d]
             count += 1
             work.on_surface[d] = True
-            is_meeting = is_meeting or automata.is_unique[d]
-    if is_meeting and count > 1:
+            is_intersection = is_intersection or automata.is_unique[d]
+    if is_intersection and count > 1:
         return -1
     put(z, trial)
     for i in range(count):
@@ -111,7 +111,7 @@ def decide_surface(
     for i in range(x.shape[0]):
         is_known = is_known and x[i] == at.x[i] and x_error[i] == at.x_error[i]
     if count == 1:
-        return decide_single(automata, tapes, inputs, lin, state, work, fired, k, is_known, members[0])
+        return choose_single_mode(automata, tapes, inputs, lin, state, work, fired, k, is_known, members[0])
     total = 3**count  # a surface has three modes
     for number in range(total):
         rest = number
@@ -135,10 +135,10 @@ def decide_surface(
             if not is_caused:
                 continue
             is_current = rank >= (count + 1) * count
-            if is_current and goes_on(automata, lin, k, z, fired, is_known, x, x_error, work):
+            if is_current and certainly_leaves(automata, lin, k, z, fired, is_known, x, x_error, work):
                 continue
-            verdict = call_apart(
-                judge_candidate,
+            verdict = call_noinline(
+                candidate_verdict,
                 (automata, tapes, inputs, lin, state, work, fired, is_current and is_known, c, number),
             )
             if verdict == UNKNOWN:

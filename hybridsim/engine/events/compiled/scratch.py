@@ -6,15 +6,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.native.kernels import ENABLED, inlined, merged
+from hybridsim.engine.native.kernels import ENABLED, inline_always, inlined
 from hybridsim.engine.native.simd_products import vector_of
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.bounded import ORDER
 
-MOST = 3  # most components at their surfaces at once; more have too many candidates for compiled loops
-FIRED, DISCRETE, DISCRETE_AT, ROW = range(4)  # indices of `Work.whole`
-AT, AT_ERROR, SPREAD = range(3)  # indices of `Work.real`
-SETTLE, LEAP, SERIES = range(3)  # indices of `Work.reached`
+# Largest number of components at their surfaces at once; more have too many candidates for compiled loops.
+MAX_JOINT_COMPONENTS = 3
+FIRED, DISCRETE, DISCRETE_AT, ROW = range(4)  # indices of `EventScratch.int_slots`
+AT, AT_ERROR, SPREAD = range(3)  # indices of `EventScratch.float_slots`
+RESOLVE, EVENT_LOOP, SERIES = range(3)  # indices of `EventScratch.entry_points`
 NOBODY = -1  # no guard fired
 
 
@@ -28,7 +29,7 @@ class Functions(NamedTuple):
     reset: Any
 
 
-class Before(NamedTuple):
+class LocatedEvent(NamedTuple):
     """An event as it was located."""
 
     s: float  # local time
@@ -39,16 +40,17 @@ class Before(NamedTuple):
     z: np.ndarray  # modes (C,)
 
 
-class Work(NamedTuple):
+class EventScratch(NamedTuple):
     """Work arrays for one event.
 
     The last ones, from `candidates` on, have a row for each joint candidate.
     """
 
     functions: np.ndarray  # addresses (5,): `Functions`
-    reached: np.ndarray  # addresses (3,) of kernels at SETTLE, LEAP, SERIES
-    whole: np.ndarray  # integers at FIRED, DISCRETE, DISCRETE_AT, ROW
-    real: np.ndarray  # numbers at AT, AT_ERROR, SPREAD (bounds by which simultaneous guards may be from zero)
+    entry_points: np.ndarray  # addresses (3,) of kernels at RESOLVE, EVENT_LOOP, SERIES
+    int_slots: np.ndarray  # integers at FIRED, DISCRETE, DISCRETE_AT, ROW
+    # numbers at AT, AT_ERROR, SPREAD (bounds by which simultaneous guards may be from zero)
+    float_slots: np.ndarray
     y: np.ndarray  # states (n,) at the event
     y_error: np.ndarray  # their error bounds (n,)
     slopes: np.ndarray  # rates (n,) at the event, then error bounds of x_after
@@ -91,17 +93,19 @@ def called_by(work: Any) -> Any:
     return Functions(f[0], f[1], f[2], f[3], f[4])
 
 
-@merged
-def located(state: Any, work: Any) -> Before:
+@inline_always
+def located(state: Any, work: Any) -> LocatedEvent:
     """Return the event in a work space. state: the state at the start of the segment that the event ends."""
-    return Before(work.real[AT], work.real[AT_ERROR], work.y, work.y_error, state.p, state.z)
+    return LocatedEvent(
+        work.float_slots[AT], work.float_slots[AT_ERROR], work.y, work.y_error, state.p, state.z
+    )
 
 
-def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> Work:
+def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> EventScratch:
     """Return work arrays for the events of a system; linear modes need atoms and monomials of time as well."""
     guards, count = system.guard_count, len(system.automata)
     registers = system.registers.count
-    together = min(MOST, len(system.surface_of))
+    together = min(MAX_JOINT_COMPONENTS, len(system.surface_of))
     joint = 3**together
 
     def numbers(*shape: int) -> np.ndarray:
@@ -110,12 +114,14 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> Work:
     def flags(size: int) -> np.ndarray:
         return np.zeros(size, dtype=np.bool_)
 
-    work: Work = packed(
-        Work(
+    work: EventScratch = packed(
+        EventScratch(
             functions=np.array(functions_of(system), dtype=np.int64 if ENABLED else object),
-            reached=numbers(3),
-            whole=np.array([-1, len(system.model.discrete), system.layout.discrete_at, -1], dtype=np.int64),
-            real=np.zeros(3),
+            entry_points=numbers(3),
+            int_slots=np.array(
+                [-1, len(system.model.discrete), system.layout.discrete_at, -1], dtype=np.int64
+            ),
+            float_slots=np.zeros(3),
             **{name: vector_of(system.n) for name in ("y", "y_error", "slopes", "x_after")},
             z_after=numbers(count),
             p_after=np.empty(system.layout.size),

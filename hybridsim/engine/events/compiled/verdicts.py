@@ -18,12 +18,12 @@ from hybridsim.engine.linear.motion import linear_coefficient, linear_side
 from hybridsim.engine.native.kernels import (
     array_at,
     call,
-    call_apart,
     call_kernel,
+    call_noinline,
     call_series,
+    inline_always,
     inlined,
     kernel,
-    merged,
 )
 from hybridsim.engine.series.bounded import ORDER, run_series
 from hybridsim.engine.system.programs.modes_index import find_modes
@@ -37,7 +37,7 @@ def interpreted_series(
     """Compute `guard_series` with the tape interpreter. This kernel is called by address."""
     judged, V, E = work.judged, work.V, work.E
     constant = tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]]
-    rows = tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]]
+    rows = tapes.optimised[tapes.optimised_start[k] : tapes.optimised_start[k + 1]]
     n, size = work.y.shape[0], work.p_after.shape[0]
     state, bounds, vector = array_at(x, n), array_at(x_error, n), array_at(p, size)
     run_series(constant, rows, inputs, tapes.derivatives[k], s, s_error, state, bounds, vector, V, E)
@@ -62,7 +62,7 @@ def guard_series(tapes: Any, inputs: Any, lin: Any, k: int, at: Any, x: Any, x_e
         call_series(tapes.bounds[k], at.s, at.s_error, x, x_error, at.p, work.judged)
         return
     tapes.lacked[k] += 1
-    call_kernel(work.reached[SERIES], (tapes, inputs, k, at.s, at.s_error, x, x_error, at.p, work))
+    call_kernel(work.entry_points[SERIES], (tapes, inputs, k, at.s, at.s_error, x, x_error, at.p, work))
 
 
 @inlined
@@ -80,7 +80,7 @@ def guard_side(
     k: the row of the modes whose `guard_series` were computed last.
     """
     if is_linear(lin):
-        return call_apart(linear_side, (lin, k, g, decreed, x, x_error, work))
+        return call_noinline(linear_side, (lin, k, g, decreed, x, x_error, work))
     values, bounds = work.judged[0, g], work.judged[1, g]
     side, order = side_after(values, bounds, decreed)
     return side, order, side == 0 and open_question(values, bounds, decreed)
@@ -125,7 +125,7 @@ def is_continuous(
 
 
 @kernel
-def judge_members(
+def members_verdict(
     automata: Any,
     lin: Any,
     k: int,
@@ -177,7 +177,7 @@ def judge_members(
 
 
 @inlined
-def goes_on(
+def certainly_leaves(
     automata: Any, lin: Any, k: int, z: Any, fired: int, is_known: bool, x: Any, x_error: Any, work: Any
 ) -> bool:
     """Return whether the located guard certainly becomes negative in the modes z in row k.
@@ -191,14 +191,14 @@ def goes_on(
     return guard_side(lin, k, fired, zeros, x, x_error, work)[0] < 0
 
 
-@merged
+@inline_always
 def cluster_of(automata: Any, c: int) -> Any:
     """Return the components whose modes are decided together with that of component c."""
     return automata.cluster[automata.cluster_start[c] : automata.cluster_start[c + 1]]
 
 
 @kernel
-def judge_candidate(
+def candidate_verdict(
     automata: Any,
     tapes: Any,
     inputs: Any,
@@ -225,8 +225,8 @@ def judge_candidate(
         guard_series(tapes, inputs, lin, k, at, x, x_error, work)
     continuous = is_continuous(called_by(work), automata, at, x, work.trial, cluster, fired, work.jumps)
     work.smooth[number] = continuous
-    return call_apart(
-        judge_members,
+    return call_noinline(
+        members_verdict,
         (
             automata, lin, k, at, x, x_error, work.trial, cluster, fired, True, continuous, work,
             work.all_sides[number], work.all_orders[number], work.all_floors[number],

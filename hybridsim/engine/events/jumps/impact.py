@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.engine.events.jumps.impulse import MOST, Answer, ImpactProblem, answers, count
+from hybridsim.engine.events.jumps.impulse import MAX_COMBINATIONS, Answer, ImpactProblem, answers, count
 from hybridsim.engine.events.jumps.rest_impulses import loaded, stopped
 from hybridsim.engine.events.outcome import Change
 from hybridsim.engine.series.bounded import UNIT
@@ -172,7 +172,7 @@ class _Collision:
             restitution,
             *(loads[side][np.ix_(rows[len(normal) :], normal_rows)] for side in (0, 1)),
         )
-        if count(problem) > MOST:
+        if count(problem) > MAX_COMBINATIONS:
             return (
                 "inconsistent",
                 f"{len(members)} contacts take part in one impact ({names}), which are too many to solve",

@@ -28,7 +28,7 @@ import numpy as np
 
 from hybridsim.engine.series.bounded import UNIT
 
-MOST = 3**8  # largest number of combinations of closed, open, slipping and sticking contacts
+MAX_COMBINATIONS = 3**8  # largest number of combinations of closed, open, slipping and sticking contacts
 _OPERATIONS = 64.0  # largest number of roundings per contact in a number of the solution
 _OFF, _ON, _FORWARD, _BACKWARD = range(4)
 

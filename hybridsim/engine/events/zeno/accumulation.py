@@ -19,12 +19,12 @@ from hybridsim.engine.system.system import Automaton
 
 # Number of consecutive intervals that must shrink by one factor before they count as a series, unlike a transient.
 _TERMS = 10
-MOST = 4  # largest number of events in one turn
-_SEVERAL = 32  # largest number of components whose events are all tracked
+MAX_EVENTS_PER_TURN = 4  # largest number of events in one turn
+_MAX_TRACKED_COMPONENTS = 32  # largest number of components whose events are all tracked
 NOBODY = -1  # component of events without one, such as resets of monitors
-_KEPT = _TERMS + 2 * MOST  # number of stored intervals
-_AHEAD = 16.0  # look-ahead in a series, in units of its last intervals
-_FEW = 2  # intervals beyond two turns after which a series may have begun
+_STORED_INTERVALS = _TERMS + 2 * MAX_EVENTS_PER_TURN  # number of stored intervals
+_LOOK_AHEAD_INTERVALS = 16.0  # look-ahead in a series, in units of its last intervals
+_TERMS_BEYOND_TURNS = 2  # intervals beyond two turns after which a series may have begun
 # Relative accuracy with which the factor must repeat. A bouncing ball repeats it within rounding; the decay of a
 # friction oscillator does not.
 SAME_FACTOR = 1e-3
@@ -47,20 +47,20 @@ def _follow(
     before, falls, ended = work[0], work[1], False
     is_nothing = gap <= max(shortest, _ULPS * 2.0**-52 * abs(now))
     end = max(resolution, _END * 2.0**-52 * abs(now), _FAR_DOWN * longest)
-    for turn in range(min(i + 1, MOST)):
-        earlier = before[(i - turn - 1) % MOST]
+    for turn in range(min(i + 1, MAX_EVENTS_PER_TURN)):
+        earlier = before[(i - turn - 1) % MAX_EVENTS_PER_TURN]
         is_shorter = gap < (1.0 - 0.5 * SAME_FACTOR) * earlier
         falls[turn] = falls[turn] + 1.0 if is_shorter or is_nothing else 0.0
         if falls[turn] >= _TERMS and i >= known:
             ended = ended or is_nothing or gap * gap <= end * (earlier - gap)
-    before[i % MOST] = gap
+    before[i % MAX_EVENTS_PER_TURN] = gap
     return ended
 
 
 @inlined
-def _goes_on(work: Any) -> bool:
+def _is_shrinking(work: Any) -> bool:
     """Return whether the last intervals form a shrinking series."""
-    for turn in range(MOST):
+    for turn in range(MAX_EVENTS_PER_TURN):
         if work[1, turn] >= _TERMS:
             return True
     return False
@@ -108,11 +108,11 @@ def may_end(
         last[i % last.shape[0]] = gap
         i += 1
     at[0], at[1] = high, low
-    return ended or _goes_on(work), i
+    return ended or _is_shrinking(work), i
 
 
 @kernel
-def leads_nowhere(instants: Any, fires: Any, owner: Any, components: int, work: Any) -> bool:
+def cannot_accumulate(instants: Any, fires: Any, owner: Any, components: int, work: Any) -> bool:
     """Return whether the first events of a run, at instants (E, 2), certainly do not accumulate.
 
     fires (E,): the guards that fired; owner: the component of each guard. work (2, largest number of events in a turn):
@@ -121,7 +121,7 @@ def leads_nowhere(instants: Any, fires: Any, owner: Any, components: int, work: 
     count = instants.shape[0]
     if count <= _TERMS:  # too few for a series
         return True
-    if count <= _KEPT + 1 or components > _SEVERAL:
+    if count <= _STORED_INTERVALS + 1 or components > _MAX_TRACKED_COMPONENTS:
         return False
     for c in range(components):
         work[0, :], work[1, :] = math.inf, 0.0
@@ -135,7 +135,7 @@ def leads_nowhere(instants: Any, fires: Any, owner: Any, components: int, work: 
                 if _follow(gap, instants[e, 0], i, 0, longest, 0.0, 0.0, work):
                     return False
             last, i = e, i + 1
-        if _goes_on(work):
+        if _is_shrinking(work):
             return False
     return True
 
@@ -145,7 +145,7 @@ def turn_of(gaps: Sequence[float], count: int, same: float) -> tuple[int, float]
 
     same : relative accuracy with which the factor must repeat.
     """
-    for turn in range(1, MOST + 1):
+    for turn in range(1, MAX_EVENTS_PER_TURN + 1):
         terms = count + turn - 1  # each event of the turn counts
         if len(gaps) < terms + turn:
             break
@@ -183,7 +183,7 @@ class Accumulation:
     def _under_way(self) -> set[int]:
         """Return the components whose last intervals shrink by a common factor."""
         for c in self._unjudged:
-            self._judge(c)
+            self._update_shrinking(c)
         self._unjudged.clear()
         return self._shrinking
 
@@ -207,7 +207,10 @@ class Accumulation:
         """Return a time span ahead in which rounding of the long run does not hide events of a series."""
         if not self.is_under_way(now):
             return math.inf
-        return min(_AHEAD * max(self.paces[c].intervals[-MOST:]) for c in self._under_way)
+        return min(
+            _LOOK_AHEAD_INTERVALS * max(self.paces[c].intervals[-MAX_EVENTS_PER_TURN:])
+            for c in self._under_way
+        )
 
     def go_on(self, paces: dict[int, Pace]) -> None:
         """Restore the state from a checkpoint."""
@@ -224,20 +227,20 @@ class Accumulation:
     def limit_of_all(self, instants: np.ndarray, owners: np.ndarray) -> Limit | None:
         """Add events (E, 2) in a row, each of one component (E,). Return the first limit, or None."""
         count = len(instants)
-        is_short = count <= _KEPT + 1  # a series there has forecasts, which need single events
+        is_short = count <= _STORED_INTERVALS + 1  # a series there has forecasts, which need single events
         if count < 2 or (is_short and self.paces):
             return self._one_by_one(instants, owners)
         counts = np.bincount(owners).tolist()
         among = [c for c, events in enumerate(counts) if events]
-        if len(among) > _SEVERAL:  # a component with few of so many events is not near a limit
+        if len(among) > _MAX_TRACKED_COMPONENTS:  # a component with few of so many events is not near a limit
             among = [c for c in among if counts[c] > _TERMS]
             self.forget(tuple(set(self.paces).difference(among)))
         paces = []
         for component in among:
             may_have_ended, pace = self._paced(instants, owners, component)
             if may_have_ended or (is_short and _next_turn(pace)[0]):  # examine the events one by one
-                kept = np.isin(owners, among)
-                return self._one_by_one(instants[kept], owners[kept])
+                selected = np.isin(owners, among)
+                return self._one_by_one(instants[selected], owners[selected])
             paces.append((component, pace))
         self.paces.update(paces)
         self._unjudged.update([component for component, _ in paces])
@@ -247,12 +250,16 @@ class Accumulation:
         """Return whether a series of a component may end with these events, and the pace to store if not."""
         pace = self.paces.get(component, BEGINNING)
         known = np.array(pace.intervals) if pace.intervals else _NO_INTERVALS
-        at, work, last = np.array(pace.last or (0.0, 0.0)), np.empty((2, MOST)), np.empty(_KEPT)
+        at, work, last = (
+            np.array(pace.last or (0.0, 0.0)),
+            np.empty((2, MAX_EVENTS_PER_TURN)),
+            np.empty(_STORED_INTERVALS),
+        )
         ended, count = may_end(
             known, at, pace.last is not None, instants, owners, component, self.shortest, self.resolution, work, last
         )  # fmt: skip
-        newest, oldest = last.tolist(), count % _KEPT
-        intervals = newest[:count] if count <= _KEPT else newest[oldest:] + newest[:oldest]
+        newest, oldest = last.tolist(), count % _STORED_INTERVALS
+        intervals = newest[:count] if count <= _STORED_INTERVALS else newest[oldest:] + newest[:oldest]
         return ended, Pace(Instant(*at.tolist()), tuple(intervals), pace.longest)
 
     def _one_by_one(self, instants: np.ndarray, owners: np.ndarray) -> Limit | None:
@@ -289,9 +296,9 @@ class Accumulation:
     def _note(self, component: int, pace: Pace) -> None:
         self.paces[component] = pace
         self._unjudged.discard(component)
-        self._judge(component)
+        self._update_shrinking(component)
 
-    def _judge(self, component: int) -> None:
+    def _update_shrinking(self, component: int) -> None:
         if _next_turn(self.paces[component])[0]:
             self._shrinking.add(component)
         else:
@@ -308,7 +315,7 @@ class Accumulation:
         before = self.paces.get(component, BEGINNING)
         gaps = before.intervals
         if before.last is not None:
-            gaps = (*gaps, abs(instant.minus(before.last)))[-_KEPT:]
+            gaps = (*gaps, abs(instant.minus(before.last)))[-_STORED_INTERVALS:]
         pace = Pace(instant, gaps, before.longest)
         self._note(component, pace)
         if len(gaps) <= _TERMS:
@@ -333,7 +340,7 @@ class Accumulation:
 
 
 def _next_turn(pace: Pace) -> tuple[int, float]:
-    return turn_of(pace.intervals, _FEW + 1, 2.0 * SAME_FACTOR)
+    return turn_of(pace.intervals, _TERMS_BEYOND_TURNS + 1, 2.0 * SAME_FACTOR)
 
 
 def _expected(pace: Pace, instant: Instant) -> float | None:

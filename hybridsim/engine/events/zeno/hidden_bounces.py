@@ -26,7 +26,7 @@ from hybridsim.engine.system.system import Automaton, Series, System
 
 _STRIDE = 1.5  # ratio of the speeds of the examined bounces
 _LEAST_LOSS = 1e-4  # least relative loss of speed in a bounce; less means over 10**4 bounces per digit
-_FEW = 2  # bounces that have to agree if they are not impacts of a declared law
+_AGREEING_BOUNCES = 2  # bounces that have to agree if they are not impacts of a declared law
 
 
 class Bounce(NamedTuple):
@@ -89,7 +89,7 @@ def limit_of_hidden(
         forecast = _forecast(system, outcome, c, last, departure)
         if forecast is not None and forecast.hidden >= 1.0:
             limit, count = _agreed(system, outcome, c, forecast, departure.speed, last, record)
-            if system.automata[c].is_unilateral or count >= _FEW:
+            if system.automata[c].is_unilateral or count >= _AGREEING_BOUNCES:
                 found[c] = (limit, departure.flight)
     if not found:
         return None

@@ -23,7 +23,7 @@ from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
 
 
-class CodeShelf(ABC):
+class CodeCache(ABC):
     """Machine code of one structure, in the order of its tapes.
 
     Parameters

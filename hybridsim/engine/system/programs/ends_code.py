@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridsim.engine.series.emit_series import ModeTape, ends_text
-from hybridsim.engine.system.programs.code_cache import CodeShelf
+from hybridsim.engine.system.programs.code_cache import CodeCache
 from hybridsim.engine.system.system import System
 
 
 class EndsCodes(NamedTuple):
-    """A `CodeShelf` tuple with functions at the end of a step, at the start of a segment, and for guards."""
+    """A `CodeCache` tuple with functions at the end of a step, at the start of a segment, and for guards."""
 
     ends: np.ndarray
     first: np.ndarray
@@ -21,7 +21,7 @@ class EndsCodes(NamedTuple):
     lacked: np.ndarray
 
 
-class EndsShelf(CodeShelf):
+class EndsCodeCache(CodeCache):
     """Machine code of one structure.
 
     Parameters

@@ -74,11 +74,14 @@ class GuardParts:
 
 
 def _mode_parts(tapes: Tapes, k: int) -> _ModeParts:
-    lean = [tuple(row) for row in tapes.lean[tapes.lean_start[k] : tapes.lean_start[k + 1]].tolist()]
+    optimised_rows = [
+        tuple(row)
+        for row in tapes.optimised[tapes.optimised_start[k] : tapes.optimised_start[k + 1]].tolist()
+    ]
     active = tapes.active[tapes.active_start[k] : tapes.active_start[k + 1]]
-    watched, rates = set(tapes.guards[k, active].tolist()), set(tapes.derivatives[k].tolist())
-    guards = live_rows(lean, watched)
+    guard_registers, rates = set(tapes.guards[k, active].tolist()), set(tapes.derivatives[k].tolist())
+    guards = live_rows(optimised_rows, guard_registers)
     is_linear = all(row[0] in _LINEAR for row in guards)
-    steps = live_rows(lean, rates | watched if is_linear else rates)
+    steps = live_rows(optimised_rows, rates | guard_registers if is_linear else rates)
     guard_rows, step_rows = (np.array(rows, dtype=np.int64).reshape(-1, 5) for rows in (guards, steps))
     return _ModeParts(guard_rows, is_linear, step_rows)

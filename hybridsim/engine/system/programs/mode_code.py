@@ -17,7 +17,7 @@ from hybridsim.engine.series.vanishing_kinds import (
     EXPONENTIAL,
     HYPERBOLIC,
     KINDS,
-    MOST_POWER,
+    MAX_POWER,
     ROOT,
     register_of,
 )
@@ -33,14 +33,14 @@ NEVER = -(2**62)  # count of misses if code exists, or cannot be made
 
 def mode_tape(system: System, z: np.ndarray) -> ModeTape:
     """Return the tape of a vector of modes with its active guards."""
-    tape, lean = system.code.data["tape"], system.optimised_tape(z)
+    tape, optimised = system.code.data["tape"], system.optimised_tape(z)
     return ModeTape(
-        rows=_rows(lean.rows),
+        rows=_rows(optimised.rows),
         high=tuple(system.high_rows(z)),
         time=tape["time"],
         states=tuple(tape["states"]),
-        rates=tuple(lean.derivatives.tolist()),
-        guards=tuple(lean.guards[np.flatnonzero(system.active(z))].tolist()),
+        rates=tuple(optimised.derivatives.tolist()),
+        guards=tuple(optimised.guards[np.flatnonzero(system.active(z))].tolist()),
         fading=tuple(register_of(number) for number in fading(system, z)),
         holding=frozenset(_holding(system, z)),
     )
@@ -81,7 +81,7 @@ def fading(system: System, z: np.ndarray) -> list[int]:
         if _may_fade(op, b):
             power = 1 if op == SQRT else _highest_power(rows, out, 2 if op in PAIRED else 1)
             found[a, _KIND[op]] = max(found.get((a, _KIND[op]), 1), power)
-    return [KINDS * (MOST_POWER * a + power - 1) + kind for (a, kind), power in found.items()]
+    return [KINDS * (MAX_POWER * a + power - 1) + kind for (a, kind), power in found.items()]
 
 
 def _highest_power(rows: Iterable[tuple[int, ...]], first: int, count: int) -> int:
@@ -94,7 +94,7 @@ def _highest_power(rows: Iterable[tuple[int, ...]], first: int, count: int) -> i
         known = [powers.get(a, 0) for a in arguments_of(row)]
         power = sum(known) if op == MUL else max(known, default=0)
         for k in range(2 if op in PAIRED else 1):
-            powers[out + k] = min(power, MOST_POWER)
+            powers[out + k] = min(power, MAX_POWER)
     return max(powers.values())
 
 

@@ -57,9 +57,9 @@ class Tapes(NamedTuple):
     """The tapes of K vectors of modes, one row or one slice each."""
 
     modes: np.ndarray  # modes (K, C)
-    places: np.ndarray  # hash table: `hybridsim.engine.system.programs.modes_index`
-    lean_start: np.ndarray
-    lean: np.ndarray  # rows of the lean tapes
+    hash_slots: np.ndarray  # hash table: `hybridsim.engine.system.programs.modes_index`
+    optimised_start: np.ndarray
+    optimised: np.ndarray  # rows of the optimised tapes
     high_start: np.ndarray
     high: np.ndarray  # rows for high orders
     constant_start: np.ndarray
@@ -81,10 +81,10 @@ def automata_of(system: System) -> Automata:
     return automata
 
 
-def shelf_of(system: System) -> TapeShelf:
+def tape_cache_of(system: System) -> TapeCache:
     """Return the tapes shared by all systems of one structure."""
-    shelf: TapeShelf = system.code.shared("shelf", lambda: TapeShelf(system))
-    return shelf
+    tape_cache: TapeCache = system.code.shared("tape cache", lambda: TapeCache(system))
+    return tape_cache
 
 
 def _automata(system: System) -> Automata:
@@ -140,7 +140,7 @@ def _flat(lists: Any) -> tuple[np.ndarray, np.ndarray]:
     return starts.astype(np.int64), np.array([i for part in lists for i in part], dtype=np.int64)
 
 
-class TapeShelf:
+class TapeCache:
     """The tapes of the modes met so far; it grows when a run reaches a new vector of modes.
 
     If there are few vectors, all are present from the start. The presence of a tape decides how an event is resolved,
@@ -228,7 +228,7 @@ class TapeShelf:
             Tapes(
                 modes,
                 index_of(modes),
-                *in_a_row([one.lean for one in rows]),
+                *in_a_row([one.optimised for one in rows]),
                 *in_a_row([one.high for one in rows]),
                 *in_a_row([one.constant for one in rows]),
                 *in_a_row([one.active for one in rows], columns=()),
@@ -245,7 +245,7 @@ class TapeShelf:
 class _ModeRows(NamedTuple):
     """The rows of `Tapes` for one vector of modes."""
 
-    lean: np.ndarray
+    optimised: np.ndarray
     high: np.ndarray
     constant: np.ndarray
     active: np.ndarray

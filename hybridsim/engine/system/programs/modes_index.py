@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.native.kernels import inlined, kernel
-from hybridsim.engine.native.loop_hints import few
+from hybridsim.engine.native.loop_hints import short_loop
 
 _SEARCHED = 32  # largest number of vectors with a linear search
-_ROOM = 4  # least number of slots for each vector
+_SLOTS_PER_VECTOR = 4  # least number of slots for each vector
 _FREE = -1
 
 
@@ -23,7 +23,7 @@ _FREE = -1
 def _is_at(modes: Any, k: int, z: Any) -> bool:
     c = 0
     while c < z.shape[0] and modes[k, c] == z[c]:
-        few()
+        short_loop()
         c += 1
     return c == z.shape[0]
 
@@ -33,7 +33,7 @@ def _first_place(z: Any, count: int) -> int:
     """Return the hash of a vector: its number modulo a power of two."""
     number = 0
     for c in range(z.shape[0]):
-        few()
+        short_loop()
         number = (31 * number + z[c]) & (count - 1)
     return number
 
@@ -51,7 +51,7 @@ def index_of(modes: np.ndarray) -> np.ndarray:
     """Return the hash table of these distinct vectors (K, components): rows, or -1 for a free slot."""
     if len(modes) <= _SEARCHED:
         return np.full(1, _FREE, dtype=np.int64)
-    index = np.full(1 << (_ROOM * len(modes) - 1).bit_length(), _FREE, dtype=np.int64)
+    index = np.full(1 << (_SLOTS_PER_VECTOR * len(modes) - 1).bit_length(), _FREE, dtype=np.int64)
     _fill(modes, index)
     return index
 
@@ -59,7 +59,7 @@ def index_of(modes: np.ndarray) -> np.ndarray:
 @inlined
 def find_modes(tapes: Any, z: Any) -> int:
     """Return the row of a vector of modes in the tapes, or -1."""
-    modes, index = tapes.modes, tapes.places
+    modes, index = tapes.modes, tapes.hash_slots
     if modes.shape[0] <= _SEARCHED:
         for k in range(modes.shape[0]):
             if _is_at(modes, k, z):

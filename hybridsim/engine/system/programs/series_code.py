@@ -8,12 +8,12 @@ import numpy as np
 
 from hybridsim.engine.series.emit_bernstein import LEADING, bernstein_code
 from hybridsim.engine.series.emit_series import ModeTape, series_text
-from hybridsim.engine.system.programs.code_cache import CodeShelf
+from hybridsim.engine.system.programs.code_cache import CodeCache
 from hybridsim.engine.system.system import System
 
 
 class Codes(NamedTuple):
-    """A `CodeShelf` tuple: series, values, ahead and sizes are those of `hybridsim.engine.series.emit_series`.
+    """A `CodeCache` tuple: series, values, ahead and sizes are those of `hybridsim.engine.series.emit_series`.
 
     bernstein: addresses of the functions of `hybridsim.engine.series.emit_bernstein`.
     """
@@ -26,7 +26,7 @@ class Codes(NamedTuple):
     bernstein: np.ndarray
 
 
-class SeriesShelf(CodeShelf):
+class SeriesCodeCache(CodeCache):
     """Machine code of one structure at one order."""
 
     codes = Codes

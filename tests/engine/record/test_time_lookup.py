@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.record.time_lookup import find_places
+from hybridsim.engine.record.time_lookup import locate_times
 
 
 def searched(times, starts, ends, origins, spans, sign, is_later):
@@ -36,7 +36,7 @@ def test_times_are_found_in_their_segments(order: str, sign: float, is_later: bo
         times = np.sort(times) if order != "anyhow" else rng.permutation(times)
         times = times[::-1].copy() if order == "against it" else times
         index, s = np.empty(len(times), dtype=np.int64), np.empty(len(times))
-        find_places(times, starts, ends, origins, spans, sign, is_later, index, s)
+        locate_times(times, starts, ends, origins, spans, sign, is_later, index, s)
         wanted = searched(times, starts, ends, origins, spans, sign, is_later)
         np.testing.assert_array_equal(index, wanted[0])
         np.testing.assert_array_equal(s, wanted[1])

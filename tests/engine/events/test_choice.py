@@ -18,8 +18,8 @@ from hybridsim.engine.events.choice.verdict import (
     UNDECIDED,
     choose,
     decree_orders,
+    guard_verdict,
     joint_candidates,
-    judge,
     side_after,
     side_before,
 )
@@ -88,7 +88,7 @@ def test_a_candidate_is_judged_by_its_worst_guard_in_any_order(
     def verdict(rows: list[tuple[list[float], list[float], int, bool]]) -> int:
         count = len(rows)
         sides, orders = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
-        return judge(
+        return guard_verdict(
             np.array([r[0] for r in rows]),
             np.array([r[1] for r in rows]),
             np.array([r[2] for r in rows]),
@@ -121,7 +121,7 @@ def test_a_release_is_decided_by_the_first_derivative_that_is_not_decreed(
     series = np.array([[-1e-12, -1e-12, 3.0, -1.0]])
     bounds = np.full((1, 4), 1e-15)
     one = np.zeros(1, dtype=np.int64)
-    verdict = judge(
+    verdict = guard_verdict(
         series, bounds, np.array([decreed]), np.ones(1, dtype=bool), False, one.copy(), one.copy()
     )
     assert verdict == expected
@@ -130,13 +130,13 @@ def test_a_release_is_decided_by_the_first_derivative_that_is_not_decreed(
 def test_a_guard_that_is_zero_throughout_admits_its_mode() -> None:
     one = np.zeros(1, dtype=np.int64)
     zero = np.zeros((1, 4))
-    assert judge(zero, zero, one, np.ones(1, dtype=bool), False, one.copy(), one.copy()) == FINE
+    assert guard_verdict(zero, zero, one, np.ones(1, dtype=bool), False, one.copy(), one.copy()) == FINE
 
 
 def test_what_is_not_a_number_is_undecided() -> None:
     one = np.zeros(1, dtype=np.int64)
     nan = np.full((1, 4), np.nan)
-    assert judge(nan, nan, one, np.ones(1, dtype=bool), False, one.copy(), one.copy()) == UNDECIDED
+    assert guard_verdict(nan, nan, one, np.ones(1, dtype=bool), False, one.copy(), one.copy()) == UNDECIDED
 
 
 # -- the choice among candidates --------------------------------------------------------------------------------
