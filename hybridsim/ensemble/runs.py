@@ -149,7 +149,7 @@ class Ensemble:
 
     def _run_group(self, group: EnsembleTables, runs: Runs) -> None:
         """Run all of them, unless `may_continue` returns False."""
-        spare: deque[Any] = self.system.code.shared(f"scratch of fleets for {group.form}", deque)
+        spare: deque[Any] = self.system.code.shared(f"scratch of ensembles for {group.form}", deque)
         try:
             group_scratch = spare.pop()
         except IndexError:

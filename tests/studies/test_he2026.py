@@ -127,8 +127,8 @@ def made_up_maps(height: float) -> deviation.Maps:
 def made_up_steps(order: float) -> step_study.StepStudy:
     """Deviations that fall with the step to the given order."""
     h0 = np.array(step_study.STEPS, dtype=float)
-    row = np.tile(0.1 * (1200.0 / h0) ** order, (len(step_study.PLACES), 1))
-    eps = np.tile(np.full(len(step_study.EPS), 0.1), (len(step_study.PLACES), 1))
+    row = np.tile(0.1 * (1200.0 / h0) ** order, (len(step_study.LOADS_AND_RATIOS), 1))
+    eps = np.tile(np.full(len(step_study.EPS), 0.1), (len(step_study.LOADS_AND_RATIOS), 1))
     return step_study.StepStudy(
         (),
         {v.name: {"A": row, "E": row} for v in SIGNS},

@@ -35,7 +35,7 @@ class LinearTables(NamedTuple):
     """Arrays with one row per mode vector, in the order of registration; y = (states, monomials) has n + M entries.
 
     Shapes: K mode vectors, A atoms, M monomials, G guards, J modal coordinates (even). Rows over y are padded
-    with zeros behind states and monomials. Panels are made by `hybridsim.engine.native.simd_products`.
+    with zeros behind states and monomials. Blocks of rows are made by `hybridsim.engine.native.simd_products`.
 
     The motion is followed from one point only for a limited time (`lasting`). For example, exp(2*(t - 400))
     underflows at t = 0 and could not grow to one from there.
@@ -57,10 +57,12 @@ class LinearTables(NamedTuple):
     upper: np.ndarray  # (K, J, J) strictly upper part of B
     ends: np.ndarray  # (K, J) end of the block of each coordinate
     basis: np.ndarray  # (K, n, J) from c to the states
-    inverse: np.ndarray  # (K, J / 2, ., 4) panels from y to c, with two numbers per complex coordinate
-    states: np.ndarray  # (K, ., 2 J, 4) panels from c to the states
-    spreads: np.ndarray  # (K, ., J, 4) panels from the sizes of c to the sizes of the states' terms
-    slopes: np.ndarray  # (K, ., ., 4) panels from y to the rates of the states
+    inverse: (
+        np.ndarray
+    )  # (K, J / 2, ., 4) blocks of rows from y to c, with two numbers per complex coordinate
+    states: np.ndarray  # (K, ., 2 J, 4) blocks of rows from c to the states
+    spreads: np.ndarray  # (K, ., J, 4) blocks of rows from the sizes of c to the sizes of the states' terms
+    slopes: np.ndarray  # (K, ., ., 4) blocks of rows from y to the rates of the states
     terms: np.ndarray  # (K, G, J, 2, BOUND_TERMS) Taylor coefficients of the guards for Re c and Im c
     sizes: np.ndarray  # (K, G, J) bounds of the guard
     rests: np.ndarray  # (K, G, J) bounds of the first omitted coefficient

@@ -12,7 +12,7 @@ from hybridsim.engine.series.bounded import UNIT
 
 @inlined
 def parts_for_exit(scratch: Any) -> Any:
-    """Return the arrays of a room that `earliest_exit` needs: sides, orders and floors of guards, and scratch."""
+    """Return the scratch arrays that `earliest_exit` needs: sides, orders and floors of guards, and others."""
     return (scratch.sides, scratch.orders, scratch.floors), (scratch.a, scratch.b, scratch.stack)
 
 

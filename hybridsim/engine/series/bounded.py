@@ -373,7 +373,7 @@ def run_series(
     V: Any,
     E: Any,
 ) -> None:
-    """Set the inputs of an optimised tape and run it up to the order for which V and E have room.
+    """Set the inputs of an optimised tape and run it up to the order for which V and E have columns.
 
     inputs: see `hybridsim.engine.system.system.Inputs`. derivatives: registers of the states' rates.
     """

@@ -180,7 +180,7 @@ def linear_event_loop(
     """Go from event to event and return why it ended; FULL also means a second of following guards, or growth.
 
     The kernel is called by address, so that it is compiled once for all callers. automata, tapes, inputs,
-    state and work are as for `leap`; lin: tables of linear modes; record: output for segments and events.
+    state and work are as for `event_loop`; lin: tables of linear modes; record: output for segments and events.
     """
     place, rates = (scratch.layout_positions[0], scratch.layout_positions[1]), scratch.rates
     longest, target, clock, functions = (

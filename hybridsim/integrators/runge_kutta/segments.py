@@ -187,7 +187,7 @@ def land(
     """Repeat the step of length h up to the zero of a guard, which the dense output places at d.
 
     place: index of the function. The step starts from work.y; its end is in work.x_after, the series there
-    are in room.right and room.guards_right. code: see `series_of`. Newton's method corrects the time until it
+    are in scratch.right and scratch.guards_right. code: see `series_of`. Newton's method corrects the time until it
     is accurate to rounding; a correction within the range of the series at the end needs no new step.
     """
     W, right, y, y1, last = scratch.W, scratch.right, work.y, work.x_after, scratch.right.shape[1] - 1
@@ -285,7 +285,7 @@ def rk_event_loop(
     parts: `Parts` of the tapes; codes: `EndsCodes` of them. method: tableau, leading terms of its estimates,
     error order, matrices of the Hermite polynomial. control: rtol, atol, order of the guards' series,
     max_step, longest segment, and an array with the length of the first step (0: unknown), which is cleared
-    after use. The others are as for `leap`.
+    after use. The others are as for `event_loop`.
     """
     rates, origin_at, phases_at = phase_layout
     tableau, leading, error_order, hermite = method

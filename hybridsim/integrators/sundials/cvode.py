@@ -207,7 +207,7 @@ class CvodeAdams(_Cvode):
     title: ClassVar[str] = "SUNDIALS CVODE, Adams"
     order: ClassVar[str] = "1 to 12"
     reference: ClassVar[str] = "Hindmarsh et al. 2005, doi:10.1145/1089014.1089020"
-    when: ClassVar[str] = "long smooth stretches, not stiff"
+    when: ClassVar[str] = "long smooth motions, not stiff"
     lacks: ClassVar[dict[str, str]] = {
         **_NOISE,
         "stiff": "with stiff rates its iteration converges only with very short steps: use cvode-bdf",

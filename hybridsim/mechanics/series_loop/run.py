@@ -246,7 +246,8 @@ def new_scratch(built: Built, order: int) -> Scratch:
     return Scratch(
         nodes=np.zeros(nodes, **ints), dofs=np.zeros(n, **ints), cons=np.zeros(m, **ints), loc=np.zeros(n, **ints),
         lcon=np.zeros(m, **ints), stamp=np.zeros(nodes + 1, **ints),
-        Q=padded_rows(columns, wide, beside), R=padded_rows(columns, wide), F=padded_rows(columns, wide), acc=np.zeros(wide),
+        Q=padded_rows(columns, wide, beside), R=padded_rows(columns, wide), F=padded_rows(columns, wide),
+        acc=np.zeros(wide),
         trig=np.zeros((len(arrays.rates), 2, columns)), lane=np.zeros(m, **ints), lane_ptr=np.zeros(tapes + 1, **ints),
         place=np.zeros(tapes + 1, **ints), poly=np.zeros(columns),
         V=padded_rows(1, registers * columns * (m + WIDTH * tapes) + 1)[0],
@@ -254,7 +255,8 @@ def new_scratch(built: Built, order: int) -> Scratch:
         zero=np.zeros(m, **ints), at_limit=np.zeros(m, **ints), next=np.zeros(m, **ints),
         err=np.zeros((columns, n)), err_f=np.zeros((columns + 8, m)), square=np.zeros((widest, widest)),
         tall=np.zeros((widest, widest)), order=np.zeros(widest, **ints), exits=np.zeros(m), kinds=np.zeros(m, **ints),
-        line=np.zeros(3 * TERMS), sums=padded_rows(4, wide), band_rows=padded_rows(1, (len(arrays.bands) + 3) * wide)[0],
+        line=np.zeros(3 * TERMS), sums=padded_rows(4, wide),
+        band_rows=padded_rows(1, (len(arrays.bands) + 3) * wide)[0],
         band_first=np.zeros(wide // WIDTH, **ints),
         W=padded_rows(1, (registers * columns + 1) * wide if len(arrays.offsets) else 1)[0],
     )  # fmt: skip
