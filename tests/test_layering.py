@@ -124,6 +124,33 @@ def import_graph(faces: set[tuple[str, str]], handed_on: set[str]) -> dict[str, 
     return graph
 
 
+def loading_graph() -> dict[str, set[str]]:
+    """The modules that Python loads for the imports at the top of each module, with the folders they lie in."""
+    graph: dict[str, set[str]] = {}
+    for path in SOURCES:
+        name, skipped = named(path), imports_for_types(path)
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        at_top = {
+            line for node in tree.body for line in range(node.lineno, (node.end_lineno or node.lineno) + 1)
+        }
+        inside = {
+            line
+            for node in tree.body
+            if isinstance(node, ast.FunctionDef | ast.ClassDef)
+            for line in range(node.lineno, (node.end_lineno or node.lineno) + 1)
+        }
+        for module, line in MAP["imports"](path):
+            parts = module.removeprefix("hybridsim").removeprefix(".").split(".")
+            if line not in at_top - inside - skipped:
+                continue
+            loaded = {".".join(parts[:count]) for count in range(1, len(parts) + 1)}
+            # the folders of the importing module are being loaded already
+            graph.setdefault(name, set()).update(
+                one for one in loaded if one != name and not name.startswith(f"{one}.")
+            )
+    return graph
+
+
 def circles(graph: dict[str, set[str]]) -> list[list[str]]:
     """Groups of modules that import each other."""
     order: list[str] = []
@@ -204,6 +231,11 @@ def test_imports_point_down_only(path: Path) -> None:
 def test_no_modules_import_each_other_in_a_circle() -> None:
     """Imports for types and inside functions count; the exceptions are the closed lists above."""
     assert circles(import_graph(FACES, HANDED_ON)) == []
+
+
+def test_every_module_can_be_loaded_first() -> None:
+    """A module also loads the folders of what it imports, and these must not wait for the module itself."""
+    assert circles(loading_graph()) == []
 
 
 @pytest.mark.parametrize("face", sorted(FACES), ids=str)

@@ -47,8 +47,9 @@ def folders(page: str) -> dict[str, str]:
     """Return a key for each folder of the package that the commands of a page use."""
     paths: dict[str, list[Path]] = {}
     for path in used(page):
-        paths.setdefault("/".join(path.relative_to(PACKAGE).parts[:2]), []).append(path)
-    return {folder: key_of(inside) for folder, inside in paths.items()}
+        inside = path.relative_to(PACKAGE)
+        paths.setdefault("/".join(inside.parent.parts[:2]) or inside.name, []).append(path)
+    return {folder: key_of(contents) for folder, contents in paths.items()}
 
 
 def key_of(paths: list[Path]) -> str:

@@ -17,7 +17,7 @@ from hybridsim.engine.record.trajectory import PiecewiseDense
 from hybridsim.engine.run.stepping import Flow, Step
 from hybridsim.engine.system.failures import Collapsed, StepFailure
 from hybridsim.engine.system.tolerances import Tolerances
-from hybridsim.integrators.runge_kutta.step import LAST_STEP_FACTOR, SMALLEST, next_length
+from hybridsim.integrators.step_control import LAST_STEP_FACTOR, SMALLEST, next_length
 
 _MAX_PARTS = 64  # most parts of a step that is repeated up to an event
 _SHORTER = 0.5  # factor on a step whose error up to an event is above the tolerance

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim import arguments
+from hybridsim.analysis.keyword_options import refuse_unknown
 from hybridsim.analysis.steady.incommensurate import follow
 from hybridsim.analysis.steady.lyapunov import largest_exponents
 from hybridsim.analysis.steady.motion import (
@@ -32,7 +33,6 @@ from hybridsim.analysis.steady.settling import (
     relative,
 )
 from hybridsim.analysis.steady.shooting import Orbit, followed_closely, shoot
-from hybridsim.analysis.sweep.sweep_request import refuse_unknown
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.analysis.variations.sizes import ranges
 from hybridsim.calls import refusing

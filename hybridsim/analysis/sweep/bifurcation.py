@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from hybridsim.analysis.compare.comparison_request import positive, whole
+from hybridsim.analysis.keyword_options import refuse_unknown
 from hybridsim.analysis.progress import Progress
 from hybridsim.analysis.sweep.axes import Points, points_of
 from hybridsim.analysis.sweep.result import Sweep
 from hybridsim.analysis.sweep.section import Section, with_section
-from hybridsim.analysis.sweep.sweep_request import refuse_unknown
 from hybridsim.analysis.sweep.work.job import Job, Settings, new_token
 from hybridsim.analysis.sweep.work.measure import work
 from hybridsim.arguments import callback, chosen_model, text

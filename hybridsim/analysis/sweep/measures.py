@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from hybridsim.analysis.keyword_options import refuse_what_it_does_not_take
 from hybridsim.analysis.sweep.named_measures import named_measure
-from hybridsim.analysis.sweep.sweep_request import refuse_what_it_does_not_take
 from hybridsim.analysis.sweep.work.job import Measure
 from hybridsim.arguments import is_row
 from hybridsim.errors import UsageError

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.analysis.compare.comparison_request import whole
+from hybridsim.analysis.keyword_options import refuse_unknown
 from hybridsim.analysis.sweep.last_period import OF_MOTION, LastPeriod, MeasuredPeriod, period_of
-from hybridsim.analysis.sweep.sweep_request import refuse_unknown
 from hybridsim.analysis.sweep.work.job import Incomplete
 from hybridsim.errors import SimulationError, UsageError, nearest
 from hybridsim.model import Model

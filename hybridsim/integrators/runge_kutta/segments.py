@@ -39,14 +39,8 @@ from hybridsim.engine.run.event_loop import (
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.series.interpreter import advance, expand
 from hybridsim.engine.system.programs.modes_index import find_modes
-from hybridsim.integrators.runge_kutta.step import (
-    LAST_STEP_FACTOR,
-    SAFETY,
-    SMALLEST,
-    attempt,
-    forget,
-    next_length,
-)
+from hybridsim.integrators.runge_kutta.step import attempt
+from hybridsim.integrators.step_control import LAST_STEP_FACTOR, SAFETY, SMALLEST, forget, next_length
 
 LANDED, UNSURE, REJECTED, LOST = 0, 1, 2, 3
 _NEIGHBOURHOOD = 0.125  # share of a step within which an event time is corrected

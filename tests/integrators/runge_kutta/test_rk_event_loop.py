@@ -15,7 +15,7 @@ from hybridsim.engine.run import compiled_loop, mode_loop
 from hybridsim.integrators.registry import integrator_class
 from hybridsim.integrators.runge_kutta.dop853 import Dop853
 from hybridsim.integrators.runge_kutta.segments import first_length
-from hybridsim.integrators.runge_kutta.step import forget, next_length
+from hybridsim.integrators.step_control import forget, next_length
 from hybridsim.testing.catalogue import SCENES
 from hybridsim.testing.measuring import load
 from hybridsim.testing.scene import Scene

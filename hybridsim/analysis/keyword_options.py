@@ -1,4 +1,4 @@
-"""This module refuses invalid options of a sweep before the first point."""
+"""Check the keyword arguments that an analysis passes on to other functions, before its first run."""
 
 from __future__ import annotations
 
