@@ -227,7 +227,7 @@ def test_tables_of_many_values_do_not_fill_the_memory(monkeypatch: pytest.Monkey
         hs.simulate(model, (0, end), integrator="exact", save="nothing")
     assert len(kept) >= 3
     most = max(made.rows.size for made in kept.values())
-    monkeypatch.setattr("hybridsim.engine.linear.tables._MOST_BYTES", most)
+    monkeypatch.setattr("hybridsim.engine.linear.tables._MAX_BYTES", most)
     hs.simulate(model, (0, 0.01), integrator="exact", save="nothing")
     assert len(kept) == 1 or sum(made.rows.size for made in kept.values()) <= most
     assert len(kept) < 3
