@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from hybridsim.engine.events.outcome import Situation
-from hybridsim.engine.events.resolve import Settling
+from hybridsim.engine.events.resolve import EventResolution
 from hybridsim.engine.linear.modes import is_linear_beside_corners, what_is_not_linear
 from hybridsim.engine.series.interpreter import advance
 from hybridsim.engine.system.instant import Instant
@@ -90,7 +90,7 @@ def _modes_at_start(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[
     """Return the modes in which the run begins; an undecided component gets its first mode."""
     p = system.vector(Instant(span[0]), system.discrete_start)
     at = Situation(0.0, x0.copy(), p, z0.copy(), np.zeros(system.n), 0.0)
-    return np.maximum(Settling(system, at, z0.copy(), span[1] >= span[0]).run((), ()).z, 0)
+    return np.maximum(EventResolution(system, at, z0.copy(), span[1] >= span[0]).run((), ()).z, 0)
 
 
 def successor_of(name: str, system: System) -> Integrator | None:

@@ -169,9 +169,9 @@ def test_a_cascade_beside_a_body_at_rest_is_counted_once(monkeypatch: pytest.Mon
         ],
     )
     rounds = []
-    transitions = resolve.Settling._transitions
+    transitions = resolve.EventResolution._transitions
     monkeypatch.setattr(
-        resolve.Settling, "_transitions", lambda *args: rounds.append(1) or transitions(*args)
+        resolve.EventResolution, "_transitions", lambda *args: rounds.append(1) or transitions(*args)
     )
     sol = hs.simulate(model, (0, 2))
     assert sol.status == "cascade" and sol.t_end == pytest.approx(1.0)

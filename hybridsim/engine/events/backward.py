@@ -8,7 +8,7 @@ import numpy as np
 
 from hybridsim.engine.events.choice.verdict import LEAVES
 from hybridsim.engine.events.outcome import Outcome, Situation
-from hybridsim.engine.events.resolve import Settling
+from hybridsim.engine.events.resolve import EventResolution
 from hybridsim.engine.system.system import System
 
 
@@ -91,7 +91,7 @@ def cross_backward(system: System, at: Situation, fired: tuple[int, ...]) -> Out
     between. For a force with a limit that is a passage of the velocity through zero.
     """
     before = at.z.copy()
-    outcome = Settling(system, at, before, forward=False).run(fired, [])
+    outcome = EventResolution(system, at, before, forward=False).run(fired, [])
     for g in fired:
         c = int(system.owner[g])
         automaton = system.automata[c]
@@ -100,7 +100,7 @@ def cross_backward(system: System, at: Situation, fired: tuple[int, ...]) -> Out
         other = automaton.below if before[c] == automaton.above else automaton.above
         rest = before.copy()
         rest[c] = automaton.hold
-        forward = Settling(system, at, rest, forward=True)
+        forward = EventResolution(system, at, rest, forward=True)
         forward.on_surface[c] = True
         could_rest = forward.verdict(rest, [c]) != LEAVES
         if outcome.status or could_rest or outcome.z[c] != other:

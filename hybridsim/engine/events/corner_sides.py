@@ -18,25 +18,25 @@ from hybridsim.engine.events.input_jumps import gaps_jump
 from hybridsim.engine.events.outcome import Change
 
 if TYPE_CHECKING:
-    from hybridsim.engine.events.resolve import Settling
+    from hybridsim.engine.events.resolve import EventResolution
     from hybridsim.engine.system.system import Automaton
 
 _ROUNDS_PER_MODE = 4  # orders of a series: each order settles at least one more component
 
 
 def sides_along(
-    settling: Settling, z: np.ndarray, x: np.ndarray, has_flow: bool = True
+    resolution: EventResolution, z: np.ndarray, x: np.ndarray, has_flow: bool = True
 ) -> tuple[np.ndarray, dict[int, int]]:
     """Return the modes z with each corner and load on its side along the flow, and their guards that are zero.
 
     A guard that was located at zero is zero on both sides, whatever rounding makes of its value. With has_flow=False
     only values decide, because the modes of surfaces are not known yet.
     """
-    system = settling.system
-    side_of = side_after if settling.forward else side_before
-    zero = {c: g for c in system.led for g in system.automata[c].guards[z[c]] if settling.fired[g]}
+    system = resolution.system
+    side_of = side_after if resolution.forward else side_before
+    zero = {c: g for c in system.led for g in system.automata[c].guards[z[c]] if resolution.fired[g]}
     for _ in range(_ROUNDS_PER_MODE * sum(len(system.automata[c].modes) for c in system.led)):
-        series = settling.series_of(z, x)
+        series = resolution.series_of(z, x)
         values, bounds, after = series.guards, series.guard_bounds, z
         for c in system.led:
             automaton, mode = system.automata[c], int(z[c])
@@ -63,27 +63,27 @@ def _way_back(automaton: Automaton, mode: int, to: int) -> int:
     return next(g for g, targets in ways if to in targets)
 
 
-def take_corners(settling: Settling) -> bool:
+def take_corners(resolution: EventResolution) -> bool:
     """Set the corners and loads of an event to their sides. Return whether any side changed."""
-    at, system = settling.at, settling.system
+    at, system = resolution.at, resolution.system
     if not system.led:
         return False
     before = np.maximum(at.z, 0)
-    z, zero = sides_along(settling, before, at.x, bool((at.z >= 0).all()))
+    z, zero = sides_along(resolution, before, at.x, bool((at.z >= 0).all()))
     changed = [c for c in system.led if z[c] != before[c]]
     for c in changed:
         automaton, mode = system.automata[c], int(before[c])
-        settling.fired[list(automaton.guards[mode])] = False
-        settling.changes.append(
+        resolution.fired[list(automaton.guards[mode])] = False
+        resolution.changes.append(
             Change(c, _guard_towards(automaton, mode, int(z[c])), mode, int(z[c]), at.x, at.x)
         )
         if automaton.is_corner:
-            settling.is_kinked = True
+            resolution.is_kinked = True
             if c in zero:  # it is still at zero, on the other side
-                settling.fired[zero[c]] = True
-        settling.jumped = settling.jumped or not automaton.is_corner or automaton.is_step
+                resolution.fired[zero[c]] = True
+        resolution.jumped = resolution.jumped or not automaton.is_corner or automaton.is_step
     if changed:
-        settling.jumped = settling.jumped or gaps_jump(system, at, before, z)
+        resolution.jumped = resolution.jumped or gaps_jump(system, at, before, z)
         at.z = at.z.copy()
         at.z[changed] = z[changed]
     return bool(changed)

@@ -9,28 +9,28 @@ import numpy as np
 from hybridsim.engine.events.outcome import Change
 
 if TYPE_CHECKING:
-    from hybridsim.engine.events.resolve import Settling
+    from hybridsim.engine.events.resolve import EventResolution
 
 
-def vanishing_surfaces(settling: Settling, cluster: tuple[int, ...]) -> set[int]:
+def vanishing_surfaces(resolution: EventResolution, cluster: tuple[int, ...]) -> set[int]:
     """Return the components of a cluster whose surfaces are zero within rounding.
 
     No step crosses a surface that stays at zero because another component keeps its function constant, such as a relay
     on the speed of a contact that sticks. Its component leaves when the other component lets go.
     """
-    system, at = settling.system, settling.at
+    system, at = resolution.system, resolution.at
     series = system.series(at.s, at.x, at.p, np.maximum(at.z, 0), at.x_error, at.s_error, at.is_put)
     near = np.abs(series.surfaces[:, 0]) <= series.surface_bounds[:, 0]
     return {c for k, c in enumerate(system.surface_of) if near[k]} & set(cluster)
 
 
-def past_zero(settling: Settling, cluster: tuple[int, ...]) -> set[int]:
+def past_zero(resolution: EventResolution, cluster: tuple[int, ...]) -> set[int]:
     """Return the components of a cluster that are past their surfaces without a crossing.
 
     A step that is repeated to end at an event may end past a surface that it did not cross before, because of its
     error. That surface was crossed first.
     """
-    system, at = settling.system, settling.at
+    system, at = resolution.system, resolution.at
     series = system.series(at.s, at.x, at.p, np.maximum(at.z, 0), at.x_error, at.s_error, at.is_put)
     found = set()
     for c, value in zip(system.surface_of, series.surfaces[:, 0], strict=True):
@@ -42,12 +42,12 @@ def past_zero(settling: Settling, cluster: tuple[int, ...]) -> set[int]:
     return found & set(cluster)
 
 
-def cross(settling: Settling, components: set[int]) -> None:
+def cross(resolution: EventResolution, components: set[int]) -> None:
     """Move components to the other side of their surfaces, before the located event."""
-    at = settling.at
-    settling.fired[:] = False
+    at = resolution.at
+    resolution.fired[:] = False
     for c in sorted(components):
-        automaton, mode = settling.system.automata[c], int(at.z[c])
+        automaton, mode = resolution.system.automata[c], int(at.z[c])
         at.z[c] = automaton.below if mode == automaton.above else automaton.above
         name = automaton.guard_names[mode][0]
-        settling.changes.append(Change(c, name, mode, int(at.z[c]), at.x, at.x))
+        resolution.changes.append(Change(c, name, mode, int(at.z[c]), at.x, at.x))

@@ -17,7 +17,7 @@ from hybridsim.model.smoothing.one_sided import names_of
 
 if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Situation
-    from hybridsim.engine.events.resolve import Settling
+    from hybridsim.engine.events.resolve import EventResolution
     from hybridsim.engine.system.system import System
 
 
@@ -53,38 +53,38 @@ def as_read_by_conditions(system: System, at: Situation, jumped: bool = False) -
     return replace(at, z=z, p=p)
 
 
-def certainly_leaving(settling: Settling) -> set[int]:
+def certainly_leaving(resolution: EventResolution) -> set[int]:
     """Return the automata that have a negative guard just after, whatever is decided at surfaces that are zero.
 
     The sides of their guards are set accordingly. If these surfaces have too many combinations of modes, only values of
     guards without forces are used.
     """
-    system = settling.system
-    owners = [c for c in settling.scope if not (system.has_surface[c] or c in system.led)]
+    system = resolution.system
+    owners = [c for c in resolution.scope if not (system.has_surface[c] or c in system.led)]
     if not owners:
         return set()
-    z, on = _modes_on_sides(settling)
+    z, on = _modes_on_sides(resolution)
     modes = [range(len(system.automata[c].modes)) for c in on]
     if math.prod(map(len, modes)) > _MAX_FLOWS:
         free = system.code.shared("guards without forces", lambda: _without_forces(system))
-        negative = {g for g in _negative(settling, owners, z, order=0) if free[g][z[system.owner[g]]]}
+        negative = {g for g in _negative(resolution, owners, z, order=0) if free[g][z[system.owner[g]]]}
     else:
         negative = set()
         for number, chosen in enumerate(product(*modes)):
             z[on] = chosen
-            found = _negative(settling, owners, sides_along(settling, z, settling.at.x)[0])
+            found = _negative(resolution, owners, sides_along(resolution, z, resolution.at.x)[0])
             negative = negative & found if number else found
             if not negative:
                 return set()
     for g in range(system.guard_count):
         if system.owner[g] in owners:
-            settling.sides[g] = -1 if g in negative else 1
+            resolution.sides[g] = -1 if g in negative else 1
     return {int(system.owner[g]) for g in negative}
 
 
-def _modes_on_sides(settling: Settling) -> tuple[np.ndarray, list[int]]:
+def _modes_on_sides(resolution: EventResolution) -> tuple[np.ndarray, list[int]]:
     """Return the modes with each surface off zero on its side, and the components whose surfaces are zero."""
-    at, system = settling.at, settling.system
+    at, system = resolution.at, resolution.system
     p = at.p.copy()
     p[system.layout.pin_at] = 0.0
     z = np.maximum(at.z, 0)
@@ -100,11 +100,11 @@ def _modes_on_sides(settling: Settling) -> tuple[np.ndarray, list[int]]:
     return z, on
 
 
-def _negative(settling: Settling, owners: list[int], z: np.ndarray, order: int = ORDER) -> set[int]:
+def _negative(resolution: EventResolution, owners: list[int], z: np.ndarray, order: int = ORDER) -> set[int]:
     """Return the guards of some components that are negative just after in the modes z, up to an order."""
-    series = settling.series_of(z)
-    side_of = side_after if settling.forward else side_before
-    numbers = [g for c in owners for g in settling.system.automata[c].guards[z[c]]]
+    series = resolution.series_of(z)
+    side_of = side_after if resolution.forward else side_before
+    numbers = [g for c in owners for g in resolution.system.automata[c].guards[z[c]]]
     found = ((g, side_of(series.guards[g], series.guard_bounds[g], 0)) for g in numbers)
     return {g for g, (side, place) in found if side < 0 and place <= order}
 

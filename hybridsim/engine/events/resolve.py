@@ -53,7 +53,7 @@ _SEVERAL_MOTIONS = "several motions are admissible"
 _MAX_CANDIDATES = 3**8  # a cluster of more components needs a complementarity solver, not enumeration
 
 
-class Settling:
+class EventResolution:
     """The resolution of one event."""
 
     is_thorough = False  # whether to judge all candidates, even if the choice does not need them

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hybridsim.engine.events.outcome import Outcome, Situation
-from hybridsim.engine.events.resolve import Settling
+from hybridsim.engine.events.resolve import EventResolution
 from hybridsim.engine.record.trajectory import Task
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.instant import Instant
@@ -31,7 +31,7 @@ def settled_start(system: System, task: Task, origin: Instant, due: tuple[int, .
         p = system.vector(origin, task.discrete, task.forward)
         at = Situation(0.0, task.x0.copy(), p, task.z0.copy(), start_errors(system, task.x0), 0.0, True)
         resets = [("schedule", k) for k in due]
-        known = Settling(system, at, task.z0.copy(), task.forward).run((), resets)
+        known = EventResolution(system, at, task.z0.copy(), task.forward).run((), resets)
         # the first side of a corner is not a change
         known.changes = [change for change in known.changes if not system.is_corner[change.component]]
         known.warnings = [*known.warnings, *_contradictions(system, task, p, known.z)]

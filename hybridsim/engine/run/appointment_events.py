@@ -13,7 +13,7 @@ import numpy as np
 
 from hybridsim.engine.events.choice.verdict import side_after, side_before
 from hybridsim.engine.events.corner_sides import take_corners
-from hybridsim.engine.events.resolve import Settling
+from hybridsim.engine.events.resolve import EventResolution
 from hybridsim.engine.run.located import Located
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
@@ -36,11 +36,11 @@ def events_before_appointment(
     discrete, error = system.discrete(found.at.p), math.ulp(float(instant))
     p, before = (system.vector(instant, discrete, side) for side in (forward, not forward))
     at = replace(found.at, s=0.0, p=p, s_error=max(found.at.s_error, error))
-    settling = Settling(system, replace(at, z=at.z.copy()), at.z.copy(), forward)
-    settling.fired[list(found.fired)] = True
-    take_corners(settling)
-    series, side_of = settling.series_of(settling.at.z), side_after if forward else side_before
-    is_open = ~system.active(settling.at.z) | np.isin(
+    resolution = EventResolution(system, replace(at, z=at.z.copy()), at.z.copy(), forward)
+    resolution.fired[list(found.fired)] = True
+    take_corners(resolution)
+    series, side_of = resolution.series_of(resolution.at.z), side_after if forward else side_before
+    is_open = ~system.active(resolution.at.z) | np.isin(
         system.owner, system.led
     )  # corners have been decided already
     fired = {

@@ -14,7 +14,7 @@ from hybridsim.engine.events.fatal_guards import is_only_fatal
 from hybridsim.engine.events.input_jumps import surfaces_jump
 from hybridsim.engine.events.monitor_sides import MonitorSides
 from hybridsim.engine.events.outcome import Outcome, Situation
-from hybridsim.engine.events.resolve import Settling
+from hybridsim.engine.events.resolve import EventResolution
 from hybridsim.engine.events.zeno.accumulation import NOBODY, Accumulation, Limit, accumulated
 from hybridsim.engine.events.zeno.hidden_bounces import bounces_of, last_bounces, limit_of_hidden
 from hybridsim.engine.events.zeno.limits import behind, closed_now, holds_several
@@ -459,9 +459,9 @@ class ModeLoop:
         if fired and not self.forward:
             return cross_backward(self.system, at, tuple(fired))
         scope = found.scope(self.system)
-        settling = Settling(self.system, at, at.z.copy(), self.forward, scope, found.inputs)
-        settling.jumped = found.inputs is not None and surfaces_jump(self.system, instant, at, True)
-        return settling.run(fired, resets)
+        resolution = EventResolution(self.system, at, at.z.copy(), self.forward, scope, found.inputs)
+        resolution.jumped = found.inputs is not None and surfaces_jump(self.system, instant, at, True)
+        return resolution.run(fired, resets)
 
     def _apply_crossed(self, outcome: Outcome, s: float, monitors: MonitorSides) -> Outcome:
         """Apply the resets of monitors that an event or another such reset moved off their sides."""
@@ -470,7 +470,7 @@ class ModeLoop:
             monitors.fire(outcome)
             at = Situation(s, outcome.x.copy(), outcome.p, outcome.z.copy(), outcome.x_error, math.ulp(s))
             resets = [("monitor", k) for k in due]
-            outcome = Settling(self.system, at, at.z.copy(), self.forward).run((), resets)
+            outcome = EventResolution(self.system, at, at.z.copy(), self.forward).run((), resets)
             changes += outcome.changes
             outcome.continuous = False
         outcome.changes = changes
@@ -498,9 +498,9 @@ class ModeLoop:
         error = with_evaluated(system, before.p, x_minus, p, z, error)
         at = Situation(0.0, x_minus.copy(), p, z.copy(), error, max(s_error, math.ulp(0.0)))
         resets = [("schedule", k) for k in schedules]
-        settling = Settling(system, at, z.copy(), self.forward)
-        settling.jumped = surfaces_jump(system, instant, at, self.forward)
-        return settling.run((), resets)
+        resolution = EventResolution(system, at, z.copy(), self.forward)
+        resolution.jumped = surfaces_jump(system, instant, at, self.forward)
+        return resolution.run((), resets)
 
     def _accumulated(self, instant: Instant, x_minus: np.ndarray, fired: tuple[int, ...]) -> bool:
         """Detect an accumulation of events. Return whether the run ends there."""

@@ -13,7 +13,7 @@ from hybridsim.engine.events.diagnosis import power_without_value
 from hybridsim.engine.events.first_modes import as_read_by_conditions
 from hybridsim.engine.events.input_jumps import surfaces_jump
 from hybridsim.engine.events.outcome import Situation
-from hybridsim.engine.events.resolve import Settling
+from hybridsim.engine.events.resolve import EventResolution
 from hybridsim.engine.events.zeno.accumulation import Accumulation, accumulated
 from hybridsim.engine.record.checkpoint import Checkpoint, damaged
 from hybridsim.engine.record.fixed_blocks import StepOccurrences, StepSegments
@@ -393,9 +393,9 @@ class FixedStepRun:
             at.z = as_read_by_conditions(system, at).z
         resets: list[tuple[object, ...]] = [("schedule", k) for k in schedules]
         resets += [("monitor", k) for k in monitors]
-        settling = Settling(system, at, before, forward=True, scope=self.declared)
-        settling.jumped = surfaces_jump(system, instant, at, forward=True)
-        outcome = settling.run(fired, resets)
+        resolution = EventResolution(system, at, before, forward=True, scope=self.declared)
+        resolution.jumped = surfaces_jump(system, instant, at, forward=True)
+        outcome = resolution.run(fired, resets)
         self.x, self.discrete = outcome.x, system.discrete(outcome.p).copy()
         self.z = np.where(system.has_surface, self.z, outcome.z)
         self._record_monitors(instant, seen, x_minus, outcome.x)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Situation
     from hybridsim.engine.system.system import System
     from hybridsim.expr import Expression
-    from hybridsim.solution.explain.recorded_settling import Decision, Look
+    from hybridsim.solution.explain.recorded_resolution import Decision, Look
 
 _VERDICTS = {FINE: "admissible", LEAVES: "not admissible"}
 _OPEN = "a question of rounding"

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from hybridsim.model.parts.monitor import Monitor
     from hybridsim.model.parts.schedule import Schedule
     from hybridsim.solution.explain.candidate import Candidate, GuardView
-    from hybridsim.solution.explain.recorded_settling import Decision
+    from hybridsim.solution.explain.recorded_resolution import Decision
     from hybridsim.solution.explain.stages import Place
     from hybridsim.solution.solution import Solution
 
@@ -186,17 +186,17 @@ def _explained(solution: Solution, event: Event, happened: list[Occurrence], num
 
 def _decision(place: Place, occurrence: Occurrence) -> Decision | None:
     """Return the decision that made a change or followed an impact; None if a guard made the change."""
-    settling, change = place.stage.settling, place.change
-    system = settling.system
+    resolution, change = place.stage.resolution, place.change
+    system = resolution.system
     c = next(k for k, a in enumerate(system.automata) if a.name == occurrence.component)
     if change is None:
-        return settling.decision_after(c, -1)
-    number = next(k for k, one in enumerate(settling.changes) if one is change)
-    found = settling.decision_of(c, number)
+        return resolution.decision_after(c, -1)
+    number = next(k for k, one in enumerate(resolution.changes) if one is change)
+    found = resolution.decision_of(c, number)
     if found is None and system.is_unilateral[c] and change.guard != BY_RESET:
-        found = settling.decision_after(c, number)
+        found = resolution.decision_after(c, number)
         if found is not None and any(
-            one.component == c for one in settling.changes[found.first : found.last]
+            one.component == c for one in resolution.changes[found.first : found.last]
         ):
             return None  # which has an event of its own
     return found

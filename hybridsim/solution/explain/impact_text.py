@@ -24,13 +24,13 @@ _AT_LIMIT = 1e-9  # relative distance of an impulse to its limit; a closer impul
 
 def restitution(model: Model, stage: Stage, c: int, impact_guard: GuardView) -> str:
     """Describe the speeds at which a gap closed and opens, and the coefficient of restitution."""
-    settling, outcome = stage.settling, stage.outcome
-    system, automaton = settling.system, settling.system.automata[c]
+    resolution, outcome = stage.resolution, stage.outcome
+    system, automaton = resolution.system, resolution.system.automata[c]
     declared = next(i for i in model.impacts if i.name == automaton.name).restitution
     z = outcome.z.copy()
     z[c] = 1 - automaton.hold  # open mode; the only one with the gap as its guard
     guard = automaton.guards[z[c]][0]
-    at = replace(settling.at, x=outcome.x)
+    at = replace(resolution.at, x=outcome.x)
     (after,) = views(system, at, z, [guard], np.zeros(system.guard_count, int))
     before, unit = -impact_guard.derivatives[1], impact_guard.units[1]
     known = model.parameter_values() | {SPEED: before}
@@ -48,7 +48,7 @@ def is_struck(system: System, change: Change) -> bool:
 
 def errors_beside(stage: Stage, c: int) -> np.ndarray:
     """Return rounding bounds of the states that impulses of the contact change, and infinity for the others."""
-    system, at = stage.settling.system, stage.before
+    system, at = stage.resolution.system, stage.before
     cluster = next(cluster for cluster in system.clusters if c in cluster)
     _, changes, _ = system.impulses(at.s, at.x, at.p, np.maximum(at.z, 0))
     can_change = changes[[system.surface_of.index(k) for k in cluster]].any(axis=0)
@@ -61,8 +61,8 @@ def friction(stage: Stage, c: int) -> str:
     The impulses are computed from the changes of the states. The text is empty if several sets of impulses
     fit.
     """
-    system, at, z = stage.settling.system, stage.before, np.maximum(stage.before.z, 0)
-    if stage.due or any((one.x_minus != one.x_plus).any() for one in stage.settling.changes):
+    system, at, z = stage.resolution.system, stage.before, np.maximum(stage.before.z, 0)
+    if stage.due or any((one.x_minus != one.x_plus).any() for one in stage.resolution.changes):
         return ""  # resets changed the states as well
     cluster = next(cluster for cluster in system.clusters if c in cluster)
     place = {k: i for i, k in enumerate(system.surface_of)}

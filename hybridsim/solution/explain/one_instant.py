@@ -14,7 +14,7 @@ from hybridsim.integrators.contract import Integrator
 
 if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Change
-    from hybridsim.engine.events.resolve import Settling
+    from hybridsim.engine.events.resolve import EventResolution
     from hybridsim.engine.record.segments import Occurrence, Segment
     from hybridsim.engine.system.system import System
 
@@ -55,11 +55,11 @@ def fired_guards(
     return [g for g in sorted(named) if not abs(series.guards[g, 0]) > LOCATED * series.guard_bounds[g, 0]]
 
 
-def resets_before(settling: Settling, change: Change) -> str:
+def resets_before(resolution: EventResolution, change: Change) -> str:
     """Describe the resets before a change at its instant, with the values that they set; empty without any."""
-    system = settling.system
+    system = resolution.system
     resets: dict[str, None] = {}
-    for one in settling.changes:
+    for one in resolution.changes:
         if one is change:
             break
         automaton = system.automata[one.component]

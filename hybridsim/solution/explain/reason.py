@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from hybridsim.engine.system.system import System
     from hybridsim.model import Model
     from hybridsim.solution.explain.candidate import GuardView
-    from hybridsim.solution.explain.recorded_settling import Decision, Look
+    from hybridsim.solution.explain.recorded_resolution import Decision, Look
     from hybridsim.solution.explain.stages import Place
 
 _RULE = "fewer changes of mode are preferred, then holding before slipping"
@@ -33,8 +33,8 @@ def reason(
 ) -> str:
     """Return the sentence; `changed` names the changed states, and `impact_guard` is the gap as it reached zero."""
     stage, change = place.stage, place.change
-    settling, outcome = stage.settling, stage.outcome
-    system = settling.system
+    resolution, outcome = stage.resolution, stage.outcome
+    system = resolution.system
     if outcome.status:
         return f"the run ended here: {outcome.message}"
     c = next(k for k, a in enumerate(system.automata) if a.name == occurrence.component)
@@ -94,14 +94,14 @@ class _Led(NamedTuple):
 def _led(place: Place) -> tuple[list[str], list[str]]:
     """List the causes of a change: due events and transitions as clauses, resets and impacts as nouns."""
     stage, change = place.stage, place.change
-    settling = stage.settling
+    resolution = stage.resolution
     assert change is not None
-    system, changes = settling.system, settling.changes
+    system, changes = resolution.system, resolution.changes
     number = next(k for k, one in enumerate(changes) if one is change)
     is_decided = system.automata[change.component].has_surface
     clauses = [stage.due] if stage.due else []
     clauses += _transitions(system, changes[:number]) if is_decided else []
-    resets, struck = resets_before(settling, change), _impacts(system, changes, change)
+    resets, struck = resets_before(resolution, change), _impacts(system, changes, change)
     nouns = [resets] if resets else []
     if struck and is_decided:
         error = errors_beside(stage, change.component)

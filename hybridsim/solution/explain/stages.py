@@ -18,7 +18,7 @@ from hybridsim.engine.run.located import Located, with_evaluated
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.integrators.contract import Integrator
 from hybridsim.solution.explain.one_instant import LOCATED
-from hybridsim.solution.explain.recorded_settling import RecordedSettling
+from hybridsim.solution.explain.recorded_resolution import RecordedResolution
 
 if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Change, Outcome
@@ -40,7 +40,7 @@ class Stage:
     """
 
     before: Situation
-    settling: RecordedSettling
+    resolution: RecordedResolution
     outcome: Outcome
     fired: tuple[int, ...] = ()
     due: str = ""
@@ -48,7 +48,7 @@ class Stage:
     @property
     def changes(self) -> list[Change]:
         """Return the changes that the run records as transitions."""
-        return [c for c in self.settling.changes if not self.settling.system.is_corner[c.component]]
+        return [c for c in self.resolution.changes if not self.resolution.system.is_corner[c.component]]
 
 
 @dataclass(frozen=True)
@@ -186,14 +186,14 @@ class _Instant:
             f"{model.schedules[k].name} was due at this instant{_set_by(system, ('schedule', k), at)}"
             for k in schedules
         ]
-        settling = RecordedSettling(
+        resolution = RecordedResolution(
             system, at, at.z.copy(), self.task.forward, found.scope(system), found.inputs
         )
         if begins:
-            settling.jumped = surfaces_jump(system, self.instant, at, self.task.forward)
+            resolution.jumped = surfaces_jump(system, self.instant, at, self.task.forward)
             causes += _knots_text(system, self.knots, self.instant, at, self.task.forward)
-        outcome = settling.run(found.fired, list(keys))
-        return Stage(before, settling, outcome, tuple(found.fired), " and ".join(causes))
+        outcome = resolution.run(found.fired, list(keys))
+        return Stage(before, resolution, outcome, tuple(found.fired), " and ".join(causes))
 
 
 def situation(system: System, segment: Segment, fired: list[int]) -> Situation:

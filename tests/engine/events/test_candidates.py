@@ -18,7 +18,7 @@ HOLD = 1  # of three modes
 def _settling(
     current: tuple[int, ...], table: dict[tuple[int, ...], int], *, thorough: bool, unique: bool = False
 ) -> Any:
-    """What `verdicts_on` asks of a settling, its verdicts in a table; `asked` notes which."""
+    """What `verdicts_on` asks of a resolution, its verdicts in a table; `asked` notes which."""
     asked: list[tuple[int, ...]] = []
 
     def verdict(modes: np.ndarray, _: Any) -> int:
@@ -40,12 +40,12 @@ def _chosen(current: tuple[int, ...], verdicts: tuple[int, ...], thorough: bool)
     n = len(current)
     candidates, holds = joint_candidates([3] * n), np.full(n, HOLD)
     table = {tuple(row): verdict for row, verdict in zip(candidates.tolist(), verdicts, strict=True)}
-    settling = _settling(current, table, thorough=thorough)
+    resolution = _settling(current, table, thorough=thorough)
     found, is_whole = verdicts_on(
-        settling, list(range(n)), candidates, np.array(current), holds, tuple(range(n))
+        resolution, list(range(n)), candidates, np.array(current), holds, tuple(range(n))
     )
-    assert is_whole == (len(settling.asked) == len(candidates))
-    return int(choose(candidates, found, np.array(current), holds)), len(settling.asked)
+    assert is_whole == (len(resolution.asked) == len(candidates))
+    return int(choose(candidates, found, np.array(current), holds)), len(resolution.asked)
 
 
 @pytest.mark.parametrize("current", [(-1,), (0,), (1,), (2,)])
@@ -68,6 +68,6 @@ def test_random_verdicts_on_two_components() -> None:
 
 def test_where_a_motion_has_to_be_the_only_one_all_are_judged() -> None:
     candidates = joint_candidates([3])
-    settling = _settling((1,), {(0,): FINE, (1,): FINE, (2,): FINE}, thorough=False, unique=True)
-    verdicts_on(settling, [0], candidates, np.array([1]), np.array([HOLD]), (0,))
-    assert len(settling.asked) == 3
+    resolution = _settling((1,), {(0,): FINE, (1,): FINE, (2,): FINE}, thorough=False, unique=True)
+    verdicts_on(resolution, [0], candidates, np.array([1]), np.array([HOLD]), (0,))
+    assert len(resolution.asked) == 3

@@ -15,15 +15,15 @@ from hybridsim.engine.events.corner_sides import take_corners
 from hybridsim.engine.events.jumps.impact import strike
 
 if TYPE_CHECKING:
-    from hybridsim.engine.events.resolve import Settling
+    from hybridsim.engine.events.resolve import EventResolution
 
 
-def cancelled_by_surfaces(settling: Settling, automata: set[int], surfaces: set[int]) -> set[int]:
+def cancelled_by_surfaces(resolution: EventResolution, automata: set[int], surfaces: set[int]) -> set[int]:
     """Return the automata whose located guards would not fire if the surfaces were decided first."""
-    ahead = copy(settling)
-    ahead.at = replace(settling.at, z=settling.at.z.copy())
-    ahead.fired, ahead.on_surface = settling.fired.copy(), settling.on_surface.copy()
-    ahead.sides, ahead.orders = settling.sides.copy(), settling.orders.copy()
+    ahead = copy(resolution)
+    ahead.at = replace(resolution.at, z=resolution.at.z.copy())
+    ahead.fired, ahead.on_surface = resolution.fired.copy(), resolution.on_surface.copy()
+    ahead.sides, ahead.orders = resolution.sides.copy(), resolution.orders.copy()
     ahead.changes, ahead.warnings, ahead.series = [], [], {}
     open_ = set(surfaces)
     if strike(ahead, open_) or ahead.choose_jointly(open_):

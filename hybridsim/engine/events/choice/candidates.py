@@ -9,19 +9,19 @@ import numpy as np
 from hybridsim.engine.events.choice.verdict import FINE, LEAVES, preference
 
 if TYPE_CHECKING:
-    from hybridsim.engine.events.resolve import Settling
+    from hybridsim.engine.events.resolve import EventResolution
 
 
 def all_verdicts(
-    settling: Settling, members: list[int], candidates: np.ndarray, cluster: tuple[int, ...]
+    resolution: EventResolution, members: list[int], candidates: np.ndarray, cluster: tuple[int, ...]
 ) -> np.ndarray:
     """Return the verdicts on all joint candidates."""
-    found = [settling.verdict(settling.with_modes(members, modes), cluster) for modes in candidates]
+    found = [resolution.verdict(resolution.with_modes(members, modes), cluster) for modes in candidates]
     return np.array(found, dtype=np.int64)
 
 
 def verdicts_on(
-    settling: Settling,
+    resolution: EventResolution,
     members: list[int],
     candidates: np.ndarray,
     current: np.ndarray,
@@ -33,15 +33,15 @@ def verdicts_on(
     The search ends after the candidates that `choose` prefers as much as the first one it accepts. The others count as
     not admissible. If a member needs a unique motion, all candidates are judged.
     """
-    if settling.is_thorough or any(settling.system.automata[c].is_unique for c in members):
-        return all_verdicts(settling, members, candidates, cluster), True
+    if resolution.is_thorough or any(resolution.system.automata[c].is_unique for c in members):
+        return all_verdicts(resolution, members, candidates, cluster), True
     count = len(members)
     ranks = [preference(modes, current, holds, count) for modes in candidates]
     verdicts, least = np.full(len(candidates), LEAVES, dtype=np.int64), -1
     for number in sorted(range(len(candidates)), key=ranks.__getitem__, reverse=True):
         if ranks[number] < least:
             return verdicts, False
-        verdict = settling.verdict(settling.with_modes(members, candidates[number]), cluster)
+        verdict = resolution.verdict(resolution.with_modes(members, candidates[number]), cluster)
         verdicts[number] = verdict
         if verdict == FINE or (verdict != LEAVES and ranks[number] >= count * (count + 1)):
             least = ranks[number]

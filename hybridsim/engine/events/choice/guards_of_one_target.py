@@ -9,13 +9,13 @@ from hybridsim.engine.lowering.reset_keys import amounts_of
 
 if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Situation
-    from hybridsim.engine.events.resolve import Settling
+    from hybridsim.engine.events.resolve import EventResolution
 
 Failure = tuple[str, str]  # status and message
 
 
 def guards_taken_together(
-    settling: Settling, read_from: Situation, component: int, leaving: Sequence[int]
+    resolution: EventResolution, read_from: Situation, component: int, leaving: Sequence[int]
 ) -> tuple[list[tuple[int, int]], Failure | None]:
     """Return the guards of a mode that are taken, each with the number of its choice, or why none can be taken.
 
@@ -23,11 +23,11 @@ def guards_taken_together(
     situation that conditions and resets read. If several guards are negative when the mode begins, the first declared
     one is taken.
     """
-    system, mode = settling.system, int(settling.at.z[component])
+    system, mode = resolution.system, int(resolution.at.z[component])
     automaton = system.automata[component]
     guards = automaton.guards[mode]
-    place = settling.rank.get(guards[leaving[0]]) if leaving else None
-    first = [j for j in leaving if settling.fired[guards[j]] and settling.rank.get(guards[j]) == place]
+    place = resolution.rank.get(guards[leaving[0]]) if leaving else None
+    first = [j for j in leaving if resolution.fired[guards[j]] and resolution.rank.get(guards[j]) == place]
     first = first or list(leaving[:1])
     if fatal := next((automaton.fatal[mode][j] for j in first if automaton.fatal[mode][j]), ""):
         return [], ("inconsistent", str(fatal))
@@ -50,13 +50,13 @@ def guards_taken_together(
             # a second reset that only sets values changes nothing
             found.setdefault((what, j if amounts_of(choice.reset) else -1), (j, number))
     taken = list(found.values())
-    apart = _apart(settling, component, taken)
+    apart = _apart(resolution, component, taken)
     return ([], ("nonunique", apart)) if apart else (taken, None)
 
 
-def _apart(settling: Settling, component: int, taken: Sequence[tuple[int, int]]) -> str:
+def _apart(resolution: EventResolution, component: int, taken: Sequence[tuple[int, int]]) -> str:
     """Return why several guards cannot be taken together, or an empty text if they lead to one mode."""
-    automaton, mode = settling.system.automata[component], int(settling.at.z[component])
+    automaton, mode = resolution.system.automata[component], int(resolution.at.z[component])
     targets = [automaton.modes[automaton.targets[mode][j][number]] for j, number in taken]
     if len(set(targets)) <= 1:
         return ""

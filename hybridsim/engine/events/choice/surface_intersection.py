@@ -22,56 +22,56 @@ from hybridsim.engine.series.bounded import UNIT
 from hybridsim.model.meanings import Meanings
 
 if TYPE_CHECKING:
-    from hybridsim.engine.events.resolve import Settling
+    from hybridsim.engine.events.resolve import EventResolution
 
 _SAME = 64.0 * UNIT  # relative difference of two series of one motion, by the rounding of a few operations
 
 
 def rivals(
-    settling: Settling, members: list[int], candidates: np.ndarray, verdicts: np.ndarray
+    resolution: EventResolution, members: list[int], candidates: np.ndarray, verdicts: np.ndarray
 ) -> np.ndarray:
     """Return the admissible joint candidates if they differ in the mode of a switching surface and in the motion.
 
     Otherwise the result is empty. A relay that is just strong enough has one motion in two modes: it may slide, or be
     on the side on which nothing moves any more.
     """
-    unique = [k for k, c in enumerate(members) if settling.system.automata[c].is_unique]
+    unique = [k for k, c in enumerate(members) if resolution.system.automata[c].is_unique]
     if not unique:
         return candidates[:0]
     fine = candidates[verdicts == FINE]
-    if len(np.unique(fine[:, unique], axis=0)) < 2 or is_one_motion(settling, members, fine):
+    if len(np.unique(fine[:, unique], axis=0)) < 2 or is_one_motion(resolution, members, fine):
         return fine[:0]
     return fine
 
 
-def is_one_motion(settling: Settling, members: list[int], candidates: np.ndarray) -> bool:
+def is_one_motion(resolution: EventResolution, members: list[int], candidates: np.ndarray) -> bool:
     """Return whether the states have the same Taylor series in all of these modes."""
-    motions = [settling.series_of(settling.with_modes(members, modes)).states for modes in candidates]
+    motions = [resolution.series_of(resolution.with_modes(members, modes)).states for modes in candidates]
     if not np.isfinite(motions).all():
         return False
     sizes = np.abs(motions).max(axis=0)
     return all((np.abs(other - motions[0]) <= _SAME * sizes).all() for other in motions[1:])
 
 
-def can_hold(settling: Settling, members: list[int], z: np.ndarray) -> bool:
+def can_hold(resolution: EventResolution, members: list[int], z: np.ndarray) -> bool:
     """Return whether the quantities held in the modes z have values, which fails if held surfaces conflict."""
-    automata = settling.system.automata
+    automata = resolution.system.automata
     if sum(automata[c].has_surface and z[c] == automata[c].hold for c in members) < 2:
         return True
-    numbers = settling.system.guards_of(z)[members]
-    return bool(np.isfinite(settling.series_of(z).guards[numbers[numbers >= 0], 0]).all())
+    numbers = resolution.system.guards_of(z)[members]
+    return bool(np.isfinite(resolution.series_of(z).guards[numbers[numbers >= 0], 0]).all())
 
 
-def on_its_side(settling: Settling, members: list[int], candidates: np.ndarray) -> int:
+def on_its_side(resolution: EventResolution, members: list[int], candidates: np.ndarray) -> int:
     """Return the number of the first candidate whose motion stays on its sides of all surfaces exactly, or 0.
 
     A body at rest may slip either way within rounding. Its holding mode leaves it a speed, or a rate, of some sign.
     """
-    system, at = settling.system, settling.at
+    system, at = resolution.system, resolution.at
     for number, modes in enumerate(candidates):
-        z = settling.with_modes(members, modes)
+        z = resolution.with_modes(members, modes)
         x = system.project(at.s, at.x, at.p, z)
-        series = settling.series_of(z, x).surfaces
+        series = resolution.series_of(z, x).surfaces
         values = np.where(series[:, 0] == 0.0, series[:, 1], series[:, 0])
         sides = [
             int(z[c] == system.automata[c].above) - int(z[c] == system.automata[c].below)
@@ -82,13 +82,13 @@ def on_its_side(settling: Settling, members: list[int], candidates: np.ndarray) 
     return 0
 
 
-def keeps_nothing(settling: Settling, members: list[int], z: np.ndarray) -> str:
+def keeps_nothing(resolution: EventResolution, members: list[int], z: np.ndarray) -> str:
     """Return why a motion along several surfaces may not be unique, or an empty text if it is."""
-    automata = settling.system.automata
+    automata = resolution.system.automata
     sliding = [c for c in members if automata[c].is_unique and z[c] == automata[c].hold]
     if len(sliding) < 2:
         return ""
-    pull = _pull(settling, sliding, z)
+    pull = _pull(resolution, sliding, z)
     if not np.isfinite(pull).all():
         return ""  # no conclusion is possible; the run reports what is not a number
     # a surface whose rate no relay changes is held by the surface of its rate (hybridsim.engine.lowering.second_order)
@@ -108,9 +108,9 @@ def keeps_nothing(settling: Settling, members: list[int], z: np.ndarray) -> str:
     return ""
 
 
-def _pull(settling: Settling, sliding: list[int], z: np.ndarray) -> np.ndarray:
+def _pull(resolution: EventResolution, sliding: list[int], z: np.ndarray) -> np.ndarray:
     """Return -B (k, k): the decrease of the rate of each surface from one side of each surface to the other."""
-    automata, order = settling.system.automata, settling.system.surface_of
+    automata, order = resolution.system.automata, resolution.system.surface_of
     rows = [order.index(c) for c in sliding]
     found = np.empty((len(sliding), len(sliding)))
     trial = z.copy()
@@ -120,17 +120,17 @@ def _pull(settling: Settling, sliding: list[int], z: np.ndarray) -> np.ndarray:
         for side in (automata[c].below, automata[c].above):
             other = trial.copy()
             other[c] = side
-            series: Any = settling.series_of(other)
+            series: Any = resolution.series_of(other)
             rates.append(series.surfaces[rows, 1])
         with np.errstate(invalid="ignore"):  # the difference of two infinite rates
             found[:, j] = 0.5 * rates[0] - 0.5 * rates[1]  # halved first, to avoid overflow
     return found
 
 
-def refused(settling: Settling, members: list[int], message: str) -> tuple[str, str]:
+def refused(resolution: EventResolution, members: list[int], message: str) -> tuple[str, str]:
     """Return status and message if no joint candidate is admissible, with hints on switching surfaces."""
-    system = settling.system
-    if fatal := message_of_every_mode(system, members, settling.sides):
+    system = resolution.system
+    if fatal := message_of_every_mode(system, members, resolution.sides):
         return "inconsistent", fatal
     unique = [c for c in members if system.automata[c].is_unique]
     slow = [c for c in unique if c not in system.pins and c not in system.projected]
@@ -140,7 +140,7 @@ def refused(settling: Settling, members: list[int], message: str) -> tuple[str, 
             f"{message}; {names} acts on higher derivatives of its switching function alone; sliding of such a "
             "higher order is not supported"
         )
-    pull = np.diag(_pull(settling, unique, np.maximum(settling.at.z, 0))) if unique else np.ones(0)
+    pull = np.diag(_pull(resolution, unique, np.maximum(resolution.at.z, 0))) if unique else np.ones(0)
     if (pull < 0.0).any():
         names = ", ".join(system.automata[c].name for c, own in zip(unique, pull, strict=True) if own < 0.0)
         return "nonunique", (
@@ -149,17 +149,17 @@ def refused(settling: Settling, members: list[int], message: str) -> tuple[str, 
     return "inconsistent", message
 
 
-def message_on_cascade(settling: Settling) -> str:
+def message_on_cascade(resolution: EventResolution) -> str:
     """Return a hint on transitions that repeat without end, or an empty text."""
     for make_message in (_message_on_opposed_modes, _message_on_negative_guard, _message_on_drift):
-        if found := make_message(settling):
+        if found := make_message(resolution):
             return found
     return ""
 
 
-def _message_on_drift(settling: Settling) -> str:
+def _message_on_drift(resolution: EventResolution) -> str:
     """Return a hint on a guard slightly below zero after a transition leads back to its mode."""
-    system, last = settling.system, settling.changes[-2:]
+    system, last = resolution.system, resolution.changes[-2:]
     if len(last) < 2 or last[0].component != last[1].component or last[0].source != last[1].target:
         return ""
     automaton = system.automata[last[0].component]
@@ -167,8 +167,8 @@ def _message_on_drift(settling: Settling) -> str:
         if change.guard not in automaton.guard_names[change.source]:
             continue
         number = automaton.guards[change.source][automaton.guard_names[change.source].index(change.guard)]
-        z = settling.with_modes([change.component], np.array([change.source]))
-        value = float(settling.series_of(z).guards[number, 0])
+        z = resolution.with_modes([change.component], np.array([change.source]))
+        value = float(resolution.series_of(z).guards[number, 0])
         if value < 0.0:
             return (
                 f". Guard {change.guard} is {value:.6g} where a transition leads to {automaton.modes[change.source]}. "
@@ -178,16 +178,16 @@ def _message_on_drift(settling: Settling) -> str:
     return ""
 
 
-def _message_on_negative_guard(settling: Settling) -> str:
+def _message_on_negative_guard(resolution: EventResolution) -> str:
     """Return a hint on a guard that is negative after its own transition."""
-    if not settling.changes:
+    if not resolution.changes:
         return ""
-    change, system = settling.changes[-1], settling.system
-    automaton, mode = system.automata[change.component], int(settling.at.z[change.component])
+    change, system = resolution.changes[-1], resolution.system
+    automaton, mode = system.automata[change.component], int(resolution.at.z[change.component])
     if change.guard not in automaton.guard_names[mode]:
         return ""
     number = automaton.guards[mode][automaton.guard_names[mode].index(change.guard)]
-    value = float(settling.series_of(np.maximum(settling.at.z, 0)).guards[number, 0])
+    value = float(resolution.series_of(np.maximum(resolution.at.z, 0)).guards[number, 0])
     if not value < 0.0:
         return ""
     return (
@@ -197,9 +197,9 @@ def _message_on_negative_guard(settling: Settling) -> str:
     )
 
 
-def _message_on_opposed_modes(settling: Settling) -> str:
+def _message_on_opposed_modes(resolution: EventResolution) -> str:
     """Return a hint on two modes that drive the motion against each other across one surface."""
-    model, last = settling.system.model, settling.changes[-2:]
+    model, last = resolution.system.model, resolution.changes[-2:]
     if len(last) < 2 or last[0].component != last[1].component or last[0].source != last[1].target:
         return ""
     component = model.all_components()[last[0].component]

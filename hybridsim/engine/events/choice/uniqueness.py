@@ -17,15 +17,15 @@ from hybridsim.engine.events.choice.surface_intersection import is_one_motion
 from hybridsim.engine.events.choice.verdict import FINE
 
 if TYPE_CHECKING:
-    from hybridsim.engine.events.resolve import Settling
+    from hybridsim.engine.events.resolve import EventResolution
 
 # Largest number of components at their surfaces whose other outcomes are examined; 3^5 verdicts would be too slow.
 MAX_JOINT_COMPONENTS = 4
 
 
-def with_cause(settling: Settling, members: list[int], candidates: np.ndarray) -> np.ndarray:
+def with_cause(resolution: EventResolution, members: list[int], candidates: np.ndarray) -> np.ndarray:
     """Return a mask of the candidates in which friction that is certainly below its limits keeps sticking."""
-    system, at = settling.system, settling.at
+    system, at = resolution.system, resolution.at
     automata, modes = system.automata, np.maximum(at.z, 0)
     holding = [
         k
@@ -37,7 +37,7 @@ def with_cause(settling: Settling, members: list[int], candidates: np.ndarray) -
         return mask
     begun = [members[k] for k in holding]
     modes[begun] = [automata[c].hold for c in begun]  # at a start, a contact on its surface sticks if it can
-    series = settling.series_of(modes)
+    series = resolution.series_of(modes)
     values, bounds = series.guards[:, 0], series.guard_bounds[:, 0]
     for k in holding:
         c = members[k]
@@ -48,7 +48,7 @@ def with_cause(settling: Settling, members: list[int], candidates: np.ndarray) -
 
 
 def other_outcomes(
-    settling: Settling,
+    resolution: EventResolution,
     members: list[int],
     candidates: np.ndarray,
     number: int,
@@ -59,11 +59,11 @@ def other_outcomes(
 
     Contacts that keep their mode are not examined, because the present mode stays if it is admissible.
     """
-    system, at, taken = settling.system, settling.at, candidates[number]
+    system, at, taken = resolution.system, resolution.at, candidates[number]
     automata = system.automata
     if all(automata[c].is_unilateral for c in cluster):
         return candidates[:0]
-    landed = {one.component for one in settling.changes if one.guard == "gap"}
+    landed = {one.component for one in resolution.changes if one.guard == "gap"}
     asked = [
         k
         for k, c in enumerate(members)
@@ -73,11 +73,11 @@ def other_outcomes(
         return candidates[:0]
     if len(members) > MAX_JOINT_COMPONENTS:
         names = ", ".join(automata[c].name for c in members)
-        settling.warnings.append(
+        resolution.warnings.append(
             f"more than {MAX_JOINT_COMPONENTS} components ({names}) change mode together: uniqueness was not examined"
         )
         return candidates[:0]
     others = candidates[(candidates[:, asked] != taken[asked]).any(axis=1)]
-    fine = others[all_verdicts(settling, members, others, cluster) == FINE]
-    apart = [one for one in fine if not is_one_motion(settling, members, np.array([taken, one]))]
+    fine = others[all_verdicts(resolution, members, others, cluster) == FINE]
+    apart = [one for one in fine if not is_one_motion(resolution, members, np.array([taken, one]))]
     return np.array(apart, dtype=np.int64).reshape(-1, len(members))

@@ -14,7 +14,7 @@ from hybridsim.engine.series.bounded import UNIT
 from hybridsim.model.parts.impact import ROUNDING
 
 if TYPE_CHECKING:
-    from hybridsim.engine.events.resolve import Settling
+    from hybridsim.engine.events.resolve import EventResolution
 
 # The error of location is rounding, so one Newton correction makes the gap zero within rounding. The second correction
 # is for steps that end slightly inside.
@@ -23,37 +23,37 @@ _CORRECTIONS = 2
 Failure = tuple[str, str]
 
 
-def strike(settling: Settling, open_: set[int]) -> Failure | None:
+def strike(resolution: EventResolution, open_: set[int]) -> Failure | None:
     """Compute the collision of contacts in `open_` whose gaps close; contacts at rest after it stay in `open_`.
 
     A contact at zero gap with a velocity of separation is open from now on.
     """
-    unilateral = [c for c in open_ if settling.system.automata[c].is_unilateral]
+    unilateral = [c for c in open_ if resolution.system.automata[c].is_unilateral]
     if not unilateral:
         return None
-    if not settling.forward:
-        names = ", ".join(sorted(settling.system.automata[c].name for c in unilateral))
+    if not resolution.forward:
+        names = ", ".join(sorted(resolution.system.automata[c].name for c in unilateral))
         return (
             "backward-nonunique",
             f"the gap of {names} closes: different motions before an impact lead to the same motion after it",
         )
     has_collided = False
-    for cluster in settling.system.clusters:
+    for cluster in resolution.system.clusters:
         mine = [c for c in cluster if c in unilateral]
         if mine:
-            failure, struck = _Collision(settling, cluster, mine, open_).run()
+            failure, struck = _Collision(resolution, cluster, mine, open_).run()
             if failure:
                 return failure
             has_collided = has_collided or struck
     if has_collided:
-        settling.jumped = True
-        settling.take_sides(open_)
+        resolution.jumped = True
+        resolution.take_sides(open_)
     return None
 
 
-def _surfaces(settling: Settling) -> tuple[np.ndarray, np.ndarray]:
+def _surfaces(resolution: EventResolution) -> tuple[np.ndarray, np.ndarray]:
     """Return Taylor coefficients of the surfaces with bounds, at the states without projection by a mode."""
-    at, system = settling.at, settling.system
+    at, system = resolution.at, resolution.system
     free = at.p.copy()
     free[system.layout.pin_at] = 0.0
     series: Any = system.series(at.s, at.x, free, np.maximum(at.z, 0), at.x_error, at.s_error, at.is_put)
@@ -70,10 +70,10 @@ class _Collision:
     """One collision of the contacts of a cluster, some of which have reached a zero gap."""
 
     def __init__(
-        self, settling: Settling, cluster: tuple[int, ...], mine: list[int], open_: set[int]
+        self, resolution: EventResolution, cluster: tuple[int, ...], mine: list[int], open_: set[int]
     ) -> None:
-        self.settling, self.cluster, self.open_ = settling, cluster, open_
-        self.system, self.at = settling.system, settling.at
+        self.resolution, self.cluster, self.open_ = resolution, cluster, open_
+        self.system, self.at = resolution.system, resolution.at
         self.place = {c: k for k, c in enumerate(self.system.surface_of)}
         self.rates = dict.fromkeys(mine, 0.0)
 
@@ -92,14 +92,14 @@ class _Collision:
 
     def _measure(self) -> Failure | None:
         """Measure the rates of the gaps, and remove contacts whose gaps are open."""
-        settling, at, automata = self.settling, self.at, self.system.automata
-        if not settling.jumped and all(at.z[c] == automata[c].hold for c in self.rates):
+        resolution, at, automata = self.resolution, self.at, self.system.automata
+        if not resolution.jumped and all(at.z[c] == automata[c].hold for c in self.rates):
             return None
         values, bounds = self._surfaces
         for c in list(self.rates):
             row, bound = values[self.place[c]], bounds[self.place[c]]
             located = (
-                at.z[c] == automata[c].above and settling.fired[automata[c].guards[automata[c].above][0]]
+                at.z[c] == automata[c].above and resolution.fired[automata[c].guards[automata[c].above][0]]
             )
             if not located and row[0] < -bound[0]:
                 state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.system.names, at.x, strict=True))
@@ -117,7 +117,7 @@ class _Collision:
 
     @cached_property
     def _surfaces(self) -> tuple[np.ndarray, np.ndarray]:
-        return _surfaces(self.settling)
+        return _surfaces(self.resolution)
 
     def _join(self) -> None:
         """Add friction without a velocity, which is decided together with the force that may load it."""
@@ -133,13 +133,13 @@ class _Collision:
         if self.at.z[c] == automaton.hold:
             self._changes(c, "impact", automaton.above)
         self.at.z[c] = automaton.above
-        self.settling.fired[automaton.guards[automaton.above][0]] = True
-        self.settling.on_surface[c] = False
+        self.resolution.fired[automaton.guards[automaton.above][0]] = True
+        self.resolution.on_surface[c] = False
         self.open_.discard(c)
 
     def _changes(self, c: int, guard: str, target: int) -> None:
         source = int(self.at.z[c])
-        self.settling.changes.append(Change(c, guard, source, target, self.at.x, self.at.x))
+        self.resolution.changes.append(Change(c, guard, source, target, self.at.x, self.at.x))
         self.at.z[c] = target
 
     def _collide(self) -> Failure | None:
@@ -186,7 +186,7 @@ class _Collision:
         among = (slopes[rows], changes[rows], loads[:, rows][:, :, rows])
         self._apply(members, found[0], restitution, *among)
         if found[0].reduced:
-            self.settling.warnings.append(
+            self.resolution.warnings.append(
                 f"an impact of {names} would gain energy by Newton's law, so its rebound was reduced"
             )
         return None
@@ -206,7 +206,7 @@ class _Collision:
         changes: np.ndarray,
         loads: np.ndarray,
     ) -> None:
-        at, automata, settling = self.at, self.system.automata, self.settling
+        at, automata, resolution = self.at, self.system.automata, self.resolution
         normal = [c for c in members if automata[c].is_unilateral]
         shares = answer.impulses[:, None] * changes
         moved = changes.any(axis=0)
@@ -214,7 +214,7 @@ class _Collision:
         sizes = np.abs(at.x) + np.abs(shares).sum(axis=0)
         error = at.x_error + 8.0 * UNIT * sizes + np.abs(changes).T @ self._uncertain(answer)
         # states evaluated from gaps are as accurate as the gaps
-        unchanged_error = np.where(settling.pinned_states(normal), 0.0, at.x_error)
+        unchanged_error = np.where(resolution.pinned_states(normal), 0.0, at.x_error)
         at.x, at.x_error = x, np.where(moved, error, np.maximum(unchanged_error, UNIT * np.abs(x)))
         # a rate that is zero within rounding is the end of an accumulation
         is_lost = np.abs(answer.after) <= np.abs(slopes) @ at.x_error
@@ -228,7 +228,7 @@ class _Collision:
             at.x = stopped(at.x, np.where(is_lost, answer.after, 0.0)[ends], slopes[ends], among[ends])
         for i, c in enumerate(members):
             automaton, is_zero = automata[c], bool(answer.zero[i] or is_lost[i])
-            settling.on_surface[c] = is_zero
+            resolution.on_surface[c] = is_zero
             if not automaton.is_unilateral:
                 continue
             if at.z[c] < 0:

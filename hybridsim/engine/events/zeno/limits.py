@@ -8,7 +8,7 @@ import numpy as np
 
 from hybridsim.engine.events.jumps.rest_impulses import loaded, stopped
 from hybridsim.engine.events.outcome import Change, Outcome, Situation
-from hybridsim.engine.events.resolve import Settling
+from hybridsim.engine.events.resolve import EventResolution
 from hybridsim.engine.events.zeno.accumulation import Limit
 from hybridsim.engine.system.system import System
 
@@ -96,7 +96,7 @@ def _held_at(
     z = z.copy()
     z[near] = -1  # no mode yet, as at a start
     at = Situation(s, x, p, z, outcome.x_error.copy(), 0.0)
-    found = Settling(system, at, outcome.z.copy(), forward=True).run((), [])
+    found = EventResolution(system, at, outcome.z.copy(), forward=True).run((), [])
     if found.status or any(
         found.z[c] != system.automata[c].hold for c in near if system.automata[c].is_unique
     ):
@@ -139,7 +139,9 @@ def _at_declared_limit(
     if x is None:
         s, x = 0.0, outcome.x
     at = Situation(s, x.copy(), p.copy(), z, outcome.x_error.copy(), 0.0)
-    found = Settling(system, at, outcome.z.copy(), forward=True).run((), [("limit", c) for c in entered])
+    found = EventResolution(system, at, outcome.z.copy(), forward=True).run(
+        (), [("limit", c) for c in entered]
+    )
     found.changes = [
         Change(c, LIMIT, int(outcome.z[c]), system.automata[c].limit, x, found.x) for c in entered
     ] + found.changes

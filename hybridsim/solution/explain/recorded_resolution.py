@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.engine.events.choice.verdict import FINE, UNDECIDED
-from hybridsim.engine.events.resolve import Settling
+from hybridsim.engine.events.resolve import EventResolution
 from hybridsim.engine.system.system import Series
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ class Decision:
         return self.with_verdict(UNDECIDED)
 
 
-class RecordedSettling(Settling):
+class RecordedResolution(EventResolution):
     """A resolution that judges all candidates, including those that the choice does not need."""
 
     is_thorough = True
