@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -69,8 +70,10 @@ def save(picture: Any, path: str | Path, dpi: float = _DPI) -> Path:
         raise UsageError(
             f"{path}: unsupported file type {path.suffix!r}", remedy=f"use {', '.join(SUFFIXES)}"
         )
+    drawn = BytesIO()  # drawn in memory, because some formats hide why a file cannot be written
+    _figure_of(picture).savefig(drawn, dpi=dpi, format=path.suffix[1:].lower())
     with whole_file(path) as partly:
-        _figure_of(picture).savefig(partly, dpi=dpi)
+        Path(partly).write_bytes(drawn.getvalue())
     return path
 
 

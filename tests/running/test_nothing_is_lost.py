@@ -23,7 +23,14 @@ from hybridsim.files import held, whole_file
 
 needs_posix = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="modes and locks are those of POSIX")
 DECAY = hs.Model("decay", states=[hs.State("x", 1.0, "-x")])
-KINDS = {"archive": "r.hsol", "table": "r.csv", "arrays": "r.npz", "picture": "r.png"}
+KINDS = {
+    "archive": "r.hsol",
+    "table": "r.csv",
+    "arrays": "r.npz",
+    "picture": "r.png",
+    "document": "r.pdf",
+    "drawing": "r.svg",
+}
 
 
 @pytest.fixture(scope="module")
