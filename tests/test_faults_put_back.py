@@ -30,7 +30,9 @@ def test_an_edit_that_no_longer_applies_is_named(tmp_path: Path) -> None:
         put_back(fault, tmp_path)
 
 
-@pytest.mark.parametrize("trial", ["steady states", "linearizations", "poles", "mechanical systems"])
+@pytest.mark.parametrize(
+    "trial", ["steady states", "linearizations", "poles", "mechanical systems", "moving bases"]
+)
 def test_the_package_stands_the_trials(trial: str) -> None:
     found = Counter(record["kind"] for number in range(8) for record in TRIALS[trial](number))
     assert found == {}

@@ -35,12 +35,14 @@ from hybridsim.mechanics.arrays import (
     VELOCITY,
 )  # fmt: skip
 from hybridsim.mechanics.series_loop.banded_series import law_holds_in_run
+from hybridsim.mechanics.series_loop.expansion import base_coefficient
 from hybridsim.mechanics.series_loop.simd_series import advance_simd_series, lane_place
 
 _UNIT = 2.0**-53
 _DEFECT = 100.0  # as in the taylor integrator: the permitted error of the law's series, in tolerances
 _SHRINKS = 200  # halvings of a reach
 _SHORT = 2.0**-12  # of the step; the interval after a touch that is checked for an exit
+_CONVERGED = 2.0**-5  # of the sum of all terms; a series has converged if it omits less
 _TINY = 2.0**-40  # of the step; an exit that is undecided on such a short interval is a touch
 
 
@@ -121,6 +123,27 @@ def reach(
         most, _, _ = _largest(scratch, largest, largest, largest)
         if most * h**k > 1.0:
             h = most ** (-1.0 / k)
+    return _reach_of_bases(arrays, state, scratch, nc, top, rtol, h) if arrays.rates.shape[0] > 0 else h
+
+
+@kernel
+def _reach_of_bases(
+    arrays: Any, state: Any, scratch: Any, nc: int, top: int, rtol: float, longest: float
+) -> float:
+    """Return the time over which the series of the oscillating bases of slipping contacts meet the tolerance.
+
+    The velocity of such a base is part of no coordinate, so that no other series bounds it.
+    """
+    h = longest
+    for i in range(nc):
+        c = scratch.cons[i]
+        if state.mode[c] == STICK or arrays.base_rate[c] < 0:
+            continue
+        permitted = rtol * max(abs(scratch.R[0, i]), math.hypot(arrays.base[c, 1], arrays.base[c, 2]))
+        for k in range(top - 2, top):
+            term = abs(base_coefficient(arrays, scratch, c, k))
+            if term * h**k > permitted:
+                h = (permitted / term) ** (1.0 / k)
     return h
 
 
@@ -131,6 +154,7 @@ def _exit_of(
     """Find the first time in (0, h] at which the polynomial in scratch.poly[:terms] goes negative, in units of h.
 
     A polynomial that is zero throughout, or within the rounding `slack` of its terms, does not go negative.
+    It is undecided if the series omits terms that are comparable with it, or with its first term after an event.
     On a short interval a touch is passed if the polynomial is positive after it.
     """
     power, total, end = 1.0, 0.0, 0.0
@@ -141,7 +165,12 @@ def _exit_of(
         power *= h
     if total <= slack:
         return NEVER, 1.0
-    error = 2.0 * (abs(scratch.poly[terms - 1]) + abs(scratch.poly[terms - 2])) + 8.0 * _UNIT * total + slack
+    omitted = 2.0 * (abs(scratch.poly[terms - 1]) + abs(scratch.poly[terms - 2]))
+    rounding = 8.0 * _UNIT * total + slack
+    scale = _CONVERGED * total if order == 0 else min(_CONVERGED * total, 0.5 * abs(scratch.poly[order]))
+    if omitted > max(scale, rounding):
+        return OPEN, 0.0  # a sign within the omitted terms would be a guess
+    error = omitted + rounding
     form = BERNSTEIN + top - (terms - order)
     code = state.kernels[form] if form < state.kernels.shape[0] else 0
     outcome, theta = first_exit(scratch.poly[:terms], error, 0.0, order, scratch.bern, scratch.stack, code)

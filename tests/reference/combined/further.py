@@ -10,7 +10,7 @@ from .reactions import reactions
 from .slopes import linearizations
 from .steady import steady_states
 from .stepped import time_stepping
-from .structures import mechanical_systems, repeated_runs
+from .structures import mechanical_systems, moving_bases, repeated_runs
 
 QUIET = ("agrees", "names refused", "unclear", "cannot", "no model", "warned of")
 
@@ -38,6 +38,7 @@ TRIALS: dict[str, Trial] = {
     "poles": poles,
     "reactions": reactions,
     "mechanical systems": mechanical_systems,
+    "moving bases": moving_bases,
     "repeated runs": repeated_runs,
     "time stepping": time_stepping,
 }

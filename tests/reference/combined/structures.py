@@ -19,9 +19,9 @@ AGAIN = (
 SLOWER = 20.0
 
 
-def drawn(number: int) -> tuple[hs.MechanicalSystem, Abstract]:
+def drawn(number: int, are_bases_moving: bool = False) -> tuple[hs.MechanicalSystem, Abstract]:
     """A system in both forms; its numbers have one digit, so that forces meet their limits exactly at times."""
-    rng = random.Random(number * 29 + 1)
+    rng, of_bases = random.Random(number * 29 + 1), random.Random(number * 31 + 7)
     n = rng.choice([1, 1, 2])
     model, contacts, forcing = Abstract(duration=DURATION), [], {}
     rest = rng.random() < 0.5
@@ -43,14 +43,17 @@ def drawn(number: int) -> tuple[hs.MechanicalSystem, Abstract]:
         mu, normal, name = Fraction(rng.randint(1, 5), 10), rng.randint(1, 3), f"f{i}"
         low = mu * Fraction(rng.randint(5, 9), 10)
         weights = {i: 1, i - 1: -1} if i and rng.random() < 0.5 else {i: 1}
-        is_static = rng.random() < 0.3
+        is_static = rng.random() < 0.3 and not (are_bases_moving and n > 1)
         law, given = "coulomb", {"mu": float(mu)}
         if is_static:
             law, given = "static-kinetic", {"mu_s": float(mu), "mu_k": float(low)}
+        size, omega = Fraction(of_bases.randint(-12, 12), 10), Fraction(of_bases.randint(5, 60), 10)
+        base, velocity = 0.0, node(0)
+        if are_bases_moving:
+            base, velocity = hs.Harmonic(float(omega), sin=float(size)), -size * sin(omega * TIME)
         contacts.append(
-            hs.MechanicalContact(name, {k: float(w) for k, w in weights.items()}, normal, law, given)
+            hs.MechanicalContact(name, {k: float(w) for k, w in weights.items()}, normal, law, given, base)
         )
-        velocity = node(0)
         for k, w in weights.items():
             velocity, rates[k] = velocity + w * var(f"v{k}"), rates[k] - w * var(name)
         model.contacts[name] = Contact(velocity, node(normal), node(mu), node(low) if is_static else None)
@@ -69,9 +72,17 @@ def drawn(number: int) -> tuple[hs.MechanicalSystem, Abstract]:
     return system, model
 
 
-def mechanical_systems(number: int) -> Iterator[dict[str, Any]]:
+def moving_bases(number: int) -> Iterator[dict[str, Any]]:
+    """One system whose contacts are on oscillating bases.
+
+    With two masses no static friction is above the kinetic one, so that every event has one outcome.
+    """
+    return mechanical_systems(number, are_bases_moving=True)
+
+
+def mechanical_systems(number: int, are_bases_moving: bool = False) -> Iterator[dict[str, Any]]:
     """One system by its compiled kernels."""
-    system, model = drawn(number)
+    system, model = drawn(number, are_bases_moving)
     truth = motion, times, certain = judged(model, {})
     if certain < DURATION and truth[0].status != "finished":
         return
