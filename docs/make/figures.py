@@ -29,6 +29,7 @@ from used_sources import modules_of
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "hybridsim"
 TABLE, NOTES = ROOT / "docs" / "figures.toml", ROOT / "docs" / "figures.json"
+MOST_NAMED = 8  # folders within folders that a foot names; of more it names the folders at the top
 OF_DATA = (".toml", ".json", ".csv", ".npz")  # kinds of files in the package that results depend on
 
 
@@ -112,8 +113,10 @@ def changes(page: str, noted: dict[str, Any]) -> str:
     before, now = noted.get("folders"), folders(page)
     if before is None:
         return "The code that they depend on has changed since."
-    other = sorted(f"`{name}`" for name in before | now if before.get(name) != now.get(name))
-    return f"This has changed since: {', '.join(other)}."
+    other = sorted(name for name in before | now if before.get(name) != now.get(name))
+    if len(other) > MOST_NAMED:
+        other = sorted({name.partition("/")[0] for name in other})
+    return f"This has changed since: {', '.join(f'`{name}`' for name in other)}."
 
 
 def make(page: str) -> None:
