@@ -83,7 +83,7 @@ class Scene:
         x, v, mode = np.array([self.motion.state(t) for t in self.t]).T
         self.x, self.largest, self.fastest = x, abs(x).max(), abs(v).max()
         self.sticks = float(np.mean(mode == 0))
-        changes = [segment.mode for segment in self.motion.segments]
+        changes = [piece.mode for piece in self.motion.pieces]
         self.releases = sum(a == 0 for a in changes[:-1])
         self.reversals = sum(a * b == -1 for a, b in pairwise(changes))
 

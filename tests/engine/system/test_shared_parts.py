@@ -36,7 +36,7 @@ def test_code_that_a_thread_runs_is_not_let_go_by_another(monkeypatch: pytest.Mo
     )
     monkeypatch.setattr("hybridsim.engine.native.kernels.compile_model_function", compile_function)
     late = code.address("flow")
-    assert overtaking == [late] == [code._addresses["flow"][0]]
+    assert overtaking == [late] == [code._compiled["flow"][0]]
 
 
 def test_what_is_shared_is_the_same_for_all() -> None:
