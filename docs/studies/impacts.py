@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "tests"))
-from reference.random_blows import random_blow
+from reference.random_impact_problems import random_impact_problem
 
 from hybridsim.engine.events.jumps.impulse import answers
 
@@ -29,7 +29,7 @@ def examine(normal: int, tangential: int, count: int) -> tuple[Counter[str], flo
     gains = []
     sign = np.where(np.arange(normal + tangential) < normal, 1.0, -1.0)
     for _ in range(count):
-        blow = random_blow(rng, normal, tangential)
+        blow = random_impact_problem(rng, normal, tangential)
         found = answers(blow)
         if len(found) != 1:
             ends["several" if found else "none"] += 1

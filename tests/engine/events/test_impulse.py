@@ -6,7 +6,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from reference.random_blows import random_blow
+from reference.random_impact_problems import random_impact_problem
 
 from hybridsim.engine.events.jumps.impulse import ImpactProblem, answers, count, energy
 
@@ -31,8 +31,8 @@ def rubbing(effects, before, restitution, mu):
     )
 
 
-def only(blow):
-    (answer,) = answers(blow)
+def only(problem):
+    (answer,) = answers(problem)
     return answer
 
 
@@ -79,21 +79,21 @@ def test_friction_stops_a_slip_or_slows_it_down():
 def test_the_order_of_the_contacts_does_not_matter():
     rng = np.random.default_rng(5)
     for _ in range(50):
-        blow = random_blow(rng, normal=3, tangential=2)
-        first = answers(blow)
+        problem = random_impact_problem(rng, normal=3, tangential=2)
+        first = answers(problem)
         order = rng.permutation(3)
         rows = np.array([*order, 3, 4])
         turned = ImpactProblem(
-            blow.effects[np.ix_(rows, rows)],
-            blow.before[rows],
-            blow.restitution[order],
-            blow.up[:, order],
-            blow.down[:, order],
+            problem.effects[np.ix_(rows, rows)],
+            problem.before[rows],
+            problem.restitution[order],
+            problem.up[:, order],
+            problem.down[:, order],
         )
         second = answers(turned)
         assert len(first) == len(second)
         if len(first) == 1:
-            size = np.abs(blow.before).max()
+            size = np.abs(problem.before).max()
             assert np.abs(second[0].after - first[0].after[rows]).max() <= 1e-9 * size
 
 
@@ -101,30 +101,32 @@ def test_the_order_of_the_contacts_does_not_matter():
 def test_without_friction_there_is_one_answer_and_it_solves_the_complementarity_problem(common):
     rng = np.random.default_rng(1)
     for _ in range(300):
-        blow = random_blow(rng, normal=int(rng.integers(1, 5)), tangential=0, common=common)
-        answer = only(blow)
-        gap = answer.after - blow.restitution * np.maximum(-blow.before, 0.0)
+        problem = random_impact_problem(rng, normal=int(rng.integers(1, 5)), tangential=0, common=common)
+        answer = only(problem)
+        gap = answer.after - problem.restitution * np.maximum(-problem.before, 0.0)
         assert (answer.impulses >= 0).all() and (gap >= -1e-12).all()
         assert np.abs(answer.impulses * gap).max() <= 1e-11 * max(1.0, np.abs(answer.impulses).max())
         assert not answer.reduced
-        lost = (1 - blow.restitution) / 2 * answer.impulses @ np.abs(blow.before)
-        assert energy(blow, answer.impulses)[0] == pytest.approx(-lost, rel=1e-9, abs=1e-13)
+        lost = (1 - problem.restitution) / 2 * answer.impulses @ np.abs(problem.before)
+        assert energy(problem, answer.impulses)[0] == pytest.approx(-lost, rel=1e-9, abs=1e-13)
 
 
 def test_energy_does_not_grow_in_any_of_many_random_impacts():
     rng = np.random.default_rng(2)
     reduced = several = 0
     for _ in range(6_000):
-        blow = random_blow(rng, normal=int(rng.integers(1, 4)), tangential=int(rng.integers(0, 3)))
-        found = answers(blow)
+        problem = random_impact_problem(
+            rng, normal=int(rng.integers(1, 4)), tangential=int(rng.integers(0, 3))
+        )
+        found = answers(problem)
         several += len(found) != 1  # such a run stops and says so
         for answer in found[: len(found) == 1]:
             before, work = (
-                blow.before,
-                answer.impulses * np.where(np.arange(len(blow.before)) < blow.normal, 1.0, -1.0),
+                problem.before,
+                answer.impulses * np.where(np.arange(len(problem.before)) < problem.normal, 1.0, -1.0),
             )
             gained = work @ (before + answer.after) / 2  # the rates after it as the answer has them
-            assert gained <= 1e-11 * np.abs(work) @ np.abs(before), (blow, answer)
+            assert gained <= 1e-11 * np.abs(work) @ np.abs(before), (problem, answer)
             reduced += answer.reduced
     assert reduced > 0, "no case in which Newton's law would have gained energy: the rule was not tried"
     assert several < 60
@@ -138,11 +140,11 @@ def test_a_blow_in_which_newtons_law_would_gain_energy_rebounds_less():
     gaining = None
     for slip in np.linspace(0.05, 3.0, 60):
         for side in (-1.0, 1.0):
-            blow = rubbing(effects * [[1, side], [side, 1]], [-1.0, slip], 0.9, mu)
-            for answer in answers(blow):
+            problem = rubbing(effects * [[1, side], [side, 1]], [-1.0, slip], 0.9, mu)
+            for answer in answers(problem):
                 gaining = answer if answer.reduced else gaining
                 if answer.reduced:
-                    work, bound = energy(blow, answer.impulses)
+                    work, bound = energy(problem, answer.impulses)
                     assert -1e-9 <= work <= bound
                     assert 0.0 <= answer.after[0] < 0.9
     assert gaining is not None

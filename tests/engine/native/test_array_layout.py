@@ -38,7 +38,7 @@ def _number(rows: Any) -> int:
 
 
 @pytest.mark.parametrize("skipped", [None, (2, 1, 5)])
-def test_a_kernel_writes_to_the_rows_of_a_sheet(skipped: tuple[int, ...] | None) -> None:
+def test_a_kernel_writes_to_the_rows_of_a_layout(skipped: tuple[int, ...] | None) -> None:
     array_layout = ArrayLayout(Rows, FIELDS)
     blocks = array_layout.blank()
     rows = array_layout.rows(blocks)
@@ -76,7 +76,7 @@ def test_memory_is_handed_on_once_nobody_holds_it(view: Callable[[np.ndarray], A
     assert pool.block().ctypes.data == place
 
 
-def test_large_sheets_take_such_memory() -> None:
+def test_large_layouts_take_such_memory() -> None:
     array_layout = ArrayLayout(Rows, ((float, (1 << 15, 2), 0), (np.int64, (6,), 1), (complex, (5, 0), 0)))
     numbers = array_layout.rows(array_layout.blank()).numbers
     numbers[:] = 1.0
@@ -90,7 +90,7 @@ def test_large_sheets_take_such_memory() -> None:
     assert array_layout.blank()[0].ctypes.data == place
 
 
-def test_a_door_leads_to_the_same_kernel() -> None:
+def test_a_precompiled_kernel_is_the_same_kernel() -> None:
     arrays = Rows(np.zeros((2, 2)), np.zeros(3, dtype=np.int64), np.zeros((1, 0), dtype=complex))
     precompiled = Precompiled(_number)
     assert [precompiled(packed(arrays)), precompiled(packed(arrays))] == [103, 103]

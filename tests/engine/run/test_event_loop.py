@@ -141,7 +141,7 @@ def test_the_compiled_loop_and_the_general_way(scene: Scene, general) -> None:
     ]
 
 
-def test_the_reference_model_is_one_leap(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_reference_model_is_one_compiled_call(monkeypatch: pytest.MonkeyPatch) -> None:
     """401 events in a hundred periods, not one of them by the general way."""
     taken = []
     segment_run = mode_loop.SegmentRun

@@ -16,13 +16,13 @@ OSCILLATOR = hs.Model("free", states=[hs.State("x", 1, der="v"), hs.State("v", 0
 
 
 @pytest.fixture
-def little_room(monkeypatch: pytest.MonkeyPatch) -> None:
+def little_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     """Room for the least number of steps."""
     monkeypatch.setattr(compiled_loop, "_CALL_DOUBLES", 0)
 
 
 @pytest.mark.parametrize("integrator", ["dop853", "tsit5", "taylor"])
-def test_a_segment_in_pieces(integrator: str, little_room: None, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_segment_in_parts(integrator: str, little_memory: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """No step is taken in Python, times go up, and the motion is the cosine."""
     model = hs.Model(f"free-{integrator}", states=OSCILLATOR.states)  # whose sheets are of another size
 
@@ -38,7 +38,7 @@ def test_a_segment_in_pieces(integrator: str, little_room: None, monkeypatch: py
 
 
 @pytest.mark.parametrize("integrator", ["dop853", "taylor"])
-def test_an_event_after_many_pieces(integrator: str, little_room: None) -> None:
+def test_an_event_after_many_parts(integrator: str, little_memory: None) -> None:
     """A guard that is looked at in each piece, and zero in the last one: exp(-t/100) falls to 1e-2."""
     modes = [hs.Mode("above", guards=[hs.Guard("g", "e - 0.01", "below")]), hs.Mode("below")]
     states = [*OSCILLATOR.states, hs.State("e", 1, der="-e/100")]
@@ -52,7 +52,7 @@ def test_an_event_after_many_pieces(integrator: str, little_room: None) -> None:
 
 
 @pytest.mark.parametrize("integrator", ["dop853", "taylor"])
-def test_a_limit_in_the_middle_and_on(integrator: str, little_room: None) -> None:
+def test_a_limit_in_the_middle_and_on(integrator: str, little_memory: None) -> None:
     """A run that is stopped among the pieces goes on to the same digits."""
     model = hs.Model(f"on-{integrator}", states=OSCILLATOR.states)
     whole = hs.simulate(model, (0, 900), integrator=integrator)

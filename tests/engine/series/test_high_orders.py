@@ -30,7 +30,7 @@ X, V, B, C = 0, 1, 2, 3  # states and constants
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_coefficients_are_those_of_the_lean_tape(name: str) -> None:
+def test_coefficients_are_those_of_the_optimised_tape(name: str) -> None:
     system = System(hs.load(name))
     p = system.vector(Instant(0.3), system.discrete_start)
     x = 0.5 + 0.3 * np.sin(np.arange(1.0, 1.0 + system.n))

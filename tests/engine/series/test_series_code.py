@@ -284,9 +284,9 @@ def test_a_run_is_the_same_with_code_and_without(
                 monkeypatch.setattr(module, "KNOWN", steps)
                 monkeypatch.setattr(module, "WORTH", steps)
             runs.append(hs.simulate(model, (0, 0.1), integrator=integrator))
-        tapes, shelves = tape_cache_of(System(model)).tapes, code._shared.values()
+        tapes, caches = tape_cache_of(System(model)).tapes, code._shared.values()
         made = [
-            kept.of(tapes).arrays[: len(kept.functions)] for kept in shelves if isinstance(kept, CodeCache)
+            cache.of(tapes).arrays[: len(cache.functions)] for cache in caches if isinstance(cache, CodeCache)
         ]
         assert any(np.all(addresses) for addresses in made) and tapes.bounds.all()
     assert len(runs[0].events) > 4

@@ -21,7 +21,7 @@ MODELS = [info.name for info in hs.list_models()] + [str(path) for path in sorte
 
 
 @pytest.mark.parametrize("name", MODELS, ids=lambda name: name.rsplit("/")[-1])
-def test_the_lean_tape_is_the_tape(name: str) -> None:
+def test_the_optimised_tape_is_the_tape(name: str) -> None:
     """States, guards and monitors to third order in every mode, to the last bit."""
     model = hs.load(name)
     system = System(model)

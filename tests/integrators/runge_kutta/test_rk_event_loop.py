@@ -149,7 +149,7 @@ def test_the_compiled_loop_and_the_general_way(
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_the_reference_model_is_one_leap(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_reference_model_is_one_compiled_call(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """401 events in a hundred periods, not one by the general way; their times are those of the closed form."""
     taken = []
     segment_run = mode_loop.SegmentRun

@@ -7,7 +7,7 @@ import numpy as np
 from hybridsim.engine.events.jumps.impulse import ImpactProblem
 
 
-def random_blow(
+def random_impact_problem(
     rng: np.random.Generator, normal: int, tangential: int, common: bool = False
 ) -> ImpactProblem:
     """Contacts of a mechanism with as many coordinates as contacts or more; none nearly follows from others."""
