@@ -207,4 +207,4 @@ def _start_of(steady: SteadyState) -> dict[str, Any]:
     run = steady.solution
     x0 = dict(zip(run.names, run.y[:, 0].tolist(), strict=True))
     x0 |= {d.name: float(run.output(d.name, run.t_start)) for d in run.model.discrete}
-    return {"x0": x0, "z0": {name: pieces[0].mode for name, pieces in run.modes.items() if pieces}}
+    return {"x0": x0, "z0": {name: intervals[0].mode for name, intervals in run.modes.items() if intervals}}

@@ -54,7 +54,7 @@ _WORK = 1 << 20  # coordinates times (steps + events) per call: about 0.1 s betw
 _TIGHTEST = 1e-15
 _RADIUS = 2  # radius of the first patch; it adapts
 _RANGE = 280  # decades of a double, less a margin for the factors of the powers
-_LEAST = 10  # a lower order makes series useless
+_MIN_ORDER = 10  # a lower order makes series useless
 
 
 def _order_in_range(built: Built, span: tuple[float, float]) -> int:
@@ -64,7 +64,7 @@ def _order_in_range(built: Built, span: tuple[float, float]) -> int:
     sizes = [size for size in (max(rates), abs(span[1] - span[0])) if size > 0.0]
     decades = max((abs(math.log10(size)) for size in sizes), default=0.0)
     order = int(_RANGE / max(decades, 1.0))
-    if order < _LEAST:
+    if order < _MIN_ORDER:
         raise UsageError(
             f"rates up to {max(rates):.3g} over a span of {span[1] - span[0]:.3g} exceed the range of numbers",
             remedy="choose a unit of time in which the rates are closer to 1",

@@ -1,0 +1,261 @@
+"""Names in the package are terms of the field: no retired word, and no new registry that is keyed by strings.
+
+`docs/glossary.md` says which words are retired and what stands in their place. A name is split at `_` and at capitals;
+a retired word is found as a whole name and as one or more of its parts.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import hybridsim
+
+PACKAGE = Path(hybridsim.__file__).parent
+GLOSSARY = Path(__file__).parents[1] / "docs" / "glossary.md"
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+
+# fmt: off
+RETIRED = (
+    "allowance", "anew", "at_once", "at_zero", "bench", "blow", "call_apart", "chain", "crossings", "decide",
+    "desk", "door", "driving", "eight", "faint", "few", "fleet", "gathering", "gauge", "given", "goes_on", "heard",
+    "holds_so_far", "hygiene", "jets", "judge", "keep", "kept", "laid", "landing", "lanes", "leads_nowhere", "lean",
+    "leap", "leaper", "leaps", "leapt", "lender", "lent", "meeting", "merged", "needed", "panels", "pieces",
+    "places", "plan", "plant", "race", "ready", "recent", "resting", "rests_for_ever", "room", "rungs", "runs",
+    "said", "sails", "settle", "sheet", "shelf", "ship", "sightings", "stand", "standing", "stretch", "strips",
+    "ties", "told", "twins", "wanted", "watched", "words",
+)
+# fmt: on
+
+# Names with a retired word in another meaning, or that users have in their programs: each with its reason.
+ALLOWED = {
+    ("mechanics", "chain_on_belt"): "a public name",
+    ("cli", "keep"): "the option --keep",
+    ("cli", "rungs"): "the option --rungs",
+    ("analysis", "rungs"): "an argument of hs.advise",
+    ("analysis", "settle"): "an argument of hs.steady_state and hs.bifurcation",
+    ("analysis", "_SETTLE"): "its default",
+    ("studies", "break_long_words"): "an argument of textwrap.fill",
+    ("preparation", "chain"): "itertools.chain",
+    ("model", "pieces"): "cubics of a table: a function is called piecewise",
+}
+# Folders where a retired word has its usual meaning.
+USUAL = {
+    ("analysis", "runs"): "runs of a model",
+    ("ensemble", "runs"): "runs of a model",
+    ("engine", "runs"): "runs of a model",
+    ("studies", "runs"): "runs of a model",
+    ("preparation", "runs"): "runs that are stored with a system",
+    ("plot", "panels"): "parts of a figure",
+    ("studies", "panels"): "parts of a figure",
+}
+# Retired words that these folders still have. The list only gets shorter.
+STILL_TO_GO: dict[str, set[str]] = {
+    "analysis": {"stretch"},
+    "engine": {
+        "at_zero",
+        "call_apart",
+        "crossings",
+        "decide",
+        "eight",
+        "faint",
+        "few",
+        "given",
+        "goes_on",
+        "holds_so_far",
+        "judge",
+        "kept",
+        "landing",
+        "lanes",
+        "leads_nowhere",
+        "lean",
+        "leap",
+        "meeting",
+        "merged",
+        "panels",
+        "pieces",
+        "places",
+        "room",
+        "settle",
+        "shelf",
+        "stretch",
+        "wanted",
+        "watched",
+        "words",
+    },
+    "ensemble": {
+        "at_once",
+        "call_apart",
+        "decide",
+        "fleet",
+        "judge",
+        "keep",
+        "kept",
+        "lanes",
+        "leap",
+        "merged",
+        "places",
+        "rests_for_ever",
+        "room",
+        "shelf",
+        "stretch",
+    },
+    "integrators": {
+        "at_zero",
+        "call_apart",
+        "goes_on",
+        "judge",
+        "keep",
+        "landing",
+        "lean",
+        "leap",
+        "merged",
+        "pieces",
+        "places",
+        "room",
+        "settle",
+        "shelf",
+        "stretch",
+        "watched",
+    },
+    "mechanics": {"room"},
+    "solution": {"panels", "places"},
+}
+
+# Objects that code stores under a name in `code.shared`, a dictionary keyed by strings. The list only gets shorter.
+SHARED = {
+    "automata",
+    "corners",
+    "frame",
+    "guard parts",
+    "guards without forces",
+    "high orders",
+    "holds constants",
+    "is linear",
+    "is linear beside corners",
+    "linear",
+    "loop functions",
+    "matrix templates",
+    "optimised tapes",
+    "registers",
+    "shelf",
+    "what is not linear",
+}
+
+
+def retired_in(name: str) -> list[str]:
+    """Return the retired words in a name."""
+    plain = "_" + re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower().strip("_") + "_"
+    return [word for word in RETIRED if f"_{word}_" in plain]
+
+
+def folder_of(path: Path) -> str:
+    """Return the first folder of a module within the package; a module beside them stands for itself."""
+    return path.relative_to(PACKAGE).with_suffix("").parts[0]
+
+
+def identifiers(tree: ast.AST) -> Iterator[str]:
+    """Yield every name that code uses: variables, attributes, functions, arguments, keywords and modules."""
+    for node in ast.walk(tree):
+        for field in ("id", "attr", "name", "arg", "asname", "module", "rest"):
+            value = getattr(node, field, None)
+            if isinstance(value, str):
+                yield from value.split(".")
+        if isinstance(node, ast.Global | ast.Nonlocal):
+            yield from node.names
+
+
+@cache
+def names() -> frozenset[tuple[str, str]]:
+    """Return all names of the package with the folder that has them, names of files and folders included."""
+    found = {
+        (folder_of(path), name)
+        for path in SOURCES
+        for name in identifiers(ast.parse(path.read_text(encoding="utf-8")))
+    }
+    of_files = {
+        (folder_of(path), part)
+        for path in SOURCES
+        for part in path.relative_to(PACKAGE).with_suffix("").parts
+    }
+    return frozenset(found | of_files)
+
+
+@cache
+def found() -> frozenset[tuple[str, str, str]]:
+    """Return folder, name and word of every name with a retired word that is not allowed."""
+    return frozenset(
+        (folder, name, word)
+        for folder, name in names()
+        if (folder, name) not in ALLOWED
+        for word in retired_in(name)
+        if (folder, word) not in USUAL
+    )
+
+
+def rows() -> list[tuple[str, str]]:
+    """Return the rows of the glossary: the name before, and the name now."""
+    return re.findall(r"^\| `(\w+)` \| `(\w+)` \|", GLOSSARY.read_text(encoding="utf-8"), re.MULTILINE)
+
+
+def test_no_name_has_a_retired_word() -> None:
+    left = sorted(
+        {(folder, name) for folder, name, word in found() if word not in STILL_TO_GO.get(folder, ())}
+    )
+    assert not left, f"give these the term of the field (docs/glossary.md): {left}"
+
+
+def test_words_that_are_gone_leave_the_list() -> None:
+    here = {(folder, word) for folder, _, word in found()}
+    gone = {(folder, word) for folder, words in STILL_TO_GO.items() for word in words} - here
+    assert not gone, f"take these off STILL_TO_GO: {gone}"
+
+
+@pytest.mark.parametrize("allowed", sorted(ALLOWED), ids=str)
+def test_each_allowed_name_is_needed(allowed: tuple[str, str]) -> None:
+    assert retired_in(allowed[1]) and allowed in names(), "take it off the list"
+
+
+@pytest.mark.parametrize("usual", sorted(USUAL), ids=str)
+def test_each_usual_meaning_is_needed(usual: tuple[str, str]) -> None:
+    folder, word = usual
+    assert any(word in retired_in(name) for here, name in names() if here == folder), "take it off the list"
+
+
+def test_the_glossary_has_the_same_words() -> None:
+    text = GLOSSARY.read_text(encoding="utf-8")
+    without = text.partition("Going without a new name of their own:")[2].partition("\n\n")[0]
+    before = [name for name, _ in rows()]
+    known = {word for name in before for word in retired_in(name)} | set(re.findall(r"`(\w+)`", without))
+    assert known == set(RETIRED), f"on one side only: {sorted(known ^ set(RETIRED))}"
+
+
+def test_the_glossary_names_what_there_is() -> None:
+    """A name that was given is a name of the package, or was itself replaced."""
+    here = {name for _, name in names()}
+    former = {before for before, _ in rows()}
+    lost = [(before, now) for before, now in rows() if now not in here and now not in former]
+    assert not lost, f"the glossary names what is not in the package: {lost}"
+
+
+def test_no_registry_is_keyed_by_strings() -> None:
+    stored = {
+        node.args[0].value
+        for path in SOURCES
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "shared" and node.args
+        if isinstance(node.args[0], ast.Constant)
+    }
+    assert stored == SHARED, "store it in a field of its own, with its type; take off the list what is gone"
+
+
+def test_parts_of_names_are_seen() -> None:
+    assert retired_in("LeaperPlan") == ["leaper", "plan"]
+    assert retired_in("_is_at_zero") == ["at_zero"]
+    assert retired_in("_KEPT") == ["kept"]
+    assert not retired_in("airplane") and not retired_in("planar") and not retired_in("bedroom")

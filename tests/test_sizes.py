@@ -1,0 +1,210 @@
+"""Files, functions and argument lists of the package are short; the exceptions are lists that only get shorter."""
+
+from __future__ import annotations
+
+import ast
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+import hybridsim
+
+PACKAGE = Path(hybridsim.__file__).parent
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+
+FILE, FUNCTION, KERNEL, PARAMETERS = 300, 80, 140, 9  # lines, lines without the docstring, the same, number
+
+# Decorators of functions that numba compiles. To divide one of them costs time of compiling.
+COMPILED = {"kernel", "inlined", "allocating_kernel", "polynomial_kernel", "merged"}
+
+# The sizes above which none of these may grow.
+FILES = {
+    "analysis/advise/question.py": 323,
+    "analysis/continuation/continuation.py": 326,
+    "analysis/steady/steady_state.py": 487,
+    "analysis/variations/carried.py": 344,
+    "analysis/variations/off_zero.py": 305,
+    "arguments.py": 391,
+    "engine/events/resolve.py": 515,
+    "engine/events/zeno/accumulation.py": 381,
+    "engine/linear/modal.py": 365,
+    "engine/linear/motion.py": 441,
+    "engine/linear/tables.py": 323,
+    "engine/lowering/emit.py": 386,
+    "engine/lowering/held_states.py": 305,
+    "engine/lowering/lower.py": 502,
+    "engine/native/kernels.py": 486,
+    "engine/native/llvm.py": 315,
+    "engine/roots/roots.py": 355,
+    "engine/run/compiled_loop.py": 385,
+    "engine/run/event_loop.py": 404,
+    "engine/run/mode_loop.py": 657,
+    "engine/run/segment_run.py": 496,
+    "engine/series/bounded.py": 401,
+    "engine/series/emit_bounds.py": 313,
+    "engine/series/emit_series.py": 422,
+    "engine/series/interpreter.py": 488,
+    "engine/series/tape.py": 306,
+    "engine/system/system.py": 530,
+    "integrators/fixed_step/moreau_kernels.py": 404,
+    "integrators/fixed_step/rk4_kernels.py": 309,
+    "integrators/fixed_step/run.py": 472,
+    "integrators/runge_kutta/segments.py": 478,
+    "mechanics/declaration/system.py": 355,
+    "mechanics/series_loop/expansion.py": 312,
+    "mechanics/series_loop/solution.py": 309,
+    "mechanics/series_loop/steps.py": 321,
+    "mechanics/time_stepping/kernels.py": 379,
+    "model/parts/model.py": 485,
+    "model/smoothing/rewriting.py": 537,
+    "solution/explain/explanation.py": 347,
+    "solution/solution.py": 523,
+}
+FUNCTIONS = {
+    "analysis/advise/advise.py::advise": 92,
+    "engine/run/event_loop.py::leap": 226,
+    "integrators/closed_form/segments.py::exact_leap": 96,
+    "integrators/runge_kutta/segments.py::rk_leap": 218,
+    "mechanics/simulate.py::simulate_mechanical": 86,
+    "testing/catalogue/coincidences.py::scenes": 105,
+    "testing/catalogue/events.py::monitored": 120,
+}
+ARGUMENTS = {
+    "analysis/advise/advise.py::advise": 15,
+    "analysis/compare/compare.py::compare": 13,
+    "analysis/continuation/continuation.py::continuation": 10,
+    "analysis/steady/steady_state.py::steady_state": 12,
+    "analysis/sweep/bifurcation.py::bifurcation": 14,
+    "analysis/sweep/sweep.py::sweep": 13,
+    "analysis/variations/rounds.py::__init__": 12,
+    "engine/events/compiled/after_segment.py::differ_by_rounding": 10,
+    "engine/events/compiled/after_segment.py::is_hidden": 11,
+    "engine/events/compiled/after_segment.py::settle_and_move_on": 11,
+    "engine/events/compiled/at_end.py::may_be_at_zero": 12,
+    "engine/events/compiled/resolve_surface.py::decide_single": 10,
+    "engine/events/compiled/verdicts.py::judge_candidate": 10,
+    "engine/events/compiled/verdicts.py::judge_members": 15,
+    "engine/events/zeno/accumulation.py::may_end": 10,
+    "engine/linear/guards.py::modal_guards": 10,
+    "engine/linear/motion_summary.py::_between": 10,
+    "engine/linear/motion_summary.py::sum_up": 10,
+    "engine/record/hermite.py::holds_between": 11,
+    "engine/roots/defect_check.py::look_ahead": 11,
+    "engine/roots/dense_guards.py::first_guard": 12,
+    "engine/roots/earliest_exit.py::earliest_exit": 10,
+    "engine/run/event_loop.py::leap": 14,
+    "engine/run/event_loop.py::series_at": 13,
+    "engine/run/segment_run.py::__init__": 11,
+    "engine/series/bounded.py::run_series": 11,
+    "engine/series/interpreter.py::reach": 12,
+    "engine/system/finite_differences.py::_series": 12,
+    "engine/system/finite_differences.py::along": 10,
+    "engine/system/finite_differences.py::run_differences": 12,
+    "engine/system/tangents.py::run_tangents": 11,
+    "ensemble/run.py::run_fleet": 17,
+    "integrators/fixed_step/kernels.py::passed": 12,
+    "integrators/fixed_step/moreau_kernels.py::moreau_step": 11,
+    "integrators/fixed_step/moreau_kernels.py::moreau_steps": 16,
+    "integrators/fixed_step/rk4_kernels.py::_halve_step": 16,
+    "integrators/fixed_step/rk4_kernels.py::_slope": 10,
+    "integrators/fixed_step/rk4_kernels.py::_step": 10,
+    "integrators/fixed_step/rk4_kernels.py::choose_modes": 10,
+    "integrators/fixed_step/rk4_kernels.py::rk4_step": 10,
+    "integrators/fixed_step/rk4_kernels.py::run_steps": 16,
+    "integrators/rosenbrock/step.py::rosenbrock_attempt": 15,
+    "integrators/runge_kutta/segments.py::is_zero": 10,
+    "integrators/runge_kutta/segments.py::land": 18,
+    "integrators/runge_kutta/segments.py::rk_leap": 16,
+    "integrators/runge_kutta/segments.py::series_of": 10,
+    "integrators/runge_kutta/step.py::attempt": 11,
+    "mechanics/declaration/system.py::__init__": 12,
+    "mechanics/series_loop/loop.py::_changes_outside": 10,
+    "mechanics/series_loop/trajectory.py::quantities": 13,
+    "mechanics/simulate.py::simulate_mechanical": 12,
+    "preparation.py::prepared": 14,
+    "reference/closed_forms/slip_phase.py::__init__": 10,
+    "simulate.py::simulate": 16,
+}
+
+
+def name_of(path: Path) -> str:
+    """Return the path of a module within the package."""
+    return path.relative_to(PACKAGE).as_posix()
+
+
+def is_compiled(function: ast.FunctionDef) -> bool:
+    """Return whether numba compiles a function."""
+    return any(
+        getattr(one, "id", getattr(one, "attr", "")) in COMPILED
+        for decorator in function.decorator_list
+        for one in (decorator.func if isinstance(decorator, ast.Call) else decorator,)
+    )
+
+
+def lines_of(function: ast.FunctionDef) -> int:
+    """Return the number of lines of a function without its docstring."""
+    first = function.body[0]
+    text = isinstance(first, ast.Expr) and isinstance(getattr(first.value, "value", None), str)
+    docstring = (first.end_lineno or first.lineno) - first.lineno + 1 if text else 0
+    return (function.end_lineno or function.lineno) - function.lineno + 1 - docstring
+
+
+def count_of(function: ast.FunctionDef) -> int:
+    """Return the number of arguments of a function, self and cls left out."""
+    arguments = function.args
+    named = [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
+    others = [one for one in (arguments.vararg, arguments.kwarg) if one is not None]
+    return len([one for one in named if one.arg not in ("self", "cls")]) + len(others)
+
+
+@cache
+def functions() -> tuple[tuple[str, ast.FunctionDef], ...]:
+    """Return every function with its file and name."""
+    return tuple(
+        (f"{name_of(path)}::{node.name}", node)
+        for path in SOURCES
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.FunctionDef)
+    )
+
+
+@cache
+def sizes() -> tuple[dict[str, int], dict[str, int], dict[str, int]]:
+    """Return files, functions and argument lists above the limits with their sizes, the largest of one name."""
+    files = {name_of(path): len(path.read_text(encoding="utf-8").splitlines()) for path in SOURCES}
+    long: dict[str, int] = {}
+    wide: dict[str, int] = {}
+    for name, function in functions():
+        lines, count = lines_of(function), count_of(function)
+        if lines > (KERNEL if is_compiled(function) else FUNCTION):
+            long[name] = max(lines, long.get(name, 0))
+        if count > PARAMETERS:
+            wide[name] = max(count, wide.get(name, 0))
+    return {name: lines for name, lines in files.items() if lines > FILE}, long, wide
+
+
+KINDS = {"files": FILES, "functions": FUNCTIONS, "arguments": ARGUMENTS}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_nothing_grows_beyond_its_limit(kind: str) -> None:
+    ceilings, here = KINDS[kind], sizes()[list(KINDS).index(kind)]
+    grown = {name: size for name, size in here.items() if size > ceilings.get(name, 0)}
+    assert not grown, f"divide these, or take out what is not needed: {grown}"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_became_small_leaves_its_list(kind: str) -> None:
+    ceilings, here = KINDS[kind], sizes()[list(KINDS).index(kind)]
+    assert not set(ceilings) - set(here), f"take these off the list: {set(ceilings) - set(here)}"
+
+
+def test_sizes_are_counted() -> None:
+    (function,) = ast.parse(
+        'def f(self, a, *b, c=1, **d):\n    """One.\n\n    Two.\n    """\n    return a\n'
+    ).body
+    assert isinstance(function, ast.FunctionDef)
+    assert lines_of(function) == 2 and count_of(function) == 4 and not is_compiled(function)
+    (compiled,) = ast.parse("@kernel\ndef f(a):\n    return a\n").body
+    assert isinstance(compiled, ast.FunctionDef) and is_compiled(compiled)
