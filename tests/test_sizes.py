@@ -55,7 +55,7 @@ FILES = {
     "mechanics/declaration/system.py": 355,
     "mechanics/series_loop/expansion.py": 312,
     "mechanics/series_loop/solution.py": 309,
-    "mechanics/series_loop/steps.py": 321,
+    "mechanics/series_loop/steps.py": 350,
     "mechanics/time_stepping/kernels.py": 379,
     "model/parts/model.py": 485,
     "model/smoothing/rewriting.py": 537,
