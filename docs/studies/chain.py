@@ -2,7 +2,7 @@
 
     python docs/studies/chain.py [OUT_DIR]
 
-Beside hybridsim run heyoka, if it is installed (the extra of that name), and what one would write in an afternoon:
+Beside hybridsim run heyoka, if it is installed (it is in the extra `rivals`), and what one would write in an afternoon:
 fixed-step RK4 in numba with bisection.
 """
 
