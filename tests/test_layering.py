@@ -284,6 +284,27 @@ def test_the_engine_compiles_in_two_places() -> None:
     assert elsewhere == []
 
 
+def test_inner_parts_of_numba_stay_where_they_are_looked_up() -> None:
+    """They are no public interface: engine/native/inner_parts looks them up, and does without what is not there."""
+    inner, hidden = re.compile(r"numba\.(core|np|misc)\b"), re.compile(r"_nrt|_tm|_tm_features")
+    native = PACKAGE / "engine" / "native"
+    imported = [
+        f"{path.name}:{line} {module}"
+        for path in SOURCES
+        for module, line in imports(path)
+        if inner.match(module)
+    ]
+    named = [
+        f"{path.name}:{node.lineno}"
+        for path in SOURCES
+        if path.parent != native
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if (isinstance(node, ast.Constant) and isinstance(node.value, str) and inner.fullmatch(node.value))
+        or hidden.fullmatch(str(getattr(node, "attr", getattr(node, "arg", ""))))
+    ]
+    assert imported == named == []
+
+
 def test_folders_are_small_and_say_what_they_are_for() -> None:
     """The long ones are a list that only gets shorter."""
     long = {"cli", "model/checks", "plot", "testing/catalogue"}

@@ -14,16 +14,19 @@ import pickle
 from pathlib import Path
 from typing import Any
 
-from numba.core.caching import CompileResultCacheImpl, FunctionCache
-from numba.core.serialize import dumps
-
 from hybridsim.engine.native.cache import _PACKAGE, engine_key, kernel_folder, load_whole, store_whole
+from hybridsim.engine.native.inner_parts import find_part
+
+_AGAIN = "each process compiles all kernels again"
+CompileResultCacheImpl: Any = find_part("numba.core.caching", "CompileResultCacheImpl", _AGAIN)
+FunctionCache: Any = find_part("numba.core.caching", "FunctionCache", _AGAIN)
+dumps: Any = find_part("numba.core.serialize", "dumps", _AGAIN)
 
 
 def cache_on_disk(dispatcher: Any, function: Any) -> None:
     """Make a compiled function of numba, or a callback for C, load its code from the cache and store it there."""
     folder = kernel_folder()
-    if folder is not None:
+    if folder is not None and None not in (CompileResultCacheImpl, FunctionCache, dumps):
         dispatcher._cache = KernelCache(function, folder)
 
 
@@ -57,7 +60,7 @@ class _Place:
         return str(self.line)
 
 
-class _Form(CompileResultCacheImpl):
+class _Form(CompileResultCacheImpl or object):  # type: ignore[misc]
     """The format of numba's compiled functions, stored in our cache folder regardless of numba's settings."""
 
     def __init__(self, function: Any, folder: Path) -> None:
@@ -91,7 +94,7 @@ class _Versions:
         """Do nothing: no index is held in memory."""
 
 
-class KernelCache(FunctionCache):
+class KernelCache(FunctionCache or object):  # type: ignore[misc]
     """A numba cache of one function that stores files in our format."""
 
     def __init__(self, function: Any, folder: Path) -> None:

@@ -20,12 +20,13 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.native.cache import cache_root, kernel_folder, store
+from hybridsim.engine.native.inner_parts import find_part, is_complete, needed, options
 
 ENABLED = os.environ.get("HYBRIDSIM_JIT", "1") != "0"
 if ENABLED:
     import numba
 
-    ENABLED = not numba.config.DISABLE_JIT  # NUMBA_DISABLE_JIT=1 turns all compilation off
+    ENABLED = not numba.config.DISABLE_JIT and is_complete()  # NUMBA_DISABLE_JIT=1 turns all compilation off
 
 _NOTICED = 1.0  # seconds of compilation after which a message is printed
 _reached: list[Any] = []  # functions by their number, kept alive here
@@ -39,11 +40,7 @@ def _fill_nan(out: Any) -> None:
 if ENABLED:
     from llvmlite import binding, ir
     from numba import types
-    from numba.core import cgutils, compiler_lock, event
-    from numba.core.ccallback import CFunc
-    from numba.core.registry import cpu_target
     from numba.extending import intrinsic
-    from numba.np.arrayobj import populate_array
 
     from hybridsim.engine.native.kernel_cache import cache_on_disk
     from hybridsim.engine.native.llvm import (
@@ -54,6 +51,18 @@ if ENABLED:
         machine_name,
     )
 
+    cgutils, populate_array = needed("cgutils"), needed("populate_array")
+    cpu_target = find_part(
+        "numba.core.registry", "cpu_target", "kernels are compiled with numba's own settings, and run slower"
+    )
+    event = find_part("numba.core", "event", "compiling takes longer, and its time is not measured")
+    compiler_lock = find_part(
+        "numba.core", "compiler_lock", "a fork while another thread compiles may wait for ever"
+    )
+    CFunc = find_part("numba.core.ccallback", "CFunc", "each process compiles the largest kernels again")
+    _Listener: Any = getattr(event, "Listener", object)
+    _lock: Any = getattr(compiler_lock, "global_compiler_lock", None) or threading.RLock()
+
     _DOUBLES = types.CPointer(types.float64)
     _LONGS = types.CPointer(types.int64)
     SIGNATURE = types.int32(types.float64, _DOUBLES, _DOUBLES, _LONGS, _DOUBLES)
@@ -63,7 +72,7 @@ if ENABLED:
 
         depth, since, spent = 0, 0.0, 0.0
 
-    class _Compiling(event.Listener):
+    class _Compiling(_Listener):
         """Measure the seconds that each thread spends on compiling or loading kernels, and set the optimisation level.
 
         Compilation holds numba's lock, so the global settings can be changed meanwhile.
@@ -107,17 +116,20 @@ if ENABLED:
 
     def _settings() -> tuple[Any, Any]:
         """Return LLVM's optimisation level and target machine, or None if numba does not provide them."""
-        return numba.config.OPT, getattr(cpu_target.target_context.codegen(), "_tm", None)
+        return numba.config.OPT, getattr(_code_generator(), "_tm", None)
+
+    def _code_generator() -> Any:
+        return None if cpu_target is None else cpu_target.target_context.codegen()
 
     def _set(settings: tuple[Any, Any]) -> None:
         numba.config.OPT, machine = settings
         if machine is not None:
-            cpu_target.target_context.codegen()._tm = machine
+            _code_generator()._tm = machine
 
     @cache
     def _plain_machine() -> Any:
         """Return this machine with its features and a generic cost model, or None if numba does not provide it."""
-        features = getattr(cpu_target.target_context.codegen(), "_tm_features", None)
+        features = getattr(_code_generator(), "_tm_features", None)
         if features is None or _settings()[1] is None:
             return None
         cpu = "x86-64" if binding.get_default_triple().startswith("x86_64") else "generic"
@@ -136,13 +148,13 @@ if ENABLED:
 
     _COMPILING, _LOCKED = "numba:compile", "numba:compiler_lock"  # compilation happens while the lock is held
     _compiling = _Compiling()
-    for _kind in (_COMPILING, _LOCKED):
+    for _kind in (_COMPILING, _LOCKED) if event else ():
         event.register(_kind, _compiling)
 
     def _free_in_child() -> None:
         """Release numba's lock in a child process that was forked while another thread was compiling."""
-        if hasattr(compiler_lock.global_compiler_lock, "_lock"):
-            compiler_lock.global_compiler_lock._lock = threading.RLock()
+        if hasattr(_lock, "_lock"):
+            _lock._lock = threading.RLock()
 
     if hasattr(os, "register_at_fork"):
         os.register_at_fork(after_in_child=_free_in_child)
@@ -151,38 +163,42 @@ if ENABLED:
         """Return the seconds that this thread has spent on compiling or loading kernels."""
         return _compiling.of.spent
 
-    def _compiled(function: Callable[..., Any], **options: Any) -> Any:
+    def _compiled(function: Callable[..., Any], allocates: bool = False, **more: Any) -> Any:
         """Compile a kernel with our options of numba; literal arguments make specialised versions, up to twice as fast.
 
-        Without the option `_nrt`, each read of an array from a pack would include two calls that count
-        references, and no value would stay in a register across them.
+        Only a kernel that allocates counts references to arrays.
         """
-        made = numba.njit(nogil=True, error_model="numpy", no_cfunc_wrapper=True, **options)(function)
+        more |= options()
+        if "_nrt" in more:  # said of each kernel, since one without it has the setting of its caller
+            more["_nrt"] = allocates
+        made = numba.njit(nogil=True, error_model="numpy", **more)(function)
         cache_on_disk(made, function)
         return made
 
     def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
         """Compile a function of the engine once, cached on disk; division by zero gives inf or nan, as in numpy."""
-        return _compiled(function, _nrt=False)
+        return _compiled(function)
 
     def allocating_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
         """Compile a kernel that allocates arrays."""
-        return _compiled(function, _nrt=True)
+        return _compiled(function, allocates=True)
 
     def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
         """Inline a short kernel into its callers."""
-        return _compiled(function, forceinline=True, _nrt=False)
+        return _compiled(function, forceinline=True)
 
     def inline_always(function: Callable[..., Any]) -> Callable[..., Any]:
         """Inline a function into the one kernel that calls it; it is never compiled separately."""
-        return _compiled(function, inline="always", _nrt=False)
+        return _compiled(function, inline="always")
 
     def polynomial_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
         """Inline a short kernel whose products and sums may be fused, as in Horner's rule."""
-        return _compiled(function, forceinline=True, fastmath={"contract"}, _nrt=False)
+        return _compiled(function, forceinline=True, fastmath={"contract"})
 
     def _entry(function: Any, arguments: tuple[Any, ...]) -> Callable[..., Any]:
-        found: Callable[..., Any] = function.compile(tuple(map(function.typeof_pyval, arguments)))
+        found: Callable[..., Any] = function.compile(
+            tuple(map(getattr(function, "typeof_pyval", numba.typeof), arguments))
+        )
         return found
 
     def compile_model_function(module: Any, name: str) -> tuple[Any, Any]:
@@ -252,14 +268,20 @@ if ENABLED:
         return types.CPointer(found.dtype) if isinstance(found, types.Array) else found
 
     def _kernel_at(function: Callable[..., int], key: tuple[Any, ...]) -> int:
-        with compiler_lock.global_compiler_lock:
+        with _lock:
             others = _settings()
             _set(_ours())
             try:
-                options = {"error_model": "numpy", "_nrt": False}
-                made = CFunc(function, (key, types.int64), locals={}, options=options)
-                cache_on_disk(made, function)
-                made.compile()
+                own = {
+                    "error_model": "numpy",
+                    **{name: on for name, on in options().items() if name == "_nrt"},
+                }
+                if CFunc is None:
+                    made = numba.cfunc(types.int64(*key), **own)(function)
+                else:
+                    made = CFunc(function, (key, types.int64), locals={}, options=own)
+                    cache_on_disk(made, function)
+                    made.compile()
             finally:
                 _set(others)
         _reached.append(made)

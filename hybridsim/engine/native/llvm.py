@@ -20,6 +20,7 @@ from typing import Any
 from llvmlite import binding, ir
 
 from hybridsim.engine.native.cache import load_whole, store_whole
+from hybridsim.engine.native.inner_parts import find_part
 from hybridsim.expr.python_tree import python_tree
 
 _DOUBLE, _LONG, _STATUS, _BIT = ir.DoubleType(), ir.IntType(64), ir.IntType(32), ir.IntType(1)
@@ -302,8 +303,10 @@ def _compiled(text: str) -> bytes:
     parsed = binding.parse_assembly(text)
     parsed.triple = machine.triple
     parsed.verify()
-    builder = binding.create_pass_builder(machine, binding.create_pipeline_tuning_options(speed_level=2))
-    builder.getModulePassManager().run(parsed, builder)
+    create = find_part("llvmlite.binding", "create_pass_builder", "the functions of models run slower")
+    if create is not None:
+        builder = create(machine, binding.create_pipeline_tuning_options(speed_level=2))
+        builder.getModulePassManager().run(parsed, builder)
     return bytes(machine.emit_object(parsed))
 
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.native.inner_parts import needed
 from hybridsim.engine.native.kernels import ENABLED, inlined
 from hybridsim.engine.native.loop_hints import short_loop
 
@@ -50,11 +51,11 @@ def row_blocks_of(matrix: np.ndarray, parts: Sequence[int] = ()) -> np.ndarray:
 if ENABLED:
     from llvmlite import ir
     from numba import types
-    from numba.core import cgutils
     from numba.extending import intrinsic
 
     from hybridsim.engine.native.loop_hints import left_as_it_is
 
+    cgutils = needed("cgutils")
     _WORD, _DOUBLE, _BYTES = ir.IntType(64), ir.DoubleType(), 8
     _FOUR = ir.VectorType(_DOUBLE, LANES)
     _NOTHING, _FIRST = ir.Constant(_FOUR, ir.Undefined), ir.IntType(32)(0)

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.native.inner_parts import needed
 from hybridsim.engine.native.kernels import ENABLED, inlined
 
 WIDTH = 8
@@ -20,10 +21,10 @@ _LINE = 64  # bytes of a vector and of a cache line
 if ENABLED:
     from llvmlite import ir
     from numba import types
-    from numba.core import cgutils
-    from numba.core.typing.templates import ConcreteTemplate, infer_global, signature
     from numba.extending import intrinsic, lower_builtin, models, register_model
 
+    cgutils, signature, infer_global = needed("cgutils"), needed("signature"), needed("infer_global")
+    ConcreteTemplate: Any = needed("ConcreteTemplate")
     _VECTOR = ir.VectorType(ir.DoubleType(), WIDTH)
 
     class Vec8Type(types.Type):

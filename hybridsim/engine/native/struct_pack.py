@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.engine.native.buffer_pool import BufferPool
+from hybridsim.engine.native.inner_parts import needed
 from hybridsim.engine.native.kernels import ENABLED, kernel
 
 _SLOTS_PER_ARRAY = 6  # words of 8 bytes per array in the table: its address and up to five lengths
@@ -26,9 +27,7 @@ _REST = [(0,) * (_SLOTS_PER_ARRAY - 1 - dimensions) for dimensions in range(_SLO
 
 if ENABLED:
     from llvmlite import ir
-    from numba import types
-    from numba.core import cgutils
-    from numba.core.typing.templates import AttributeTemplate
+    from numba import from_dtype, types
     from numba.extending import (
         NativeValue,
         infer_getattr,
@@ -39,8 +38,9 @@ if ENABLED:
         typeof_impl,
         unbox,
     )
-    from numba.np.arrayobj import populate_array
-    from numba.np.numpy_support import from_dtype
+
+    cgutils, populate_array = needed("cgutils"), needed("populate_array")
+    AttributeTemplate: Any = needed("AttributeTemplate")
 
     class Packed:
         """A named tuple of C-contiguous arrays in the form that kernels take: a table of addresses and shapes."""

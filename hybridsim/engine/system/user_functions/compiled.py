@@ -11,10 +11,8 @@ from typing import Any
 
 import numba
 import numpy as np
-from numba import literal_unroll, types
-from numba.core.errors import NumbaError
+from numba import NumbaError, literal_unroll, types
 from numba.extending import intrinsic, overload
-from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from hybridsim.engine.native.kernels import SIGNATURE
 from hybridsim.engine.system.user_functions.forms import Failures, Parts, Scalar, number, rates
@@ -33,6 +31,19 @@ def _doubles_at(typingctx: Any, address: Any) -> Any:
         return builder.inttoptr(args[0], context.get_value_type(signature.return_type))
 
     return types.CPointer(types.float64)(types.int64), generate
+
+
+@intrinsic(prefer_literal=True)
+def _as_tuple(typingctx: Any, array: Any, count: Any) -> Any:
+    """Return the first numbers of an array, a literal count of them, as a tuple."""
+    kind = types.UniTuple(types.float64, count.literal_value)
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        data = context.make_array(array)(context, builder, args[0]).data
+        places = [builder.gep(data, [context.get_constant(types.intp, i)]) for i in range(len(kind))]
+        return context.make_tuple(builder, kind, [builder.load(place) for place in places])
+
+    return kind(array, count), generate
 
 
 @numba.njit
@@ -125,7 +136,7 @@ class Compiler:
             t, state, parameter_array = p[origin] + s, numba.carray(x, (n,)), numba.carray(p, (count,))
             raised = False
             try:
-                named = parameters(*to_fixed_tuple(parameter_array, count))
+                named = parameters(*_as_tuple(parameter_array, count))
                 _put(function(t, state.copy(), named), out, at, width)
             except Exception:  # numba supports no other clause; a repeated call gives the error
                 raised = True

@@ -1,0 +1,87 @@
+"""The parts of numba and llvmlite that their documentation does not offer, and what happens without each.
+
+A later version may rename or drop them. Each is looked up here, and nowhere else. Without one of `_NEEDED` the engine
+runs as plain Python, as with ``HYBRIDSIM_JIT=0``. Without one of the others compiling takes longer or more often. One
+line on stderr says so.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from functools import cache
+from typing import Any
+
+# What compiled kernels consist of: module, name, and what it is for.
+_NEEDED = (
+    ("numba.core", "cgutils"),  # loads the entries of tuples, and declares functions of LLVM
+    ("numba.core.typing.templates", "AttributeTemplate"),  # types the fields of a pack
+    ("numba.core.typing.templates", "ConcreteTemplate"),  # types the operators of a vector
+    ("numba.core.typing.templates", "infer_global"),  # declares the operators of a vector
+    ("numba.core.typing.templates", "signature"),
+    ("numba.np.arrayobj", "populate_array"),  # makes an array of an address and a shape
+    ("llvmlite.binding", "create_mcjit_compiler"),  # loads the machine code of a model's functions
+)
+# A function of our own texts: LLVM before version 17 knows no pointers without the type of what they point to.
+_TEXT = "define double @first(ptr %x) {\n  %y = load double, ptr %x\n  ret double %y\n}\n"
+
+
+@cache
+def _told(text: str) -> None:
+    print(f"hybridsim: {text}", file=sys.stderr, flush=True)
+
+
+def _version() -> str:
+    numba = importlib.import_module("numba")
+    return f"numba {numba.__version__}"
+
+
+def find_part(module: str, name: str, without: str) -> Any:
+    """Return a part of numba or llvmlite; without it return None and print once what follows."""
+    found = _found(module, name)
+    if found is None:
+        _told(f"{_version()} has no {module}.{name}; {without}")
+    return found
+
+
+def _found(module: str, name: str) -> Any:
+    try:
+        return getattr(importlib.import_module(module), name, None)
+    except ImportError:
+        return None
+
+
+def needed(name: str) -> Any:
+    """Return a part of numba whose presence `is_complete` has checked."""
+    return next(_found(module, known) for module, known in _NEEDED if known == name)
+
+
+@cache
+def is_complete() -> bool:
+    """Return whether this numba has all that compiled kernels consist of; print once if not."""
+    lacking = next((f"no {module}.{name}" for module, name in _NEEDED if _found(module, name) is None), None)
+    if lacking is None:
+        try:
+            importlib.import_module("llvmlite.binding").parse_assembly(_TEXT)
+        except RuntimeError:
+            lacking = "an LLVM without opaque pointers"
+    if lacking is not None:
+        _told(f"{_version()} has {lacking}; the engine is not compiled, and runs are slow")
+    return lacking is None
+
+
+@cache
+def options() -> dict[str, bool]:
+    """Return the options of kernels that numba knows, among those that it does not document.
+
+    `_nrt`: without it each read of an array from a pack includes two calls that count references, and no value
+    stays in a register across them. `no_cfunc_wrapper`: without it each kernel gets a wrapper that nothing calls.
+    """
+    target = find_part(
+        "numba.core.registry", "cpu_target", "kernels are compiled with numba's own settings, and run slower"
+    )
+    wanted = {"_nrt": False, "no_cfunc_wrapper": True}
+    known = {name: value for name, value in wanted.items() if hasattr(getattr(target, "options", None), name)}
+    if target is not None and known != wanted:
+        _told(f"{_version()} lacks the options {', '.join(wanted.keys() - known)}; kernels are slower")
+    return known
