@@ -1,4 +1,4 @@
-"""The engine runs a declared automaton: it compiles its functions, finds its events and decides what follows them.
+"""The engine runs a model: it compiles its functions, locates events and finds the motion after each event.
 
 Each folder is a floor and imports only from the floors before it. Read them in this order: `native`, `series`,
 `lowering`, `system`, `record`, `roots`, `linear`, `events`, `run`.

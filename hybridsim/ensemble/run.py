@@ -62,7 +62,7 @@ def run_ensemble(
     record: Any,
     found: Any,
 ) -> None:
-    """Run one after the other, from the current one on, until all are done or some milliseconds have passed.
+    """Run the points of a group in order, until all are done or a number of segments is computed.
 
     lin: tables of the common type. vector_positions: positions of the origin, the phases and the pin in p. hold:
     holding mode of each component. rule: nodes and weights. slopes (3, n): scratch for `sum_up`. record: twice as
@@ -134,7 +134,7 @@ def _begin(record: Any, stored: int, count: int, since: float) -> tuple[int, flo
 
 @inlined
 def _shift_back(record: Any, stored: int, count: int) -> None:
-    """Move the last segments before the second half of a record, which is then free again."""
+    """Move the segments after the middle of a record to its start, to free rows for new segments."""
     for i in range(SEGMENTS - stored, SEGMENTS):
         record.ends[i], record.rows[i] = record.ends[i + count], record.rows[i + count]
         put(record.clocks[i + count], record.clocks[i])
@@ -155,7 +155,7 @@ def _clear(found: Any) -> None:
 
 @inlined
 def _take_rest(hold: Any, period: float, state: Any, found: Any) -> None:
-    """Write the results for a period in which nothing moves."""
+    """Write the results for a last period without any motion."""
     x, z = state.x, state.z
     for i in range(x.shape[0]):
         for side in range(2):

@@ -65,7 +65,7 @@ def can_run_together(system: System) -> bool:
 
 
 class Ensemble:
-    """Runs of one system from t = 0, each over a number of periods of its forcing; for use in one thread.
+    """Runs of one system from t = 0 over a number of forcing periods each; each thread needs its own object.
 
     Parameters
     ----------
@@ -148,7 +148,7 @@ class Ensemble:
             )
 
     def _run_group(self, group: EnsembleTables, runs: Runs) -> None:
-        """Run all of them, unless `may_continue` returns False."""
+        """Run all points of a group, unless `may_continue` returns False."""
         spare: deque[Any] = self.system.code.shared(f"scratch of ensembles for {group.form}", deque)
         try:
             group_scratch = spare.pop()

@@ -1,4 +1,4 @@
-"""Selection of the integrator for integrator="auto", with the reason."""
+"""Choose the integrator for integrator="auto", and give the reason."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
 
 
 def _for_functions(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float]) -> Choice:
-    """Choose for rates that are a Python function, for which closed forms and series have no tape."""
+    """Choose an integrator for rates that are a Python function; closed forms and series cannot use them."""
     steps = _steps_for_stability(system, x0, z0, span)
     stiff = f"stability would hold an explicit method to {steps:.0e} steps" if steps > _MANY else ""
     if isinstance(system.code, PythonCode) and system.code.refused:
@@ -78,7 +78,7 @@ def _for_functions(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[f
 
 
 def _steps_for_stability(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float]) -> float:
-    """Return the number of steps that an explicit method needs for stability alone."""
+    """Return the number of steps that stability requires of an explicit method."""
     per_rate = abs(span[1] - span[0]) / _STABLE
     steps = per_rate * _fastest_decay(system, x0, np.maximum(z0, 0), span[0])
     if steps > _MANY and (z0 < 0).any():  # a law may be steep on the side that the motion does not take
@@ -94,7 +94,7 @@ def _modes_at_start(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[
 
 
 def successor_of(name: str, system: System) -> Integrator | None:
-    """Return the method that replaces a chosen one on stiffness during the run; None if it is not monitored."""
+    """Return the method to continue with if the run becomes stiff; None if stiffness is not monitored."""
     from hybridsim.integrators.rosenbrock.rodas5p import Rodas5P
 
     return Rodas5P() if name == "dop853" and system.has_tape else None
@@ -106,7 +106,7 @@ def _fastest_decay(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> f
 
 
 def _is_apart(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> bool:
-    """Return whether decays are much faster than all other motions, so that they alone limit the step."""
+    """Return whether decays are much faster than all other motions, and so limit the step by stability."""
     values = _eigenvalues(system, x, np.maximum(z, 0), t0)
     sizes = np.abs(values)
     stiff = values.real < -_DECAYING * sizes

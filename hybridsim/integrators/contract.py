@@ -102,7 +102,7 @@ class Integrator(metaclass=_IntegratorType):
 
     @property
     def stable_to(self) -> float:
-        """Return how far along the negative axis of h*lambda an explicit method is stable; 0 for others."""
+        """Return the stability limit |h*lambda| of an explicit method on the negative axis; 0 for others."""
         return 0.0
 
     @property

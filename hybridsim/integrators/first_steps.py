@@ -1,4 +1,4 @@
-"""First steps of a multistep method from a guard that grows late, taken by a method of high order."""
+"""Take the first steps of a multistep method by a method of high order if a guard grows late."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def with_first_steps(
 
 
 class FirstSteps:
-    """Steps of DOP853 until the guards that begin at zero exceed the errors of the states; then the method's own steps.
+    """Take steps of DOP853 until late guards exceed the errors of the states, then steps of the method.
 
     A multistep method begins at order one with errors of the size of its tolerance, while a gap that opens
     grows with the cube of time. Without these steps a gap that has opened would seem to close again.
@@ -71,7 +71,7 @@ class FirstSteps:
         return self.stepper.restep(step, s)
 
     def _first(self, x0: np.ndarray, watch: Watch) -> float:
-        """Return the first step, after which the late guards' leading terms are significant; it may be shortened."""
+        """Return a first step length after which the leading terms of late guards are significant."""
         series = self.flow.system.series(0.0, x0, self.flow.p, self.flow.z, np.zeros(self.flow.n), 0.0)
         orders = watch.orders[self.late]
         leading = np.abs(series.guards[self.late, orders])
@@ -81,7 +81,7 @@ class FirstSteps:
         return 2.0 * float(max(steps, default=np.inf))
 
     def _errors(self, s: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the late guards, and their changes by errors of the states within the tolerances."""
+        """Return the late guards, and how much tolerated errors of the states change them."""
         sizes = self.tolerances.atol + self.tolerances.rtol * np.abs(x)
         states = np.vstack([x, x + np.diag(sizes)])
         values = self.flow.guards(np.full(len(states), s), states)[:, self.late]

@@ -24,7 +24,7 @@ _SHORTER = 0.5  # factor on a step whose error up to an event is above the toler
 
 
 class Point:
-    """A state along the run; further quantities are computed at first use."""
+    """A state along the run; further quantities are computed on first use."""
 
     def __init__(self, flow: Flow, s: float, x: np.ndarray) -> None:
         self.flow, self.s, self.x = flow, s, x

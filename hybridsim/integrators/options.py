@@ -70,7 +70,7 @@ def fits(value: object, kind: Any) -> bool:
 
 
 def _is_small(value: Any, most: float) -> bool:
-    """Return whether a number is a finite double not above `most`; other values are not judged here."""
+    """Return whether a number is at most `most` in size and in the range of doubles; NaN passes."""
     try:
         return not abs(float(value)) > most
     except OverflowError:

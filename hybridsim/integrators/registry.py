@@ -89,7 +89,7 @@ def integrator_class(name: str) -> type[Integrator]:
 
 @contextmanager
 def registered(method: str | type[Integrator]) -> Iterator[str]:
-    """Yield the name of an integrator; an unregistered class can be used by name inside the context."""
+    """Yield an integrator's name, by which even an unregistered class is available inside the context."""
     if isinstance(method, str):
         yield integrator_class(method).name
         return
@@ -145,7 +145,7 @@ def keyword_elsewhere(keyword: str) -> str | None:
 
 
 def make_integrator(name: str, options: dict[str, Any], keywords: Iterable[str] = ()) -> Integrator:
-    """Return the integrator of a name with its options; keywords: other names that the user may have meant."""
+    """Return the integrator with this name and options; keywords: names the user may have meant."""
     cls = integrator_class(name)
     known = option_names(cls)
     for option in options:

@@ -26,7 +26,7 @@ _INSTEAD = {
 
 
 class ArraysResult(InTables):
-    """The base class of results of a system given as arrays."""
+    """The base class of the results of mechanical systems."""
 
     model: MechanicalSystem
     integrator: str
@@ -74,7 +74,7 @@ class ArraysResult(InTables):
 
     @abstractmethod
     def _values(self, name: str, t: np.ndarray, right: bool) -> np.ndarray:
-        """Return a quantity just after some times, or just before them."""
+        """Return a quantity just after some times, or just before these times."""
 
     def table(self, points: int | None = None) -> Table:
         """Return times, states, forces, relative velocities and modes as columns.
@@ -137,7 +137,7 @@ class ArraysResult(InTables):
             )
 
     def __getattr__(self, name: str) -> NoReturn:
-        """Raise an AttributeError that names the alternative for a feature that only `Solution` has."""
+        """Raise an AttributeError with an alternative for a feature that only `Solution` has."""
         kind = type(self).__name__
         if name.startswith("_") or not hasattr(Solution, name):
             raise AttributeError(f"{kind} has no {name!r}", name=name, obj=self)

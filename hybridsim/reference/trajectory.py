@@ -1,4 +1,4 @@
-"""An exact motion: its states over a span and the events in it."""
+"""This module defines an exact motion: its states over a span, and its events."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class ExactEvent:
 
 @dataclass(frozen=True)
 class Trajectory:
-    """States over a span, and the events in it.
+    """The states over a span, and the events in this span.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""This folder decides what holds just after an event: transitions, resets, impacts, and stick or slip of contacts.
+"""This folder finds the state and modes just after an event: transitions, resets, impacts, stick and slip.
 
 Start with `resolve`, which goes through one instant, then `choice` (joint decisions at surfaces).
 """

@@ -60,7 +60,7 @@ def has_no_past(
 
 @dataclass(frozen=True)
 class Entry:
-    """A guard of another mode at whose zero the present mode may have been entered."""
+    """A guard of another mode; the present mode may have begun when this guard reached zero."""
 
     z: np.ndarray  # modes (C,) in which the guard is evaluated
     guard: int  # its number

@@ -1,4 +1,4 @@
-"""Set corners and automata of loads to the sides that hold just after an instant, before any other decision.
+"""Choose the sides of corners and of load automata just after an instant, before any other mode is chosen.
 
 Each is a component whose mode follows from the state alone: a corner (`abs`, `min`, a piece of a table), a step in
 time, or the load of a contact that opens. A value beyond its error bound decides the side. At zero, the first
@@ -27,7 +27,7 @@ _ROUNDS_PER_MODE = 4  # orders of a series: each order settles at least one more
 def sides_along(
     resolution: EventResolution, z: np.ndarray, x: np.ndarray, has_flow: bool = True
 ) -> tuple[np.ndarray, dict[int, int]]:
-    """Return the modes z with each corner and load on its side along the flow, and their guards that are zero.
+    """Return the modes z with each corner and load on its side along the flow, and the guards that are zero.
 
     A guard that was located at zero is zero on both sides, whatever rounding makes of its value. With has_flow=False
     only values decide, because the modes of surfaces are not known yet.

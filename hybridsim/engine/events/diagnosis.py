@@ -73,7 +73,7 @@ def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Ins
 
 
 def advice_on_sizes(system: System) -> str:
-    """Return a remedy for steps that collapse without a cause: the tolerance is below rounding error."""
+    """Return a remedy if steps collapse without another cause: the tolerance is below rounding error."""
     is_sized = all(state.nominal is not None for state in system.model.states)
     return "pass a larger atol or rtol" if is_sized else "declare `nominal` sizes or pass atol"
 
@@ -95,7 +95,7 @@ def _cause(system: System, names: list[str], t: float, x: np.ndarray) -> str:
 
 
 def _of_function(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> str:
-    """Return what a Python function returned as a rate that is not finite, or an empty text for expressions."""
+    """Return a message on non-finite rates that a Python function returned; it is empty for expressions."""
     from hybridsim.engine.system.user_functions.code import PythonCode
 
     return system.code.flow_without_value(s, x, p, z) if isinstance(system.code, PythonCode) else ""

@@ -1,4 +1,4 @@
-"""Determine the modes before surfaces are decided: those for resets at a start, and automata that leave in any case."""
+"""Find the modes that are needed before modes at surfaces are chosen: for resets, and for automata."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _MAX_FLOWS = 3**4  # combinations of modes examined at most; each costs a Taylor
 
 
 def as_read_by_conditions(system: System, at: Situation, jumped: bool = False) -> Situation:
-    """Return a situation with modes and run-time vector in which conditions and resets read the state as it is.
+    """Return a situation in which conditions and resets read the states without projection.
 
     At a start some components have no mode yet. They are read in the mode of the side of their surface, or in the
     holding mode if they are at rest on it. At a start and after a jump no state is evaluated from a surface.
@@ -54,7 +54,7 @@ def as_read_by_conditions(system: System, at: Situation, jumped: bool = False) -
 
 
 def certainly_leaving(resolution: EventResolution) -> set[int]:
-    """Return the automata that have a negative guard just after, whatever is decided at surfaces that are zero.
+    """Return the automata with a guard that is negative just after, in every mode of the surfaces at zero.
 
     The sides of their guards are set accordingly. If these surfaces have too many combinations of modes, only values of
     guards without forces are used.
@@ -83,7 +83,7 @@ def certainly_leaving(resolution: EventResolution) -> set[int]:
 
 
 def _modes_on_sides(resolution: EventResolution) -> tuple[np.ndarray, list[int]]:
-    """Return the modes with each surface off zero on its side, and the components whose surfaces are zero."""
+    """Return the modes by the signs of the surfaces, and the components whose surfaces are zero."""
     at, system = resolution.at, resolution.system
     p = at.p.copy()
     p[system.layout.pin_at] = 0.0
@@ -101,7 +101,7 @@ def _modes_on_sides(resolution: EventResolution) -> tuple[np.ndarray, list[int]]
 
 
 def _negative(resolution: EventResolution, owners: list[int], z: np.ndarray, order: int = ORDER) -> set[int]:
-    """Return the guards of some components that are negative just after in the modes z, up to an order."""
+    """Return the guards of some components that become negative in the modes z, by terms up to an order."""
     series = resolution.series_of(z)
     side_of = side_after if resolution.forward else side_before
     numbers = [g for c in owners for g in resolution.system.automata[c].guards[z[c]]]
@@ -110,7 +110,7 @@ def _negative(resolution: EventResolution, owners: list[int], z: np.ndarray, ord
 
 
 def _without_forces(system: System) -> list[list[bool]]:
-    """Return for each guard number and mode whether no force of a surface enters the guard there."""
+    """Return for each guard number and mode whether the guard is independent of all surface forces there."""
     meanings, components = Meanings(system.model), system.model.all_components()
     found: list[list[bool]] = [[] for _ in range(system.guard_count)]
     for automaton, component in zip(system.automata, components, strict=True):

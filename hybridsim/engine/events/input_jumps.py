@@ -43,7 +43,7 @@ def gaps_jump(system: System, at: Situation, before: np.ndarray, after: np.ndarr
 def _differ(
     system: System, at: Situation, sides: Sequence[tuple[np.ndarray, np.ndarray]], s_error: float = 0.0
 ) -> bool:
-    """Return whether surfaces or rates of closed gaps differ between two pairs of vector and modes at one state."""
+    """Return whether surfaces or gap rates differ between two run-time vectors and modes at one state."""
     values, bounds = [], []
     for p, z in sides:
         p[system.layout.pin_at] = 0.0

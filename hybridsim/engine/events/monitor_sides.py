@@ -40,7 +40,7 @@ class MonitorSides:
 
     @classmethod
     def of(cls, monitors: Sequence[Monitor], before: np.ndarray) -> MonitorSides:
-        """Return the sides without any knowledge of the motion."""
+        """Return the sides for monitors whose motion before the instant is unknown."""
         return cls(monitors, before, np.zeros_like(before), np.zeros(len(before), dtype=np.bool_))
 
     @classmethod

@@ -155,7 +155,7 @@ class EventResolution:
         )
 
     def _past_corners(self, open_: set[int]) -> set[int]:
-        """Set corners to their sides. Return the other components whose guards still fire there.
+        """Set corners to their sides. Return the other components whose guards still fire after this change.
 
         A zero that was located by a series past a corner, where the guard turns back, does not fire.
         """
@@ -171,7 +171,7 @@ class EventResolution:
         return others - staying
 
     def _first_modes(self, surfaces: set[int]) -> tuple[str, str] | None:
-        """Set the sides of corners after a change of state, and leave modes that cannot last.
+        """Set the sides of corners after a change of state, and leave modes that end at this instant.
 
         Without this, a contact would be decided in a mode of an automaton that lasts for zero time.
         """
@@ -186,7 +186,7 @@ class EventResolution:
         return None
 
     def take_sides(self, open_: set[int]) -> None:
-        """Set every surface component to the mode of the side it is on.
+        """Set every component with a surface to the mode of its side.
 
         open_: the components to be decided on their surfaces. A component that a reset moved off its surface is
         removed, and one that came to its surface is added.
@@ -395,7 +395,7 @@ class EventResolution:
         return None
 
     def _current(self, components: list[int], holds: np.ndarray) -> np.ndarray:
-        """Return the modes that are kept if they are admissible; at a start a contact on its surface sticks.
+        """Return the preferred modes: the present ones, or at a start the holding modes of contacts.
 
         Static friction therefore holds a contact that is at its limit within rounding.
         """

@@ -47,11 +47,11 @@ _HIGHEST = 8  # largest degree of a monomial; the closure under derivatives woul
 
 
 class NotLinear(StepFailure):
-    """An error for a rate or a guard that is not a linear form; the message names the nonlinear operation."""
+    """This error reports a rate or a guard that is not a linear form, and names the nonlinear operation."""
 
 
 class DividesByZero(NotLinear):
-    """An error for a division by zero, as for forces that several holding modes cannot distinguish."""
+    """This error reports a division by zero, as for forces that several holding modes cannot distinguish."""
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,7 @@ class LinearReader:
         raise NotLinear(_IN_THE_WAY.get(op, _OTHER))
 
     def _of_form(self, op: int, form: Form) -> tuple[Read, ...]:
-        """Apply an operation with one operand that is not a number."""
+        """Apply an operation to one operand that is a form and not a number."""
         if op == NEG:
             return ({key: -weight for key, weight in form.items()},)
         if op == SINCOS:

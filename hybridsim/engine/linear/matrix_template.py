@@ -87,7 +87,7 @@ class MatrixTemplate:
         self.recipe: Recipe = Recipe(numbers, None if begun is None else begun.recipe)
 
     def _first_read(self, system: System, met: np.ndarray) -> Iterable[Monomial]:
-        """Return functions of time in an order that does not depend on which modes a run enters first.
+        """Return functions of time in an order that is the same whichever modes a run enters first.
 
         The order of sums depends on it. If all mode vectors are entered, they are read in their order.
         Otherwise vectors that differ in one component come first; they contain almost all functions of time.
@@ -122,7 +122,7 @@ def _factors(monomials: Sequence[Sequence[int]], one: int) -> np.ndarray:
 
 
 def template_of(system: System, met: np.ndarray, p: np.ndarray) -> tuple[MatrixTemplate, np.ndarray]:
-    """Return the template of these mode vectors that holds at the parameters in p, and its registers there."""
+    """Return the template of these mode vectors that is valid at parameters p, and its registers at p."""
     cached: dict[bytes, list[MatrixTemplate]] = system.code.shared("matrix templates", dict)
     inputs = p[: system.layout.parameters]
     with _lock:
@@ -150,7 +150,7 @@ def _with_values(template: MatrixTemplate, inputs: np.ndarray) -> tuple[MatrixTe
 def _that_holds(
     templates: Iterable[MatrixTemplate], inputs: np.ndarray
 ) -> tuple[MatrixTemplate, np.ndarray] | None:
-    """Return the first template that holds at these inputs, and its registers there."""
+    """Return the first template that is valid at these inputs, and its registers at these inputs."""
     return next(
         (found for template in templates if (found := _with_values(template, inputs)) is not None), None
     )
@@ -159,7 +159,7 @@ def _that_holds(
 def _begun(
     cached: dict[bytes, list[MatrixTemplate]], met: np.ndarray, inputs: np.ndarray
 ) -> MatrixTemplate | None:
-    """Return the template of as many leading vectors as possible, as a run's vectors grow by a few at the end."""
+    """Return the template of the longest cached list with which this list of mode vectors begins."""
     whole = met.tobytes()
     for key in sorted((key for key in cached if whole.startswith(key)), key=len, reverse=True):
         found = _that_holds(cached[key], inputs)

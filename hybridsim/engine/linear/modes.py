@@ -88,7 +88,7 @@ def modes_of(
 
 
 def single_changes(system: System) -> np.ndarray:
-    """Return mode vectors: the first mode of each component, and all vectors that differ from it in one mode."""
+    """Return mode vectors: the first mode of each component, and all changes of one component from it."""
     first = np.zeros(len(system.automata), dtype=np.int64)
     vectors = [first]
     for c, automaton in enumerate(system.automata):
@@ -179,7 +179,7 @@ def _first_reason(system: System, p: Sequence[float] | None) -> str | None:
 
 
 def is_linear_beside_corners(system: System) -> bool:
-    """Return whether each mode is linear on both sides of each corner, at the values of the parameters."""
+    """Return whether each mode is linear on both sides of each corner, for the given parameter values."""
     known: dict[tuple[float, ...] | None, bool] = system.code.shared("is linear beside corners", dict)
     for p in (None, tuple(system.values.values())):
         if p not in known:

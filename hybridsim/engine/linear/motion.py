@@ -144,7 +144,7 @@ def linear_coefficient(
 
 @inlined
 def size_of_point(x: Any, x_error: Any, w: Any, w_error: Any) -> float:
-    """Return the size of y = (x, w); a coefficient's bound is at most its largest rounding times this size."""
+    """Return the size of y = (x, w), by which rounding errors of coefficients are bounded."""
     size = 0.0
     for m in range(x.shape[0]):
         short_loop()
@@ -342,7 +342,7 @@ def guard_terms(lin: Any, k: int, g: int, c: Any, terms: Any) -> tuple[float, fl
 
 @inlined
 def first_zero_of_wave(lin: Any, k: int, g: int, c: Any, bound: float) -> tuple[int, float]:
-    """As `first_zero`, for a positive guard a + r cos(omega s + phase); OPEN if it hardly falls below zero."""
+    """Find the first zero of a guard a + r cos(omega s + phase); OPEN if it is nearly a double zero."""
     j, terms = lin.waves[k, g], lin.terms
     level, size = 0.0, 0.0
     for i in range(lin.counts[k]):

@@ -90,7 +90,7 @@ def _bend(lin: Any, k: int, i: int, v: Any, is_shrinking: bool) -> tuple[float, 
 
 @inlined
 def _is_shrinking(lin: Any, k: int) -> bool:
-    """Return whether no modal coordinate ever grows, so that bounds made from them stay valid."""
+    """Return whether no modal coordinate grows, so that bounds made from the coordinates stay valid."""
     for j in range(lin.counts[k]):
         if lin.values[k, j].real > 0.0:
             return False
@@ -113,7 +113,7 @@ def _between(
     v: Any,
     extremes: Any,
 ) -> None:
-    """Widen a state's extremes by those between two times at which its rates are known, however close they are.
+    """Extend a state's extremes by those between two times at which the state's rates are known.
 
     The rate x' has two zeros in an interval of length h only if |x'| is at most max |x'''| h**2/2 at both of
     its ends. Such an interval is halved until a possible extremum in it is below rounding.

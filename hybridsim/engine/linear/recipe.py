@@ -1,4 +1,4 @@
-"""Arithmetic on numbers that is recorded while it is done, to be repeated with other numbers in compiled code.
+"""Record arithmetic on numbers while it runs, so that compiled code can repeat it with other numbers.
 
 The operations may depend on the numbers: whether one is zero, or whether two are equal. Such comparisons are
 recorded with their results, and a recipe holds for other numbers if all comparisons have the same results.
@@ -20,7 +20,7 @@ _PLAIN = {ADD: operator.add, SUB: operator.sub, MUL: operator.mul}  # equal resu
 
 
 def computed(op: int, values: Sequence[float], b: int, c: int) -> tuple[float, float]:
-    """Apply an operation of the tape to numbers; the second result is 0 for most. b and c may be flags."""
+    """Apply an operation of the tape to numbers; return two results, the second one mostly 0."""
     if op in _PLAIN:
         return _PLAIN[op](values[0], values[1]), 0.0
     V = np.zeros((4, 1))
@@ -152,7 +152,7 @@ class Recipe:
 
 
 def _gone_on_with(known: np.ndarray, written: Sequence[Any]) -> np.ndarray:
-    """Return recorded rows as an array (entries, width), whose first entries are known."""
+    """Return the recorded rows as an array (entries, width); the first entries are given."""
     new = np.array(written[len(known) :], dtype=known.dtype).reshape(-1, known.shape[1])
     return np.concatenate([known, new])
 

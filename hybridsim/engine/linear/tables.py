@@ -107,7 +107,7 @@ class _Rows:
         return {name: field[:count] for name, field in self._fields.items()}
 
     def gone_on_with(self, first: int, new: dict[str, np.ndarray]) -> _Rows:
-        """Return the rows up to `first` followed by new ones, in the spare rows if these are still free."""
+        """Return the first rows followed by new ones, which use the spare rows if these are free."""
         count = first + len(new["counts"])
         with _lock:
             rows = self
@@ -139,7 +139,7 @@ class Made(NamedTuple):
 def linear_tables(
     system: System, met: np.ndarray, p: np.ndarray, horizon: float, begun: Made | None = None
 ) -> Made | None:
-    """Return tables of the mode vectors entered so far (K, components) at the parameters in p; horizon: of a segment.
+    """Return tables of the mode vectors (K, components) entered so far; horizon: the length of a segment.
 
     begun: tables of the first of these vectors, which are reused as far as they agree. Return None if each
     mode has a rate or a guard with a coefficient that is not finite, or is too large to be squared.
@@ -169,7 +169,7 @@ def _gone_on_with(
 
 
 def leave_out(A: np.ndarray, guards: np.ndarray, n: int) -> np.ndarray:
-    """Return which modes (..., K) have usable coefficients; make the others modes that no guard admits.
+    """Return a mask (..., K) of modes with usable coefficients; give the other modes a guard of -1.
 
     A (..., K, m, m), guards (..., K, G, m). Two surfaces that cannot be held together give modes with
     non-finite numbers, which runs have only as neighbours. `unknown` stops a run that is in such a mode.
@@ -256,7 +256,7 @@ def of_matrices(
 
 
 def _lasting(rates: np.ndarray, ends: np.ndarray, count: int) -> float:
-    """Return how long a motion can be followed before numbers overflow or parts of a block are lost to rounding.
+    """Return for how long a motion can be computed before numbers overflow or blocks lose accuracy.
 
     Coordinates of one block have errors relative to the largest of them. If one grows faster than the others,
     such as a load that is still very small, the rounding error grows as fast.
@@ -274,7 +274,7 @@ def _lasting(rates: np.ndarray, ends: np.ndarray, count: int) -> float:
 
 
 def horizon_class(horizon: float) -> float:
-    """Return the order of magnitude for which tables are made."""
+    """Return the order of magnitude of a horizon, for which tables are made."""
     return 16.0 ** math.ceil(math.log(horizon, 16.0)) if horizon > 0.0 else math.inf
 
 

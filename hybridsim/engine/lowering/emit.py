@@ -216,7 +216,7 @@ class Emitter:
         return "\n".join([*lines, "    return 0"])
 
     def _tangent(self) -> str:
-        """Return the function for J dx, the rate of a change of the states; dx follows x in the state array."""
+        """Return the text of the function for J dx, the rate of a small change dx of the states."""
         program, n = self.program, len(self.program.model.states)
         lines = ["def tangent(t, x, p, z, out):"]
         moving = {f"raw_{i}": f"x[{n + i}]" for i in range(n)}
@@ -235,7 +235,7 @@ class Emitter:
         return "\n".join([*lines, "    return 0"])
 
     def _changes(self, branch: Iterable[Assign], moving: dict[str, str]) -> dict[str, str]:
-        """Return the change of each name of a branch as text, in order; it is empty for a zero change."""
+        """Return the change of each name in a branch as text, in order; an empty text means no change."""
         moving, found = dict(moving), {}
         for assign in branch:
             terms = []

@@ -1,4 +1,4 @@
-"""How holding modes keep constraints at zero: by evaluating a state from each, or by projection."""
+"""Choose how holding modes keep constraints at zero: solve each for one state, or project the states."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Held = tuple[int, int]
 
 
 class HeldStates:
-    """The states that the surfaces of a model hold, and the items that evaluate them.
+    """The states that are determined by held surfaces, and the program items that evaluate them.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class HeldStates:
         self._lengths: dict[Held, Any] = {c: lowering.sp.Integer(0) for c in self.projected}
 
     def by_component(self, states: dict[Held, Any]) -> dict[int, tuple[int, ...]]:
-        """Return pins or projected states (an index or several per constraint) in the form that the engine uses."""
+        """Return the states of each component's constraints, given one or several per constraint."""
         found: dict[int, tuple[int, ...]] = {}
         for (c, _), i in states.items():
             found[c] = tuple(sorted({*found.get(c, ()), *(i if isinstance(i, tuple) else (i,))}))
@@ -83,7 +83,7 @@ class HeldStates:
         return tuple(i for i, x in enumerate(self.states) if x in self.surfaces[c].free_symbols)
 
     def _without_choice(self, choices: dict[Held, list[int]]) -> set[Held]:
-        """Return the projected constraints: those not linear in any state, and those that share states with them."""
+        """Return the constraints to project: nonlinear ones, and those that share states with them."""
         found = {c for c, states in choices.items() if not states}
         for c in found:
             surface = self.lowering.components[c[0]].surface
@@ -102,7 +102,7 @@ class HeldStates:
         return found
 
     def _chosen(self, choices: dict[Held, list[int]], free: set[Held]) -> dict[Held, int] | None:
-        """Return a distinct state for each constraint that is not projected, without cycles, or None."""
+        """Choose a distinct state for each constraint that is not projected; None if only cycles remain."""
         pinned = {c: found for c, found in choices.items() if c not in free}
         return self._match(list(pinned), pinned, {})
 
@@ -156,13 +156,13 @@ class HeldStates:
         return None
 
     def _may_share(self, one: Held, other: Held) -> bool:
-        """Return whether two constraints never hold together or are equal: a gap's rate and a contact along it."""
+        """Return whether two constraints may determine one state: they never hold together, or are equal."""
         rates = {one, other}
         tied = any(rates == {(tie.gap, 1), (tie.along, 0)} for tie in self.lowering.stop_couplings)
         return tied or self._exclude(one[0], other[0])
 
     def _exclude(self, c: int, d: int) -> bool:
-        """Return whether two gaps or two other surfaces are parallel at a constant distance, so never both zero."""
+        """Return whether two surfaces are parallel at a constant distance, and so never both zero."""
         is_gap, is_other = (self.lowering.components[i].surface.is_unilateral for i in (c, d))
         if c == d or is_gap != is_other:
             return False
@@ -194,7 +194,7 @@ class HeldStates:
     # -- how ------------------------------------------------------------------------------------------------
 
     def items(self) -> list[Item]:
-        """Return the effective states: a held state from its constraint, every other as integrated."""
+        """Return the states to use: a held state follows from its constraint, other states are integrated."""
         sp = self.lowering.sp
         moved = {i for states in self.projected.values() for i in states}
         items: list[Item] = self._projection(sorted(moved)) if moved else []
@@ -216,7 +216,7 @@ class HeldStates:
         return self._in_hold(c[0], name, _where_pinned(sp, value, raw), before)
 
     def holding(self, i: int) -> list[int]:
-        """Return the components that evaluate a state while they hold."""
+        """Return the components whose holding modes determine a state."""
         return [c for (c, _), j in self.pins.items() if i == j]
 
     def _in_hold(self, c: int, name: str, value: Any, otherwise: Any) -> Switch:
@@ -268,7 +268,7 @@ class HeldStates:
         return items
 
     def turned(self, derivatives: list[str]) -> tuple[list[Item], list[str]]:
-        """Return the rates of the states as integrated, from the rates on the surfaces, whose normals turn.
+        """Return the rates of the integrated states; the normals of held surfaces turn with the motion.
 
         The projection of x + sum of l_c grad s_c(x) is x. The integrated point is off the surface by its
         errors and moves by x' + sum of l_c d(grad s_c)/dt with constant l_c. Its projection then moves by x'
@@ -301,5 +301,5 @@ def _raw(sp: Any, i: int) -> Any:
 
 
 def _where_pinned(sp: Any, value: Any, raw: Any) -> Any:
-    """Return a value if held states are to be evaluated, else the state as integrated."""
+    """Return an expression: the value if held states are evaluated, else the integrated state."""
     return sp.Piecewise((value, sp.Symbol("pin", real=True) > 0), (raw, True))

@@ -25,7 +25,7 @@ def speed_name(k: int) -> str:
 
 
 def impulses(lowering: Lowering) -> Rows:
-    """Return the rows of the function ``impulses``, or none without unilateral contacts."""
+    """Return the rows of the function ``impulses``; there are none without unilateral contacts."""
     if not _unilateral(lowering):
         return []
     return [(f"out[{i}]", value) for i, value in enumerate(_values(lowering))]
@@ -73,7 +73,7 @@ def _values(lowering: Lowering) -> Iterator[Any]:
 
 
 def _onset(lowering: Lowering, c: int, backward: bool) -> Any:
-    """Return the friction force at the onset of slip: the stick limit less the drop, up to terms without load."""
+    """Return the friction force when slip begins, as a function of load: stick limit minus drop."""
     component = lowering.components[c]
     surface = component.surface
     if surface.unique or surface.is_unilateral:

@@ -219,7 +219,7 @@ class Lowering:
         return found
 
     def inlined(self, expression: Expression) -> Any:
-        """Return a declared expression in SymPy with definitions substituted."""
+        """Return a declared expression in SymPy with all definitions substituted."""
         return self.inline(self.convert(expression), self.definitions)
 
     def _rate_in_time(self, s: Any) -> Any:
@@ -279,7 +279,7 @@ class Lowering:
     def _unknowns(
         self, surfaces: dict[int, Any], der: list[Any], definitions: dict[Any, Any]
     ) -> tuple[list[Item], list[list[int]]]:
-        """Return the mode values of the unknowns; in a holding mode, those that jointly keep ds/dt = 0."""
+        """Return the values of the unknowns in each mode; holding modes jointly keep ds/dt = 0."""
         sp = self.sp
         order = list(surfaces)
         unknown = {c: self.symbols[self.components[c].surface.unknown] for c in order}
@@ -399,7 +399,7 @@ class Lowering:
         return items + eliminated(cluster, unknown, matrix, right)
 
     def in_modes(self, c: int, name: str, in_hold: Any, otherwise: Any = None, without: Any = None) -> Switch:
-        """Return a switch that sets a name to one value in the holding mode and to another value in the other modes.
+        """Return an item that sets a name to one value in the holding mode, and to another in other modes.
 
         otherwise : value by mode; without it, the unknown's declared value. without : values substituted in
             declared values.

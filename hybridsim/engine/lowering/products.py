@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Products:
-    """The values that modes give to unknowns in products, and the unknowns that never hold together."""
+    """The values of unknowns in products, and the pairs of unknowns that never hold together."""
 
     def __init__(self, lowering: Lowering, unknown: dict[int, Any]) -> None:
         self.lowering, self.unknown = lowering, unknown
@@ -65,13 +65,13 @@ class Products:
         return found
 
     def not_together(self, c: int, pull: Any) -> Any:
-        """Return how strongly surface c attracts; it is negative while a factor of its unknown also holds."""
+        """Return how strongly surface c attracts; it is negative if a factor of its unknown holds as well."""
         for d in sorted({e for pair in self.pairs if c in pair for e in pair} - {c}):
             pull = pull * (1 - self._holds(d)) - self._holds(d)
         return pull
 
     def diagonal(self, c: int, entry: Any) -> Any:
-        """Return the effect on its own surface, made non-zero while a factor of the unknown also holds."""
+        """Return the effect of c on its own surface, plus 1 while a factor of its unknown also holds."""
         return entry + sum(
             self._holds(c) * self._holds(d)
             for d in sorted({e for p in self.pairs if c in p for e in p} - {c})

@@ -81,7 +81,7 @@ def ordered(items: Iterable[Item]) -> list[Item]:
 
 
 def items_for(items: list[Item], names: Iterable[str]) -> list[Item]:
-    """Return the items, in order, on which the given names depend."""
+    """Return the items that compute the given names, in order."""
     open_names = set(names)
     selected: list[Item] = []
     for item in reversed(items):

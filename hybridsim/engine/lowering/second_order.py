@@ -1,4 +1,4 @@
-"""Relays that act on the second derivative of their function, which are held if it and its rate are zero.
+"""Relays that act on the second derivative of their function; they hold if function and rate are zero.
 
 If du/dt = k w for the functions u and w of two relays and a number k, a motion that stays at u = 0 also stays
 at w = 0. There dw/dt = a + b U + c W with both relays anywhere between -1 and 1. Filippov's rates hold both
@@ -35,7 +35,7 @@ class Partner:
     factor: Any
 
     def share(self, c: int, d: int, sp: Any) -> Any:
-        """Return the entry for component d of the joint solve's row that gives relay c its partner's fraction."""
+        """Return a matrix entry of the condition that relay c takes the same fraction as its partner."""
         if d == c:
             return sp.Integer(1)
         return -sp.sign(self.factor) if d == self.component else sp.Integer(0)
@@ -66,7 +66,7 @@ def partners(
 
 
 def attraction(lowering: Lowering, c: int, partner: Partner, effect: dict[tuple[int, int], Any]) -> Item:
-    """Return how strongly relay c attracts to its surface through the second derivative, while its partner holds."""
+    """Return how strongly relay c attracts by the second derivative while its partner holds."""
     sp, other = lowering.sp, lowering.components[partner.component]
     name = user(ATTRACTION + lowering.components[c].surface.unknown)
     pull = -partner.factor * effect[partner.component, c]

@@ -1,4 +1,4 @@
-"""Rates that follow from the surface along which a relay slides, instead of from the forces that hold it.
+"""Compute a rate during sliding from the condition ds/dt = 0 of the surface instead of from its forces.
 
 While s(x) = 0 is held, the one rate on which the relay acts follows from the others, f_k = -(ds/dt + sum of
 g_i f_i over i != k)/g_k with g the gradient of s. A sum of forces would carry their rounding errors: a
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def shared_rates(lowering: Lowering, i: int, der: list[Any], held: HeldStates) -> Iterator[tuple[int, Any]]:
-    """Yield the relays that determine the rate of a state while they slide, each with the rate.
+    """Yield each relay that determines the rate of state i while the relay slides, with this rate.
 
     The relay's held state must be evaluated from its surface and must be another state. Of the rates in ds/dt
     the relay must act only on this one, and the derivative of s by this state must not depend on states.

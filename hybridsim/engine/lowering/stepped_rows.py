@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def stepped(lowering: Lowering) -> list[tuple[str, Any]]:
-    """Return the rows of the function ``stepped``, or none without unilateral contacts."""
+    """Return the rows of the function ``stepped``; there are none without unilateral contacts."""
     if not any(lowering.components[c].surface.is_unilateral for c in lowering.unknown):
         return []
     return [(f"out[{i}]", value) for i, value in enumerate(_values(lowering))]

@@ -52,7 +52,7 @@ def stop_couplings(
 def without_share(
     lowering: Lowering, pairs: list[StopCoupling], c: int, d: int, entry: Any, of_held: Any
 ) -> tuple[list[Item], Any]:
-    """Return items and name of the entry in the row of contact c: `of_held` while a gap along it is closed."""
+    """Return items and name of a matrix entry of contact c: `of_held` while a gap along c is closed."""
     items: list[Item] = []
     for tie in pairs:
         if tie.along == c:
@@ -68,7 +68,7 @@ def without_share(
 def coupling_help(
     lowering: Lowering, pairs: list[StopCoupling], p: int, effect: dict[tuple[int, int], Any]
 ) -> tuple[list[Item], Any]:
-    """Return items and value of the force that sticking friction adds to the force at which a closed gap opens."""
+    """Return items and value of the pull by sticking friction that keeps a gap closed."""
     sp, total = lowering.sp, lowering.sp.Integer(0)
     items: list[Item] = []
     for tie in pairs:
@@ -96,7 +96,7 @@ def coupling_help(
 
 
 def reported_forces(lowering: Lowering, pairs: list[StopCoupling]) -> dict[Any, Any]:
-    """Return the forces to report, by name: a stop does not pull, so that a pull is reported as friction."""
+    """Return the forces to report by name; a stop cannot pull, so its pull is reported as friction."""
     sp, found = lowering.sp, {}
     for tie in pairs:
         if tie.is_one:

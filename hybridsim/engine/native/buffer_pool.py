@@ -1,4 +1,4 @@
-"""A pool of large memory blocks, which are reused after their last array is gone.
+"""A pool of large memory blocks, each of which is reused when all arrays in it have been deleted.
 
 The operating system maps a fresh block of this size page by page, when it is first written. In a compiled
 loop this can cost a sixth of the time of a run of thousands of steps.

@@ -110,7 +110,7 @@ def _of_sources(floors: tuple[str, ...]) -> hashlib._Hash:
 
 
 def kernel_folder() -> Path | None:
-    """Return the folder of compiled kernels for these sources and versions, or None without a cache."""
+    """Return the folder of compiled kernels for these sources and versions, or None if there is no cache."""
     root = cache_root()
     if root is None:
         return None
@@ -129,7 +129,7 @@ def _is_marked(folder: Path) -> bool:
 
 
 def model_folder() -> Path | None:
-    """Return the folder of generated model modules and their compiled functions, or None without a cache."""
+    """Return the folder of generated model modules and their compiled functions; None without a cache."""
     kernels = kernel_folder()
     if kernels is None:
         return None
@@ -181,7 +181,7 @@ def load_whole(path: Path | None) -> bytes | None:
 
 
 def _made_by_us(root: Path) -> tuple[list[Path], list[Path]]:
-    """List the folders of compiled code that carry our mark, and those with such a name but no mark."""
+    """List the folders of compiled code with our mark, and the folders with such a name but without mark."""
     ours, others = [], []
     for entry in sorted(root.glob("engine-*")):
         is_folder = entry.is_dir() and not entry.is_symlink()

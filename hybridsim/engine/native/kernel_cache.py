@@ -1,4 +1,4 @@
-"""Cache of compiled kernels on disk with the safety rules of the rest of the cache.
+"""A disk cache of compiled kernels, with the same safety rules as the other caches.
 
 A cached kernel is private to this user and checked against its digest; a damaged file is compiled again.
 numba's own cache loads any pickle under a predictable name and ends with a traceback if a file is truncated.

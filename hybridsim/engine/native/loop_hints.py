@@ -1,4 +1,4 @@
-"""Loops over short arrays that LLVM must not unroll or vectorise.
+"""Hints for loops over short arrays, which LLVM should neither unroll nor vectorise.
 
 For arrays of two or three entries most of the code of a vectorised loop only prepares it for long arrays.
 """

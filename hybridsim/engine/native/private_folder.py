@@ -17,7 +17,7 @@ _LINKS = 40  # most links in one path, as in Linux
 
 
 def why_not(path: Path) -> str | None:
-    """Return the reason why other users could have put code at a path; None if they could not.
+    """Return why other users could have written code at a path, or None if they could not.
 
     Missing parts of the path are accepted, since this user creates them.
     """
@@ -79,7 +79,7 @@ def _has_trusted_owner(found: os.stat_result) -> bool:
 
 
 def _unmapped() -> int | None:
-    """Return the user number that stands for unmapped users in this namespace; None if all are mapped."""
+    """Return the user number that this namespace shows for all unmapped users; None if all are mapped."""
     try:
         with open("/proc/self/uid_map") as mapped, open("/proc/sys/kernel/overflowuid") as number:
             knows_all = mapped.read().split() == ["0", "0", "4294967295"]

@@ -190,7 +190,7 @@ else:
 
 @inlined
 def product(row_blocks: Any, k: int, vectors: Any, out: Any) -> None:
-    """Multiply matrix k of an array (K, Q, m, 4) by the vectors of a tuple; compute only the rows of `out`."""
+    """Multiply matrix k of an array (K, Q, m, 4) by the vectors of a tuple, only for the rows of `out`."""
     i = 0
     while i < out.shape[0]:
         short_loop()

@@ -165,7 +165,7 @@ class SegmentBlockList(BlockList[Segment]):
 
     @property
     def is_end_alone(self) -> bool:
-        """Return whether only the end of the run is kept."""
+        """Return whether only the end of the run is stored."""
         return self.window == 0.0
 
     def drop_all_but_end(self) -> None:

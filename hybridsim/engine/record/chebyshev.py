@@ -40,7 +40,7 @@ class ChebyshevDense:
 
 
 def chebyshev_series(dense: Dense, a: float, b: float, sizes: np.ndarray) -> np.ndarray:
-    """Return coefficients (d, n) of dense output between local times a and b; sizes (n,): of the states."""
+    """Return Chebyshev coefficients (d, n) of dense output on [a, b]; sizes (n,): sizes of the states."""
     middle, half = 0.5 * (a + b), 0.5 * (b - a)
     for degree in _DEGREES:
         points = chebyshev.chebpts1(degree + 1)

@@ -1,4 +1,4 @@
-"""Limits on the cost of a run, at which it stops with its results so far."""
+"""Limits on the cost of a run; a run that exceeds one stops and keeps its results."""
 
 from __future__ import annotations
 

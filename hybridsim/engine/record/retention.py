@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 class Retention(NamedTuple):
-    """The time before the end of a run, in the unit of t, for which segments and events are kept; None: not at all."""
+    """Which part of a run is stored: a time before its end, for segments and for events; None: nothing."""
 
     segments: float | None = math.inf
     events: float | None = math.inf

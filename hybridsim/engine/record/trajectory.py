@@ -79,7 +79,7 @@ class Trajectory:
         self.segments.append(end_point(instant, z, p, x))
 
     def close(self, retention: Retention) -> None:
-        """Discard everything that is not to be kept, at the exact times."""
+        """Discard results that are not to be stored, at exact times."""
         if retention == ALL or not self.segments:
             return
         if retention.segments is None:
@@ -105,11 +105,11 @@ class Trajectory:
             self.occurrences.drop(first)
 
     def mark(self, checkpoint: Made) -> None:
-        """Store a function that makes a checkpoint here; the last one is called when the run is over."""
+        """Store a function that makes a checkpoint here; the last stored function is called after the run."""
         self._mark = (checkpoint, self.segments.mark(), self.occurrences.mark(), dict(self.warnings))
 
     def seal(self) -> None:
-        """Make the last mark the checkpoint, because nothing more will be recorded."""
+        """Make the last mark the checkpoint, because the run records nothing more."""
         if self._mark is not None:
             checkpoint, segments, occurrences, self.warnings_there = self._mark
             since = self.segments.since_mark(segments), self.occurrences.since_mark(occurrences)
@@ -159,7 +159,7 @@ def _before(end: Instant, length: float, forward: bool) -> Instant:
 
 @dataclass(frozen=True)
 class Task:
-    """The definition of a run: span, initial state and modes, accuracy, and what is kept."""
+    """The definition of a run: span, initial state and modes, accuracy, and stored results."""
 
     t0: float
     t1: float

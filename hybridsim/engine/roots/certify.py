@@ -156,7 +156,7 @@ def stays_positive(terms: Any, first: int, rest: float, d: float, error: float) 
 
 @inlined
 def past_dip(terms: Any, first: int, longest: float, error: float, backward: Any) -> float:
-    """Return a point just past the minimum of a guard that falls and rises again; 0 if none or too near its error."""
+    """Return a point past the minimum of a guard that falls and rises; 0 if there is no clear minimum."""
     a, b, c = terms[first], terms[first + 1], terms[first + 2]
     if not (b < 0.0 < c and b * b < _DIPS * a * c):
         return 0.0
@@ -174,7 +174,7 @@ def past_dip(terms: Any, first: int, longest: float, error: float, backward: Any
 
 @inlined
 def falls_over(terms: Any, rest: float, longest: float) -> float:
-    """Return how far on both sides a guard falls at least half as fast as here, by its Taylor polynomial, or 0."""
+    """Return up to which distance on both sides a guard falls at least half as fast as here, or 0."""
     steepness = -terms[1]
     if not steepness > 0.0:
         return 0.0

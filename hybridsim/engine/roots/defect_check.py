@@ -19,13 +19,13 @@ BETWEEN = (0.618, 0.236, 0.854, 0.472, 0.09, 0.708, 0.326, 0.944)
 
 
 def ahead_size(order: int, n: int, guards: int) -> int:
-    """Return the length of this array."""
+    """Return the length of the array that `look_ahead` fills."""
     return order + 1 + 4 * n + 2 * guards
 
 
 @inlined
 def parts_of(ahead: Any, order: int, n: int, count: int) -> tuple[Any, Any, Any, Any]:
-    """Return the parts of the array: states, their rates, values of the functions, values of their series."""
+    """Return the parts of the array: states, rates, function values, values of the functions' series."""
     x, f = order + 1, order + 1 + 4 * n
     return ahead[x : x + n], ahead[x + n : x + 2 * n], ahead[f : f + count], ahead[f + count : f + 2 * count]
 
@@ -69,7 +69,7 @@ def values_at(
 def _interpreted_values(
     rows: Any, flow_registers: Any, s: float, x: Any, guard_registers: Any, W: Any, values: Any, rates: Any
 ) -> None:
-    """Compute the same as `values_at` with the interpreter of tapes."""
+    """Compute the values of `values_at` with the interpreter of tapes."""
     time, states, derivatives = flow_registers
     if time >= 0:
         W[time, 0] = s

@@ -1,4 +1,4 @@
-"""The places where a Taylor step has to end because of an exponential or a root that its series does not show.
+"""Places where a Taylor step must end because its series does not show a vanishing exponential or root.
 
 For a rate such as exp(-((t - 1)/w)**2) or 1 + exp(-(v/w)**2) all terms are below rounding far away. This may
 be so at the start and at the end of a step that contains the whole pulse. The series of the argument u has no
@@ -74,7 +74,7 @@ def may_end(u: Any, kind: int, size: float) -> bool:
 
 @kernel
 def where_it_ends(u: Any, kind: int, order: int, h: float, a: Any, stack: Any, code: int) -> float:
-    """Return how far a step of length h may go for a function of u of this kind; u (order + 1,): its series.
+    """Return the length up to h of a step that is safe for a function of this kind; u (order + 1,): a series.
 
     h may be negative; order >= 2. a (order,) or longer, stack (STACK_ROWS, order + 2) or larger: scratch space.
     code: address of a function that does `to_bernstein` for as many coefficients as the order
@@ -104,7 +104,7 @@ def where_it_ends(u: Any, kind: int, order: int, h: float, a: Any, stack: Any, c
 
 @kernel
 def where_a_root_ends(u: Any, order: int, h: float, a: Any, stack: Any, code: int) -> float:
-    """Return the same for sqrt(u): before u falls below a hundredth, if it rises again within the step."""
+    """Return the safe step length for sqrt(u), before u falls below a hundredth and rises again."""
     change, _, _ = _sizes(u, order, h)
     high, low = _FAR_SHARE * u[0], _NEAR_SHARE * u[0]
     if not (u[0] > 0.0 and u[0] - change < low):

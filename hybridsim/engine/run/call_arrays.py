@@ -1,4 +1,4 @@
-"""Arrays of a compiled loop during one call: the state that it advances, and scratch. Later calls reuse them."""
+"""Arrays of one call of a compiled loop: the state that it advances, and scratch; later calls reuse them."""
 
 from __future__ import annotations
 

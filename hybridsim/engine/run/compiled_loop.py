@@ -137,11 +137,11 @@ class CompiledLoopBase(ABC):
 
     @abstractmethod
     def _cost(self, scratch: Any) -> Any:
-        """Return the cost of a call beyond its steps."""
+        """Return the cost of a call except for its number of steps."""
 
     @abstractmethod
     def _count(self, counters: Counters, steps: int, cost: Any) -> None:
-        """Add the cost of the steps, other than their number, to the counters."""
+        """Add the cost of the steps to the counters, except for their number."""
 
     def _block(self, *arrays: np.ndarray) -> SegmentBlock:
         """Return the segments in the arrays as a `SeriesBlock`."""
@@ -298,7 +298,7 @@ class CompiledLoopBase(ABC):
         return self.array_layout.packed(self.memory, (steps, steps, first + 1, *(first,) * 5))
 
     def segments_of(self, kernel_run: KernelRun) -> SegmentBlock:
-        """Return the segments of a call that has some and has not released them."""
+        """Return the segments of a call, which must have stored some and released none."""
         first_step, first = kernel_run.beside[0], kernel_run.first
         lengths, series, ends, origins, modes, vectors, _, jumps = kernel_run.rows
         steps, begun = (

@@ -1,4 +1,4 @@
-"""Stop runs that would take days, and switch to a stiff method if it is faster."""
+"""Stop runs that would take days, and change to a stiff method if that is faster."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class Headway:
             self._check_pace(now, None)
 
     def is_sooner(self, now: Instant, h: float, compiled: bool) -> bool:
-        """Return whether steps of length h to the end would take longer than a stiff method."""
+        """Return whether a stiff method is probably faster than steps of length h up to the end."""
         return abs(self.end.minus(now)) * (_COMPILED_STEP if compiled else _STEP) > _SOONER * abs(h)
 
     def _spent(self) -> float:
@@ -133,7 +133,7 @@ class Headway:
             )
 
     def _fades(self, now: Instant, spent: float, left: float) -> bool:
-        """Return whether several doublings of the cost led no farther each time, and the end is far."""
+        """Return whether several doublings of the cost advanced time by little, and the end is far away."""
         self._cost += spent
         if self._cost < self._twice:
             return False

@@ -1,4 +1,4 @@
-"""The result of one call of a compiled loop: what it wrote, why it ended, and the state there."""
+"""The result of one call of a compiled loop: its output, the reason for its end, and the final state."""
 
 from __future__ import annotations
 

@@ -238,7 +238,7 @@ class Locator:
     def _before(
         self, step: Step, number: int, is_monitor: bool, errors: Callable[[], np.ndarray]
     ) -> Callable[[float], float]:
-        """Return a function of theta: the error of a guard or monitor due to errors at the start of the step."""
+        """Return how errors at the start of the step affect a guard or monitor, as a function of theta."""
         known: list[list[float]] = []
 
         def bound(theta: float) -> float:

@@ -85,7 +85,7 @@ class Located:
     waiting: frozenset[int] = frozenset()
 
     def scope(self, system: System) -> set[int]:
-        """Return the components that are decided before the schedules."""
+        """Return the components whose modes are chosen before schedules are applied."""
         return set(range(len(system.automata))) - self.waiting
 
 
@@ -164,7 +164,7 @@ def as_stepped(system: System, at: Situation, arrival: Arrival, segment: Segment
 def _as_due(
     system: System, origin: Instant, at: Situation, series: Any, arrival: Arrival, known_at: float
 ) -> tuple[Situation, Any]:
-    """Return the state at a scheduled time, with a bound for the rounding of that time if more is zero within it."""
+    """Return the state at a scheduled time; widen its errors if more functions are then zero."""
     slopes = np.abs(system.flow(at.s, at.x, at.p, at.z)) if system.n else 0.0
     wide = replace(at, x_error=at.x_error + known_at * slopes, s_error=at.s_error + known_at)
     known = system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
@@ -173,7 +173,7 @@ def _as_due(
 
 
 def others_near(system: System, at: Situation, series: Any, arrival: Arrival, share: float) -> bool:
-    """Return whether a function that did not fire is zero within `share` times its bound, by rounding of steps."""
+    """Return whether rounding may make another function zero, within `share` times its bound."""
     active = set(map(int, np.flatnonzero(system.active(at.z) & ~system.is_corner[system.owner])))
     monitors = set(range(len(series.monitors))) - set(arrival.stopping)
     values = [(series.guards[g][0], series.guard_bounds[g][0]) for g in active.difference(arrival.fired)]
@@ -189,7 +189,7 @@ def _zero_count(system: System, origin: Instant, at: Situation, arrival: Arrival
 
 
 def _is_near(series: Any, arrival: Arrival, guard: int, s: float) -> bool:
-    """Return whether a near-grazing of a guard is its zero at the event itself."""
+    """Return whether a near-grazing of a guard is the zero at the event itself."""
     return abs(arrival.s - s) <= 2.0 * time_error(series.guards[guard], series.guard_bounds[guard])
 
 
@@ -217,7 +217,7 @@ def _before_instant(series: Any, arrival: Arrival, segment: SegmentRun) -> np.nd
 
 
 def located_backward(system: System, origin: Instant, arrival: Arrival, segment: SegmentRun) -> Located:
-    """Return the same backward in time, where no schedules take part."""
+    """Return the guards and monitors that are zero and the state, backward in time, without schedules."""
     at = situation(system, arrival, segment)
     fired = coincident(system, origin, at, arrival.fired) if arrival.fired else {}
     sides = segment.locator.monitor_sides

@@ -92,7 +92,7 @@ class ModeLoop:
         return self.lazy_state.p
 
     def _set_state(self, instant: Instant, make: Callable[[], Outcome]) -> None:
-        """Set the state at an instant, which is made on demand."""
+        """Set the instant at which the next segment begins; its state is made on demand."""
         self.lazy_state = LazyState(self.system, instant, self.forward, make)
 
     def _progress(self, instant: Instant) -> None:
@@ -102,7 +102,7 @@ class ModeLoop:
             self.limit_monitor.check()
 
     def _stepped(self, instant: Instant, run: SegmentRun) -> None:
-        """Do the same after a step in Python; raises NoHeadway and TakenOver as well."""
+        """Report progress after a step in Python; check limits and pace (raises NoHeadway, TakenOver)."""
         self._progress(instant)
         self.headway.step(instant, run)
         if self.notices.look_on_the_way(run):
@@ -217,7 +217,7 @@ class ModeLoop:
     def _no_farther(
         self, target: Instant, appointment: Appointment | None
     ) -> tuple[Instant, Appointment | None]:
-        """Return the target and its appointment, or the end of the longest allowed segment if it is nearer."""
+        """Return the target with its appointment, or the end of the longest allowed segment if earlier."""
         reach = self._reach()
         if abs(target.minus(self.origin)) <= reach:
             return target, appointment
@@ -433,7 +433,7 @@ class ModeLoop:
         error: np.ndarray,
         s_error: float,
     ) -> list[tuple[object, ...]]:
-        """Return the resets of monitors that fire at zero. They read the same state as guards that are zero with them.
+        """Return the resets of monitors that fire at an instant; they read the state before all changes.
 
         Guards, schedules and inputs of the instant decide which monitors fire; the resets of monitors do not.
         """
@@ -464,7 +464,7 @@ class ModeLoop:
         return resolution.run(fired, resets)
 
     def _apply_crossed(self, outcome: Outcome, s: float, monitors: MonitorSides) -> Outcome:
-        """Apply the resets of monitors that an event or another such reset moved off their sides."""
+        """Apply the resets of monitors that changed sides because of an event or of another such reset."""
         changes = list(outcome.changes)
         while not outcome.status and self.forward and (due := monitors.fire(outcome, "reset")):
             monitors.fire(outcome)
@@ -485,7 +485,7 @@ class ModeLoop:
         error: np.ndarray,
         s_error: float = 0.0,
     ) -> Outcome:
-        """Resolve a scheduled instant with the inputs that hold from then on.
+        """Resolve a scheduled instant with the inputs that hold after it.
 
         before: the outcome that holds until then. s_error: error of the times of zeros located there. An event that was
         resolved within two roundings of the instant has its zero there as well.

@@ -291,7 +291,7 @@ class SegmentRun:
         return self._at_step_end(stepper, step, found)
 
     def _has_not_moved(self, step: Step, hit: Hit, is_monitor: bool) -> bool:
-        """Return whether a guard leaves in the first step before its own series has moved it from zero.
+        """Return whether a guard was located in the first step before its series exceeds rounding.
 
         The step then contradicts the flow at its start, as a long step of a stiff method may if the motion grows away
         from the surface. A shorter step is searched instead.
@@ -443,7 +443,7 @@ class SegmentRun:
         return bool(abs(values[number, 0]) <= bounds[number, 0])
 
     def _look_for_entries(self, step: Step, arrival: Arrival | None) -> tuple[Step, Arrival | None]:
-        """Stop a backward run where the present mode may have been entered through a guard of another."""
+        """Stop a backward run if the present mode may have been entered through a guard of another mode."""
         for entry in self.entries:
             sample = self._entry_sampler(step, entry)
             found, *_ = find_roots(sample, sample(POINTS), 0, 0, 0, lambda: 0.0, lambda _: 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""The set-up of a run before its first instant. It is stored with the task, because it is the same for each run."""
+"""The set-up of a run before its first instant, stored with the task for all its runs."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class RunSetup:
 
     @property
     def silent_start(self) -> StateBuffer | None:
-        """Return the read-only state at the start if it causes no record, known from the second run on.
+        """Return the read-only start state if an earlier run has shown that the start records nothing.
 
         The result is None if an event is recorded at the start, if there are schedules or input signals, or if there is
         no compiled loop.

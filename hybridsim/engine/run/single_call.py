@@ -87,7 +87,7 @@ class LazyTrajectory(Trajectory):
 
 
 class _FailedCall:
-    """A stand-in for a compiled loop whose first call raised an error, so that the mode loop handles the error."""
+    """A substitute for a compiled loop whose first call failed; it raises the error in the mode loop."""
 
     kernel_run = None
 
@@ -103,7 +103,7 @@ _cannot_accumulate = Precompiled(cannot_accumulate)
 
 
 def _is_over(system: System, kernel_run: KernelRun) -> bool:
-    """Return whether the call is certainly the whole run: its events have no limit and hide no bounces."""
+    """Return whether the call is certainly the whole run: no events accumulate, no bounces are hidden."""
     if not kernel_run.is_at_target or kernel_run.has_news or not kernel_run.count:
         return False
     if kernel_run.events == 0:

@@ -200,7 +200,7 @@ class CompiledLoop(Protocol):
         """Add the cost of a call to the counters."""
 
     def segments_of(self, kernel_run: KernelRun) -> SegmentBlock:
-        """Return the segments of a call that has some and has not released them."""
+        """Return the segments of a call, which must have stored some and released none."""
 
     def forget_segments(self, kernel_run: KernelRun) -> bool:
         """Release the memory of segments except the end of the last one. Return False if it is needed.

@@ -22,7 +22,7 @@ _TIGHTEST = 1e-15  # tightest tolerance of series in double precision
 
 
 def short_order(rtol: float) -> int:
-    """Return the cheapest order of series if only convolutions cost time: 1 - ln(rtol)/2.
+    """Return the cheapest order of series if convolutions dominate the cost: 1 - ln(rtol)/2.
 
     The number of convolutions grows with the square of the order (Jorba and Zou 2005, section 3).
     """

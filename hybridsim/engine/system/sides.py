@@ -1,4 +1,4 @@
-"""Determine the modes of components that a state alone decides: corners, jumps, and pieces of tables."""
+"""Find the modes of components that depend on the state alone: corners, jumps, and pieces of tables."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 def modes_by_state(
     system: System, components: Iterable[int], s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray
 ) -> np.ndarray:
-    """Return the modes z, with those of some components replaced by the modes that hold at x.
+    """Return the modes z in which some components have the modes that are valid at x.
 
     A component on a border keeps its mode if that is one of the two; on a surface it holds if possible. An argument may
     have corners itself, so the modes are computed again until none changes.
@@ -36,7 +36,7 @@ def modes_by_state(
         return automaton.above if above else automaton.below
 
     def on_side(c: int, automaton: Automaton) -> int:
-        """Return the mode of a corner or a table, by following borders."""
+        """Return the mode of a corner or a table at x, found from one mode to the next."""
         mode = int(z[c])
         for _ in automaton.modes:
             k = violated(c, mode)

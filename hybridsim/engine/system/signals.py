@@ -77,7 +77,7 @@ class Signal:
         return min(ahead_of, key=float) if forward else max(ahead_of, key=float)
 
     def _step_turns(self, near: Instant) -> list[tuple[Instant, float]]:
-        """Return the changes of a step input near an instant, each with the value from then on."""
+        """Return the changes of a step input near an instant, each with the value that follows it."""
         if self._period == 0.0:
             return [(Instant(time), value) for time, value in self._turns]
         k0 = math.floor(float(near) / self._period)

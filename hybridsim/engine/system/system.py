@@ -505,7 +505,7 @@ class System:
     def _differences(
         self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray, x_error: np.ndarray, s_error: float
     ) -> DifferenceSeries:
-        """Return the same by finite differences, for models of Python functions."""
+        """Return the series by finite differences, for models of Python functions."""
         guards = self.guard_count
         shape = (guards + len(self.monitor_names), ORDER + 1)
         C, G, E = np.empty((self.n, ORDER + 1)), np.empty(shape), np.empty(shape)

@@ -53,7 +53,7 @@ class ClosedFormLoop:
 
     @property
     def place(self) -> tuple[np.ndarray, ...]:
-        """The horizon of the tables and the last zeros of guards, which affect the last digits of later zeros.
+        """Return the horizon of the tables and the last zeros of guards, which affect later zeros slightly.
 
         The hints are stored with their mode vectors, because another process has these in other rows.
         """
@@ -85,7 +85,7 @@ class ClosedFormLoop:
         self.hints[rows] = hints[is_known]
 
     def go(self, origin: Instant, buffer: StateBuffer, target: Instant) -> KernelRun | None:
-        """Call the kernel; return None without tables."""
+        """Call the kernel; return None if there are no tables."""
         system, tape_cache = self.system, self.tape_cache
         tape_cache.surround(buffer.part("z"))
         tapes, inputs = tape_cache.tapes, system.registers.inputs
@@ -130,7 +130,7 @@ class ClosedFormLoop:
     def advance(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
     ) -> LoopResult:
-        """Advance through ordinary events as far as the buffers last."""
+        """Run over ordinary events until another kind of event, the target, or the end of the arrays."""
         kernel_run, self.kernel_run = self.kernel_run or self.go(origin, buffer_of(outcome, p), target), None
         if kernel_run is None:
             return LoopResult(origin, outcome.copy, BEFORE_SOMETHING, np.zeros((0, 2)), _NO_OWNERS)
@@ -154,7 +154,7 @@ class ClosedFormLoop:
         return True
 
     def _array_layout(self, tables: LinearTables) -> ArrayLayout:
-        """Return the arrays for the kernel's output; the trajectory keeps them, those of the events longest."""
+        """Return the layout of the arrays that the kernel writes; event arrays are stored longest."""
         widest, system = tables.values.shape[1], self.system
 
         def made() -> ArrayLayout:
@@ -177,7 +177,7 @@ class ClosedFormLoop:
         return array_layout
 
     def segments_of(self, kernel_run: KernelRun) -> ClosedFormBlock:
-        """Return the segments of a call that has some and has released none."""
+        """Return the segments of a call, which must have stored some and released none."""
         ends, origins, numbers, modes, vectors, coordinates, _, jumps = kernel_run.rows
         begun, tables = slice(0, kernel_run.count), kernel_run.beside[0]
         return ClosedFormBlock(

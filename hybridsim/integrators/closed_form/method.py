@@ -67,6 +67,6 @@ class Exact(Integrator):
         first_step: float | None,
         watch: Watch,
     ) -> Stepper:
-        """Begin a smooth segment that contains something unusual."""
+        """Begin a smooth segment in the general mode loop, by Taylor series with a tight tolerance."""
         tight = Tolerances(_TIGHTEST, 1e-3 * tolerances.atol, tolerances.max_step)
         return TaylorStepper(flow, x0, s_bound, tight, first_step)

@@ -169,7 +169,7 @@ def scratch_for(system: Any, tables: Any) -> Scratch:
 
 @inlined
 def stopped(hints: Any, k: int, former: Any) -> int:
-    """Restore the hints of the current segment, because its zeros are not committed."""
+    """Restore the initial guesses of zeros for the current segment, because the segment is not committed."""
     put(former, hints[k])
     return STOPPED
 
@@ -177,7 +177,7 @@ def stopped(hints: Any, k: int, former: Any) -> int:
 def linear_event_loop(
     automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any, scratch: Any, record: Any
 ) -> int:
-    """Go from event to event and return why it ended; FULL also means a second of following guards, or growth.
+    """Run from event to event and return why the loop ended; FULL: full arrays, much work, or growing states.
 
     The kernel is called by address, so that it is compiled once for all callers. automata, tapes, inputs,
     state and work are as for `event_loop`; lin: tables of linear modes; record: output for segments and events.

@@ -1,4 +1,4 @@
-"""Gaps of unilateral contacts at the steps of a method: their signs, as far as rounding determines them."""
+"""Find the signs of the gaps of unilateral contacts at a step, as far as rounding allows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Kernels that all fixed-step methods share: the reasons to return to Python, and sign changes in a step."""
+"""Kernels that all fixed-step methods share: reasons to return to Python, and sign changes in a step."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def leaves_side(before: float, after: float) -> bool:
 def brought_to_zero(
     address: Any, s: float, x: Any, p: Any, z: Any, fresh: Any, is_first: bool, before: Any, after: Any
 ) -> bool:
-    """Return whether the modes at the start of a step brought a monitor to zero from its value after the last step.
+    """Return whether the modes at the start of a step, rather than the motion, set a monitor to zero.
 
     address: the monitors' function, whose values are written to before; after: their values at the end of the
     last step. Monitors for which this holds are marked in fresh.

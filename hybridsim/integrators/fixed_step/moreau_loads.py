@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def refuse_loads_of_friction(model: Model, integrator: str) -> None:
-    """Refuse a contact whose load, or law, uses the friction force of another one.
+    """Refuse a contact whose load or law uses the friction force of another contact.
 
     The sweeps treat each limit as given, except for normal forces. A limit that depends on another friction
     force would be evaluated at the slip force of that contact.

@@ -101,7 +101,7 @@ def _slope(
 def _step(
     addresses: Any, law: Any, table: Any, s: float, h: float, x: Any, p: Any, z: Any, out: Any, work: Any
 ) -> None:
-    """Do the work of `rk4_step`, inlined into its callers."""
+    """Compute one classic Runge-Kutta step, inlined into its callers; see `rk4_step`."""
     rule, every_stage, eps = law
     k, stage, other, modes, sides, surfaces, guards = work[:7]
     n = x.shape[0]

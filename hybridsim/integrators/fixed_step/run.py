@@ -234,7 +234,7 @@ class FixedStepRun:
         return self._declared_event(s, p, why)
 
     def _sides_taken(self) -> np.ndarray:
-        """Return the modes, with held components on the side to which a jump of an input has moved them."""
+        """Return the modes, where held components that an input jump moved are on their new sides."""
         z, p = self.z.copy(), self._vector()
         p[self.system.layout.pin_at] = 0.0
         values = self.system.rows(
@@ -250,7 +250,7 @@ class FixedStepRun:
         return z
 
     def _gaps(self) -> dict[int, tuple[int, bool]]:
-        """Return `gaps` of the present states."""
+        """Return the signs of all gaps at the present states; see `gaps`."""
         if not self.system.is_unilateral.any():
             return {}
         p = self._vector()
@@ -320,14 +320,14 @@ class FixedStepRun:
         return self.march.trial(s, tau, self.x, p, self.z)
 
     def _monitors(self, s: float, x: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Return the monitors at the unchanged states, not at held states evaluated from constraints."""
+        """Return the monitors at the integrated states; held states are not evaluated from constraints."""
         free = p.copy()
         free[self.system.layout.pin_at] = 0.0
         names = self.system.monitor_names
         return self.system.rows("monitors", len(names), np.array([s]), x[None, :], free, self.z)[0]
 
     def _turning_back(self, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-        """Return which monitors are exactly zero here and return to their previous side."""
+        """Return which monitors are exactly zero at this instant and return to their previous side."""
         back = np.zeros(len(after), dtype=np.bool_)
         if (after == 0.0).any():  # use the inputs after this instant
             series = self.system.series(0.0, self.x, self._vector(), self.z, np.zeros(len(self.x)), 0.0)

@@ -40,7 +40,7 @@ def refuse_longer(step: float, max_step: float, name: str) -> None:
 
 
 def refuse_endless(step: float, span: tuple[float, float], name: str) -> None:
-    """Refuse steps so short that the run would not end, which is probably a typing error."""
+    """Refuse steps that are so short that the run would not end; they are probably a typing error."""
     count = abs(span[1] - span[0]) / step
     if count > _MAX_STEPS:
         raise UsageError(

@@ -147,5 +147,5 @@ class RosenbrockPoint(Point):
 
     @cached_property
     def linear(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the linearisation, computed at first use; a repeated step has a start point of its own."""
+        """Return the linearisation, computed on first use."""
         return self._linearised(self.s, self.x)

@@ -41,7 +41,7 @@ class Rodas5P(Integrator):
 
     @property
     def rounding(self) -> float:
-        """Return three times the root sum of squares of the stages' roundings, whose coefficients c are large."""
+        """Return three times the root sum of squares of the rounding errors of the stages."""
         return 2500.0
 
     def start(

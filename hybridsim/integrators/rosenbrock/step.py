@@ -14,7 +14,7 @@ from hybridsim.engine.series.interpreter import advance
 
 @dataclass(frozen=True)
 class RosenbrockTableau:
-    """A method with s stages U_i, in the variables in which nothing is multiplied by the Jacobian J.
+    """A Rosenbrock method with s stages U_i, in the form without products of the Jacobian J and a vector.
 
             (1/(gamma h) - J) U_i = f(t + nodes_i h, x + sum_j a_ij U_j) + sum_j c_ij U_j/h + d_i h df/dt
             x1 = x + sum_i m_i U_i, error = sum_i e_i U_i

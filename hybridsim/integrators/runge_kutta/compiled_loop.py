@@ -101,7 +101,7 @@ class RungeKuttaLoop(CompiledLoopBase):
         )
 
     def fresh_copy(self) -> RungeKuttaLoop:
-        """Return the same loop for another run, which determines its own first step."""
+        """Return a fresh loop for another run, which determines its own first step."""
         other = cast("RungeKuttaLoop", super().fresh_copy())
         *rest, declared_step = self.control
         other.control = (*rest, declared_step.copy())

@@ -100,7 +100,7 @@ class RungeKuttaIntegrator(Integrator):
 
     @property
     def rounding(self) -> float:
-        """Return the rounding of the sums of stages and of the sums within them, which cancel in part."""
+        """Return the rounding error of a step, from the sums of the stages and the sums inside each stage."""
         return self.tableau.rounding
 
     @classmethod

@@ -51,7 +51,7 @@ _PASSES = 3  # error of a first step in tolerances that still passes; its length
 
 @kernel
 def first_length(leading: Any, x: Any, tolerances: Any, series: Any, longest: float) -> float:
-    """Return the length at which the error estimate of a step from the series' origin (n, q + 2) meets the tolerance.
+    """Return the step length at which the error estimate meets the tolerance, from a series (n, q + 2).
 
     leading: q, the coefficients of the main estimate at h**q x^(q)/q! and h**(q + 1) x^(q + 1)/(q + 1)!, then
     q and one such coefficient of the low estimate, with q = 0 if there is none; see `leading_terms`.
@@ -85,7 +85,7 @@ def first_length(leading: Any, x: Any, tolerances: Any, series: Any, longest: fl
 
 @inlined
 def gather(registers: Any, W: Any, out: Any) -> None:
-    """Copy the coefficients of some registers, a row each."""
+    """Copy the coefficients of some registers, one row for each register."""
     for i in range(registers.shape[0]):
         for j in range(out.shape[1]):
             out[i, j] = W[registers[i], j]
@@ -103,7 +103,7 @@ def is_finite(series: Any) -> bool:
 
 @kernel
 def expand_ends(rows: Any, guard_rows: Any, flow_registers: Any, s: float, x: Any, W: Any, out: Any) -> None:
-    """Compute coefficients of the states (n, K) along the flow from (s, x), and in W those of all registers.
+    """Compute the coefficients of the states (n, K) and of all registers (W) along the flow from (s, x).
 
     rows: tape rows of the flow and of further wanted functions; guard_rows: those of them that guards need.
     """
@@ -178,7 +178,7 @@ def land(
     scratch: Any,
     work: Any,
 ) -> tuple[int, float]:
-    """Repeat the step of length h up to the zero of a guard, which the dense output places at d.
+    """Repeat the step of length h up to a guard's zero, which the dense output locates at d.
 
     place: index of the function. The step starts from work.y; its end is in work.x_after, the series there
     are in scratch.right and scratch.guards_right. code: see `series_of`. Newton's method corrects the time until it
@@ -245,7 +245,7 @@ def is_zero(
     state: Any,
     work: Any,
 ) -> bool:
-    """Return whether a guard at the work space's state is zero within twice its rounding and that of the instant."""
+    """Return whether a guard at the present state is zero within twice its error by rounding and time."""
     s_error, y = 8.0 * 2.0**-52 * s, work.y
     call(functions.flow, s, y, state.p, state.z, work.slopes)
     state_errors(automata, s_error, y, scale, state.x_error, state.z, work.slopes, work.y_error)
@@ -274,7 +274,7 @@ def rk_event_loop(
     scratch: Any,
     record: Any,
 ) -> tuple[int, int, int]:
-    """Go from event to event; return why it ended and how many steps and segments were committed.
+    """Run from event to event; return why the loop ended, and how many steps and segments were committed.
 
     parts: `Parts` of the tapes; codes: `EndsCodes` of them. method: tableau, leading terms of its estimates,
     error order, matrices of the Hermite polynomial. control: rtol, atol, order of the guards' series,

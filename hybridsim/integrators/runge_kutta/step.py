@@ -49,7 +49,7 @@ class Tableau:
 
     @cached_property
     def leading_terms(self) -> tuple[int, float, float, int, float]:
-        """Return the first terms of the error estimates on a linear problem, for coefficients x_k = x^(k)/k!.
+        """Return the first terms of the error estimates for a linear problem, as multiples of x^(k)/k!.
 
         On a linear problem a combination e of the stages is sum_k (e . A**(k - 1) 1) k! h**k x_k. Return the
         order q of the main estimate, its coefficients at q and q + 1, then order and coefficient of the low
@@ -66,7 +66,7 @@ class Tableau:
 
     @cached_property
     def real_stability(self) -> float:
-        """Return the largest z with |R(-z)| <= 1 up to it, R(z) = 1 + b.1 z + b.A 1 z**2 + ..., to about 1e-3."""
+        """Return the largest z with |R(-w)| <= 1 on 0 <= w <= z, for R(z) = 1 + b.1 z + b.A 1 z**2 + ..."""
         power, terms = np.ones(len(self.c)), [1.0]
         for _ in self.c:
             terms.append(float(self.b @ power))
@@ -101,7 +101,7 @@ def attempt(
     k: Any,
     out: Any,
 ) -> float:
-    """Try one step of length h from (s, x) with slope dx; write its end to `out`, return its error in tolerances.
+    """Try one step of length h from (s, x) with slope dx; write its end to `out`, return its scaled error.
 
     tableau: `Coefficients`. tolerances: rtol, atol.
     """

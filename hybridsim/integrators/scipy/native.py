@@ -136,7 +136,7 @@ class NativeStepper:
         return steps
 
     def _direction(self, monitor: int, result: Any, s: float) -> int:
-        """Return whether a monitor rises or falls at a zero, from its values at the ends of the step."""
+        """Return +1 if a monitor rises at a zero, else -1, from its values at the ends of the step."""
         ends = np.abs(result.t)
         right = int(np.clip(np.searchsorted(ends, abs(s), side="left"), 1, len(ends) - 1))
         pair = result.t[[right - 1, right]]

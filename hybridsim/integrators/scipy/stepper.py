@@ -67,7 +67,7 @@ class SolverStepper:
         return rate
 
     def _jacobian(self, s: float, x: np.ndarray) -> np.ndarray:
-        """Return the Jacobian, or zero if it is not finite; the step then fails, and SciPy tries a shorter one."""
+        """Return the Jacobian, or zeros if it is not finite, which makes SciPy try a shorter step."""
         jacobian = self.flow.jacobian(s, x)
         return jacobian if np.isfinite(jacobian).all() else np.zeros_like(jacobian)
 

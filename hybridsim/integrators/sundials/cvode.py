@@ -30,7 +30,7 @@ _SMALLEST = 2e-14  # smallest rtol that CVODE accepts
 
 @cache
 def _leave_stdout_alone() -> None:
-    """Make SUNDIALS write its warnings to standard error, unless the user has chosen another place.
+    """Make SUNDIALS write its warnings to standard error, unless the user has chosen another output.
 
     Otherwise they go to C's standard output, among the caller's data. SUNDIALS reads these variables when a
     solver is created. Redirecting the file descriptor around its calls would also redirect the output of
@@ -152,7 +152,7 @@ class CvodeStepper:
 
 
 class _Cvode(Integrator):
-    """The part that both formulas of CVODE share: how a smooth segment begins."""
+    """The common part of both CVODE integrators."""
 
     formulas: ClassVar[str]
     dense_is_accurate: ClassVar[bool] = True

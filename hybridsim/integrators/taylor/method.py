@@ -55,7 +55,7 @@ class TaylorStepper:
         self.creeping, self.since, self.shortest = 0, 0.0, 0.0
 
     def step(self) -> Step:
-        """Return the next step, as long as the series is accurate."""
+        """Return the next step, over which the series are accurate."""
         direction = math.copysign(1.0, self.bound)
         left = abs(self.bound - self.s)
         longest = min(left, self.tolerances.max_step)
@@ -107,7 +107,7 @@ class TaylorStepper:
         return Step(s0, self.s, x0, x1, dense, holds=holds)
 
     def _holds_between(self, coefficients: np.ndarray, h: float) -> bool:
-        """Do the test of `_holds` inside the step, if the rate of a state seems constant."""
+        """Check the equation at points inside the step, if the rate of a state seems constant."""
         moves = np.abs(coefficients[:, 2:]) @ np.abs(h) ** np.arange(2, coefficients.shape[1])
         still = moves <= self.tolerances.atol + self.series.rtol * np.abs(self.x)
         if not (still & self.computed).any():
@@ -135,7 +135,7 @@ class TaylorStepper:
         return bool((defect <= _DEFECT * (scale + self.series.rtol * change)).all())
 
     def restep(self, step: Step, s: float) -> Step:
-        """Repeat a step with a shorter length, because its series is inaccurate at s."""
+        """Prepare a shorter repetition of a step, because its series is inaccurate at s."""
         self.flow.counters.rejected += 1
         self.s, self.x, self.longest = step.s0, step.x0, _SHORTER * abs(s - step.s0)
         return self.step()

@@ -1,4 +1,4 @@
-"""This module writes a mechanical system as an ordinary model, as an independent way to run a small one."""
+"""This module converts a mechanical system to an ordinary model, as an independent way to simulate it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def as_model(system: MechanicalSystem) -> Model:
-    """Return a model with explicit accelerations, M^-1 multiplied in, and contacts with their velocities and laws.
+    """Return a model with explicit accelerations and one contact for each contact of the system.
 
     An angular frequency becomes a parameter, so that its angle stays accurate over any time.
     """

@@ -25,7 +25,7 @@ def finite(part: Declared, what: str, value: Any) -> float:
 
 
 def weights(part: Declared, direction: Any) -> tuple[tuple[tuple[int, float], ...], int]:
-    """Return the non-zero (coordinate, weight) pairs, and the length of a row (0 for a mapping)."""
+    """Return the non-zero weights as (coordinate, weight) pairs, and the row's length (0 for a mapping)."""
     is_mapping = isinstance(direction, Mapping)
     if not (is_mapping or is_row(direction)):
         raise part._fault(

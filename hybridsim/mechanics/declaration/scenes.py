@@ -1,4 +1,4 @@
-"""This module builds known systems of several blocks with friction, with adjustable numbers and values."""
+"""This module builds known systems of several blocks with friction, with adjustable parameters."""
 
 from __future__ import annotations
 

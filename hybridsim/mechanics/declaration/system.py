@@ -29,7 +29,7 @@ Part = TypeVar("Part")
 
 @dataclass(frozen=True)
 class Harmonic:
-    """A force, or base speed, sin*sin(omega t) + cos*cos(omega t), whose phase stays accurate over any time.
+    """A force or base speed sin*sin(omega t) + cos*cos(omega t), with an accurate phase at all times.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""This folder runs mechanical systems by Taylor series, and decides all contacts together at events.
+"""This folder runs mechanical systems by Taylor series, and chooses the modes of all contacts jointly.
 
 Start with `run`, then `loop` (the compiled loop) and `decision`.
 """

@@ -1,4 +1,4 @@
-"""This module computes Taylor series of a run of neighbouring blocks, eight at a time.
+"""This module computes Taylor series of consecutive blocks of a chain, eight blocks at a time.
 
 It does the work of `hybridsim.mechanics.series_loop.expansion` for blocks in a row. Coordinate and contact a of the
 patch have number first + a in the system. The lanes before and after the run hold the series of its neighbours, or
@@ -33,7 +33,7 @@ _SLIP, _BESIDE, _FORWARD, _BASE, _MOBILITY, _HOLDING, _STILL, _DIAGONALS = range
 
 @kernel
 def gather_neighbours(arrays: Any, state: Any, scratch: Any, count: int, tau: float, top: int) -> bool:
-    """Store the values of a patch at tau as `gather` does, if it is a run of neighbours."""
+    """Store the values of a patch at tau if its nodes are consecutive; return whether they are."""
     first, last = scratch.nodes[0], scratch.nodes[0]
     for i in range(count):
         first, last = min(first, scratch.nodes[i]), max(last, scratch.nodes[i])
@@ -60,7 +60,7 @@ def gather_neighbours(arrays: Any, state: Any, scratch: Any, count: int, tau: fl
 
 @kernel
 def clear_beside(arrays: Any, scratch: Any, count: int, top: int) -> None:
-    """Write zeros into the lanes around a run, as far as coupling reaches."""
+    """Write zeros into the lanes on both sides of consecutive nodes, as far as coupling reaches."""
     wide, offsets = scratch.Q.shape[1], arrays.offsets
     before, after = -min(offsets[0], 0), max(offsets[-1], WIDTH)  # including the rest of the last vector
     for k in range(top + 1):
@@ -75,7 +75,7 @@ def _height(arrays: Any) -> int:
 
 @kernel
 def _lay_out(arrays: Any, laws: Any, state: Any, scratch: Any, first: int, count: int, orders: int) -> None:
-    """Lay out coefficients and law constants for each eight of the run.
+    """Arrange the coefficients and the law constants of each group of eight nodes.
 
     Every contact is a lane. Higher coefficients of constants are zero from the start, and the layout of the
     same eight is reused.
@@ -110,7 +110,7 @@ def _lay_out(arrays: Any, laws: Any, state: Any, scratch: Any, first: int, count
 
 @kernel
 def expand_run(arrays: Any, laws: Any, state: Any, scratch: Any, count: int, top: int) -> None:
-    """Compute the series of the gathered run: Q (positions), R (relative velocities), F (forces)."""
+    """Compute the series of consecutive nodes: Q (positions), R (relative velocities), F (forces)."""
     orders = scratch.Q.shape[0]  # the same for every request, so that the layout remains valid
     _lay_out(arrays, laws, state, scratch, state.whole[FIRST], count, orders)
     Q, R, F, W, band_rows, offsets = (
@@ -167,7 +167,7 @@ def expand_run(arrays: Any, laws: Any, state: Any, scratch: Any, count: int, top
 
 @kernel
 def law_holds_in_run(arrays: Any, laws: Any, scratch: Any, count: int, share: float) -> bool:
-    """Return whether the forces in scratch.sums agree with the law at the velocities there, relative to their terms."""
+    """Return whether the forces in scratch.sums agree with the law at the velocities in scratch.sums."""
     sums, W, band_rows = scratch.sums, scratch.W, scratch.band_rows
     orders, wide, height = scratch.Q.shape[0], sums.shape[1], _height(arrays)
     block = laws.registers[0] * orders * WIDTH

@@ -53,7 +53,7 @@ def factorise(arrays: Any, state: Any, scratch: Any, j: int) -> None:
 
 @kernel
 def _anchors(arrays: Any, state: Any, first: int, last: int) -> None:
-    """Choose an anchor coordinate for each sticking contact with several weights that shares no coordinate.
+    """Choose an anchor for each sticking contact with several weights and no coordinate shared with others.
 
     It is the coordinate with the largest weight. Contacts that share coordinates are solved by least squares only.
     """

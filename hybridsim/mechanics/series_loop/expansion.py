@@ -59,7 +59,7 @@ def gather(arrays: Any, state: Any, scratch: Any, count: int, tau: float, top: i
 
 @kernel
 def whole(arrays: Any, state: Any, scratch: Any, top: int) -> tuple[int, int]:
-    """List all coordinates as one group to expand, from the start of the step."""
+    """Make all coordinates one patch, which starts at the beginning of the step."""
     state.whole[FIRST] = -1
     if arrays.offsets.shape[0] > 0:
         state.whole[FIRST] = 0
@@ -124,7 +124,7 @@ def _fill_registers(arrays: Any, laws: Any, state: Any, scratch: Any, nc: int, o
 
 @kernel
 def constants(arrays: Any, laws: Any, scratch: Any, t: int, last: int, orders: int) -> int:
-    """Store the constants of lanes lane_ptr[t]..last - 1 in a tape's registers; return the end of these registers."""
+    """Store the constants of lanes lane_ptr[t]..last - 1 in a tape's registers; return the end."""
     first, at, block = scratch.lane_ptr[t], scratch.place[t], laws.registers[t] * orders * WIDTH
     count, rows = last - first, laws.constant_rows
     end = at + whole_vectors(count) // WIDTH * block
@@ -143,7 +143,7 @@ def constants(arrays: Any, laws: Any, scratch: Any, t: int, last: int, orders: i
 
 @inlined
 def _forces_of_slip(arrays: Any, laws: Any, state: Any, scratch: Any, orders: int, k: int) -> None:
-    """Compute coefficient k of all slip forces from that of the relative velocities."""
+    """Compute coefficient k of all slip forces from coefficients of the relative velocities."""
     for t in range(laws.registers.shape[0]):
         first, count, at = (
             scratch.lane_ptr[t],
@@ -189,7 +189,7 @@ def _relative(arrays: Any, state: Any, scratch: Any, nc: int, k: int) -> None:
 
 @inlined
 def _accelerate(arrays: Any, scratch: Any, nd: int, k: int) -> None:
-    """Compute coefficient k of the accelerations, with slip forces but without those of sticking contacts."""
+    """Compute coefficient k of the accelerations with slip forces, without forces of sticking contacts."""
     dofs, loc, lcon, acc = scratch.dofs, scratch.loc, scratch.lcon, scratch.acc
     q, v, f = scratch.Q[k], scratch.Q[k + 1], scratch.F[k]
     k_ptr, k_col, k_val, b_ptr, b_col, b_val = (
@@ -241,7 +241,7 @@ def _advance(arrays: Any, state: Any, scratch: Any, nd: int, k: int) -> None:
 
 @inlined
 def _hold_one(arrays: Any, state: Any, scratch: Any, j: int, k: int) -> None:
-    """Do the work of `_hold` for a node whose only contact sticks."""
+    """Compute the holding force of a node whose only contact sticks; see `_hold`."""
     c, total = arrays.node_con[j], 0.0
     for e in range(arrays.w_ptr[c], arrays.w_ptr[c + 1]):
         total += arrays.w_val[e] * scratch.acc[scratch.loc[arrays.w_col[e]]]

@@ -1,4 +1,4 @@
-"""This module is the compiled loop: all nodes step together, and an event restarts the nodes that it affects.
+"""This module is the compiled loop: all nodes step together; an event restarts the nodes that it affects.
 
 The series of a node far from an event does not change: a jump of an acceleration changes coefficient 2 + 2 r
 of the positions r couplings away. Beyond half the order nothing changes, and nearer nodes soon change by less
@@ -29,7 +29,7 @@ _ROUNDS = 1000  # events of one node at one instant
 
 @kernel
 def _hold(arrays: Any, state: Any, scratch: Any) -> None:
-    """Compute the phases of bases and forcing at the clock, and make velocities satisfy the stick constraints."""
+    """Compute phases of bases and forcing, and make the velocities satisfy the stick constraints."""
     for r in range(arrays.rates.shape[0]):
         state.phase[r] = phase_of(state.clock[0], state.clock[1], arrays.rates[r], 0.0)
     for j in range(arrays.node_dof.shape[0] - 1):
@@ -87,7 +87,7 @@ def _record_series(arrays: Any, state: Any, scratch: Any, record: Any, count: in
 
 @kernel
 def _grow(arrays: Any, scratch: Any, j: int, radius: int, most: int) -> tuple[int, int]:
-    """Write the nodes within `radius` couplings of j to scratch.nodes; return their number and the first outer one.
+    """Write the nodes within `radius` couplings of j to scratch.nodes; return (count, first outer node).
 
     Returns (-1, 0) if there are more than `most`.
     """
@@ -126,7 +126,7 @@ def _changes_outside(
     top: int,
     rtol: float,
 ) -> float:
-    """Return the change that the new series of the outermost nodes cause outside over a time h, in tolerances."""
+    """Return the effect of the outermost nodes' new series on other nodes over a time h, in tolerances."""
     worst = 0.0
     for i in range(outer, count):
         j = scratch.nodes[i]
@@ -224,7 +224,7 @@ def _record_events(
 
 @kernel
 def _end_step(arrays: Any, state: Any, scratch: Any, tau: float) -> None:
-    """Move all positions and velocities to tau, which becomes the origin."""
+    """Move all positions and velocities to tau, the origin of the next step."""
     for x in range(arrays.dof_node.shape[0]):
         scratch.acc[x] = tau - state.origin[arrays.dof_node[x]]
     for x in range(0, arrays.dof_node.shape[0], WIDTH):
@@ -243,7 +243,7 @@ def _end_step(arrays: Any, state: Any, scratch: Any, tau: float) -> None:
 
 @kernel
 def run(arrays: Any, laws: Any, state: Any, scratch: Any, record: Any, control: Any, target: Any) -> int:
-    """Continue to the target (high, low), or until no continuation exists (see `arrays`).
+    """Continue to the target (high, low), or until no mode is admissible (see `arrays`).
 
     It returns FULL if the record is full, or after the largest number of steps and events of one call.
     """

@@ -223,7 +223,7 @@ def forcing(
 
 
 def bases(contacts: list[MechanicalContact], rates: list[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return (m, 3) constant, sine, cosine of the speed of each base, and the number of its rate (-1 if constant)."""
+    """Return constant, sine and cosine (m, 3) of each base speed, and its rate's number (-1 if constant)."""
     base, rate = np.zeros((len(contacts), 3)), np.full(len(contacts), -1, dtype=np.int64)
     for i, contact in enumerate(contacts):
         if isinstance(contact.base, Harmonic):

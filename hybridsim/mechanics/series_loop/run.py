@@ -58,7 +58,7 @@ _MIN_ORDER = 10  # a lower order makes series useless
 
 
 def _order_in_range(built: Built, span: tuple[float, float]) -> int:
-    """Return the order up to which powers of rates and times are doubles, whatever the unit of time."""
+    """Return the largest order for which powers of rates and times stay in the range of doubles."""
     arrays = built.arrays
     rates = [abs(arrays.k_val).max(initial=0.0) ** 0.5, abs(arrays.c_val).max(initial=0.0), *arrays.rates]
     sizes = [size for size in (max(rates), abs(span[1] - span[0])) if size > 0.0]
@@ -95,7 +95,7 @@ class MechanicalRun:
         self.counters, self.compile_time = Counters(), 0.0
 
     def go(self, progress: Callable[[float], None] | None) -> None:
-        """Run to the end of the span, or until no continuation exists."""
+        """Run to the end of the span, or until no mode is admissible."""
         arrays, laws = packed(self.built.arrays), packed(self.built.laws)
         state, scratch = packed(self.state), packed(self.scratch)
         began, compiled = perf_counter(), seconds_compiling()
@@ -130,7 +130,7 @@ class MechanicalRun:
         self.counters.steps, self.counters.events = self.state.counts[:2].tolist()
 
     def _resolve_start(self, *packs: Any) -> int:
-        """Find the modes at the start: by sign for moving contacts, by decision for resting ones."""
+        """Find the modes at the start: by sign for moving contacts, by joint choice for resting contacts."""
         arrays, state = self.built.arrays, self.state
         state.series[:2, : len(arrays.dof_node)] = state.x
         for r, rate in enumerate(arrays.rates):
@@ -159,7 +159,7 @@ class MechanicalRun:
         return [int(self.built.contacts[c]) for c in range(arrays.node_con[j], arrays.node_con[j + 1])]
 
     def start_segments(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return a segment per node with the start only, for a run that ends where it begins."""
+        """Return one segment of zero length per node, for a run that ends where it begins."""
         node_dof = self.built.arrays.node_dof
         nodes = len(node_dof) - 1
         start = np.zeros((nodes, 3))
@@ -198,7 +198,7 @@ class MechanicalRun:
 
 @kernel
 def _resolve_nodes(arrays: Any, laws: Any, state: Any, scratch: Any) -> int:
-    """Decide the nodes at the start one by one, up to the first without a decision."""
+    """Choose the modes of the nodes at the start one by one; stop at a node without an admissible choice."""
     for j in range(arrays.node_dof.shape[0] - 1):
         state.whole[NODE], state.whole[FIRED], state.real[AT] = j, -1, 0.0
         code = call_kernel(state.kernels[JOINT_CHOICE], (arrays, laws, state, scratch))

@@ -103,7 +103,7 @@ def _leading(op: int, V: Any, a: int, b: int, flag: int, kind: int, o: int, o2: 
 
 @kernel
 def _higher(op: int, V: Any, a: int, b: int, flag: int, out: int, out2: int, k: int) -> None:
-    """Compute order k >= 1 of the operations defined by a differential equation, from indices of coefficient 0."""
+    """Compute order k >= 1 of the operations defined by a differential equation."""
     o, o2, share = out + k * WIDTH, out2 + k * WIDTH, splat(1.0 / k)
     if op == EXP:
         store(V, o, share * _weighted(V, a, out, k, k))

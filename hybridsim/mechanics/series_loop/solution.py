@@ -137,7 +137,7 @@ class MechanicalSolution(ArraysResult):
     def _quantities(
         self, times: np.ndarray, right: bool, states: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return forces and relative velocities (k, m); the states are made to satisfy the stick constraints."""
+        """Return forces and relative velocities (k, m), at states that satisfy the stick constraints."""
         built, (state, scratch) = self._run.built, self._scratch
         forces, velocities = np.empty((2, len(times), len(self.model.contacts)))
         order = np.argsort(times, kind="stable")
@@ -215,7 +215,7 @@ class MechanicalSolution(ArraysResult):
 
     @property
     def x_end(self) -> np.ndarray:
-        """States (2n,) at the end of the run, whatever of it was saved."""
+        """States (2n,) at the end of the run; they are available for every value of `save`."""
         run = self._run
         return run.state.x.reshape(-1)[self._columns].copy()
 
@@ -250,7 +250,7 @@ class MechanicalSolution(ArraysResult):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Warnings of the run: undecided events, and touches of a limit."""
+        """Warnings of the run: events that rounding leaves undecided, and near-grazings."""
         *_, undecided, touches = self._run.state.counts.tolist()
         texts = {
             f"undecided at rounding ({undecided} times)": undecided,

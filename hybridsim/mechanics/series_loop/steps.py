@@ -1,4 +1,4 @@
-"""This module computes the reach of a patch's series and the first exits of its contacts, in a tournament tree."""
+"""This module computes step lengths and the first exits of contacts, in a tournament tree."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def set_time(tree: Any, leaf: int, t: float) -> None:
 
 @kernel
 def first_leaf(tree: Any) -> int:
-    """Return the leaf with the earliest time."""
+    """Return the leaf of the tree with the earliest time."""
     i, half = 1, tree.shape[0] // 2
     while i < half:
         i = 2 * i if tree[2 * i] == tree[i] else 2 * i + 1
@@ -87,7 +87,7 @@ def _largest(scratch: Any, first: Any, second: Any, total: Any) -> tuple[float, 
 def reach(
     arrays: Any, state: Any, scratch: Any, nd: int, nc: int, top: int, rtol: float, longest: float
 ) -> float:
-    """Return the time over which the last two terms of each series stay below its tolerance; NaN if a term is NaN."""
+    """Return the time over which the last two terms of each series are below tolerance, or NaN."""
     h, Q, wide = longest, scratch.Q, scratch.Q.shape[1]
     for a in range(nd):
         x = scratch.dofs[a]
@@ -151,7 +151,7 @@ def _reach_of_bases(
 def _exit_of(
     state: Any, scratch: Any, top: int, terms: int, h: float, order: int, slack: float, is_short: bool
 ) -> tuple[int, float]:
-    """Find the first time in (0, h] at which the polynomial in scratch.poly[:terms] goes negative, in units of h.
+    """Find when the polynomial in scratch.poly[:terms] first becomes negative on (0, h], in units of h.
 
     A polynomial that is zero throughout, or within the rounding `slack` of its terms, does not go negative.
     It is undecided if the series omits terms that are comparable with it, or with its first term after an event.
@@ -181,7 +181,7 @@ def _exit_of(
 
 @kernel
 def _bound_rest(arrays: Any, state: Any, scratch: Any, nc: int, top: int, h: float) -> None:
-    """Sum the positive and the negative terms of each guard of slip (or force of stick) over a time h.
+    """Sum positive and negative terms of each guard (slip) or force (stick) over a time h, except the first.
 
     The first term is left out; results go to scratch.sums, rows 1 and 2.
     """
@@ -205,7 +205,7 @@ def _bound_rest(arrays: Any, state: Any, scratch: Any, nc: int, top: int, h: flo
 def _is_far(
     series: Any, i: int, last: int, lead: float, fall: float, power: float, h: float, most: float
 ) -> bool:
-    """Return whether a guard that begins at `lead` stays clear of zero for `first_exit`, whatever its terms do.
+    """Return whether a guard with the value `lead` certainly stays positive up to the time h.
 
     fall: sum of the negative terms, each of which acts in part only; power: h**last; most: size of all terms.
     """
@@ -217,7 +217,7 @@ def _is_far(
 def isolate(
     arrays: Any, state: Any, scratch: Any, nc: int, tau: float, h: float, top: int, is_short: bool
 ) -> tuple[int, float]:
-    """Find the first exit of each contact over (0, h]; return (OPEN, fraction) if one is undecided."""
+    """Find the first exit of each contact over (0, h]; return (OPEN, fraction) if an exit is undecided."""
     _bound_rest(arrays, state, scratch, nc, top, h)
     power = h ** (top - 2)
     for i in range(nc):
@@ -261,7 +261,7 @@ def isolate(
 
 @kernel
 def _at_ends(scratch: Any, nc: int, h: float, top: int) -> None:
-    """Compute relative velocities and forces at the end, or at the exits, and their largest terms, to scratch.sums."""
+    """Compute relative velocities and forces at the end or at the exits, and their largest terms."""
     R, F, sums = scratch.R, scratch.F, scratch.sums
     wide = R.shape[1]
     for i in range(whole_vectors(nc)):
@@ -285,7 +285,7 @@ def _at_ends(scratch: Any, nc: int, h: float, top: int) -> None:
 def _law_holds(
     arrays: Any, laws: Any, state: Any, scratch: Any, nc: int, h: float, top: int, rtol: float
 ) -> bool:
-    """Return whether slip forces agree with their laws at the end of the patch's series, or at their exits."""
+    """Return whether slip forces agree with their laws at the end of the series, or at the exits."""
     _at_ends(scratch, nc, h, top)
     if state.whole[FIRST] >= 0:
         share = _DEFECT * rtol + 64.0 * _UNIT
@@ -341,7 +341,7 @@ def step_length_kernel(arrays: Any, laws: Any, state: Any, scratch: Any) -> int:
 
 @inlined
 def step_length(arrays: Any, laws: Any, state: Any, scratch: Any, longest: float, rtol: float) -> float:
-    """Return the length over which the series of the expanded patch are used, and find its exits up to there.
+    """Return the length over which the patch's series are used, and find its exits up to this length.
 
     NaN if there is no such length.
     """

@@ -155,7 +155,7 @@ def slip_forces(arrays: Any, laws: Any, scratch: Any) -> None:
 
 @kernel
 def sweep(arrays: Any, state: Any, scratch: Any, h: float, tolerance: float) -> bool:
-    """Compute impulses for given slip forces by projected Gauss-Seidel sweeps; return whether they converged.
+    """Compute impulses for given slip forces by projected Gauss-Seidel; return whether they converged.
 
     Only contacts with a changed neighbour are swept. A friction impulse is positive along its direction, so that a
     force f gives - h f.
@@ -221,7 +221,7 @@ def sweep(arrays: Any, state: Any, scratch: Any, h: float, tolerance: float) -> 
 def impulses(
     arrays: Any, laws: Any, state: Any, scratch: Any, h: float, tolerance: float, iterations: int
 ) -> bool:
-    """Compute the impulses of a step, with slip forces at its end velocities; return whether they converged."""
+    """Compute the impulses of a step, with slip forces at the end velocities; return if they converged."""
     nc = scratch.speed.shape[0]
     slip_forces(arrays, laws, scratch)
     for _ in range(iterations):
@@ -250,7 +250,7 @@ def impulses(
 
 @kernel
 def begin(arrays: Any, state: Any, scratch: Any, h: float, theta: float, t: float, t_after: float) -> None:
-    """Prepare a step: free velocities and rates, and the gaps that may exert a force."""
+    """Prepare a step: velocities and rates without impulses, and the gaps that may exert a force."""
     n, nc = state.q.shape[0], scratch.speed.shape[0]
     forces_at(arrays, t_after, scratch.force_after)
     for x in range(n):
@@ -282,7 +282,7 @@ def begin(arrays: Any, state: Any, scratch: Any, h: float, theta: float, t: floa
 
 @kernel
 def finish(arrays: Any, state: Any, scratch: Any, h: float, theta: float) -> None:
-    """Compute velocities and positions at the end of a step from its impulses, and the works in it.
+    """Compute velocities and positions at the end of a step from its impulses, and the works of the step.
 
     An impulse does the work of the mean of the velocities before and after, whatever theta is.
     """
@@ -342,7 +342,7 @@ def steps(
     first: int,
     count: int,
 ) -> int:
-    """Make `count` steps; return the number done, which is smaller if the record is full or a state is NaN.
+    """Make up to `count` steps; stop if the record is full or a state is NaN. Return the number of steps.
 
     settings: step, theta, tolerance, iterations. record.used: numbers of rows of states and of events.
     """

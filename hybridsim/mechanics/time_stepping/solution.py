@@ -212,12 +212,12 @@ class SteppedSolution(ArraysResult):
 
     @property
     def x_end(self) -> np.ndarray:
-        """States (2n,) at the end of the run, whatever of it was saved."""
+        """States (2n,) at the end of the run; they are available for every value of `save`."""
         return np.concatenate([self._run.state.q, self._run.state.v])
 
     @property
     def work(self) -> dict[str, float]:
-        """Energy that the system gets from each source; see the class."""
+        """Energy that the system receives from each source; see the class."""
         return dict(zip(_WORKS, self._run.state.work.tolist(), strict=True))
 
     @property

@@ -1,4 +1,4 @@
-"""This package holds exact solutions of particular systems, which it recognises by structure, as references."""
+"""This package contains exact solutions of particular systems, recognised by their equations."""
 
 from __future__ import annotations
 

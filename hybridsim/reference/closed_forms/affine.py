@@ -1,4 +1,4 @@
-"""This module reads an expression as a linear form in chosen names plus sine waves of time, if it is one."""
+"""This module converts an expression to a linear form in chosen names plus sine waves of time."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Affine:
 
 
 class NotAffine(Exception):
-    """The expression is not a linear form with sines."""
+    """This error reports an expression that is not a linear form plus sine waves."""
 
 
 def affine(
@@ -45,7 +45,7 @@ def affine(
     values: Mapping[str, float],
     definitions: Mapping[str, Expression],
 ) -> Affine:
-    """Return the linear form of an expression in the `unknowns`; raise `NotAffine` if there is none."""
+    """Return the linear form of an expression in the `unknowns`; raise `NotAffine` if it has another form."""
     try:
         return _read(expression.tree, unknowns | {TIME}, values, definitions)
     except (NoValue, KeyError) as fault:

@@ -1,4 +1,4 @@
-"""This module defines the closed form of a motion, as comparisons use it."""
+"""This module defines the closed form of a motion, which comparisons use as a reference."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""This module recognises a forced linear oscillator with one Coulomb contact, and gives its exact motion.
+"""This module recognises a forced linear oscillator with one Coulomb contact, and returns its exact motion.
 
 It uses the declarations of the model (one contact whose force does not depend on the speed, rates that are
 linear in the states, one sine) and never its name.

@@ -112,7 +112,7 @@ class ForcedCoulombOscillator:
         return SLIP_FORWARD if push > 0 else SLIP_BACKWARD
 
     def _release(self, x: float, angle: float) -> tuple[float, str] | None:
-        """Return the forcing angle at which the push next leaves the stick limits, and the slip that follows."""
+        """Return the angle at which the force next exceeds the stick limits, and the slip mode after it."""
         exits = []
         for direction, mode in ((1.0, SLIP_FORWARD), (-1.0, SLIP_BACKWARD)):
             # The push times `direction` rises through the limit at |force| sin(angle') = level.

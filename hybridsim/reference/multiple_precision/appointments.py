@@ -20,7 +20,7 @@ _SAME = 2.0**-51
 
 @dataclass(frozen=True)
 class Appointment:
-    """A time at which a step must end, and the numbers of the schedules that are due then."""
+    """A time at which a step must end, with the numbers of the schedules that are due."""
 
     t: Number
     schedules: tuple[int, ...]
@@ -43,7 +43,7 @@ class Appointments:
                 clock.count += 1
 
     def next(self, t: Number) -> Appointment:
-        """Return the next appointment after t, at last the end of the run; `mark_done` marks its schedules as done."""
+        """Return the next appointment after t, finally the end of the run."""
         ahead = [(time, k) for k, clock in enumerate(self._clocks) if (time := clock.next) is not None]
         nearest = min((time for time, _ in ahead), default=self._t1)
         knots = [knot for signal in self._signals if (knot := signal.next_knot(t)) is not None]
@@ -63,7 +63,7 @@ class Appointments:
 
 
 class _Clock:
-    """The times of one schedule, and the number of past ones."""
+    """The times of one schedule, and how many of them have passed."""
 
     def __init__(self, schedule: Schedule, values: dict[str, float], precision: Precision) -> None:
         self._times = sorted(precision.number(evaluate(time, values)) for time in schedule.times)
@@ -83,7 +83,7 @@ class _Clock:
         return self._start if self._period is None else self._start + k * self._period
 
     def times_at(self, k: int, t: Number) -> int:
-        """Return how many times from the k-th on are equal to t."""
+        """Return how many consecutive times, from the k-th on, are equal to t."""
         count = 0
         while (time := self.time(k + count)) is not None and _same(time, t):
             count += 1

@@ -1,4 +1,4 @@
-"""This module holds the Taylor series of the motion from one instant: their reach, and their signs just after it."""
+"""This module stores Taylor series from one instant, with their accurate range and initial signs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _FOREVER = 1000.0
 
 @dataclass(frozen=True)
 class Term:
-    """A term of a sum, whose size bounds the rounding of the sum; ``late`` if it belongs to its rate."""
+    """A term of a sum, whose size bounds the rounding of the sum; ``late``: it is a term of the rate."""
 
     log2_factor: int
     c: Coefficients
@@ -63,11 +63,11 @@ class Expansion:
 
     @cached_property
     def reach(self) -> Number:
-        """Return the reach of the series by their own terms."""
+        """Return the time over which the series are accurate relative to their own terms."""
         return self.reach_above([self.precision.context.zero] * len(self.states))
 
     def reach_above(self, sizes: Sequence[Number]) -> Number:
-        """Return the reach: the last two terms are below 10^-digits of the largest term, or of a state's size."""
+        """Return the time over which the last two terms are below 10^-digits of the largest one."""
         log2_reach = [self._log2_reach(state.c, size) for state, size in zip(self.states, sizes, strict=True)]
         log2_reach += [
             self._log2_reach(quantity.c, self.precision.context.zero) for quantity in self.quantities
@@ -110,11 +110,11 @@ class Expansion:
         return 0, 0
 
     def is_zero(self, quantity: QuantitySeries) -> bool:
-        """Return whether it is zero at the start."""
+        """Return whether a quantity is zero at the start."""
         return bool(abs(quantity.c[0]) <= self.precision.zero * self.scale(quantity))
 
     def scale(self, quantity: QuantitySeries) -> Number:
-        """Return the size of the largest of its terms within reach, to the next power of two."""
+        """Return the largest term of a quantity within the accurate range, to the next power of two."""
         log2_reach = self.precision.log2(self.reach)
         sizes = [
             max(log + n * log2_reach for n, log in logs) + term.log2_factor + log2_reach * term.late
@@ -125,7 +125,7 @@ class Expansion:
 
 
 def terms_of(node: Node, rates: Mapping[int, Node]) -> tuple[Term, ...]:
-    """Return the terms of a sum with constant factors multiplied out; a state also has the terms of its rate."""
+    """Return the terms of a sum, without constant factors; for a state also the terms of its rate."""
     found: list[Term] = []
     log2 = node.context.mag
     open_ = [(node, 0, False)]

@@ -30,7 +30,7 @@ class Holding:
         self.pins: list[int] = []
 
     def begin(self, effects: list[list[Number]]) -> None:
-        """Store the change of the rates per unknown; find the slopes, and a pinned state for each surface."""
+        """Store the effects of the unknowns; find the surface slopes and the states to solve for."""
         self._effects = effects
         self._find_slopes()
         self._product = [[self.context.fdot(row, effect) for effect in effects] for row in self._slopes]
@@ -55,11 +55,11 @@ class Holding:
         return [-value for value in self._solve(self._product, rates)]
 
     def reach_of(self, unknowns: Sequence[Number]) -> Number:
-        """Return the largest rate of a surface that unknowns of this size cause."""
+        """Return the largest rate of a surface that unknowns of a given size cause."""
         return max(abs(a * u) for row in self._product for a, u in zip(row, unknowns, strict=True))
 
     def pin_changes(self, values: list[Number]) -> list[Number]:
-        """Return the decrease of the pinned states' coefficients that makes these surface coefficients zero."""
+        """Return corrections of the pinned states' coefficients that make these surface coefficients zero."""
         return self._solve([[row[i] for i in self.pins] for row in self._slopes], values)
 
     def coupled(self, index: int) -> set[int]:

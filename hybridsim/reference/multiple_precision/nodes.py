@@ -28,15 +28,15 @@ class Node:
 
     @property
     def delayed(self) -> tuple[Node, ...]:
-        """Return nodes of which only lower coefficients are used, so that they need not be computed first."""
+        """Return operands of which only lower coefficients are used, and which may be computed later."""
         return ()
 
     def coefficient(self, n: int) -> Number:
-        """Return the n-th coefficient; it is zero beyond the first of a constant."""
+        """Return the n-th coefficient; a constant has zeros after the first coefficient."""
         return self.c[n] if n < len(self.c) else self.context.zero
 
     def extend(self, n: int) -> None:
-        """Append the n-th coefficient; a constant has the first only."""
+        """Append the n-th coefficient; a constant has only the first coefficient."""
         raise NotImplementedError
 
     def forget(self, n: int) -> None:
@@ -58,7 +58,7 @@ class Held(Node):
 
 
 class ExternalSeries(Node):
-    """A series that is set from outside: a state, an unknown force, the time, an input."""
+    """A series whose coefficients its owner sets: a state, an unknown force, the time, an input."""
 
     __slots__ = ()
 
@@ -131,7 +131,7 @@ class Quotient(Node):
 
 
 class Power(Node):
-    """The power u**exponent for a fixed exponent that is not a small integer; u must not be zero."""
+    """The power u**exponent for a constant exponent other than a small integer; u must not be zero."""
 
     __slots__ = ("exponent",)
 
@@ -154,7 +154,7 @@ class Power(Node):
 
 
 class Integral(Node):
-    """The function f(u) with f' = slope, a node that may depend on f: n f_n = sum of k u_k slope_(n-k)."""
+    """The function f(u) with derivative `slope`, which may depend on f: n f_n = sum of k u_k slope_(n-k)."""
 
     __slots__ = ("first", "slope", "weights")
 
@@ -182,7 +182,7 @@ class Integral(Node):
 
 
 class Pointwise(Node):
-    """A quantity with a value but without a series if its operands move: a corner, a jump, a condition."""
+    """A corner, a jump or a condition: it has a value, and a series only while its operands are constant."""
 
     __slots__ = ("function", "text")
 

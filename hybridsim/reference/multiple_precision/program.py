@@ -36,7 +36,7 @@ class Point:
 
 
 class Program:
-    """The Taylor series of the states and the watched quantities in one combination of modes."""
+    """The Taylor series of states, guards and monitors in one combination of modes."""
 
     def __init__(self, reading: Reading, precision: Precision, longest: Number) -> None:
         self.reading, self.precision, self.context = reading, precision, precision.context
@@ -111,7 +111,7 @@ class Program:
         return node.c[0]
 
     def project(self, point: Point) -> Point:
-        """Return the point with the held surfaces exactly zero; one state per surface is changed."""
+        """Return the point with the held surfaces exactly zero, by a change of one state for each surface."""
         if self.holding is None:
             return point
         x = list(point.x)
@@ -136,7 +136,7 @@ class Program:
                 node.extend(n)
 
     def _first_coefficients(self) -> None:
-        """Compute order 0: rates with all unknowns zero and with each of them 1, and from these the unknowns."""
+        """Compute order 0: the rates without unknowns and with each unknown equal to 1, then the unknowns."""
         one, zero = self.context.one, self.context.zero
         rates: list[list[Number]] = []
         for j in (*range(len(self.unknowns)), -1):  # finally with all of them zero
@@ -184,7 +184,7 @@ class Program:
         return rates
 
     def _states(self, n: int) -> None:
-        """Append the n-th coefficients of the states; the pinned ones follow from their surfaces."""
+        """Append the n-th coefficients of the states; pinned states follow from their surfaces."""
         for state, rate in zip(self.states, self.reading.rates, strict=True):
             state.c.append(rate.coefficient(n - 1) / n)
         if self.holding is not None:

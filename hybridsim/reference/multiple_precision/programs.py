@@ -43,11 +43,11 @@ class Programs:
         return tuple(component.initial or UNDECIDED for component in self.components)
 
     def decided(self, modes: Modes) -> Modes:
-        """Return the modes with undecided components holding; their surfaces are the same functions in every mode."""
+        """Return the modes with every undecided component holding, which does not affect the surfaces."""
         return self.held(modes, [c for c, mode in enumerate(modes) if mode == UNDECIDED])
 
     def held(self, modes: Modes, components: Iterable[int]) -> Modes:
-        """Return the same modes with some components holding."""
+        """Return the modes in which some components hold."""
         changed = list(modes)
         for c in components:
             surface = self.components[c].surface
@@ -56,7 +56,7 @@ class Programs:
         return tuple(changed)
 
     def modes_by_side(self, point: Point, modes: Modes) -> Modes:
-        """Return the modes with undecided components on the side of their state, or holding if on neither."""
+        """Return the modes with undecided components on their sides, or holding on the surface."""
         if UNDECIDED not in modes:
             return modes
         decided = self.decided(modes)

@@ -104,7 +104,7 @@ class Run:
             self._process_schedules(appointment.schedules)
 
     def _go_on(self, point: Point, arrived: bool) -> None:
-        """Begin the next step if nothing was located; a guard may be zero at exactly this instant.
+        """Begin the next step if no event was located; a guard may still be zero at exactly this instant.
 
         Corners alone cause no event: if something is due, they take their sides with it.
         """
@@ -130,7 +130,7 @@ class Run:
         )
 
     def _resolved(self, expansion: Expansion, h: Number) -> bool:
-        """Return whether the states at the end satisfy their equations, and the watched quantities are accurate."""
+        """Return whether the end of a step satisfies the equations, with accurate guards and monitors."""
         program = self.programs.program(self.now.modes)
         x = tuple(value_at(state.c, h) for state in expansion.states)
         program.begin(replace(self.now.point, t=self.now.point.t + h, x=x))
@@ -153,7 +153,7 @@ class Run:
         return side, sign_changes(quantity.c[order:], h, self.precision) if side else []
 
     def _first_departure(self, expansion: Expansion, h: Number) -> tuple[list[tuple[int, int]], Number]:
-        """Return the guard that becomes negative first, and its time; no guard and h if none does."""
+        """Return the guard that becomes negative first, and its time; none and h if no guard does."""
         first: list[tuple[int, int]] = []
         for c, row in enumerate(expansion.guards):
             for j, guard in enumerate(row):
@@ -165,7 +165,7 @@ class Run:
     # -- events ---------------------------------------------------------------------------------------------
 
     def _adopt(self, settled: Settled, is_last: bool = True) -> None:
-        """Continue from the result of an event; monitors off their sides fire if it is the last event."""
+        """Continue after an event; after the last event of an instant, monitors that changed sides fire."""
         self.now = settled
         for move in settled.moves:
             name = self.rules.components[move.component].name
@@ -201,7 +201,7 @@ class Run:
     def _pass_monitors(
         self, expansion: Expansion, t: Number, s: Number, arriving: bool
     ) -> tuple[list[int], Number]:
-        """Record the monitors that change their side before s; return those that act there first, and the time."""
+        """Record monitors that change sides before s; return the first with another action, and the time."""
         seen: list[tuple[Number, int, int]] = []
         tolerance = self.precision.zero * s
         for k, quantity in enumerate(expansion.monitors):

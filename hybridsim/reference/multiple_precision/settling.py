@@ -1,4 +1,4 @@
-"""This module decides the state after an event: transitions and resets at x-, then trials of admissible modes.
+"""This module finds state and modes after an event: transitions, resets, and a search for admissible modes.
 
 The rules:
 
@@ -116,7 +116,7 @@ class Rules:
         return self.sides.others(self.programs.leaving(self.programs.expand(point, modes)))
 
     def _cancelled(self, point: Point, modes: Modes, fired: set[tuple[int, int]]) -> set[tuple[int, int]]:
-        """Return the located guards that are not negative just after if contacts are decided first."""
+        """Return the located guards that stay non-negative if the modes of contacts are chosen first."""
         open_ = {c for c, _ in fired if self.components[c].surface}
         if not open_ or all(c in open_ for c, _ in fired):
             return set()
@@ -128,7 +128,7 @@ class Rules:
         return {(c, j) for c, j in fired - leaving if c not in open_}
 
     def _leave_in_any_case(self, point: Point, modes: Modes, moves: list[Move]) -> tuple[Point, Modes]:
-        """Change the modes of automata whose guards are negative whatever the undecided forces are."""
+        """Change modes of automata with a guard that is negative for all values of the undecided forces."""
         for _ in range(_MAX_ROUNDS if self._surfaces() else 0):
             leaving = self.sides.leaving_in_any_case(point, modes)
             if not leaving:
@@ -141,7 +141,7 @@ class Rules:
         return [c for c, component in enumerate(self.components) if component.surface]
 
     def _take_sides(self, point: Point, modes: Modes, moves: list[Move]) -> tuple[Modes, set[int]]:
-        """Set components off their surface to the mode of their side; return those on it without a mode."""
+        """Set components off their surface to the mode of their side; return undecided ones on it."""
         order = self._surfaces()
         if not order:
             return modes, set()
@@ -164,7 +164,7 @@ class Rules:
     def _choose_jointly(
         self, point: Point, modes: Modes, open_: set[int], names: Mapping[int, str], moves: list[Move]
     ) -> tuple[Point, Modes]:
-        """Decide the open components on their surfaces, each with those on which its force acts."""
+        """Choose the modes of open components on their surfaces, jointly with the components they affect."""
         deciding = {c for c in open_ if self._on_surface(c, point, modes)}
         while deciding:
             chosen = self._with_coupled(min(deciding), deciding, point, modes)
@@ -191,7 +191,7 @@ class Rules:
         return expansion.is_zero(expansion.surfaces[self._surfaces().index(c)])
 
     def _with_coupled(self, first: int, deciding: set[int], point: Point, modes: Modes) -> list[int]:
-        """Return a component and all undecided or holding ones coupled with it through forces on surfaces."""
+        """Return a component and the undecided or holding components that it is coupled with by forces."""
         together = [c for c in self._surfaces() if c in deciding or self._holds(c, modes)]
         program = self.programs.program(self.programs.held(self.programs.decided(modes), together))
         program.begin(point)
@@ -207,7 +207,7 @@ class Rules:
         return surface is not None and modes[c] == surface.hold
 
     def _best(self, point: Point, modes: Modes, chosen: Sequence[int], deciding: set[int]) -> Modes:
-        """Return the admissible combination that keeps most modes, first those of components without an event."""
+        """Return the admissible combination with the fewest changes, first of components without an event."""
         scores: dict[tuple[int, int, int], list[Modes]] = {}
         for combination in itertools.product(*([m.name for m in self.components[c].modes] for c in chosen)):
             candidate = list(self.programs.decided(modes))

@@ -1,4 +1,4 @@
-"""This module implements rule 0 of `settling`: sides of corners and loads, and automata that leave in any case."""
+"""This module implements rule 0 of `settling`: sides of corners and loads, and automata that surely leave."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Sides:
         )
 
     def taken(self, point: Point, modes: Modes, moves: list[Move]) -> Modes:
-        """Return the same modes, and add each change to the moves."""
+        """Return the modes with each corner and load on its side, and add each change to `moves`."""
         after = self.along(point, modes)
         for c in self.led:
             if after[c] != modes[c]:
@@ -68,7 +68,7 @@ class Sides:
         return after
 
     def leaving_in_any_case(self, point: Point, modes: Modes) -> set[tuple[int, int]]:
-        """Return guards of automata that are negative just after in every combination of modes of contacts at rest.
+        """Return the guards of automata that are negative just after in all modes of contacts at rest.
 
         With too many combinations, it returns the guards that are negative by value and independent of
         contact forces.

@@ -1,4 +1,4 @@
-"""This module represents an input as the polynomial that holds from an instant on, in the time since its knot."""
+"""This module represents an input by the polynomial that holds from an instant on."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Signal:
         return self.declared.kind == "chirp" or self.declared.shape == "sine"
 
     def node(self, reading: Reading, piece: Sequence[Held]) -> Node:
-        """Return the input as a node over its piece, given the knot and the four coefficients."""
+        """Return the node of an input, given the knot and the four coefficients of its piece."""
         knot, *coefficients = piece
         passed = reading.sum(reading.time, knot, minus=True)
         total: Node = coefficients[3]

@@ -1,4 +1,4 @@
-"""Enumerate the joint candidates of a cluster at its surfaces, and judge as many as the choice needs."""
+"""Enumerate the combinations of modes at the surfaces of a cluster, and test as many as the choice needs."""
 
 from __future__ import annotations
 

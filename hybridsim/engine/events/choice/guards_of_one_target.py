@@ -1,4 +1,4 @@
-"""Take all guards of one mode that reach zero at one instant, if they lead to one mode."""
+"""Select the transitions of a mode if several of its guards reach zero together and have one target mode."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Failure = tuple[str, str]  # status and message
 def guards_taken_together(
     resolution: EventResolution, read_from: Situation, component: int, leaving: Sequence[int]
 ) -> tuple[list[tuple[int, int]], Failure | None]:
-    """Return the guards of a mode that are taken, each with the number of its choice, or why none can be taken.
+    """Return the guards whose transitions are taken, each with the number of its choice, or an error.
 
     leaving: positions of the guards that become negative, in the order in which they reached zero. read_from: the
     situation that conditions and resets read. If several guards are negative when the mode begins, the first declared
@@ -55,7 +55,7 @@ def guards_taken_together(
 
 
 def _apart(resolution: EventResolution, component: int, taken: Sequence[tuple[int, int]]) -> str:
-    """Return why several guards cannot be taken together, or an empty text if they lead to one mode."""
+    """Return an error text if several guards lead to different modes, else an empty text."""
     automaton, mode = resolution.system.automata[component], int(resolution.at.z[component])
     targets = [automaton.modes[automaton.targets[mode][j][number]] for j, number in taken]
     if len(set(targets)) <= 1:

@@ -1,4 +1,4 @@
-"""Determine which components leave their holding mode through the located guard, and whether the flow is continuous."""
+"""Find components that leave their holding mode at the located guard; test if the flow is continuous."""
 
 from __future__ import annotations
 

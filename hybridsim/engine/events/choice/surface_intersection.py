@@ -1,4 +1,4 @@
-"""Check at intersections of switching surfaces that one motion alone is admissible and that the surfaces attract it.
+"""Check that motion at an intersection of switching surfaces is unique and attracted to the intersection.
 
 On k surfaces at once ds/dt = a + B u with u in [-1, 1]^k. If all principal minors of -B are positive (a P-matrix),
 exactly one choice of u, among the corners, edges and the inside of that cube, is consistent for every a (Cottle, Pang
@@ -54,7 +54,7 @@ def is_one_motion(resolution: EventResolution, members: list[int], candidates: n
 
 
 def can_hold(resolution: EventResolution, members: list[int], z: np.ndarray) -> bool:
-    """Return whether the quantities held in the modes z have values, which fails if held surfaces conflict."""
+    """Return whether the held surfaces in the modes z are compatible, so that their holding forces exist."""
     automata = resolution.system.automata
     if sum(automata[c].has_surface and z[c] == automata[c].hold for c in members) < 2:
         return True
@@ -63,7 +63,7 @@ def can_hold(resolution: EventResolution, members: list[int], z: np.ndarray) -> 
 
 
 def on_its_side(resolution: EventResolution, members: list[int], candidates: np.ndarray) -> int:
-    """Return the number of the first candidate whose motion stays on its sides of all surfaces exactly, or 0.
+    """Return the number of the first candidate that moves to its own side of every surface, or 0.
 
     A body at rest may slip either way within rounding. Its holding mode leaves it a speed, or a rate, of some sign.
     """
@@ -109,7 +109,7 @@ def keeps_nothing(resolution: EventResolution, members: list[int], z: np.ndarray
 
 
 def _pull(resolution: EventResolution, sliding: list[int], z: np.ndarray) -> np.ndarray:
-    """Return -B (k, k): the decrease of the rate of each surface from one side of each surface to the other."""
+    """Return -B (k, k): how much the rate of each surface falls from below to above each other surface."""
     automata, order = resolution.system.automata, resolution.system.surface_of
     rows = [order.index(c) for c in sliding]
     found = np.empty((len(sliding), len(sliding)))
@@ -158,7 +158,7 @@ def message_on_cascade(resolution: EventResolution) -> str:
 
 
 def _message_on_drift(resolution: EventResolution) -> str:
-    """Return a hint on a guard slightly below zero after a transition leads back to its mode."""
+    """Return a hint if a guard is slightly below zero after a transition leads back to its mode."""
     system, last = resolution.system, resolution.changes[-2:]
     if len(last) < 2 or last[0].component != last[1].component or last[0].source != last[1].target:
         return ""

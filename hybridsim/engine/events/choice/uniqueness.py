@@ -1,4 +1,4 @@
-"""Select joint candidates that have a cause, and check that the selected motion is the only one.
+"""Discard combinations in which friction below its limit starts to slip, and check that the motion is unique.
 
 Static friction above kinetic friction makes several combinations admissible: if one contact releases, the force on
 another jumps. A contact below its limit has no cause to release unless the other contacts leave no alternative, as in
@@ -24,7 +24,7 @@ MAX_JOINT_COMPONENTS = 4
 
 
 def with_cause(resolution: EventResolution, members: list[int], candidates: np.ndarray) -> np.ndarray:
-    """Return a mask of the candidates in which friction that is certainly below its limits keeps sticking."""
+    """Return a mask of the candidates in which all friction certainly below its limits keeps sticking."""
     system, at = resolution.system, resolution.at
     automata, modes = system.automata, np.maximum(at.z, 0)
     holding = [
@@ -55,7 +55,7 @@ def other_outcomes(
     open_: set[int],
     cluster: tuple[int, ...],
 ) -> np.ndarray:
-    """Return admissible candidates with a motion other than the selected one, if friction is loaded by a reaction.
+    """Return admissible candidates with another motion than the selected one, if a reaction loads friction.
 
     Contacts that keep their mode are not examined, because the present mode stays if it is admissible.
     """

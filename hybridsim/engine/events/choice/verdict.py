@@ -49,7 +49,7 @@ def side_before(series: Any, bounds: Any, decreed: int) -> tuple[int, int]:
 
 @inlined
 def open_question(series: Any, bounds: Any, decreed: int) -> bool:
-    """Return whether a guard without a side is undecided by rounding, and not identically zero."""
+    """Return whether rounding hides the sign of a guard that is not identically zero."""
     for k in range(decreed, series.shape[0]):
         if series[k] != 0.0 or bounds[k] != 0.0:
             return True
@@ -58,7 +58,7 @@ def open_question(series: Any, bounds: Any, decreed: int) -> bool:
 
 @inlined
 def verdict_with(verdict: int, series: Any, bounds: Any, decreed: int, side: int) -> int:
-    """Return the verdict on a candidate after one more guard, whose side just after is known."""
+    """Combine the verdict on a candidate with the sign of one more of its guards just after the event."""
     if side < 0:
         return LEAVES
     if side == 0 and verdict == FINE and open_question(series, bounds, decreed):

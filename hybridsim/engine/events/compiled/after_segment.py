@@ -50,7 +50,7 @@ def is_crowded(gap: float, clock: Any, pace: Any) -> bool:
 def state_errors(
     automata: Any, s_error: float, y: Any, scale: Any, x_error: Any, z: Any, slopes: Any, out: Any
 ) -> None:
-    """Write error bounds of the states at an event: rounding (of sizes `scale`), earlier errors, the instant."""
+    """Write error bounds of the states at an event: from rounding, earlier errors and the event time."""
     for i in range(y.shape[0]):
         out[i] = 4.0 * UNIT * scale[i] + x_error[i] + s_error * abs(slopes[i])
     for c in range(z.shape[0]):
@@ -63,7 +63,7 @@ def state_errors(
 
 @inlined
 def spread(steps: int, rounding: float) -> float:
-    """Return the factor on guard bounds that covers rounding of the steps: see `engine.run.located.add_steps`."""
+    """Return the factor by which rounding of the steps enlarges guard bounds; see `add_steps`."""
     return 1.0 + 12.0 * steps + 0.5 * rounding
 
 

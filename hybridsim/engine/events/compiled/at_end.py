@@ -66,7 +66,7 @@ def may_vanish(
 def may_vanish_linear(
     lin: Any, tapes: Any, k: int, s: float, time: float, v: Any, sizes: Any, terms: Any
 ) -> bool:
-    """Return the same for linear modes at modal coordinates v, with `sizes` on the segment.
+    """Return whether a guard of linear modes may be about to become negative, at modal coordinates v.
 
     terms (TERMS,): scratch.
     """

@@ -23,7 +23,7 @@ _UNCLEAR = 0
 
 @inlined
 def _zeros_of(automata: Any, z: Any, c: int, g: int, is_smooth: bool) -> int:
-    """Return the decreed zeros of a guard in modes z, which component c begins at its surface."""
+    """Return how many leading coefficients of a guard are exactly zero when component c enters modes z."""
     is_its = automata.owner[g] == c
     is_holding = z[c] == automata.hold[c]
     return decreed_zeros(automata.place[g] == 0, is_its, is_holding, is_smooth, False, False)
@@ -33,7 +33,7 @@ def _zeros_of(automata: Any, z: Any, c: int, g: int, is_smooth: bool) -> int:
 def _verdict(
     automata: Any, tapes: Any, lin: Any, k: int, c: int, is_smooth: bool, size: float, work: Any
 ) -> int:
-    """Return 1 if the trial modes of row k certainly last, -1 if c leaves them, else _UNCLEAR."""
+    """Return 1 if the trial modes of row k certainly persist, -1 if c leaves them, else _UNCLEAR."""
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         short_loop()
         g = tapes.active[i]
@@ -58,7 +58,7 @@ def _is_alone(tapes: Any, lin: Any, k: int, fired: int, size: float, work: Any) 
 
 @kernel
 def resolve_clear(automata: Any, tapes: Any, lin: Any, state: Any, work: Any) -> bool:
-    """Return whether the event in the work space is clear. If so, the state after it replaces the state.
+    """Resolve the event in the work space if its outcome is clear; return whether the event was resolved.
 
     `ROW` of the work space is the row of the modes before the event, and then of those after it. If the event is not
     clear, other parts of the work space may have been overwritten.

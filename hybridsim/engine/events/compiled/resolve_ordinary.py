@@ -103,7 +103,7 @@ def take_choice(
 
 @inline_always
 def resolve_ordinary(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> bool:
-    """Return whether the event is ordinary. If so, the state after it is in x_after, slopes and z_after.
+    """Compute the state after an ordinary event (x_after, slopes, z_after); return False for other events.
 
     A transition of a component without a surface may change the run-time vector, which is then written to p_after.
     Sides, orders and floors of the guards in the new modes are in the work space as well. If the event is not ordinary,

@@ -25,7 +25,7 @@ def choose_single_mode(
     is_known: bool,
     c: int,
 ) -> int:
-    """Decide one component at its surface as `choose_surface_modes` does, by judging its three modes one by one."""
+    """Choose the mode of one component at its surface by testing its three modes one by one."""
     z, trial = work.z_after, work.trial
     now, hold = z[c], automata.hold[c]
     if not certainly_leaves(automata, lin, k, z, fired, is_known, work.x_after, work.slopes, work):

@@ -193,7 +193,7 @@ def certainly_leaves(
 
 @inline_always
 def cluster_of(automata: Any, c: int) -> Any:
-    """Return the components whose modes are decided together with that of component c."""
+    """Return the components whose modes are chosen together with the mode of component c."""
     return automata.cluster[automata.cluster_start[c] : automata.cluster_start[c + 1]]
 
 

@@ -120,7 +120,7 @@ class _Collision:
         return _surfaces(self.resolution)
 
     def _join(self) -> None:
-        """Add friction without a velocity, which is decided together with the force that may load it."""
+        """Add friction contacts at zero velocity, whose modes are chosen together with the normal forces."""
         values, bounds = self._surfaces
         for c in self.cluster:
             k = self.place[c]
@@ -128,7 +128,7 @@ class _Collision:
                 self.open_.add(c)
 
     def _opens(self, c: int) -> None:
-        """Open a contact. Its gap is zero by decree if it is zero now."""
+        """Open a contact; from now on its gap counts as exactly zero at this instant."""
         automaton = self.system.automata[c]
         if self.at.z[c] == automaton.hold:
             self._changes(c, "impact", automaton.above)

@@ -74,7 +74,7 @@ def count(problem: ImpactProblem) -> int:
 
 
 def answers(problem: ImpactProblem) -> list[Answer]:
-    """Return all solutions that differ in the motion; one if the contacts are independent and without friction."""
+    """Return all solutions with different motions; independent contacts without friction have only one."""
     rebound = problem.restitution * np.maximum(-problem.before[: problem.normal], 0.0)
     found = _answers(problem, rebound)
     if len(found) != 1 or not _gains(problem, found[0].impulses) or not rebound.any():
@@ -160,7 +160,7 @@ def _same(one: Answer, other: Answer) -> bool:
 
 
 def _between(problem: ImpactProblem, dead: Answer, lively: Answer) -> Answer:
-    """Return the last impulses on the line from one solution to the other whose work is not positive.
+    """Return the last impulses on the line between two solutions whose work is not positive.
 
     The work is quadratic in the position w on this line, not positive at 0 and positive at 1.
     """

@@ -167,7 +167,7 @@ def _of_numbers(system: System, at: Situation, key: Key) -> np.ndarray:
 
 
 def _slopes(system: System, at: Situation, key: Key, errors: np.ndarray) -> np.ndarray | None:
-    """Return derivatives of the values of a reset of expressions by all that it reads, or None if not finite."""
+    """Return derivatives of the values of a reset by all quantities that it reads; None if not finite."""
     n, size = system.n, len(errors)
     seeds = np.eye(size)
     x, p = with_slopes(at.x, seeds[:n]), with_slopes(at.p, seeds[n:-1])
@@ -185,7 +185,7 @@ def _slopes(system: System, at: Situation, key: Key, errors: np.ndarray) -> np.n
 
 
 def _differences(system: System, at: Situation, key: Key, errors: np.ndarray) -> np.ndarray:
-    """Return the same derivatives by finite differences, for code without usable derivatives."""
+    """Return the derivatives of a reset's values by finite differences, for code without derivatives."""
     n, discrete = system.n, system.layout.discrete_slice
     columns = []
     for shift in np.diag(errors):

@@ -79,7 +79,7 @@ def may_end(
     work: Any,
     last: Any,
 ) -> tuple[bool, int]:
-    """Return whether a series continues at the last event or may have ended before, and the number of intervals.
+    """Return whether the series of intervals continues or may have ended, and its number of intervals.
 
     In a series an interval is shorter than the one a turn before it, or negligible, many times in a row. The series has
     not ended while the next interval, predicted by the last factor, exceeds the threshold.
@@ -141,7 +141,7 @@ def cannot_accumulate(instants: Any, fires: Any, owner: Any, components: int, wo
 
 
 def turn_of(gaps: Sequence[float], count: int, same: float) -> tuple[int, float]:
-    """Return the events in a turn and the factor by which the last `count` intervals and a turn shrink, or (0, 1).
+    """Return the events per turn and the factor by which intervals shrink per turn, or (0, 1).
 
     same : relative accuracy with which the factor must repeat.
     """
@@ -247,7 +247,7 @@ class Accumulation:
         return None
 
     def _paced(self, instants: np.ndarray, owners: np.ndarray, component: int) -> tuple[bool, Pace]:
-        """Return whether a series of a component may end with these events, and the pace to store if not."""
+        """Return whether the series of a component may end with these events, and its updated intervals."""
         pace = self.paces.get(component, BEGINNING)
         known = np.array(pace.intervals) if pace.intervals else _NO_INTERVALS
         at, work, last = (
@@ -270,13 +270,13 @@ class Accumulation:
         return None
 
     def limit(self, instant: Instant, components: tuple[int, ...]) -> Limit | None:
-        """Add an event of these components. Return the limit if the rest of a series is negligible, else None."""
+        """Add an event of these components; return the limit if the remaining time is negligible."""
         times = {c: self._limit_of(instant, c) for c in components}
         ended = [(self._sign * time, c) for c, time in times.items() if time is not None]
         return self._shared(self._sign * min(ended)[0], min(ended)[1]) if ended else None
 
     def expected(self, instant: Instant) -> Limit | None:
-        """Return the limit of a series whose rest contains an instant that does not belong to it, or None."""
+        """Return the limit of a series if an instant outside the series is close to the limit, else None."""
         for c in sorted(self._under_way):
             time = _expected(self.paces[c], instant)
             if time is not None:
@@ -344,7 +344,7 @@ def _next_turn(pace: Pace) -> tuple[int, float]:
 
 
 def _expected(pace: Pace, instant: Instant) -> float | None:
-    """Return the limit of a series if an instant that does not belong to it lies within its rest, else None."""
+    """Return the limit of a series if an instant outside the series is close to the limit, else None."""
     if pace.forecast is None:
         return None
     limit, rest = pace.forecast
@@ -354,7 +354,7 @@ def _expected(pace: Pace, instant: Instant) -> float | None:
 
 
 def _steadier(before: Pace, limit: float, least: float) -> tuple[float, float, float]:
-    """Return the forecast of a series that changed least until the next two: (its change, that change, forecast).
+    """Return the steadiest forecast of a series, as (last change, least change, forecast).
 
     The first forecasts miss the deviation of the series from a geometric one. The last ones are dominated by rounding,
     unless the events are located at zero.

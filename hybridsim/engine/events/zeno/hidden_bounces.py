@@ -1,4 +1,4 @@
-"""Find the end of bounces that rounding hides.
+"""Find when bounces end if rounding hides the last bounces.
 
 A guard w leaves zero with w' = u > 0 and w'' = -g, for a flight of 2 u/g. The next flights last e, e**2, ... of it,
 with e the ratio of the speeds after and before, so that they take 2 u/(g (1 - e)) in total. A bounce loses
@@ -49,7 +49,7 @@ class _Departure(NamedTuple):
 
 
 class _Forecast(NamedTuple):
-    """A forecast of the end of bounces."""
+    """A forecast of the time at which bounces end."""
 
     limit: float  # time of the end
     error: float  # its error bound
@@ -82,7 +82,7 @@ def _recorded(automaton: Automaton, o: Occurrence) -> Bounce:
 def limit_of_hidden(
     system: System, outcome: Outcome, bounces: dict[int, Bounce], record: Trajectory
 ) -> Limit | None:
-    """Return the limit of the components whose last bounces have just become hidden, or None."""
+    """Return the time and the components whose bounces end, if rounding hides further bounces, or None."""
     found = {}
     for c, departure in _barely_seen(system, outcome, bounces).items():
         last = bounces[c]
@@ -98,12 +98,12 @@ def limit_of_hidden(
 
 
 def may_be_hidden(system: System, outcome: Outcome, happened: Sequence[Occurrence]) -> bool:
-    """Return whether bounces may have become hidden after the last event."""
+    """Return whether rounding may hide the bounces after the last event."""
     return bool(_barely_seen(system, outcome, last_bounces(system, happened)))
 
 
 def _barely_seen(system: System, outcome: Outcome, bounces: dict[int, Bounce]) -> dict[int, _Departure]:
-    """Return the departures of components whose flights are so short that rounding may hide the next loss."""
+    """Return the departures with flights so short that rounding may hide the next loss of speed."""
     found = {}
     for c, last in bounces.items() if system.has_tape else ():
         automaton = system.automata[c]
@@ -119,7 +119,7 @@ def _barely_seen(system: System, outcome: Outcome, bounces: dict[int, Bounce]) -
 def _agreed(
     system: System, outcome: Outcome, c: int, best: _Forecast, speed: float, last: Bounce, record: Trajectory
 ) -> tuple[float, int]:
-    """Return the limit by the first bounce that all later ones agree with, and the number of agreeing ones."""
+    """Return the forecast of the first bounce with which all later forecasts agree, and how many agree."""
     count = 1
     for bounce in _backward(system.automata[c], last, record):
         departure = _departure(system, outcome, c, bounce)
@@ -135,7 +135,7 @@ def _agreed(
 
 
 def _departure(system: System, outcome: Outcome, c: int, bounce: Bounce) -> _Departure | None:
-    """Return how a guard of the new mode leaves zero and turns back, or None."""
+    """Return how a guard of the new mode leaves zero and turns back; None if no guard does."""
     series = _series(system, outcome, c, bounce.instant, bounce.target, bounce.x_plus)
     for guard in system.automata[c].guards[bounce.target]:
         (value, rate, curve), bound = series.guards[guard, :3].tolist(), float(series.guard_bounds[guard, 0])
@@ -165,7 +165,7 @@ def _forecast(
 
 
 def _backward(automaton: Automaton, last: Bounce, record: Trajectory) -> Iterator[Bounce]:
-    """Yield the bounces of a component before the last one, backward, until it rested."""
+    """Yield the bounces of a component before the last one, backward, until it was in its holding mode."""
     blocks = reversed(record.occurrences.blocks)
     events = (block[i] for block in blocks for i in range(len(block) - 1, -1, -1))
     for o in islice(events, LOOKED_BACK_ON):
@@ -177,7 +177,7 @@ def _backward(automaton: Automaton, last: Bounce, record: Trajectory) -> Iterato
 
 
 def _series(system: System, outcome: Outcome, c: int, instant: Instant, mode: int, x: np.ndarray) -> Series:
-    """Return the series of the guards in a mode of the component, with the others in their modes."""
+    """Return the series of all guards with one component in the given mode."""
     z = outcome.z.copy()
     z[c] = mode
     p = system.vector(instant, system.discrete(outcome.p))

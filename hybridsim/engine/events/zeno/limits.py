@@ -20,7 +20,7 @@ _REACH = 2.0  # a surface farther away than this many times its possible motion 
 def behind(
     limit: Limit, system: System, outcome: Outcome, p: np.ndarray, s: float
 ) -> tuple[float, Outcome] | None:
-    """Return what holds from a limit at local time s on, or None: along surfaces, in contacts, or as declared.
+    """Return the outcome after a limit of events at local time s, or None if no motion continues.
 
     The first item is the local time from which it holds. That is the present time if another event may come before the
     limit.
@@ -32,7 +32,7 @@ def behind(
 def _gathered(
     system: System, outcome: Outcome, p: np.ndarray, s: float, left: float, changed: tuple[int, ...]
 ) -> tuple[float, Outcome] | None:
-    """Return what holds at the limit of crossings or impacts, or None if nothing can be held.
+    """Return the outcome that holds surfaces and contacts at a limit of events, or None if none can be held.
 
     The limit is on the surfaces whose rates, or derivatives of rates, may bring them to zero within the time `left`,
     and in the contacts whose gaps and rates become zero in it. They are held from here on. On average, bounces that
@@ -111,7 +111,7 @@ def _held_at(
 def _at_the_end(
     system: System, start: np.ndarray, p: np.ndarray, z: np.ndarray, s: float, apart: Collection[int]
 ) -> np.ndarray | None:
-    """Return the state at local time s, or None if it is not accurate to rounding or another event may intervene."""
+    """Return the state at local time s; None if it is inaccurate or another event may come before."""
     with np.errstate(over="ignore", invalid="ignore"):
         whole = _moved(system, start, p, z, 0.0, s)
         halves = _moved(system, _moved(system, start, p, z, 0.0, 0.5 * s), p, z, 0.5 * s, s)
@@ -129,7 +129,7 @@ def _at_the_end(
 def _at_declared_limit(
     system: System, outcome: Outcome, p: np.ndarray, s: float, changed: tuple[int, ...]
 ) -> tuple[float, Outcome] | None:
-    """Return what holds at the declared limit of these components, or None if no limit is declared."""
+    """Return the outcome in the declared limit modes of these components, or None if no limit is declared."""
     entered = tuple(c for c in changed if c >= 0 and system.automata[c].limit >= 0)
     if not entered:
         return None

@@ -1,4 +1,4 @@
-"""The code of a model of Python functions, in place of the generated code of `hybridsim.engine.system.modules`."""
+"""The code of a model of Python functions; it replaces the generated code of other models."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ class PythonCode:
 
     @property
     def is_current(self) -> bool:
-        """Return whether the globals that the functions read are the same as when they were compiled."""
+        """Return whether the globals that the functions read are unchanged since their compilation."""
         is_live = self._compiler is None or bool(self.refused)
         return is_live or surroundings(self._functions) == self._surroundings
 
@@ -102,7 +102,7 @@ class PythonCode:
         return self._things[name]
 
     def address(self, name: str) -> Any:
-        """Return the address of flow, guards, monitors, quantities, or guards_and_monitors (guards and monitors)."""
+        """Return the address of flow, guards, monitors, quantities or guards_and_monitors."""
         if name not in self._addresses:
             self._addresses.setdefault(name, self._addressed(name))
         return self._addresses[name][0]
@@ -193,7 +193,7 @@ class PythonCode:
     # -- functions called once per event, in plain Python ---------------------------------------------------
 
     def _choose(self, s: float, x: Any, p: Any, z: Any, out: Any) -> int:
-        """Act as the generated function of that name; component, mode and guard follow the modes in z."""
+        """Do the work of the generated function `choose`; component, mode and guard follow the modes in z."""
         c, m, g = (int(k) for k in z[-3:])
         out[0] = -1.0
         for k, condition in enumerate(self.conditions[c, m, g]):
@@ -203,7 +203,7 @@ class PythonCode:
         return 0
 
     def _reset(self, s: float, x: Any, p: Any, z: Any, out: Any) -> int:
-        """Act as the generated function of that name; the number of the reset follows the modes in z."""
+        """Do the work of the generated function `reset`; the number of the reset follows the modes in z."""
         names = [state.name for state in self.model.states]
         for name, function in self.resets[int(z[-1])][1].items():
             out[names.index(name)] = self.forms.number(function, s, x, p)
@@ -211,7 +211,7 @@ class PythonCode:
 
 
 def _refuse_other_arguments(parts: Parts) -> None:
-    """Refuse a function that does not take time, states and parameters."""
+    """Refuse a function that does not accept time, states and parameters."""
     scalars = (*parts.guards, *parts.monitors, *parts.outputs)
     functions = [function for _, function in parts.flows] + [scalar.function for scalar in scalars]
     for function in filter(callable, functions):

@@ -150,7 +150,7 @@ class Compiler:
 
 
 def _put(result: Any, out: Any, at: int, width: int) -> None:
-    """Write the result of a function, `width` numbers or (-1) a scalar; raises if it has another form."""
+    """Write the result of a function, `width` numbers or (-1) a scalar; raise an error for other results."""
     raise NotImplementedError("compiled code only")
 
 
@@ -198,7 +198,7 @@ overload(_put)(_put_compiled)
 
 @numba.njit
 def _nothing(s: float, x: Any, p: Any, z: Any, out: Any) -> None:
-    """Do nothing: the end of a chain."""
+    """Do nothing, as the last function of a chain."""
 
 
 def _constant(value: float) -> Any:
@@ -210,7 +210,7 @@ def _constant(value: float) -> Any:
 
 
 def _one_more(write: Any, place: int, component: int, mode: int, rest: Any) -> Any:
-    """Return a chain with one more number in front, which is 1 if its mode is not active."""
+    """Return a chain that writes one more number first, or 1 if the number's mode is not active."""
 
     @numba.njit
     def write_row(s: float, x: Any, p: Any, z: Any, out: Any) -> None:
@@ -224,7 +224,7 @@ def _one_more(write: Any, place: int, component: int, mode: int, rest: Any) -> A
 
 
 def _either(component: int, mode: int, write: Any, other: Any) -> Any:
-    """Return a flow that is `write` in one mode, and `other` in the rest."""
+    """Return a flow that calls `write` in one mode, and `other` in all other modes."""
 
     @numba.njit
     def chosen(s: float, x: Any, p: Any, z: Any, out: Any) -> None:

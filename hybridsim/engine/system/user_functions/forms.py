@@ -86,7 +86,7 @@ def value(expr: Expression) -> Function | float:
 
 
 class Failures:
-    """The last exception that a function raised in a run. Its value counts as not a number."""
+    """The last exception that a function raised in a run; the function's value is then NaN."""
 
     def __init__(self) -> None:
         self.last = ""

@@ -1,4 +1,4 @@
-"""Collect the globals and closures that Python functions read, because compiled code keeps their former values."""
+"""Collect the globals and closures that functions read, because compiled code keeps their old values."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def globals_of(function: FunctionType) -> dict[str, Any]:
 
 
 def closure_of(function: FunctionType) -> dict[str, Any]:
-    """Return names and values of its closure, without empty cells."""
+    """Return names and values of a function's closure, without empty cells."""
     found = {}
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
         try:
