@@ -422,7 +422,7 @@ class Lowering:
         for i, (name, e) in enumerate(zip(names, der, strict=True)):
             state = self.model.states[i].name
             for c, rate in shared_rates(self, i, der, held):
-                component, replacement = self.components[c], self.sp.Symbol(f"kept_{c}", real=True)
+                component, replacement = self.components[c], self.sp.Symbol(f"kinematic_rate_{c}", real=True)
                 branches = [rate if m.name == component.surface.hold else e for m in component.modes]
                 items.append(Switch(c, tuple((Assign(replacement.name, value),) for value in branches)))
                 e = replacement
