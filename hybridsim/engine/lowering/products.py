@@ -78,7 +78,7 @@ class Products:
         )
 
     def _value_by_mode(self, d: int) -> Any:
-        return self.lowering.sp.Symbol(f"given_{d}", real=True)
+        return self.lowering.sp.Symbol(f"from_mode_{d}", real=True)
 
     def _holds(self, d: int) -> Any:
         return self.lowering.sp.Symbol(f"holds_{d}", real=True)
