@@ -40,7 +40,7 @@ def number(value: Any, what: str, remedy: str = "use a number") -> float:
     """Return a real number as float; strings, bools, complex numbers and sequences raise an error."""
     found = as_real(value)
     if found is None:
-        raise UsageError(f"{what} is {value!r}", remedy=remedy)
+        raise UsageError(f"{what} cannot be {value!r}", remedy=remedy)
     return found
 
 
@@ -60,7 +60,7 @@ def finite_number(value: Any, what: str) -> float:
     """Return a finite real number as float, or raise an error."""
     found = number(value, what, "use a finite number")
     if not math.isfinite(found):
-        raise UsageError(f"{what} is {value!r}", remedy="use a finite number")
+        raise UsageError(f"{what} cannot be {value!r}", remedy="use a finite number")
     return found
 
 
@@ -68,14 +68,14 @@ def whole_number(value: Any, what: str, least: int, most: int) -> int:
     """Return an integer within bounds; bools are rejected."""
     found = int(value) if isinstance(value, int | np.integer) and not isinstance(value, bool) else least - 1
     if not least <= found <= most:
-        raise UsageError(f"{what} is {value!r}", remedy=f"use a whole number from {least} to {most}")
+        raise UsageError(f"{what} cannot be {value!r}", remedy=f"use a whole number from {least} to {most}")
     return found
 
 
 def text(value: Any, what: str) -> str:
     """Return a string, or raise an error."""
     if not isinstance(value, str):
-        raise UsageError(f"{what} is {value!r}", remedy="use a name (a string)")
+        raise UsageError(f"{what} cannot be {value!r}", remedy="use a name (a string)")
     return value
 
 
@@ -89,14 +89,14 @@ def known_name(value: Any, known: Sequence[str], what: str, kind: str) -> str:
 def flag(value: Any, what: str) -> bool:
     """Return a bool, or raise an error."""
     if not isinstance(value, bool | np.bool_):
-        raise UsageError(f"{what} is {value!r}", remedy="use True or False")
+        raise UsageError(f"{what} cannot be {value!r}", remedy="use True or False")
     return bool(value)
 
 
 def side_of_event(side: Any) -> str:
     """Return the requested side of an event, '-' or '+'."""
     if not (isinstance(side, str) and side in ("+", "-")):
-        raise UsageError(f"side is {side!r}", remedy="use '-' (before the event) or '+' (after it)")
+        raise UsageError(f"side cannot be {side!r}", remedy="use '-' (before the event) or '+' (after it)")
     return side
 
 
@@ -105,12 +105,12 @@ def real_array(value: Any, what: str, remedy: str) -> np.ndarray:
     try:
         found = np.asarray(value)
     except ValueError:  # rows of different lengths
-        raise UsageError(f"{what} is {value!r}", remedy=remedy) from None
+        raise UsageError(f"{what} cannot be {value!r}", remedy=remedy) from None
     if found.dtype.kind == "O":
         items = [as_real(item) for item in found.flat]
         found = np.array([math.nan if item is None else item for item in items]).reshape(found.shape)
     if found.dtype.kind not in "iuf" or not np.isfinite(found).all():
-        raise UsageError(f"{what} is {value!r}", remedy=remedy)
+        raise UsageError(f"{what} cannot be {value!r}", remedy=remedy)
     return found.astype(float)
 
 
@@ -126,7 +126,7 @@ def is_row(value: Any) -> bool:
 def numbers(value: Any, what: str, remedy: str) -> np.ndarray:
     """Return a sequence of real numbers as a one-dimensional array."""
     if not is_row(value):
-        raise UsageError(f"{what} is {value!r}", remedy=remedy)
+        raise UsageError(f"{what} cannot be {value!r}", remedy=remedy)
     if isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "iuf":
         return value.astype(float)
     return np.array([number(item, f"a value of {what}", remedy) for item in value], dtype=float)
@@ -138,13 +138,13 @@ def as_times(t: Any) -> np.ndarray:
     try:
         found = np.asarray(t)
     except ValueError:  # rows of different lengths
-        raise UsageError(f"t is {t!r}", remedy=remedy) from None
+        raise UsageError(f"t cannot be {t!r}", remedy=remedy) from None
     if found.dtype.kind == "O" and found.ndim == 1:
         return numbers(found.tolist(), "t", remedy)
     if found.dtype.kind == "O" and found.ndim == 0:
         return np.array([number(t, "t", remedy)])
     if found.dtype.kind not in "iuf" or found.ndim > 1:
-        raise UsageError(f"t is {t!r}", remedy=remedy)
+        raise UsageError(f"t cannot be {t!r}", remedy=remedy)
     return np.atleast_1d(found.astype(float, copy=False))
 
 
@@ -156,7 +156,8 @@ def chosen_model(model: Any, params: Any) -> Model:
         return model
     if not isinstance(params, Mapping) or not all(isinstance(name, str) for name in params):
         raise UsageError(
-            f"params is {params!r}", remedy="use a dict of parameter names and values, such as {'F0': 30.0}"
+            f"params cannot be {params!r}",
+            remedy="use a dict of parameter names and values, such as {'F0': 30.0}",
         )
     return model.with_(**params)
 
@@ -173,13 +174,13 @@ def time_span(t_span: Any) -> tuple[float, float]:
 def two_numbers(value: Any, what: str, remedy: str, but: str = "") -> tuple[float, float]:
     """Return two finite numbers; `but` completes the remedy for infinite ones."""
     if not is_row(value):
-        raise UsageError(f"{what} is {value!r}", remedy=remedy)
+        raise UsageError(f"{what} cannot be {value!r}", remedy=remedy)
     ends = [number(t, f"a value of {what}", remedy) for t in value]
     if len(ends) != 2:
         shown = repr(value) if len(ends) < 5 else f"{len(ends)} numbers from {ends[0]!r} to {ends[-1]!r}"
-        raise UsageError(f"{what} is {shown}", remedy=remedy)
+        raise UsageError(f"{what} cannot be {shown}", remedy=remedy)
     if not all(map(math.isfinite, ends)):
-        raise UsageError(f"{what} is {value!r}", remedy=f"use two finite numbers{but}")
+        raise UsageError(f"{what} cannot be {value!r}", remedy=f"use two finite numbers{but}")
     return ends[0], ends[1]
 
 
@@ -220,7 +221,7 @@ def start_values(model: Model, x0: Any, what: str = "x0") -> tuple[dict[str, flo
             value, f"{what} of {name}", f"use a number; for an expression use model.with_start({name}=...)"
         )
         if not math.isfinite(found[name]):
-            raise UsageError(f"{what} of {name} is {value!r}", remedy="use a finite number")
+            raise UsageError(f"{what} of {name} cannot be {value!r}", remedy="use a finite number")
     changed = {n: v for n, v in found.items() if n in discrete}
     return {n: v for n, v in found.items() if n in names}, model.with_start(**changed) if changed else model
 
@@ -229,7 +230,7 @@ def integrator_name(integrator: Any) -> str:
     """Return the name of an integrator or "auto", or raise an error."""
     if not isinstance(integrator, str):
         raise UsageError(
-            f"integrator is {integrator!r}", remedy="use a name; hs.list_integrators() lists them"
+            f"integrator cannot be {integrator!r}", remedy="use a name; hs.list_integrators() lists them"
         )
     return integrator
 
@@ -247,7 +248,7 @@ def refuse_unused(method: Integrator, **tolerances: Any) -> None:
 def callback(progress: Any) -> Any:
     """Return the progress function or None, or raise an error."""
     if progress is not None and not callable(progress):
-        raise UsageError(f"progress is {progress!r}", remedy="use a function of the finished fraction")
+        raise UsageError(f"progress cannot be {progress!r}", remedy="use a function of the finished fraction")
     return progress
 
 
@@ -256,7 +257,7 @@ def relative_tolerance(rtol: Any) -> float:
     remedy = f"use a number from {SMALLEST_RTOL!r} to below 1"
     value = RTOL if rtol is None else number(rtol, "rtol", remedy)
     if not (SMALLEST_RTOL <= value < 1.0):
-        raise UsageError(f"rtol is {rtol!r}", remedy=remedy)
+        raise UsageError(f"rtol cannot be {rtol!r}", remedy=remedy)
     return value
 
 
@@ -264,7 +265,7 @@ def step_bound(value: Any, name: str) -> float:
     """Return a positive limit of the step size."""
     bound = number(value, name, "use a positive number")
     if not bound > 0.0:
-        raise UsageError(f"{name} is {value!r}", remedy="use a positive number")
+        raise UsageError(f"{name} cannot be {value!r}", remedy="use a positive number")
     return bound
 
 
@@ -289,7 +290,7 @@ def absolute_tolerances(model: Model, atol: Any, rtol: float, start: np.ndarray)
     else:
         values[:] = number(atol, "atol", remedy)
     if values.shape != start.shape or not (np.isfinite(values).all() and (values >= 0).all()):
-        raise UsageError(f"atol is {atol!r}", remedy=remedy)
+        raise UsageError(f"atol cannot be {atol!r}", remedy=remedy)
     return values
 
 
@@ -300,7 +301,7 @@ def initial_modes(system: System, z0: Any) -> np.ndarray:
         return z
     components = [a.name for a in system.declared]
     if not isinstance(z0, Mapping):
-        raise UsageError(f"z0 is {z0!r}", remedy="use a dict of component names and mode names")
+        raise UsageError(f"z0 cannot be {z0!r}", remedy="use a dict of component names and mode names")
     for name, mode in z0.items():
         if name not in components:
             raise UsageError(
@@ -337,7 +338,7 @@ def retention_of(save: Any, system: System) -> Retention:
     remedy = "use 'all', 'events', 'last-period', 'nothing', or a length of time"
     length = number(save, "save", remedy)
     if not length > 0.0:
-        raise UsageError(f"save is {save!r}", remedy=remedy)
+        raise UsageError(f"save cannot be {save!r}", remedy=remedy)
     return Retention(length, length)
 
 
@@ -352,14 +353,14 @@ def run_limits(limits: Any) -> Limits:
     names = [f.name for f in fields(Limits)]
     if not isinstance(limits, Mapping):
         raise UsageError(
-            f"limits is {limits!r}",
+            f"limits cannot be {limits!r}",
             remedy=f"use a dict with the keys {', '.join(names)}, such as {{'events': 1000}}",
         )
     for name, value in limits.items():
         if name not in names:
             raise UsageError(f"Unknown limit {name!r}", remedy=nearest(str(name), names, kind="limits"))
         if not number(value, f"limit of {name}") > 0.0:
-            raise UsageError(f"limit of {name} is {value!r}", remedy="use a positive number")
+            raise UsageError(f"limit of {name} cannot be {value!r}", remedy="use a positive number")
     return Limits(**{name: float(value) for name, value in limits.items()})
 
 

@@ -163,7 +163,7 @@ def path_text(path: object) -> str:
     except TypeError:
         found = path
     if not isinstance(found, str) or "\0" in found or not found:
-        raise UsageError(f"The path is {path!r}", remedy="use the path of a file as a string")
+        raise UsageError(f"The path cannot be {path!r}", remedy="use the path of a file as a string")
     return found
 
 

@@ -138,7 +138,7 @@ def _modes(system: Any, declared: Mapping[str, str] | None) -> np.ndarray:
     names = [a.name for a in system.automata]
     z: object = {} if declared is None else declared
     if not isinstance(z, Mapping):
-        raise UsageError(f"z is {z!r}", remedy="use a dict of component names and mode names")
+        raise UsageError(f"z cannot be {z!r}", remedy="use a dict of component names and mode names")
     for name in z:
         if name not in names:
             raise UsageError(

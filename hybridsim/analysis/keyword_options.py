@@ -14,12 +14,12 @@ _OF_AUTO = ("exact", "dop853", "taylor", "rodas5p", "cvode-bdf", "scipy-dop853",
 
 
 def refuse_unknown(calls: Iterable[Callable[..., Any]], options: Mapping[str, Any]) -> None:
-    """Check options for calls, the last of which passes unknown options to an integrator.
+    """Check options for several functions; the last function passes unknown options to an integrator.
 
     Raises
     ------
     UsageError
-        For a name that none of them has, or an unknown integrator.
+        For a name that no function and no integrator accepts, or an unknown integrator.
     """
     from hybridsim.integrators.registry import integrator_class, option_names
 

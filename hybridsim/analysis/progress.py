@@ -9,7 +9,7 @@ Progress = Callable[[int, int, str], None]
 
 
 class Steps:
-    """Counts `total` steps; call it with the name of each step, and it passes that on with the count."""
+    """A counter of `total` steps; each call reports the name of a step and the count as progress."""
 
     def __init__(self, total: int, progress: Progress | None) -> None:
         self._total, self._done, self._progress = total, 0, progress

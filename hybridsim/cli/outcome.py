@@ -80,12 +80,12 @@ def check_arguments(args: argparse.Namespace) -> None:
     if args.points is not None and not (args.csv or args.npz):
         raise UsageError("--points requires --csv or --npz", remedy="add --csv FILE or --npz FILE")
     if args.points == 1:
-        raise UsageError("--points is 1", remedy="use at least 2 (the start and the end)")
+        raise UsageError("--points cannot be 1", remedy="use at least 2 (the start and the end)")
     if args.points is not None:
         from hybridsim.solution.files.tabulated import MOST_POINTS
 
         if args.points > MOST_POINTS:
-            raise UsageError(f"--points is {args.points}", remedy=f"use at most {MOST_POINTS}")
+            raise UsageError(f"--points cannot be {args.points}", remedy=f"use at most {MOST_POINTS}")
 
 
 def limits(args: argparse.Namespace) -> dict[str, Any]:

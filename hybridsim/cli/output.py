@@ -18,7 +18,7 @@ TRIAL = ".hybridsim-"  # prefix of the temporary folder that tests whether a fol
 
 
 class _Data:
-    """The stream for data while stdout is redirected to stderr; None stands for `sys.stdout`."""
+    """The stream for data while stdout is redirected to stderr; if it is None, data go to `sys.stdout`."""
 
     stream: TextIO | None = None
 

@@ -9,7 +9,7 @@ from hybridsim.cli import options, outcome, values
 from hybridsim.cli.output import complain
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
-from hybridsim.errors import UsageError
+from hybridsim.errors import UsageError, near, nearest
 
 _EXAMPLES = """\
 examples:
@@ -70,22 +70,32 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     t_end = values.end_time(model, args.t_end)
 
     import hybridsim
+    from hybridsim.integrators.registry import UnknownOption, integrator_class, option_names
     from hybridsim.model.checks.doubtful import forces_of, jumps_of
 
     cautions = [caution.sentence for caution in (*jumps_of(model), *forces_of(model))]
     for caution in cautions:  # before the run, which may be very slow
         complain(f"warning: {caution}")
-    with Progress(session) as progress, session.stopping_gently():
-        solution = outcome.as_far_as_it_came(
-            lambda: hybridsim.simulate(
-                model,
-                (0.0, t_end),
-                integrator=args.integrator,
-                limits=outcome.limits(args),
-                progress=progress,
-                **settings,
+    try:
+        with Progress(session) as progress, session.stopping_gently():
+            solution = outcome.as_far_as_it_came(
+                lambda: hybridsim.simulate(
+                    model,
+                    (0.0, t_end),
+                    integrator=args.integrator,
+                    limits=outcome.limits(args),
+                    progress=progress,
+                    **settings,
+                )
             )
-        )
+    except UnknownOption as fault:  # its message is about a call in Python
+        known = option_names(integrator_class(fault.integrator))
+        close = near(fault.option, ("rtol", "atol", "max_step"))
+        remedy = f"did you mean --{close[0].replace('_', '-')}?" if close else ""
+        raise UsageError(
+            f"--option {fault.option}: integrator {fault.integrator!r} has no such option",
+            remedy=remedy or nearest(fault.option, known, kind=f"options of {fault.integrator}"),
+        ) from None
     return outcome.deliver(solution, args, session, already_reported=cautions)
 
 

@@ -194,7 +194,7 @@ class _Checker:
         count = len(node.args)
         if not function.least <= count <= function.most:
             raise self.fail(
-                node, f"{name}() needs {function.arity}, but has {count}", "correct the arguments"
+                node, f"{name}() needs {function.arity}, but was called with {count}", "correct the arguments"
             )
         return self.every(self.number, node.args)
 

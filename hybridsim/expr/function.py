@@ -1,4 +1,4 @@
-"""Python functions in place of expressions."""
+"""Python functions that are used as expressions."""
 
 from __future__ import annotations
 

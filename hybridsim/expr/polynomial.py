@@ -12,7 +12,7 @@ from hybridsim.expr.grammar import FUNCTIONS
 from hybridsim.expr.write import write
 
 Monomial = tuple[tuple[str, int], ...]
-"""Factors with their powers, sorted; () stands for the constant."""
+"""Factors with their powers, sorted; () is the constant monomial."""
 Polynomial = Mapping[Monomial, Fraction]
 """Monomials with their exact, nonzero coefficients."""
 

@@ -144,6 +144,12 @@ def keyword_elsewhere(keyword: str) -> str | None:
     return _ELSEWHERE.get(keyword)
 
 
+class UnknownOption(UsageError):
+    """An error for an option that the chosen integrator does not have."""
+
+    option = integrator = ""
+
+
 def make_integrator(name: str, options: dict[str, Any], keywords: Iterable[str] = ()) -> Integrator:
     """Return the integrator with this name and options; keywords: names the user may have meant."""
     cls = integrator_class(name)
@@ -155,7 +161,9 @@ def make_integrator(name: str, options: dict[str, Any], keywords: Iterable[str] 
             remedy = nearest(option, close) if close else remedy
             what = f"simulate() has no argument {option!r}, and {name} has no option {option!r}"
             what = what if keywords else f"{name} has no option {option!r}"
-            raise UsageError(what, remedy=keyword_elsewhere(option) or remedy)
+            fault = UnknownOption(what, remedy=keyword_elsewhere(option) or remedy)
+            fault.option, fault.integrator = option, name
+            raise fault
     kinds = get_type_hints(cls) if options else {}
     for option, value in options.items():
         if not fits(value, kinds[option]):

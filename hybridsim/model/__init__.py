@@ -1,4 +1,4 @@
-"""A model says what a system is: this folder declares, reads, checks and writes models, and knows no numerics.
+"""This folder declares, reads, checks and writes models; it contains no numerical methods.
 
 Start with `parts` (what one declares), then `toml`, `checks`, `laws` and `smoothing`.
 """

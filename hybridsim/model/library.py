@@ -60,7 +60,7 @@ def load(name_or_path: str | os.PathLike[str]) -> Model:
             remedy = "pass the system to hs.simulate directly, or use its model, system.to_model()"
         elif callable(argument):
             remedy = "for rates from a function f(t, x, p) use hs.Model('m', states={'x': 1.0}, flow=f)"
-        raise UsageError(f"The model is {argument!r}", remedy=remedy)
+        raise UsageError(f"The model cannot be {argument!r}", remedy=remedy)
     text = os.fspath(name_or_path)
     if isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or "/" in text or os.sep in text:
         path = Path(text)
@@ -130,7 +130,7 @@ def load_law(name: str) -> FrictionLaw:
     True
     """
     if not isinstance(name, str):
-        raise UsageError(f"The law is {name!r}", remedy="use the name of a law (a string)")
+        raise UsageError(f"The law cannot be {name!r}", remedy="use the name of a law (a string)")
     return _packaged_law(name)
 
 

@@ -95,7 +95,7 @@ class Meanings:
         return frozenset(found), sign
 
     def signs(self, component: Component, mode: Mode) -> Mapping[Family, int]:
-        """Return the signs by family that hold in a mode: those of its guards, and 0 for a held surface."""
+        """Return the known signs in a mode by family: the signs of its guards, and 0 for a held surface."""
         surface = component.surface
         known: dict[Family, int] = {}
         for guard in mode.guards:

@@ -47,7 +47,9 @@ def friction_law(
             f"friction_law({found.name!r}) needs a speed", remedy="give speed=, the largest velocity to draw"
         )
     if not speed > 0 or not amplitude > 0:
-        raise UsageError(f"speed is {speed!r}, amplitude is {amplitude!r}", remedy="give numbers above zero")
+        raise UsageError(
+            f"speed and amplitude cannot be {speed!r} and {amplitude!r}", remedy="give numbers above zero"
+        )
     law_arguments = {name: parse(value) for name, value in (arguments or {}).items()}
     contact = Contact("f", parse("v"), parse(normal), found, law_arguments)
     panels = 1 + bool(found.states)

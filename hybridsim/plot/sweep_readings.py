@@ -48,7 +48,7 @@ def chosen_names(result: Sweep, names: Sequence[str], arrays: bool) -> tuple[str
 
 
 def _first_asked_for(drawable: Sequence[str]) -> tuple[str, ...]:
-    """Return as many readings as fit on a page, one of each kind above before a second, in the order of the sweep."""
+    """Return the readings that fit on a page: first one of each common kind, then further ones."""
 
     def rank(name: str) -> tuple[int, int]:
         kind = name.partition(".")[0]

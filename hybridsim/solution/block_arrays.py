@@ -1,4 +1,4 @@
-"""The segments of a run as plain arrays, to be kept in a file, and the way back."""
+"""This module converts the segments of a run to plain arrays for a file, and back."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ _SEGMENT_FORMS: dict[str, Form] = _ROW_FORMS | {
 
 
 def taken_apart(blocks: Iterable[Any]) -> Iterator[tuple[str, Arrays]]:
-    """Kind and arrays of each block; segments in closed form share their tables, which come first."""
+    """Yield kind and arrays of each block; closed-form segments share tables, which are yielded first."""
     tables: list[Any] = []
     for block in blocks:
         if isinstance(block, ClosedFormBlock):
@@ -109,12 +109,12 @@ def taken_apart(blocks: Iterable[Any]) -> Iterator[tuple[str, Arrays]]:
 
 
 def put_together(system: System, stored: Iterable[tuple[str, Arrays]]) -> list[Any]:
-    """The blocks again.
+    """Return the blocks of segments that `taken_apart` converted to arrays.
 
     Raises
     ------
     ValueError
-        For arrays that no run of the system can have left: they do not come as far as a kernel.
+        For arrays that no run of the system can have written; compiled code never sees them.
     """
     sizes = {"n": system.n, "C": len(system.automata), "P": system.layout.size}
     tables: list[Any] = []
@@ -139,12 +139,12 @@ def put_together(system: System, stored: Iterable[tuple[str, Arrays]]) -> list[A
             _check_segments(title, system, arrays, sizes)
             blocks.append(SegmentList(system, _segments(arrays)))
         else:
-            raise ValueError(f"a block of kind {kind!r}")
+            raise ValueError(f"unknown kind of block {kind!r}")
     return blocks
 
 
 def _check_rows(title: str, system: System, arrays: Arrays) -> None:
-    """What all blocks have for each segment."""
+    """Check the arrays that every kind of block has for each segment: times and modes."""
     if not len(arrays["modes"]):
         raise ValueError(f"{title} is empty")
     check_finite(f"{title}: a time", arrays["origins"])
@@ -152,7 +152,7 @@ def _check_rows(title: str, system: System, arrays: Arrays) -> None:
 
 
 def _check_series(title: str, system: System, arrays: Arrays, sizes: dict[str, int], columns: int) -> None:
-    """Series of steps; columns: coefficients of each, where they are a certain number."""
+    """Check a block of step series; `columns` is the required number of coefficients, 0 for any."""
     known = check_forms(title, arrays, _SERIES_FORMS, sizes)
     _check_rows(title, system, arrays)
     ends, steps = arrays["ends"], arrays["steps"]
@@ -161,16 +161,16 @@ def _check_series(title: str, system: System, arrays: Arrays, sizes: dict[str, i
     check_ascending(f"{title}: the steps of its segments", ends, strictly=True)
     check_finite(f"{title}: a time", steps)
     if known["K"] < 1 or (columns and known["K"] != columns):
-        raise ValueError(f"{title} has {known['K']} coefficients a step")
+        raise ValueError(f"{title} has {known['K']} coefficients per step")
 
 
 def _not_near_a_start(count: int, unknowns: int) -> Arrays:
-    """What files of earlier versions do not have: their states are summed from modal coordinates from the start on."""
+    """Return the arrays that files of earlier versions lack, so that modal coordinates are used instead."""
     return {"flows": np.zeros((count, unknowns, unknowns)), "near": np.zeros(count)}
 
 
 def _checked_tables(title: str, arrays: Arrays, sizes: dict[str, int]) -> LinearTables:
-    """Tables of a motion in closed form with what states are made of; the rest is not needed any more, and empty."""
+    """Return the tables of a closed-form motion; entries that evaluation does not need are empty."""
     if "near" not in arrays and "counts" in arrays and "factors" in arrays:
         arrays = arrays | _not_near_a_start(len(arrays["counts"]), sizes["n"] + len(arrays["factors"]))
     known = check_forms(title, arrays, _TABLE_FORMS, sizes)
@@ -186,7 +186,7 @@ def _checked_tables(title: str, arrays: Arrays, sizes: dict[str, int]) -> Linear
     check_range(f"{title}: a number of coordinates", counts, 0, widest)
     used = np.arange(widest) < counts[:, None]
     if not ((ends > np.arange(widest)) & (ends <= counts[:, None]))[used].all():
-        raise ValueError(f"{title}: a block of coordinates ends outside of its coordinates")
+        raise ValueError(f"{title}: a block of coordinates ends outside the array")
     present = {name: arrays[name] for name in (*_TABLE_FORMS, "states", "flows")}
     empty = {name: getattr(no_tables(), name) for name in LinearTables._fields}
     tables: LinearTables = packed(LinearTables(**(empty | present)))
@@ -224,16 +224,16 @@ def _check_segments(title: str, system: System, arrays: Arrays, sizes: dict[str,
         or int(terms.sum()) != known["S"]
         or len(terms) != known["L"] - known["N"]
     ):
-        raise ValueError(f"{title}: its knots or its terms are not those of its segments")
+        raise ValueError(f"{title}: the numbers of knots and terms do not match the segments")
     inside = np.ones(max(known["L"] - 1, 0), dtype=np.bool_)
     inside[np.cumsum(lengths)[:-1] - 1] = False
     signs = np.sign(np.diff(knots)[inside])
     if not ((signs == 1.0).all() or (signs == -1.0).all()):
-        raise ValueError(f"{title}: its time turns")
+        raise ValueError(f"{title}: the times of a segment are not monotonic")
 
 
 def _of_segments(segments: list[Segment]) -> Arrays:
-    """Knots and states of all steps in a row, lengths (N,) of the segments in knots, a series for each step."""
+    """Return arrays of N segments: all knots, states and series in order, and the knots per segment."""
     series = []
     for segment in segments:
         sizes = np.abs(segment.x).max(axis=0)

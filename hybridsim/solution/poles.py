@@ -126,8 +126,8 @@ def end_at_pole(system: System, trajectory: Trajectory) -> None:
     trajectory.forget_checkpoint()
     trajectory.status = "step-failure"
     trajectory.message = (
-        f"after t = {float(ended.end)!r}: the denominator {divisor.text} in the rate of {divisor.state} passes zero. "
-        f"The rates have a pole or a jump there, so the motion cannot be continued: {_REMEDY}"
+        f"after t = {float(ended.end):.9g}: the denominator {divisor.text} in the rate of {divisor.state} "
+        f"passes zero. The rates have a pole or a jump there, so the motion cannot be continued: {_REMEDY}"
     )
 
 

@@ -32,7 +32,9 @@ def resumed(
         )
     end = task.t1 if t_end is None else arguments.number(t_end, "t_end")
     if not math.isfinite(end):
-        raise UsageError(f"t_end is {t_end!r}", remedy="give a finite time; a monitor can end a run early")
+        raise UsageError(
+            f"t_end cannot be {t_end!r}", remedy="give a finite time; a monitor can end a run early"
+        )
     sign = 1.0 if task.t1 >= task.t0 else -1.0
     if t_end is None and solution.status == "finished":
         raise UsageError(

@@ -1,1 +1,1 @@
-"""Published studies are done again here, each in one folder."""
+"""This folder reproduces published studies, each in its own subfolder."""

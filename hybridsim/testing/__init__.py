@@ -1,4 +1,4 @@
-"""This folder tests an integrator on scenes with known answers: what it gets right, what wrong, and why."""
+"""This folder tests integrators on scenes with known answers, and explains their failures."""
 
 from hybridsim.testing.catalogue import SCENES
 from hybridsim.testing.scene import END, TOLERANCES, TROUBLES, VOCABULARY, Scene, Truth

@@ -128,7 +128,7 @@ def ending(scene: Scene, solution: Any) -> list[str]:
             f"the run ended with the status {solution.status!r} instead of {truth.status!r}: {solution.message}"
         )
     if solution.status not in ENDED and not solution.message:
-        wrong.append(f"the run ended with the status {solution.status!r} without a word")
+        wrong.append(f"the run ended with the status {solution.status!r} without a message")
     if truth.status is None and solution.status not in ENDED:
         sign = 1.0 if scene.span[1] > scene.span[0] else -1.0
         if any(t != END and sign * (t - solution.t_end) > 0.0 for t, _ in truth.states):

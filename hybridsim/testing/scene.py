@@ -129,4 +129,4 @@ class Scene:
     def __post_init__(self) -> None:
         unknown = set(self.needs) - set(VOCABULARY)
         if unknown:
-            raise ValueError(f"scene {self.name} needs {sorted(unknown)}, which is not in the vocabulary")
+            raise ValueError(f"scene {self.name} needs {sorted(unknown)}, unknown capabilities")

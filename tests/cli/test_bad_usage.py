@@ -22,6 +22,10 @@ BAD = {
     "option without a value": (["run", "dfcs", "--rtol"], ["--rtol"]),
     "unknown integrator": (["run", "dfcs", "--integrator", "scipy-dop583"], ["scipy-dop583", "scipy-dop853"]),
     "unknown integrator option": (["run", "dfcs", "--option", "ordr=3"], ["ordr"]),
+    "run option as an integrator option": (
+        ["run", "dfcs", "--integrator", "dop853", "--option", "rtoll=1e-9"],
+        ["--option rtoll: integrator 'dop853' has no such option", "did you mean --rtol?"],
+    ),
     "integrator option near a known one": (
         ["run", "dfcs", "--integrator", "rk4-dichotomy", "--option", "step_per_period=600"],
         ["step_per_period", "steps_per_period"],
@@ -65,7 +69,7 @@ BAD = {
     "picture without an ending": (["run", "dfcs", "--plot", "out"], ["out", ".png"]),
     "picture in no folder": (["run", "dfcs", "--plot", "nowhere/out.png"], ["nowhere"]),
     "points of no table": (["run", "dfcs", "--points", "9"], ["--points", "--csv"]),
-    "one point": (["run", "dfcs", "--csv", "x.csv", "--points", "1"], ["--points is 1", "at least 2"]),
+    "one point": (["run", "dfcs", "--csv", "x.csv", "--points", "1"], ["--points cannot be 1", "at least 2"]),
     "arrays into a table": (["run", "dfcs", "--npz", "x.csv"], ["--npz", ".csv", ".npz"]),
     "table into a folder": (["run", "dfcs", "--csv", "."], ["--csv", "folder"]),
     "unknown integrator to compare": (

@@ -55,7 +55,7 @@ REFUSED = {
     "sin(**x)": "keyword",
     "sin(x=1)": "keyword",
     "sin()": "1 argument",
-    "sin(x, y)": "1 argument, but has 2",
+    "sin(x, y)": "1 argument, but was called with 2",
     "min(x)": "2 to 64",
     "atan2(x)": "2 arguments",
     "sin": "function",

@@ -209,7 +209,7 @@ def _decay(end: float, depth: int) -> float:
 
 def test_more_arguments_than_min_and_max_are_taken_apart_into() -> None:
     many = ", ".join(f"{k}*x" for k in range(300))
-    with pytest.raises(hs.ModelError, match=r"max\(\) needs 2 to 64 arguments, but has 300"):
+    with pytest.raises(hs.ModelError, match=r"max\(\) needs 2 to 64 arguments, but was called with 300"):
         hs.Model.from_toml(f'[states]\nx = {{ start = 2, der = "max({many})" }}\n')
 
 

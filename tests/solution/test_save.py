@@ -153,12 +153,12 @@ def test_modes_out_of_events_with_transitions_at_both_ends() -> None:
 @pytest.mark.parametrize(
     ("save", "said"),
     [
-        ("some", "save is 'some'"),
-        (-1.0, "save is -1.0"),
-        (0, "save is 0"),
-        (math.nan, "save is nan"),
-        (None, "save is None"),
-        (True, "save is True"),
+        ("some", "save cannot be 'some'"),
+        (-1.0, "save cannot be -1.0"),
+        (0, "save cannot be 0"),
+        (math.nan, "save cannot be nan"),
+        (None, "save cannot be None"),
+        (True, "save cannot be True"),
     ],
 )
 def test_what_save_cannot_be(save: object, said: str) -> None:

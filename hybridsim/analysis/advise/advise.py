@@ -124,7 +124,7 @@ def advise(
     over = None if over is None else mapping(over, "over")
     tol = positive(tol, "tol")
     if not tol < 1.0:
-        raise UsageError(f"tol is {tol!r}", remedy="give a relative tolerance below 1, such as 0.01")
+        raise UsageError(f"tol cannot be {tol!r}", remedy="give a relative tolerance below 1, such as 0.01")
     accuracy = min(max(_FINER * tol, _ACCURACY[0]), _ACCURACY[1])
     span = None if t_span is None else arguments.time_span(t_span)
     question = question_of(model, quantity, span, accuracy)

@@ -135,7 +135,7 @@ def _at(form: Affine, start: Mapping[str, float]) -> float:
 
 
 def _largest(model: Model, form: Affine, force: str, values: Mapping[str, float]) -> float:
-    """Return a bound of |form| for all times, without the contact's force."""
+    """Return an upper bound of a linear form over all times, without the contact's force."""
     steady, swing = form.constant, sum(abs(phasor) for phasor in form.waves.values())
     inputs = {i.name: i for i in model.inputs}
     for name, value in form.linear.items():

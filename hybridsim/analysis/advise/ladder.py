@@ -57,7 +57,7 @@ class Step:
 
     @property
     def is_adequate(self) -> bool:
-        """Whether its value is within the tolerance."""
+        """Whether the value of the rung is within the tolerance."""
         return self.verdict in (ADEQUATE, FULL)
 
 

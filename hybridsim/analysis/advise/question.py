@@ -50,7 +50,7 @@ class OverRun(Measures):
         self.solution = solution
 
     def _extreme(self, name: str, side: int) -> float:
-        """Return an extreme of this quantity only, because a search on all quantities is slow for fixed steps."""
+        """Return the least or greatest value of one quantity, since a search on all of them is slow."""
         if name not in self._alone:
             orbit = self._orbit
             q = slice(orbit.column(name), orbit.column(name) + 1)
@@ -284,7 +284,7 @@ def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None,
         return Question(getattr(quantity, "__name__", "a function"), quantity, t_span, accuracy)
     if not isinstance(quantity, str):
         raise UsageError(
-            f"quantity is {quantity!r}", remedy=f"give a name such as {'amplitude.x'!r}, or a function"
+            f"quantity cannot be {quantity!r}", remedy=f"give a name such as {'amplitude.x'!r}, or a function"
         )
     head, *rest = quantity.split(".")
     if head not in HEADS:
@@ -296,7 +296,8 @@ def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None,
     if head in OF_MOTION:
         if t_span is not None or rest:
             raise UsageError(
-                f"quantity is {quantity!r}", remedy="write 'period' without a name, and leave t_span out"
+                f"quantity cannot be {quantity!r}",
+                remedy="write 'period' without a name, and leave t_span out",
             )
         return Question(quantity, None, None, accuracy)
     names = _names(model, head)
@@ -306,10 +307,10 @@ def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None,
     numbered = head in ("harmonic", "event_time")
     if len(rest) > 2 or (len(rest) == 2 and not (numbered and rest[1].isdecimal())):
         raise UsageError(
-            f"quantity is {quantity!r}", remedy=f"write {head}.{rest[0]}" + (".1" if numbered else "")
+            f"quantity cannot be {quantity!r}", remedy=f"write {head}.{rest[0]}" + (".1" if numbered else "")
         )
     if head == "event_time" and len(rest) == 2 and int(rest[1]) < 1:
-        raise UsageError(f"quantity is {quantity!r}", remedy="events are counted from 1")
+        raise UsageError(f"quantity cannot be {quantity!r}", remedy="events are counted from 1")
     return Question(quantity, None, t_span, accuracy)
 
 

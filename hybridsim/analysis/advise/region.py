@@ -88,7 +88,7 @@ def over_region(
     limits: Limits,
     options: Mapping[str, Any],
 ) -> tuple[Sweep, tuple[Step, ...]]:
-    """Return the map, and the ladder summed up over all points."""
+    """Return the map, and a ladder that combines the results of all points."""
     found = sweep(model, over, _Point(tuple(ladder_steps), question, tol, v0, limits), **options)
     if found.failed.all():
         raise SimulationError(f"no point of the region has an answer: {next(found.problems())[0]}")

@@ -69,7 +69,7 @@ class Setting:
 
     @property
     def is_adequate(self) -> bool:
-        """Whether its value is within the tolerance."""
+        """Whether the value of the setting is within the tolerance."""
         return self.verdict == ADEQUATE
 
     @property
@@ -80,7 +80,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class _Settling:
-    """The length of a run that settles, and the part of its end that is read."""
+    """The length of a run up to its steady motion, and the interval at its end that is measured."""
 
     question: Question
     span: tuple[float, float]

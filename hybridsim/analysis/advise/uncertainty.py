@@ -32,17 +32,20 @@ def ranges_of(model: Model, declared_ranges: Any) -> dict[str, tuple[float, floa
     """Return the checked ranges by parameter; each must contain the model's own value."""
     if not isinstance(declared_ranges, Mapping) or not declared_ranges:
         raise UsageError(
-            f"uncertain is {declared_ranges!r}", remedy="give ranges by parameter: {'mu': (0.28, 0.32)}"
+            f"uncertain cannot be {declared_ranges!r}",
+            remedy="give ranges by parameter: {'mu': (0.28, 0.32)}",
         )
     if len(declared_ranges) > _MAX_RANGES:
         raise UsageError(f"uncertain has {len(declared_ranges)} ranges", remedy=f"give at most {_MAX_RANGES}")
     found, known = {}, model.parameter_values()
     for name, ends in declared_ranges.items():
         if not is_row(ends) or len(ends) != 2:
-            raise UsageError(f"the range of {name} is {ends!r}", remedy="give (low, high)")
+            raise UsageError(f"the range of {name} cannot be {ends!r}", remedy="give (low, high)")
         low, high = (number(end, f"an end of the range of {name}") for end in ends)
         if not low < high:
-            raise UsageError(f"the range of {name} is {ends!r}", remedy="give (low, high) with low < high")
+            raise UsageError(
+                f"the range of {name} cannot be {ends!r}", remedy="give (low, high) with low < high"
+            )
         if name not in known:
             raise UsageError(
                 f"uncertain has {name!r}, but model {model.name} has no parameter of that name",

@@ -69,12 +69,12 @@ class Comparison(Readable):
         return self.table()
 
     def reading(self, row: Row, quantity: str) -> Reading | None:
-        """Return an error of a row, one of `QUANTITIES`; None if the row has none.
+        """Return one kind of error of a row (see `QUANTITIES`), or None if it was not measured.
 
         Event times are in periods if the model has a period, else in the model's unit of time.
         """
         if not isinstance(row, Row):
-            raise UsageError(f"row is {row!r}", remedy="give one of the comparison's rows")
+            raise UsageError(f"row cannot be {row!r}", remedy="give one of the comparison's rows")
         value, floor = self.scaled(row.errors, quantity), self.floor(quantity)
         if value is None:
             return None
@@ -82,7 +82,7 @@ class Comparison(Readable):
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """The kinds of error that some row has; the error of the states is always among them."""
+        """The kinds of error that were measured in any row; the error of the states is always included."""
         return tuple(
             name
             for name in QUANTITIES
@@ -97,7 +97,7 @@ class Comparison(Readable):
         """Return an error in the units of `reading`."""
         known_name(quantity, QUANTITIES, "a comparison has no quantity", "quantities")
         if errors is not None and not isinstance(errors, Errors):
-            raise UsageError(f"errors is {errors!r}", remedy="give the errors of a row, row.errors")
+            raise UsageError(f"errors cannot be {errors!r}", remedy="give the errors of a row, row.errors")
         value: float | None = getattr(errors, quantity, None)
         return (
             value / self.period if value is not None and quantity == "event_time" and self.period else value

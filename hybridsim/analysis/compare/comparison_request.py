@@ -17,7 +17,7 @@ def positive(value: Any, what: str) -> float:
     remedy = "give a number above zero"
     found = number(value, what, remedy)
     if not found > 0:
-        raise UsageError(f"{what} is {value!r}", remedy=remedy)
+        raise UsageError(f"{what} cannot be {value!r}", remedy=remedy)
     return found
 
 
@@ -26,17 +26,17 @@ def whole(value: Any, what: str, most: int = MOST) -> int:
     remedy = f"give a whole number above zero, {most} at most"
     found = number(value, what, remedy)
     if not (1 <= found <= most and found.is_integer()):
-        raise UsageError(f"{what} is {value!r}", remedy=remedy)
+        raise UsageError(f"{what} cannot be {value!r}", remedy=remedy)
     return int(found)
 
 
 def positives(values: Any, what: str) -> tuple[float, ...] | None:
-    """Return numbers above zero; None stays None."""
+    """Return numbers above zero, or None if nothing is given."""
     return None if values is None else tuple(positive(value, what) for value in _row(values, what))
 
 
 def wholes(values: Any, what: str) -> tuple[int, ...] | None:
-    """Return whole numbers above zero; None stays None."""
+    """Return whole numbers above zero, or None if nothing is given."""
     return None if values is None else tuple(whole(value, what, MOST_STEPS) for value in _row(values, what))
 
 
@@ -45,16 +45,16 @@ def mapping(value: Any, what: str) -> Mapping[str, Any]:
     if value is None:
         return {}
     if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
-        raise UsageError(f"{what} is {value!r}", remedy="give a mapping from names to values")
+        raise UsageError(f"{what} cannot be {value!r}", remedy="give a mapping from names to values")
     return value
 
 
 def checked_names(values: Any, what: str) -> tuple[str, ...]:
-    """Return names; a single one becomes a tuple of one."""
+    """Return a tuple of names; a single name becomes a tuple of length one."""
     found = (values,) if isinstance(values, str) else tuple(_row(values, what, "give names"))
     for value in found:
         if not isinstance(value, str):
-            raise UsageError(f"{what} holds {value!r}", remedy="give names")
+            raise UsageError(f"{what} cannot contain {value!r}", remedy="give names")
     return found
 
 
@@ -65,17 +65,17 @@ def named_options(item: Any) -> tuple[str, Mapping[str, Any]]:
     if isinstance(item, tuple | list) and len(item) == 2 and isinstance(item[0], str):
         return item[0], mapping(item[1], f"options of {item[0]}")
     raise UsageError(
-        f"integrators holds {item!r}",
+        f"integrators cannot contain {item!r}",
         remedy="give names, pairs of a name and a mapping of options, or Series objects",
     )
 
 
 def row_of_integrators(value: Any) -> tuple[Any, ...]:
-    """Return the items of a choice of integrators; a single name becomes a tuple of one."""
+    """Return the requested integrators; a single name becomes a tuple of length one."""
     return (value,) if isinstance(value, str) else tuple(_row(value, "integrators", "give a list of names"))
 
 
 def _row(values: Any, what: str, remedy: str = "give a list of numbers") -> Any:
     if not is_row(values):
-        raise UsageError(f"{what} is {values!r}", remedy=remedy)
+        raise UsageError(f"{what} cannot be {values!r}", remedy=remedy)
     return values

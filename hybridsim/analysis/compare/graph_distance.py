@@ -68,7 +68,7 @@ class CompletedGraph:
         return self._refined(times, states, self._bound(times, states, end), end)
 
     def _bound(self, times: Array, states: Array, end: float) -> Array:
-        """Return an upper bound of each distance: to the state at its time, and to the nearest vertical lines."""
+        """Return an upper bound of each distance, from the state at the same time and the nearest jumps."""
         inside = np.clip(times, self.trajectory.t_span[0], end)
         late = np.abs(times - inside) / self.time
         far = np.min([np.abs(self.at(inside, side) - states).max(axis=1) for side in "-+"], axis=0)
@@ -151,7 +151,7 @@ def _farthest(one: CompletedGraph, other: CompletedGraph, end: float) -> float:
 
 
 def _nearest_gap(times: Array, others: Array) -> Array:
-    """Return the distance of each time from the nearest of the others; 0 if there are none."""
+    """Return the distance of each of `times` from the nearest of `others`; 0 if `others` is empty."""
     if not len(others):
         return np.zeros(len(times))
     after = np.clip(np.searchsorted(others, times), 0, len(others) - 1)

@@ -40,11 +40,13 @@ class Series:
 
     def __post_init__(self) -> None:
         if not self.values:
-            raise UsageError(f"no values of {self.varied} for {self.integrator}", remedy="give at least one")
+            raise UsageError(
+                f"the line of {self.integrator} has no {self.varied}", remedy="give at least one"
+            )
         if (self.varied == "v0") != bool(self.regularized):
             raise UsageError(
-                f"a line that varies {self.varied!r} with regularized = {self.regularized!r}",
-                remedy="vary v0 along a regularised form, and nothing else",
+                f"a line with regularized = {self.regularized!r} cannot vary {self.varied!r}",
+                remedy="vary v0 if the line has a regularised form, and only then",
             )
         if not self.label:
             shown = {name: value for name, value in self.options.items() if name != "period"}
@@ -120,7 +122,7 @@ def _line(
 
 
 def _shown_unasked(name: str) -> list[tuple[Mapping[str, Any], str]]:
-    """Return the options and labels of an integrator's lines; several if an option decides its accuracy."""
+    """Return options and labels of an integrator's default lines; several if an option sets its accuracy."""
     if name in _ALSO_NATIVE:
         return [({}, ""), ({"events": "native"}, f"{name}, native events")]
     if name != "rk4-dichotomy":

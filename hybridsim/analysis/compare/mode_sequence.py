@@ -52,7 +52,7 @@ class _Entry:
 
 
 def match_events(reference: Trajectory, run: Trajectory) -> MatchedEvents:
-    """Match the events of each component, monitor and schedule of the reference with those of a run.
+    """Match the events of a run with those of the reference, for each component, monitor and schedule.
 
     The sequences of different components are matched separately, because the order of independent events may
     differ by rounding. Matched events are at most half of the longest event-free interval apart; beyond that

@@ -39,7 +39,7 @@ def regularised_series(
     integrators: Sequence[str] | None = None,
     rtols: Sequence[float] | None = None,
 ) -> tuple[Series, ...]:
-    """Return, per integrator and tolerance, a line for the set-valued law and one per regularised form over v0.
+    """Return lines for each integrator and tolerance: the set-valued law, and each regularised form over v0.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def _velocity_size(model: Model) -> float:
 
 
 def as_set_valued(run: Trajectory, contacts: Collection[str]) -> Trajectory:
-    """Return a run of a regularised form with the set-valued law's names of modes, without smooth contacts."""
+    """Return a run of a regularised form with mode names of the set-valued law; smooth modes are dropped."""
     modes = {
         name: _BREAKING.get(mode, mode) if name in contacts else mode
         for name, mode in run.initial_modes.items()

@@ -142,12 +142,12 @@ def _notes(comparison: Comparison) -> list[str]:
     facts = comparison.provenance
     counted = any(row.setting[0] == "steps_per_period" for row in comparison.rows)
     return [
-        "State errors: the largest of all states, relative to each one's amplitude in the reference.",
+        "State errors: the largest error of all states, relative to the state's amplitude in the reference.",
         f'Event times are in {unit}. "< u": below the uncertainty u of the reference.',
         *_graph_notes(comparison),
         *_form_notes(comparison),
         *(["T is a tenth of the run: the model has no period."] if counted and not comparison.period else []),
-        f"Wall time of a call: {turns(comparison.repeat)} of all rows, of several calls where short,",
+        f"Wall time of a call: {turns(comparison.repeat)} of all rows, of several calls if they are short,",
         f"after a warm-up; fewer turns of a run that takes more than {ENOUGH / comparison.repeat:.2g} s.",
         versions(facts),
         f"model {facts.get('model')}, {_hash(facts)}",

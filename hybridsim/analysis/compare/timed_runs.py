@@ -127,7 +127,7 @@ def _predicted(entries: Sequence[Entry], rows: dict[_Run, Row], run: _Run) -> fl
 
 
 def _not_fitting(predicted: dict[_Run, float], seconds: float) -> list[_Run]:
-    """Return the longest runs whose removal lets the others fit."""
+    """Return the longest runs to leave out so that the remaining runs fit into the budget."""
     gone = []
     total = sum(predicted.values())
     for run in sorted(predicted, key=lambda run: -predicted[run]):

@@ -173,7 +173,7 @@ class _Follower:
         self.section = int(np.argmax(rates / scale[: len(rates)])) if len(rates) else 0
 
     def follow(self, first: _Closing, sign: float) -> tuple[list[BranchPoint], str]:
-        """Return the points from the first one on, going down (sign -1) or up at first, and why they end."""
+        """Return the points of the branch towards lower (sign -1) or higher parameters, and why it ends."""
         found: list[BranchPoint] = []
         here, step = first, _FIRST
         direction = np.zeros(len(self.unit))
@@ -250,7 +250,7 @@ class _Follower:
         return None, _CORRECTIONS
 
     def close(self, orbit: Orbit, value: float) -> _Closing | None:
-        """Return the Newton data of an orbit that closes already."""
+        """Return the data of Newton's method for an orbit that is already periodic."""
         motion = Motion(self.model.with_(**{self.parameter: value}), self.method)
         point = BranchPoint(value, orbit, motion, np.zeros(0), (), self.is_free)
         return self._closing(point, self._unknowns(point))

@@ -54,7 +54,7 @@ class Field:
         return self if (z == self.z).all() else Field(self.system, z, self.t, self.by_state)
 
     def borders(self, x: np.ndarray) -> list[tuple[int, int]]:
-        """Return the components that x leaves, to rounding, on a border to another mode, each with that mode."""
+        """Return the components with a guard at zero within rounding, each with the mode beyond the guard."""
         _, _, g, G = self(x)
         rounding = dict(zip(self.guards.tolist(), INSIDE * (np.abs(G) @ self.sizes(x)), strict=True))
         value = dict(zip(self.guards.tolist(), g.tolist(), strict=True))
@@ -104,7 +104,7 @@ def modes_of(system: System, mode: Mapping[str, str] | str | None) -> tuple[np.n
             )
         mode = {declared[0].name: mode}
     if not (mode is None or isinstance(mode, Mapping)):
-        raise UsageError(f"mode is {mode!r}", remedy="give a mapping from components to modes")
+        raise UsageError(f"mode cannot be {mode!r}", remedy="give a mapping from components to modes")
     mode_names: dict[str, Any] = dict(mode or {})
     names = [a.name for a in system.declared]
     for name in mode_names:
@@ -124,7 +124,7 @@ def modes_of(system: System, mode: Mapping[str, str] | str | None) -> tuple[np.n
             )
         if chosen is not None and chosen not in automaton.modes:
             raise UsageError(
-                f"mode of {automaton.name} is {chosen!r}",
+                f"mode of {automaton.name} cannot be {chosen!r}",
                 remedy=nearest(str(chosen), automaton.modes, kind="modes"),
             )
         numbers.append(max(automaton.initial, 0) if chosen is None else automaton.modes.index(chosen))

@@ -202,7 +202,7 @@ def _refuse_borders(field: Field, x: np.ndarray, A: np.ndarray) -> None:
 
 
 def equilibrium_near(field: Field, x: np.ndarray) -> np.ndarray:
-    """Return an equilibrium found by Newton's method from x; of a continuum, one close to the path."""
+    """Return an equilibrium found by Newton's method from x; in a continuum of equilibria, a nearby one."""
     x = field.projected(x)
     field = field.at_sides(x)
     f, A, *_ = field(x)

@@ -1,4 +1,4 @@
-"""This module defines the rungs with a constant coefficient of friction instead of a law of the speed."""
+"""This module defines the rungs with a constant friction coefficient instead of a speed-dependent law."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class EquivalentViscous(LadderStep):
     drops = "stick and all harmonics of friction: a damper takes the same work per cycle at the forcing's frequency"
 
     def apply(self, scene: Scene) -> Model:
-        """Return the model with a damper in place of each contact."""
+        """Return the model with each contact replaced by a damper."""
         model = scene.model
         need_stick(model)
         period = _period(model)
@@ -144,7 +144,7 @@ def _balanced(response: Response, forces: list[FirstHarmonic], c: np.ndarray) ->
 
 
 def _first(response: Response, forces: list[FirstHarmonic]) -> np.ndarray:
-    """Return the dampers of the frictionless motion; if that is unbounded, of a motion with very small damping."""
+    """Return the dampers for the frictionless motion, or with very small damping if it is unbounded."""
     try:
         found = _balanced(response, forces, np.zeros(len(forces)))
     except (np.linalg.LinAlgError, DoesNotApply):

@@ -71,7 +71,7 @@ def with_law(contact: Contact, law: FrictionLaw) -> Contact:
 
 
 def with_parameters(model: Model, wishes: Mapping[str, float]) -> tuple[Model, dict[str, str]]:
-    """Return the model with more parameters, and the unused name chosen for each wish."""
+    """Return the model with additional parameters, and the unused name chosen for each requested name."""
     taken, names = names_of_model(model), {}
     for wish in wishes:
         names[wish] = free_name(taken, wish)

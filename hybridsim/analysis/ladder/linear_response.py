@@ -67,13 +67,13 @@ def _matrix(rows: list[Affine], names: list[str]) -> np.ndarray:
 
 
 def _wave(row: Affine, frequency: float, inputs: Mapping[str, complex]) -> complex:
-    """Return the amplitude of exp(iwt) whose real part is the row's first harmonic."""
+    """Return the complex amplitude of exp(iwt) in a row's constant waves and inputs."""
     own = sum(-1j * p for w, p in row.waves.items() if abs(w - frequency) <= _SAME * frequency)
     return complex(own + sum(row.linear.get(name, 0.0) * wave for name, wave in inputs.items()))
 
 
 def _mean(row: Affine, inputs: Iterable[Input], values: Mapping[str, float]) -> float:
-    """Return the row's mean over a period without the states."""
+    """Return the mean over a period of a row's constant and inputs, without its states."""
     total = row.constant
     for declared in inputs:
         number = {name: float(evaluate(e, values)) for name, e in declared.expressions.items()}

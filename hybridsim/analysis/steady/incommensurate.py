@@ -20,7 +20,7 @@ _NO_PERIOD = "the periods of forcing and clocks have no common multiple"
 
 
 class Followed(NamedTuple):
-    """The rest orbit, if there is one, whether a change of the start decays, the periods, and a message."""
+    """The result of `follow`: an orbit at rest if found, and whether a change of the start decays."""
 
     rests: Orbit | None
     dies_out: bool
@@ -53,7 +53,7 @@ def follow(motion: Motion, longest: float, settle: int, max_periods: int) -> Fol
         unit = np.where(largest > 0.0, largest, 1.0)
         unit = np.concatenate([unit, np.ones(len(matrix) - len(unit))])
         left = float(np.abs(matrix * unit[None, :] / unit[:, None]).max(initial=0.0))
-        growth = f"a change of the start is {left:.1e} times as large after {count} periods of the slowest"
+        growth = f"a change of the start is {left:.1e} times as large after {count} slowest periods"
         if left <= _DIES_OUT:
             return Followed(None, True, count, f"quasi-periodic: {_NO_PERIOD}, and {growth}")
         if count * _LONGER > min(max_periods, _MAX_SLOW_PERIODS):

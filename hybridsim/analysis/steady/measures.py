@@ -86,7 +86,7 @@ class Measures:
 
     @property
     def _phase(self) -> float:
-        """The time, counted with the forcing, at which the orbit begins."""
+        """The time at which the orbit begins, in the time of the forcing."""
         return 0.0
 
     @cached_property
@@ -146,7 +146,9 @@ class Measures:
         """
         known_name(name, self._names, "the steady state has no quantity", "quantities")
         if not isinstance(k, int) or not 0 <= k <= MOST_HARMONICS:
-            raise UsageError(f"k is {k!r}", remedy="give 0 for the mean, 1 for the fundamental, 2, 3, ...")
+            raise UsageError(
+                f"k cannot be {k!r}", remedy="give 0 for the mean, 1 for the fundamental, 2, 3, ..."
+            )
         frequency = 2.0 * math.pi * k / self._orbit.duration
         found = self._orbit.harmonic(name, frequency)
         return found * cmath.exp(-1j * frequency * self._phase) if self._phase else found

@@ -114,7 +114,7 @@ class Motion:
         self.time_budget, self._spent, self._pace = math.inf, 0.0, 0.0
 
     def unwatched(self) -> Motion:
-        """Return the same without the progress callback, for later runs."""
+        """Return a copy without the progress callback, for later runs."""
         motion = Motion(self.model, self.options, self.first)
         motion.sizes = self.sizes
         return motion

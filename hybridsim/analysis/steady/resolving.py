@@ -37,7 +37,7 @@ _ROUNDINGS = 4.0  # multiple of the measured rounding
 
 
 def _misfits() -> tuple[np.ndarray, np.ndarray]:
-    """Return the sample places on a interval (Gauss points and two near its ends) and the misfit weights (rows).
+    """Return the sample points of an interval (Gauss points and two near its ends) and misfit weights (rows).
 
     Misfits are the last coefficients, and the errors of the polynomial near the ends. Only the latter show a
     feature that begins behind the last Gauss point.

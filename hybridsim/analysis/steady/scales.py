@@ -39,7 +39,7 @@ def coupled_sizes(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -
 
 
 def rounding_of(sizes: np.ndarray, rtol: float) -> np.ndarray:
-    """Return the changes of states (n,) of these sizes that a run of this tolerance may make at rest."""
+    """Return the largest changes (n,) from rounding alone, for states of these sizes and this tolerance."""
     return _ROUNDINGS * min(rtol, _LOOSEST) * sizes
 
 
@@ -52,7 +52,7 @@ def stands_still(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, rt
 
 
 def _rates(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rates (n,) and their derivatives by the states (n, n)."""
+    """Return the rates (n,) and their derivatives with respect to the states (n, n)."""
     n = system.n
     seeds = np.eye(n + 1 + len(p), n)
     with np.errstate(over="ignore", invalid="ignore"):  # a motion may grow without bound

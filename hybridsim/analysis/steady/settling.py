@@ -89,7 +89,7 @@ class Passings:
         return multiple * left / rate
 
     def _change(self, back: int, multiple: int) -> float:
-        """Return the change over `multiple` passages, `back` times as many passages earlier."""
+        """Return the change over `multiple` passages, up to `back * multiple` passages before the last."""
         return relative(
             self.values[-1 - back * multiple] - self.values[-1 - (back + 1) * multiple], self.scale
         )

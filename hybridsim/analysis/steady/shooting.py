@@ -88,9 +88,9 @@ def shoot(
 
 
 def followed_closely(motion: Motion, start: Orbit, scale: np.ndarray, is_free: bool) -> Orbit:
-    """An orbit with the residual that is left with the tightest tolerance, and the period where that is_free.
+    """Return an orbit with its residual at the tightest tolerance, and with a corrected period if it is free.
 
-    Orbits that lie among others, such as those of what conserves energy, change by what a run loses, and no further.
+    Orbits in a continuum, as in a system that conserves energy, change only by the numerical loss of a run.
     """
     try:
         solution = motion.run(start.start, start.period, rtol=SMALLEST_RTOL)
@@ -156,7 +156,7 @@ def multipliers(matrix: np.ndarray, rates: np.ndarray | None) -> np.ndarray:
 
 
 def _beside(matrix: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Return the part of a matrix that acts across a direction; components along it are left out."""
+    """Return a matrix restricted to the subspace orthogonal to the rates."""
     direction = np.zeros((len(matrix), 1))
     direction[: len(rates), 0] = rates
     across = np.linalg.qr(direction, mode="complete")[0][:, 1:]

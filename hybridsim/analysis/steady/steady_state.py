@@ -148,7 +148,9 @@ def steady_state(
 
     tol = arguments.number(tol, "tol")
     if not 0.0 < tol < 1.0:
-        raise UsageError(f"tol is {tol!r}", remedy="give a relative tolerance between 0 and 1, such as 1e-10")
+        raise UsageError(
+            f"tol cannot be {tol!r}", remedy="give a relative tolerance between 0 and 1, such as 1e-10"
+        )
     system = system_of(model)
     _refuse_what_ends(system, period is not None)
     own = common_period(system)
@@ -405,7 +407,7 @@ class _Search:
         return found
 
     def _without_return(self, passings: Passings) -> SteadyState:
-        """Return the result for a motion that does not return to where it was."""
+        """Return the result for a motion that does not return to its earlier states."""
         name = self.motion.names[passings.state]
         orbit = Orbit(passings.last, self.duration, 1, math.inf)
         message = (
@@ -444,7 +446,7 @@ def _found(
 
 def _check_period(model: Model, period: float, own: float | None) -> None:
     if not (period > 0.0 and math.isfinite(period)):
-        raise UsageError(f"period is {period!r}", remedy="give a time above zero")
+        raise UsageError(f"period cannot be {period!r}", remedy="give a time above zero")
     if own is not None and abs(period / own - max(round(period / own), 1)) > _COMMENSURATE * period / own:
         raise UsageError(
             f"period is {period!r}, but model {model.name} is forced with the period {own!r}",
@@ -469,13 +471,13 @@ def _refuse_what_ends(system: System, has_period: bool) -> None:
     for clock in model.schedules:
         if clock.period is None or clock.count is not None:
             raise UsageError(
-                f"{clock.name} of model {model.name} ends: there is no steady state before",
-                remedy="leave it out, or let it tick without end",
+                f"schedule {clock.name} of model {model.name} ends, so there is no steady state before",
+                remedy="leave the schedule out, or declare a clock without count",
             )
         start = evaluate(clock.start, system.values) if clock.start is not None else 0.0
         if start >= evaluate(clock.period, system.values):
             raise UsageError(
-                f"{clock.name} of model {model.name} begins after its first period",
+                f"clock {clock.name} of model {model.name} begins after its first period",
                 remedy="choose a start below the period of the clock",
             )
     tape = system.code.data["tape"]

@@ -119,7 +119,7 @@ class SuiteComparison(Readable):
         if fewer:
             notes.append(
                 f"{len(fewer)} of {len(timed)} runs were timed fewer than {self.repeat} times, "
-                f"{fewer.count(0)} of them only in the run that warms up"
+                f"{fewer.count(0)} runs only while they warmed up"
             )
         return tuple(notes)
 

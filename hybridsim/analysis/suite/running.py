@@ -139,7 +139,7 @@ def _reference(case: PreparedCase, seconds: float, step: Callable[[str], None]) 
         return find((CLOSED_FORM, MULTIPLE_PRECISION, RUNS))
     except _TooSlow:
         warning = (
-            f"a reference in multiple precision was not ready after {seconds:.2g} s: two runs stand in for it"
+            f"a reference in multiple precision was not ready after {seconds:.2g} s: two runs replace it"
         )
         found = find((RUNS,))
         return replace(found, warnings=(*found.warnings, warning))

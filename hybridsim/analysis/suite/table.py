@@ -63,10 +63,10 @@ def _references(suite: SuiteComparison) -> list[str]:
 
 def _notes(suite: SuiteComparison) -> list[str]:
     return [
-        "State errors: the largest of all states over the run, relative to each one's amplitude in the reference.",
-        "Event times are in periods of the forcing where there is one, else in the model's unit of time.",
-        f"Wall times: {turns(suite.repeat)} of all runs of all scenes, of several calls where short.",
-        f"It took {suite.seconds:.0f} s of {suite.budget:g} s.",
+        "State errors: the largest error of all states over the run, relative to the state's amplitude.",
+        "Event times are in periods of the forcing if the model has one, else in the model's unit of time.",
+        f"Wall times: {turns(suite.repeat)} of all runs of all scenes, of several calls if they are short.",
+        f"The suite took {suite.seconds:.0f} s of its budget of {suite.budget:g} s.",
         versions(suite.provenance),
-        *(["Not as asked:", *(f"  {note}" for note in suite.notes)] if suite.notes else []),
+        *(["Differences from the request:", *(f"  {note}" for note in suite.notes)] if suite.notes else []),
     ]

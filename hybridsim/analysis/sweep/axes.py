@@ -90,10 +90,10 @@ def points_of(model: Model, values: Any, mode: Any) -> Points:
         For unknown names, invalid values, or lists of different lengths.
     """
     if not isinstance(mode, str) or mode not in MODES:
-        raise UsageError(f"mode is {mode!r}", remedy="give 'grid' for all combinations, or 'list'")
+        raise UsageError(f"mode cannot be {mode!r}", remedy="give 'grid' for all combinations, or 'list'")
     if not isinstance(values, Mapping) or not values:
         raise UsageError(
-            f"values is {values!r}",
+            f"values cannot be {values!r}",
             remedy="give a mapping from names of parameters to values, {'F0': [20, 30, 40]}",
         )
     units = {p.name: p.unit for p in model.parameters}
@@ -167,7 +167,7 @@ def _setting(name: str, value: Any) -> float | Expression:
         return parse(value)
     found = number(value, f"a value of {name}", "give a number or an expression")
     if not math.isfinite(found):
-        raise UsageError(f"a value of {name} is {value!r}", remedy="give finite numbers")
+        raise UsageError(f"a value of {name} cannot be {value!r}", remedy="give finite numbers")
     return found
 
 

@@ -60,7 +60,7 @@ def frequency_response(
     model = chosen_model(model, params)
     others, frequency = mapping(levels, "levels"), text(frequency, "frequency")
     if len(others) > 1 or frequency in others:
-        raise UsageError(f"levels is {levels!r}", remedy="give one parameter other than the frequency")
+        raise UsageError(f"levels cannot be {levels!r}", remedy="give one parameter other than the frequency")
     if not model.states:
         raise UsageError(
             f"model {model.name} has no states", remedy="give a model with a state that responds"

@@ -121,7 +121,7 @@ class Journal:
         if found.get("sweep") != head["sweep"]:
             raise UsageError(
                 f"{self.path} belongs to another sweep: model, values, options or measure differ",
-                remedy="finish that one, delete the file, or give another path",
+                remedy="finish that sweep, delete the file, or give another path",
             )
 
     def note(self, numbers: range, outcomes: Sequence[Outcome]) -> None:

@@ -75,7 +75,7 @@ class LastPeriod:
         alone: Callable[[Settings], Outcome],
         watch: Watch,
     ) -> list[Outcome] | None:
-        """Run all points in compiled code, except those left to `alone`; return None if none of them can be.
+        """Run all points in compiled code, except those left to `alone`; return None if no point can run so.
 
         If the watch requests a stop, the outcomes are those of the first points, as far as they were run.
         """

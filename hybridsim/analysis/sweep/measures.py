@@ -44,5 +44,6 @@ def measure_of(measure: Any, model: Model, chained: bool, options: Mapping[str, 
     if names and all(isinstance(word, str) for word in names):
         return named_measure(names, model, options)
     raise UsageError(
-        f"measure is {measure!r}", remedy="give a function of the model, or the name of a built-in measure"
+        f"measure cannot be {measure!r}",
+        remedy="give a function of the model, or the name of a built-in measure",
     )

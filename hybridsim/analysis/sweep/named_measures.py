@@ -115,8 +115,8 @@ def named_measure(
         return Final(tuple(names), options)
     if FINAL in heads:
         raise UsageError(
-            f"measure is {reading_names!r}",
-            remedy="steady states and ends of runs need two sweeps; ask for one of them",
+            f"measure cannot be {reading_names!r}",
+            remedy="use two sweeps: one for readings of steady states, and one for ends of runs",
         )
     if AFTER in options:
         refuse_unknown([simulate], {name: value for name, value in options.items() if name != AFTER})

@@ -113,7 +113,9 @@ def with_section(model: Model, section: str | None) -> tuple[Model, str]:
     if section is None:
         return model, ""
     if not isinstance(section, str):
-        raise UsageError(f"section is {section!r}", remedy="give an expression, or the name of a monitor")
+        raise UsageError(
+            f"section cannot be {section!r}", remedy="give an expression, or the name of a monitor"
+        )
     if section in {monitor.name for monitor in model.monitors}:
         return model, section
     name = free_name(names_of_model(model), LEVEL)

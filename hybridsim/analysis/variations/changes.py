@@ -58,11 +58,11 @@ class Changed:
 
     @property
     def moves(self) -> np.ndarray:
-        """A mask (M,) of the directions along which it changes."""
+        """A mask (M,) of the directions along which the function changes."""
         return np.asarray(np.abs(self.by) > _ALIKE * self.sizes)
 
     def along(self, rates: np.ndarray) -> float:
-        """Return its rate if the states have these rates (n,); 0 if it is negligible relative to its terms."""
+        """Return the rate of the function for these rates (n,) of the states; 0 if the terms cancel."""
         terms = np.append(self.row * rates, self.by_time)
         return float(terms.sum()) if abs(terms.sum()) > _TANGENTIAL * np.abs(terms).sum() else 0.0
 
@@ -85,7 +85,7 @@ class Changes:
         self._scale, self.own = scale, own
 
     def flow(self, at: Place) -> tuple[np.ndarray, np.ndarray]:
-        """Return the rates (n,) of the states, and their derivatives by all inputs of the formulas."""
+        """Return the rates (n,) of the states, and their derivatives by each input of the formulas."""
         found = TangentTape(self.system, at.z)(
             np.array([at.s]), at.x[None, :], at.p, seeds(self.system, at.origin, self.rates)
         )

@@ -97,7 +97,7 @@ class EventTimes:
         Yd: np.ndarray,
         is_first: bool,
     ) -> Shift | None:
-        """Return the shift of an event at a zero of a guard or monitor; None for one that followed from another."""
+        """Return the shift of an event at a zero of a guard or monitor; None if another event caused it."""
         system = self.system
         is_monitor = one.kind == "monitor"
         if is_monitor:

@@ -24,7 +24,7 @@ _SAME = 1e-9  # of their size: rates on two sides of a guard that differ by less
 
 
 class OffZero(NamedTuple):
-    """A function exactly at zero at time t, and the effect on the directions (M,) that move it off zero.
+    """A function exactly at zero at time t, and its effect on the derivatives in M directions.
 
     moves : mask (M,) of these directions. lost : mask (M,) of those from whose side the run does not return.
     more : addition to the derivatives (n, M) of the states on the other side; zero elsewhere.
@@ -185,7 +185,7 @@ class _Sides:
         return off
 
     def _passed(self, c: int, both: list[Changed], above: np.ndarray, below: np.ndarray) -> list[OffZero]:
-        """Return a surface that the run leaves to one side, before and after the impulses of holding components.
+        """Describe a surface at zero that the run leaves, before and after impulses of holding components.
 
         On the other side, directions with impulses do not return by themselves.
         """
@@ -261,7 +261,7 @@ class _Sides:
         return off
 
     def off(self, name: str, one: Changed, other: np.ndarray, there: np.ndarray, speed: float) -> OffZero:
-        """Return a function at zero that changes on its other side at a speed, or does not return (speed 0)."""
+        """Describe a function at zero by its rate on the other side; with rate 0 it does not return."""
         other = other & one.moves
         t = self.at.origin + self.at.s
         if speed == 0.0:

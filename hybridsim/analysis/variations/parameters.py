@@ -1,4 +1,4 @@
-"""This module computes derivatives of parameter values and initial values by some parameters."""
+"""This module computes derivatives of parameter and initial values with respect to some parameters."""
 
 from __future__ import annotations
 

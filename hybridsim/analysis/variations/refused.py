@@ -20,7 +20,7 @@ _ROUNDINGS = 4096.0
 
 
 def refuse_limits(solution: Solution) -> None:
-    """Refuse a run with a series of events that ended short of rounding."""
+    """Refuse a run with an accumulation of events that was not followed down to rounding."""
     components = {component.name: component for component in solution.components}
     before = solution.t_start
     for event in solution.events:
@@ -46,7 +46,7 @@ def refuse_limits(solution: Solution) -> None:
 
 
 def refuse_inputs(model: Model, G: np.ndarray) -> None:
-    """Refuse parameters that change an input's shape, because the derivatives G (P, M) by them are unknown."""
+    """Refuse parameters that change an input's shape, because the derivatives by them are unknown."""
     moving = {p.name for p, row in zip(model.parameters, G, strict=True) if row.any()}
     starts = {part.name: part.start.names for part in model.discrete}
     for declared in model.inputs:

@@ -56,7 +56,7 @@ def segment_events_of(solution: Solution) -> Iterator[SegmentEvents]:
 
 
 def time_rounding(solution: Solution) -> float:
-    """How far from its time an event may be located by what the steps of a run round away: see `add_steps`."""
+    """Return a bound of the rounding error of event times from the sum of the steps; see `add_steps`."""
     steps, length = solution.stats["steps"], abs(solution.t_end - solution.t_start)
     rounding = UNIT * (16.0 * steps + solution._run.method.rounding) * length
     return rounding + 4.0 * math.ulp(max(abs(solution.t_end), abs(solution.t_start)))

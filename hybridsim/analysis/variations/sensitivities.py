@@ -1,4 +1,4 @@
-"""This module computes derivatives of a run's end and event times by its start and by parameters."""
+"""This module computes derivatives of a run's end and event times with respect to start and parameters."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Sensitivities(Readable):
-    """The derivatives of a run's end and event times by its start and by parameters.
+    """The derivatives of a run's end and event times with respect to its start and parameters.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class Sensitivities(Readable):
 def sensitivities(
     solution: Solution, parameters: Sequence[str] | None = None, *, starts_follow: bool = True
 ) -> Sensitivities:
-    """Differentiate the end and the event times of a run by its start and by parameters, through all events.
+    """Differentiate the end and event times of a run with respect to its start and parameters.
 
     The variational equations Y' = f_x Y + f_p are integrated along the dense output and carried through each event by
     its saltation matrix (`hybridsim.analysis.variations.carried`), including a contact's loss of rank in stick. The
@@ -142,7 +142,7 @@ def _found(
     ],
 ) -> Sensitivities:
     if not hasattr(solution, "_segments"):
-        raise UsageError(f"solution is {solution!r}", remedy="give the result of hs.simulate")
+        raise UsageError(f"solution cannot be {solution!r}", remedy="give the result of hs.simulate")
     model, system = solution.model, solution._system
     names = [p.name for p in model.parameters]
     starts_follow = flag(starts_follow, "starts_follow")

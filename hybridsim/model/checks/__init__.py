@@ -1,4 +1,4 @@
-"""This folder checks whether a declaration holds together, and collects all faults.
+"""This folder checks that declarations are consistent, and collects all errors.
 
 Start with `validate`, which calls the others, and `scope`, which they share.
 """

@@ -138,7 +138,7 @@ _GUARDS_OF_SURFACE = (
 
 def _lacking(mode: Mode, hold: str) -> str:
     if mode.name == hold:
-        return f"needs one guard for each side but has {len(mode.guards)}, so the mode could never end"
+        return f"needs one guard for each side but has only {len(mode.guards)}, so the mode could never end"
     return "has no guard, so the surface could never be reached"
 
 

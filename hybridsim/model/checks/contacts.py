@@ -83,7 +83,7 @@ def _own_names(scope: Scope, law: FrictionLaw) -> frozenset[str]:
 
 
 def _form(scope: Scope, law: FrictionLaw, what: str) -> None:
-    """Report fields that this form of law cannot have, and modes that change foreign quantities."""
+    """Report fields that this form of law cannot have, and modes that set anything but the force."""
     if law.is_set_valued:
         for table in law.tables:
             if table.over.text == SPEED and table.at[0] < 0.0:

@@ -37,7 +37,7 @@ class Caution:
 
     @property
     def sentence(self) -> str:
-        """The same in one line, with file and line number but without the source text."""
+        """The warning in one line, with file and line number but without the source text."""
         where = self.place.prefix if self.place else ""
         return f"{where}{self.message}: {self.remedy.rstrip('.')}"
 

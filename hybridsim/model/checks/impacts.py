@@ -44,5 +44,5 @@ def check_restitution(scope: Scope, impact: Impact, values: Mapping[str, float])
     if impact.restitution.names <= values.keys():
         e = evaluate(impact.restitution, values)
         if not -ROUNDING <= e <= 1.0 + ROUNDING:
-            message = f"impact {impact.name}: the restitution '{impact.restitution.text}' is {e!r}"
+            message = f"impact {impact.name}: the restitution '{impact.restitution.text}' cannot be {e!r}"
             scope.fail(impact, message, "use a number from 0 (no rebound) to 1 (no energy loss)")

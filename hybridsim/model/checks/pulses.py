@@ -7,7 +7,7 @@ import ast
 from hybridsim.expr.grammar import TIME
 from hybridsim.model.smoothing.one_sided import Lookup
 
-# Degree that stands for expressions that are not polynomials in t.
+# Degree that is assigned to expressions that are not polynomials in t.
 _CURVED = 9
 
 

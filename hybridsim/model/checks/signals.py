@@ -53,7 +53,7 @@ def _schedule(scope: Scope, schedule: Schedule) -> None:
         if schedule.period is None:
             scope.fail(schedule, f"{what} has count = {schedule.count} but no period", "set period")
         if schedule.count < 1:
-            scope.fail(schedule, f"{what}: count is {schedule.count}", "use a whole number >= 1")
+            scope.fail(schedule, f"{what}: count cannot be {schedule.count}", "use a whole number >= 1")
 
 
 def _input(scope: Scope, signal: Input) -> None:
@@ -93,7 +93,7 @@ def _table(scope: Scope, signal: Input, what: str) -> None:
     for name, numbers in (("times", times), ("values", values)):
         for index, number in enumerate(numbers):
             if not math.isfinite(number):
-                scope.fail(signal, f"{what}: {name}[{index}] is {number}", "use finite numbers")
+                scope.fail(signal, f"{what}: {name}[{index}] cannot be {number}", "use finite numbers")
                 return
     for index in range(1, len(times)):
         jump = times[index] == times[index - 1]

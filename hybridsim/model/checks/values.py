@@ -87,7 +87,7 @@ def _value(scope: Scope, expr: Expression, values: dict[str, float]) -> float | 
 def _size(scope: Scope, part: Declared, what: str, size: float | None) -> None:
     """Report a nominal size that is not positive and finite."""
     if size is not None and not 0 < size < math.inf:
-        scope.fail(part, f"{what} is {size!r}", "use a finite number above zero")
+        scope.fail(part, f"{what} cannot be {size!r}", "use a finite number above zero")
 
 
 def _positive(
@@ -96,7 +96,7 @@ def _positive(
     value = None if expr is None else _value(scope, expr, values)
     if expr is not None and value is not None and value <= 0:
         shown = "" if expr.is_constant else f" ({expr.text})"
-        scope.fail(part, f"{what}: {field} is {value:g}{shown}", "it must be above zero")
+        scope.fail(part, f"{what}: {field} cannot be {value:g}{shown}", "it must be above zero")
 
 
 def _input(scope: Scope, signal: Input, values: dict[str, float]) -> None:
@@ -107,7 +107,7 @@ def _input(scope: Scope, signal: Input, values: dict[str, float]) -> None:
             continue
         value = _value(scope, expr, values)
         if field == "duty" and value is not None and not 0 < value < 1:
-            scope.fail(signal, f"{what}: duty is {value:g}", "it must be between 0 and 1")
+            scope.fail(signal, f"{what}: duty cannot be {value:g}", "it must be between 0 and 1")
 
 
 def _constant_definitions(scope: Scope, values: dict[str, float]) -> dict[str, float]:
@@ -131,7 +131,9 @@ def _contact(scope: Scope, contact: Contact, values: dict[str, float]) -> None:
         load = _value(scope, contact.normal, values)
         if load is not None and load < 0:
             shown = "" if contact.normal.is_constant else f" ({contact.normal.text})"
-            scope.fail(contact, f"{what}: the normal load is {load:g}{shown}", "it must not be negative")
+            scope.fail(
+                contact, f"{what}: the normal load cannot be {load:g}{shown}", "it must not be negative"
+            )
             return
     if not contact.law.is_set_valued:
         return
@@ -153,7 +155,9 @@ def _onset(scope: Scope, contact: Contact, values: dict[str, float], backward: b
         return
     for name, force in (("stick limit", limit), ("slip force at v = 0", onset)):
         if force < 0:
-            scope.fail(contact, f"{what}: the {name} is {force:g}", "a friction force must not be negative")
+            scope.fail(
+                contact, f"{what}: the {name} cannot be {force:g}", "a friction force must not be negative"
+            )
             return
     if onset - limit > ROUNDING * onset:
         message = f"{what}: the stick limit {limit:g} is below the slip force {onset:g} at v = 0"
@@ -169,6 +173,6 @@ def _slip_at_points(scope: Scope, contact: Contact, values: dict[str, float], ba
         force = contact.slip_force_at(speed, backward)
         value = _value(scope, force, values) if force.names <= values.keys() else None
         if value is not None and value < 0:
-            message = f"contact {contact.name}: the slip force at v = {speed:g} is {value:g}"
+            message = f"contact {contact.name}: the slip force at v = {speed:g} cannot be {value:g}"
             scope.fail(contact, message, "a friction force must not be negative")
             return

@@ -1,4 +1,4 @@
-"""Friction laws give a force as a function of velocity and load and, where a law remembers, of states.
+"""This folder defines friction laws: the force as a function of velocity, load and internal states.
 
 Start with `law`.
 """

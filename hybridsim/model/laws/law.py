@@ -97,7 +97,8 @@ class FrictionLaw(Declared):
             names = as_tuple(parameters)
             if not all(isinstance(name, str) for name in names):
                 raise self._fault(
-                    f"parameters is {parameters!r}", "use a list of names, or a dict of names and defaults"
+                    f"parameters cannot be {parameters!r}",
+                    "use a list of names, or a dict of names and defaults",
                 )
             object.__setattr__(self, "parameters", dict.fromkeys(names))
         self._maps("parameters", "definitions")

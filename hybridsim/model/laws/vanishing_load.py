@@ -25,7 +25,7 @@ def vanishing_load(
     start: tuple[float, Sequence[float]],
     now: tuple[float, Sequence[float]],
 ) -> str:
-    """Return the remedy for the first such contact, from time and state at the start and now, or "".
+    """Return the remedy for the first contact whose load vanishes between the start and now, or "".
 
     A load that depends on other names than parameters, states and time is reported if a state of its law is not finite.
     """

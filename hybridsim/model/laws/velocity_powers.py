@@ -57,7 +57,7 @@ class _Candidate:
 
 
 def velocity_powers(model: Model) -> tuple[VelocityPower, ...]:
-    """Return all such powers of a model that the form of its expressions shows."""
+    """Return the fractional velocity powers that can be recognised in the expressions of a model."""
     found = model.once("velocity powers", lambda: _candidates(model))
     if not found:
         return ()

@@ -1,4 +1,4 @@
-"""One declares these parts: states, contacts, impacts, automata, monitors, schedules, inputs, and the model of them.
+"""This folder defines the parts of a model: states, contacts, impacts, automata, events and inputs.
 
 Start with `model`.
 """

@@ -238,9 +238,9 @@ class Component(Declared):
         if isinstance(limit, str):
             object.__setattr__(self, "limit", Choice(limit, place=self.place))
         elif not (limit is None or isinstance(limit, Choice)):
-            raise self._fault(f"limit is {limit!r}", "use the name of a mode, or hs.Choice(...)")
+            raise self._fault(f"limit cannot be {limit!r}", "use the name of a mode, or hs.Choice(...)")
         if not (self.surface is None or isinstance(self.surface, Surface)):
-            raise self._fault(f"surface is {self.surface!r}", "use hs.Surface(...)")
+            raise self._fault(f"surface cannot be {self.surface!r}", "use hs.Surface(...)")
         if self.initial is None and self.surface is None and len(self.modes) == 1:
             object.__setattr__(self, "initial", self.modes[0].name)
 

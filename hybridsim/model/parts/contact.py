@@ -77,7 +77,7 @@ class Contact(Declared):
 
             object.__setattr__(self, "law", load_law(law))
         elif not isinstance(law, FrictionLaw):
-            raise self._fault(f"law is {law!r}", "use hs.FrictionLaw(...), or the name of a law")
+            raise self._fault(f"law cannot be {law!r}", "use hs.FrictionLaw(...), or the name of a law")
 
     def component(self, constants: Collection[str] = ()) -> Component:
         """Return the automaton with the contact's name; for a set-valued law it has three modes.

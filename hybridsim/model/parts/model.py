@@ -137,7 +137,7 @@ class Model(Declared):
             definitions = tuple((name, parse(text)) for name, text in pairs)
         except (TypeError, ValueError):
             remedy = "use a dict of names and expressions, or a list of pairs"
-            raise self._fault(f"definitions is {self.definitions!r}", remedy) from None
+            raise self._fault(f"definitions cannot be {self.definitions!r}", remedy) from None
         object.__setattr__(self, "definitions", definitions)
         object.__setattr__(self, "states", tuple(self._with_those_of_laws()))
 
@@ -363,7 +363,7 @@ class Model(Declared):
         return names
 
     def _never_negative_names(self) -> frozenset[str]:
-        """Return constant names and normal forces of impacts: a load of these needs no guard."""
+        """Return the names for which a load needs no guard: constants and the normal forces of impacts."""
         return self.constant_names() | {impact.name for impact in self.impacts}
 
     def _constant_names(self) -> frozenset[str]:
@@ -441,7 +441,8 @@ class Model(Declared):
 
         if not isinstance(text, str):
             raise UsageError(
-                f"The text of the model is {text!r}", remedy="pass TOML text, or use hs.load for a file"
+                f"The text of the model cannot be {text!r}",
+                remedy="pass TOML text, or use hs.load for a file",
             )
         if path is not None:
             path = path_text(path)
@@ -477,7 +478,7 @@ def _known(
     allowed = as_tuple(names)
     for name, value in changes.items():
         if not isinstance(value, Expression | str | Real):
-            raise UsageError(f"{kind} {name} is {value!r}", remedy="use a number or an expression")
+            raise UsageError(f"{kind} {name} cannot be {value!r}", remedy="use a number or an expression")
         if name not in allowed:
             raise UsageError(
                 f"the model '{model}' has no {kind} '{name}'",

@@ -178,7 +178,7 @@ def _rank(rows: list[list[Fraction]]) -> int:
 def apart_by(
     meanings: Meanings, first: ast.expr, second: ast.expr
 ) -> tuple[Polynomial, Polynomial, Polynomial]:
-    """Return n, d and g = n first - d second, constant and not zero, of parallel borders; else empty ones.
+    """Return n, d and g = n*first - d*second of two parallel borders, with constant g; otherwise empty ones.
 
     n and d are numbers times products of parameters, n / d the ratio of the slopes of the second to those of the first.
     """

@@ -366,7 +366,7 @@ class Rewriting:
         return None in (met := self._borders_in(node)) or family in met
 
     def _borders_in(self, node: ast.expr) -> frozenset[Family | None]:
-        """Return the borders of the corners in a tree; None stands for all jumps."""
+        """Return the borders of the corners in a tree, with None for any jump."""
         if id(node) not in self._met:
             found: set[Family | None] = set()
             is_jump = isinstance(node, ast.IfExp | ast.Compare | ast.BoolOp)

@@ -56,7 +56,7 @@ def _from_file(table: Table, folder: Path) -> dict[str, tuple[float, ...]]:
     columns = table.data.get("columns", [0, 1])
     good = isinstance(columns, list) and len(columns) == 2
     if not good or not all(isinstance(column, (str, int)) for column in columns):
-        table.fail(f"'columns' is {columns!r}", "use two names or indices, [time, value]", "columns")
+        table.fail(f"'columns' cannot be {columns!r}", "use two names or indices, [time, value]", "columns")
         return {}
     path = folder / table.text("file")
     try:

@@ -71,7 +71,7 @@ class Table:
         if value is None:
             return None
         if isinstance(value, bool) or not isinstance(value, int):
-            self.fail(f"'{key}' is {_shown(value)}", "it must be a whole number", key)
+            self.fail(f"'{key}' cannot be {_shown(value)}", "it must be a whole number", key)
             return None
         return value
 
@@ -80,7 +80,7 @@ class Table:
         if value is None:
             return None
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            self.fail(f"'{key}' is {_shown(value)}", "it must be a number", key)
+            self.fail(f"'{key}' cannot be {_shown(value)}", "it must be a number", key)
             return None
         return _real(value)
 
@@ -147,7 +147,7 @@ class Table:
         """Return the sub-table at a key, or None after reporting a wrong type."""
         if not isinstance(value, dict):
             if shorthand is None or isinstance(value, list):
-                self.fail(f"{kind} is {_shown(value)}", "it must be a table { ... }", *keys)
+                self.fail(f"{kind} cannot be {_shown(value)}", "it must be a table { ... }", *keys)
                 return None
             value = {shorthand: value}
         return Table(self.source, (*self.path, *keys), value, kind)
@@ -155,7 +155,7 @@ class Table:
     def _typed(self, key: str, kind: type, required_kind: str, default: Any) -> Any:
         value = self.data.get(key, default)
         if not isinstance(value, kind):
-            self.fail(f"'{key}' is {_shown(value)}", f"it must be {required_kind}", key)
+            self.fail(f"'{key}' cannot be {_shown(value)}", f"it must be {required_kind}", key)
             return default
         return value
 

@@ -136,7 +136,7 @@ def _schedule(schedule: Schedule) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value as TOML has it: expressions become numbers or texts, and what is not given is left out."""
+    """Return a value for TOML: expressions become numbers or strings, and unset entries are omitted."""
     if isinstance(value, Expression):
         number = _number(value.text)
         return value.text if number is None else number
@@ -146,7 +146,7 @@ def _plain(value: Any) -> Any:
 
 
 def _number(text: str) -> float | None:
-    """Return the number that a text is, if TOML reads it back to the same text, otherwise None."""
+    """Return a text as a number if TOML reads this number back to the same text, otherwise None."""
     for kind in (int, float):
         try:
             value = kind(text)

@@ -1,4 +1,4 @@
-"""This folder explains an event: it makes the decision once more and keeps everything that it looked at.
+"""This folder explains an event: it repeats the decision and records every quantity that was used.
 
 Start with `explanation`.
 """

@@ -59,7 +59,7 @@ class GuardView:
         return self.side == 0 and any(left)
 
     def in_numbers(self) -> str:
-        """Return its value, its first two derivatives, and the rounding error of the value as text."""
+        """Return value, first two derivatives and rounding error of the guard as text."""
         numbers = zip(("g", "g'", "g''"), self.derivatives, self.units, strict=False)
         terms = [f"{name} = {value + 0.0:.3g} {unit}".rstrip() for name, value, unit in numbers]
         rounding = f"{self.bounds[0]:.1g} {self.units[0]}".rstrip()

@@ -337,7 +337,7 @@ def _segment_before(solution: Solution, occurrence: Occurrence) -> Segment | Non
 
 
 def _met(system: System, at: Situation, fired: list[int]) -> list[int]:
-    """Return the other guards that reached zero with those that fired and would go negative."""
+    """Return the guards that reached zero at the same instant as the fired ones and would go negative."""
     series = system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
     found = []
     for g in np.flatnonzero(system.active(at.z)):

@@ -1,4 +1,4 @@
-"""This module describes how near to zero a guard came that touched it within rounding and turned back."""
+"""This module describes a near-grazing: how close to zero a guard came before it turned back."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ class Look:
     free: np.ndarray
 
     def is_as(self, other: Look) -> bool:
-        """Return whether both are the same motion to rounding."""
+        """Return whether two combinations give the same motion within rounding."""
         free = self.free & other.free
         (mine, error), (its, its_error) = self.motion[:, free], other.motion[:, free]
         return bool((np.abs(mine - its) <= error + its_error).all())
@@ -67,27 +67,27 @@ class Decision:
         return self.looks[0].components if self.looks else ()
 
     def has_taken(self, look: Look) -> bool:
-        """Return whether it ended with the modes of a look."""
+        """Return whether the decision chose the modes of this combination."""
         members = list(look.components)
         return bool(len(self.z) and (look.z[members] == self.z[members]).all())
 
     @property
     def taken(self) -> Look | None:
-        """The look whose modes were taken."""
+        """The combination whose modes were chosen."""
         return next((look for look in self.looks if self.has_taken(look)), None)
 
     def with_verdict(self, verdict: int) -> list[Look]:
-        """The looks with this verdict."""
+        """The combinations with this verdict."""
         return [look for look in self.looks if look.verdict == verdict]
 
     @property
     def fine(self) -> list[Look]:
-        """Return the admissible looks."""
+        """Return the admissible combinations."""
         return self.with_verdict(FINE)
 
     @property
     def undecided(self) -> list[Look]:
-        """Return the looks that rounding leaves open."""
+        """Return the combinations that rounding leaves open."""
         return self.with_verdict(UNDECIDED)
 
 

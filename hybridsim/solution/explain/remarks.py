@@ -79,7 +79,7 @@ def _changed(system: System, occurrence: Occurrence, z: np.ndarray) -> str:
 
 
 def _jump(system: System, occurrence: Occurrence, z: np.ndarray) -> Iterator[str]:
-    """Describe the component that stands for a jump in the rates."""
+    """Describe the component that represents a jump in the rates."""
     for component in system.model.all_components():
         surface = component.surface if component.name == occurrence.component else None
         if surface and surface.unknown.startswith(SIGN):

@@ -1,1 +1,1 @@
-"""This folder does the published study of the RK4 method with a dichotomy again, claim by claim."""
+"""This folder reproduces the study by He et al. (2026) of an RK4 method with bisection, claim by claim."""

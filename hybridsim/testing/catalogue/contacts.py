@@ -56,7 +56,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def tied() -> Scene:
-    """Return the scene of coupled contacts at their limits together: one release keeps the other in stick."""
+    """Return the scene of two contacts that reach their limits together; one release holds the other."""
     release, own, forced = math.asin(0.4) / 4, math.sqrt(30), 7.5 / 14
 
     def after(t: float) -> tuple[float, float]:

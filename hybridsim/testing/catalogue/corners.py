@@ -41,7 +41,7 @@ def _backlash() -> Scene:
 
 
 def _saturation() -> Scene:
-    """The input 2 sin(t) is clipped between pi/6 and 5 pi/6; the rest integrates to 2 (1 - cos)."""
+    """The input 2 sin(t) is clipped to 1 between pi/6 and 5 pi/6, and its integral is known."""
     rise = 2 * (1 - math.cos(math.pi / 6))
     top = rise + 2 * math.pi / 3
     states = (

@@ -169,7 +169,7 @@ def _moving_floor() -> Scene:
 
 
 def _kinked_floors() -> Scene:
-    """The rising floor closes the gap at 0.5, which opens at 0.25; what lies on the sinking one falls freely."""
+    """The floors kink at t = 0.1: the body on the rising floor is thrown up, the other falls freely."""
     began, end = 0.1, 0.14
 
     def state(t: float) -> tuple[float, ...]:
@@ -190,7 +190,7 @@ def _kinked_floors() -> Scene:
 
 
 def _own_speed() -> Scene:
-    """v' = 0.48 min(-v, 0.85) - 2 from v = -0.2 has an exponential solution until -v = 0.85, then a line."""
+    """The speed v' = 0.48 min(-v, 0.85) - 2 is exponential until v = -0.85, and linear after that."""
     limit = 2.0 / 0.48
     reached = math.log((limit - 0.2) / (limit - 0.85)) / 0.48
 

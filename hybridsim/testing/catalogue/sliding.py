@@ -200,7 +200,7 @@ def _rubbing_servo() -> Scene:
 
 
 def _two_relays() -> Scene:
-    """With u = 1, w = -1 y = 3t - 1/2; then w = 1/2, x' = t - 3/2; along both u = 2t/3, w = t/3; u = 1 at 3/2."""
+    """The motion reaches y = 0 at t = 1/6, then x = 0, slides along both, and leaves x = 0 at t = 3/2."""
     first, both, off = 1 / 6, 1.5 - math.sqrt(0.75), 1.5
 
     def x(t: float) -> float:

@@ -14,7 +14,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _speeds() -> Scene:
-    """v' = -1.5 from 1.2 and, at 0.8, from 0.5, then -0.5; w' = -0.8; u' = y + 1 in slip-, y - 1 in slip+."""
+    """Three bodies move with piecewise known accelerations, and guards on their speeds fire at stops."""
     back = math.sqrt(5.4) - 2.0  # after its kick the third body moves by -0.7 + 2 s + s**2/2
     turn = 0.8 + 1 / 3
     events = (
@@ -36,7 +36,7 @@ def _speeds() -> Scene:
         "guards-on-speeds",
         (0.0, 2.0),
         Truth(events, states, checks=checks),
-        # the first speed comes to zero and is thrown back within one step
+        # the first speed reaches zero and is reset within one step
         needs("contacts", "transitions", "exact-stick", "multiple-roots"),
         start_is_event=False,
     )

@@ -89,7 +89,7 @@ reset.x = "x + 1\""""
         (
             'x = { start = 0, der = "-x + sin(t)" }',
             '[schedules.s]\ntimes = [1.0]\nreset.x = "x + 1"',
-            "ends: there is no steady state",
+            "ends, so there is no steady state",
         ),
     ],
 )

@@ -247,13 +247,13 @@ def test_labelled_arrays() -> None:
         ({"values": {"F0": []}}, "F0 has no values"),
         ({"values": {"F0": 3.0}}, "give a list of numbers"),
         ({"values": {"F0": [math.inf]}}, "finite"),
-        ({"values": {"F0": [None]}}, "a value of F0 is None"),
+        ({"values": {"F0": [None]}}, "a value of F0 cannot be None"),
         ({"values": {"F0": [1, 2], "N": [1]}, "mode": "list"}, "F0 2, N 1"),
-        ({"mode": "cloud"}, "mode is 'cloud'"),
-        ({"workers": 0}, "workers is 0"),
+        ({"mode": "cloud"}, "mode cannot be 'cloud'"),
+        ({"workers": 0}, "workers cannot be 0"),
         ({"executor": 3}, "client.get_executor"),
-        ({"measure": 3}, "measure is 3"),
-        ({"progress": 3}, "progress is 3"),
+        ({"measure": 3}, "measure cannot be 3"),
+        ({"progress": 3}, "progress cannot be 3"),
     ],
 )
 def test_what_cannot_be_asked_for(given: dict[str, object], message: str) -> None:

@@ -174,7 +174,7 @@ def test_points_that_fail_leave_a_status_and_all_the_others() -> None:
     found = hs.sweep("dfcs", values, ["amplitude.x"], mode="list", after=20)
     assert found.failed.tolist() == [False, True, True, False, False, True]
     assert found["amplitude.x"][0] == found["amplitude.x"][3] > 0.0
-    assert "normal load is -1" in found.status[1]
+    assert "normal load cannot be -1" in found.status[1]
     wrong = hs.sweep(hs.load("dfcs").with_(omega=400.0), {"m": [0.2, -0.2, 0.0]}, ["amplitude.x"], after=3)
     assert wrong.failed.tolist() == [False, True, True]
     assert "acts along its relative velocity" in wrong.status[1]

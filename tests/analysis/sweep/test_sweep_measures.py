@@ -72,7 +72,7 @@ def test_the_end_of_a_run() -> None:
         ("final", {}, "without t_span"),
         ("final.y", {"t_span": (0, 1)}, "no measure 'final.y'"),
         (["final.x", "period"], {"t_span": (0, 1)}, "two sweeps"),
-        ([], {}, r"measure is \[\]"),
+        ([], {}, r"measure cannot be \[\]"),
     ],
 )
 def test_what_does_not_exist(measure: object, options: dict[str, object], message: str) -> None:

@@ -70,11 +70,11 @@ FORM = {
     "unknown key of a clock": (BLOCK + "[clocks.c]\nperiod = 1\nreset = {}\n", "unknown key 'reset'", 16),
     "unknown key of a schedule": (BLOCK + "[schedules.c]\ntime = 1\n", "did you mean 'times'", 15),
     "unknown key of an output": (BLOCK + "[outputs]\nf = { exp = 'f' }\n", "did you mean 'expr'", 15),
-    "a number for a text": (changed(BLOCK, '"block"', "3"), "'name' is a number (3)", 1),
+    "a number for a text": (changed(BLOCK, '"block"', "3"), "'name' cannot be a number (3)", 1),
     "a text for a number": (changed(BLOCK, "start = 1,", "start = 1, nominal = 'big',"), "a string ('big')", 8),
     "a text for a flag": (changed(RELAY, "initial = true", "initial = 'yes'"), "it must be true or false", 4),
     "a list for a table": (changed(BLOCK, "[states]", "states = []\n[other]"), "states", None),
-    "a number for a state": (changed(BLOCK, '{ start = 1, der = "v" }', "1"), "state x is a number (1)", 8),
+    "a number for a state": (changed(BLOCK, '{ start = 1, der = "v" }', "1"), "state x cannot be a number (1)", 8),
     "a list for an expression": (changed(BLOCK, "m = 1.0", "m = [1]"), "[1]", 3),
     "a date for an expression": (changed(BLOCK, "m = 1.0", "m = 2026-01-01"), "date", 3),
     "a state without der": (changed(BLOCK, ', der = "v"', ""), "'der' is missing", 8),
@@ -143,11 +143,11 @@ CONTENT = {
     "an infinite parameter": (changed(BLOCK, "m = 1.0", "m = inf"), "inf is not finite", 3),
     "a parameter that overflows": (changed(BLOCK, "4*m", "1e300*(m + 1e300)"), "it is inf", 4),
     "a start without value": (changed(BLOCK, "start = 1,", "start = 'log(-m)',"), "evaluated with m = 1", 8),
-    "nominal zero": (changed(BLOCK, "start = 1,", "start = 1, nominal = 0,"), "nominal is 0", 8),
-    "negative normal load": (changed(BLOCK, "N = 2.0", "N = -2.0"), "the normal load is -2 (N)", 10),
+    "nominal zero": (changed(BLOCK, "start = 1,", "start = 1, nominal = 0,"), "nominal cannot be 0", 8),
+    "negative normal load": (changed(BLOCK, "N = 2.0", "N = -2.0"), "the normal load cannot be -2 (N)", 10),
     "negative load by expression": (changed(BLOCK, '"N"', '"N - 3*d"') + "[definitions]\nd = 'm'\n",
-        "the normal load is -1 (N - 3*d)", 10),
-    "negative friction": (changed(BLOCK, "mu = 0.3", "mu = -0.3"), "the stick limit is -0.6", 10),
+        "the normal load cannot be -1 (N - 3*d)", 10),
+    "negative friction": (changed(BLOCK, "mu = 0.3", "mu = -0.3"), "the stick limit cannot be -0.6", 10),
     "static below kinetic": (changed(OWN, "a - b", "a + b"), "the stick limit 1 is below", 10),
     "a velocity without state": (changed(BLOCK, 'velocity = "v"', 'velocity = "t"'), "contains no state", 10),
     "a velocity with a force": (changed(BLOCK, 'velocity = "v"', 'velocity = "v + w"') + '[definitions]\nw = "f"\n',
@@ -163,12 +163,12 @@ CONTENT = {
     "an unknown direction": (BLOCK + "[monitors.p]\nexpr = 'v'\ndirection = 'dwon'\n", "did you mean 'down'", 14),
     "an unknown action": (BLOCK + "[monitors.p]\nexpr = 'v'\naction = 'stop'\n", "known actions", 14),
     "a reset of nothing": (BLOCK + "[monitors.p]\nexpr = 'v'\naction = 'reset'\n", "nothing to reset", 14),
-    "a period of zero": (BLOCK + "[clocks.c]\nperiod = 0\n", "period is 0", 14),
-    "a negative period": (BLOCK + '[clocks.c]\nperiod = "m - 2"\n', "period is -1 (m - 2)", 14),
+    "a period of zero": (BLOCK + "[clocks.c]\nperiod = 0\n", "period cannot be 0", 14),
+    "a negative period": (BLOCK + '[clocks.c]\nperiod = "m - 2"\n', "period cannot be -1 (m - 2)", 14),
     "no times": (BLOCK + "[schedules.c]\nterminate = true\n", "has no times", 14),
     "times and a clock": (BLOCK + "[schedules.c]\ntimes = 1\nperiod = 2\n", "both times and start or period", 14),
     "a count without period": (BLOCK + "[schedules.c]\nstart = 1\ncount = 3\n", "count = 3 but no period", 14),
-    "a count of zero": (BLOCK + "[schedules.c]\nperiod = 1\ncount = 0\n", "count is 0", 14),
+    "a count of zero": (BLOCK + "[schedules.c]\nperiod = 1\ncount = 0\n", "count cannot be 0", 14),
     "two events of one name": (BLOCK + "[monitors]\na = 'v'\n[clocks.a]\nperiod = 1\n",
         "event 'a' is declared twice", 16),
 }  # fmt: skip
@@ -227,7 +227,7 @@ def test_python_models_are_checked_alike() -> None:
     with pytest.raises(hs.ModelError) as caught:
         block(components=[hs.Component("s", unguarded, surface=surface)]).validate()
     assert "mode a has no guard, so the surface could never be reached" in str(caught.value)
-    assert "mode c needs one guard for each side but has 1" in str(caught.value)
+    assert "mode c needs one guard for each side but has only 1" in str(caught.value)
     with pytest.raises(hs.ModelError, match="both choices and a fatal message"):
         block(components=[hs.Component("s", [hs.Mode("a", [hs.Guard("g", "x", "a", "end")])])]).validate()
 

@@ -23,19 +23,19 @@ def sliding(law: hs.FrictionLaw) -> hs.Model:
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: hs.State("x", 0, 1, place="here"), "State: place is 'here'"),
-        (lambda: hs.Contact("f", "v", 1, "coulomb", {"mu": 1}, opens="yes"), "opens is 'yes'"),
-        (lambda: hs.Contact("f", "v", 1, "coulomb", {"mu": 1}, nominal=3), "nominal is 3"),
-        (lambda: hs.Schedule("s", period=1, count=2.5), "count is 2.5"),
-        (lambda: hs.Schedule("s", times=[1], terminate=1), "terminate is 1"),
-        (lambda: hs.FrictionLaw("a", slip="mu", stick="mu", parameters=[["mu"]]), "parameters is"),
-        (lambda: hs.LawTable("mu", at=[0, 10**400], values=[1, 2]), "at is"),
+        (lambda: hs.State("x", 0, 1, place="here"), "State: place cannot be 'here'"),
+        (lambda: hs.Contact("f", "v", 1, "coulomb", {"mu": 1}, opens="yes"), "opens cannot be 'yes'"),
+        (lambda: hs.Contact("f", "v", 1, "coulomb", {"mu": 1}, nominal=3), "nominal cannot be 3"),
+        (lambda: hs.Schedule("s", period=1, count=2.5), "count cannot be 2.5"),
+        (lambda: hs.Schedule("s", times=[1], terminate=1), "terminate cannot be 1"),
+        (lambda: hs.FrictionLaw("a", slip="mu", stick="mu", parameters=[["mu"]]), "parameters cannot be"),
+        (lambda: hs.LawTable("mu", at=[0, 10**400], values=[1, 2]), "at cannot be"),
         (lambda: hs.Harmonic(math.nan), "Harmonic: omega is nan"),
         (lambda: hs.Harmonic(1.0, sin=math.inf), "Harmonic: sin is inf"),
         (lambda: hs.Harmonic(1.0, cos=1j), "Harmonic: cos is 1j"),
-        (lambda: hs.MechanicalSystem([1.0], None, None, q0=[1j]), "q0 is"),
-        (lambda: hs.MechanicalSystem([[1, 2], [3]], None, None), "M is"),
-        (lambda: hs.MechanicalSystem([10**400], None, None), "M is"),
+        (lambda: hs.MechanicalSystem([1.0], None, None, q0=[1j]), "q0 cannot be"),
+        (lambda: hs.MechanicalSystem([[1, 2], [3]], None, None), "M cannot be"),
+        (lambda: hs.MechanicalSystem([10**400], None, None), "M cannot be"),
         (lambda: hs.MechanicalSystem([], None, None), "M is empty"),
         (lambda: hs.MechanicalSystem([1.0], None, None, contacts=[3]), "contacts contain 3"),
         (lambda: hs.MechanicalSystem([1.0], None, None, forcing=[math.inf]), "holds inf"),
@@ -49,7 +49,7 @@ def test_a_wrong_value_is_named(make: Callable[[], Any], says: str) -> None:
 
 @pytest.mark.parametrize("nominal", [0, -1, math.nan, math.inf, 10**400])
 def test_a_size_that_is_not_above_zero_is_refused_with_the_model(nominal: float) -> None:
-    with pytest.raises(hs.ModelError, match="nominal is"):
+    with pytest.raises(hs.ModelError, match="nominal cannot be"):
         hs.Model("m", states=[hs.State("x", 0, 1, nominal=nominal)]).validate()
 
 
@@ -90,7 +90,7 @@ def test_tables_over_the_speed_begin_at_rest() -> None:
 
 def test_a_table_that_turns_friction_into_a_drive_is_refused() -> None:
     table = hs.LawTable("mu", at=[0, 1, 2], values=[0.5, -0.1, 0.5])
-    with pytest.raises(hs.ModelError, match=r"the slip force at v = 1 is -0\.1"):
+    with pytest.raises(hs.ModelError, match=r"the slip force at v = 1 cannot be -0\.1"):
         sliding(hs.FrictionLaw(**TABLE, tables=[table])).validate()
 
 

@@ -65,7 +65,7 @@ def test_changing_what_is_not_there(change: Callable[[hs.Model], hs.Model], near
 def test_bad_values_are_refused_at_once_or_by_validation() -> None:
     with pytest.raises(hs.ExpressionError, match="nan is not finite"):
         block().with_(N=math.nan)
-    with pytest.raises(hs.ModelError, match="the normal load is -3"):
+    with pytest.raises(hs.ModelError, match="the normal load cannot be -3"):
         block().with_(N=-3).validate()
     with pytest.raises(hs.ModelError, match="cyclic dependency among parameters: m -> k -> m"):
         block().with_(m="k").parameter_values()

@@ -35,7 +35,7 @@ def work(
     """
     if executor is not None and not isinstance(executor, Executor):
         raise UsageError(
-            f"executor is {executor!r}",
+            f"executor cannot be {executor!r}",
             remedy="give a concurrent.futures.Executor; of a dask client, client.get_executor()",
         )
     if isinstance(executor, ProcessPoolExecutor):

@@ -47,7 +47,7 @@ LIMIT = 1e-3  # Eq. 6
 
 @dataclass(frozen=True)
 class Curves:
-    """A and E of every case over the settings, by method, and the exact values.
+    """Amplitude A and energy E of every case over the settings, by method, with the exact values.
 
     values : method -> case -> (A, E) of shape (2, settings).
     """
@@ -173,7 +173,7 @@ def claim_figure_5(curves: Curves) -> Claim:
 
 
 def _row(curves: Curves, method: str, setting: float) -> dict[str, Any]:
-    """Return for each case when it has converged, and its error at the published setting."""
+    """Return the setting at which each case has converged, and its error at the published setting."""
     found = {case: curves.converged(method, case) for case in CASES}
     values = np.array(list(found.values()))
     rising = curves.settings[-1] > curves.settings[0]

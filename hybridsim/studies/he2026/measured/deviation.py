@@ -30,7 +30,7 @@ class Maps:
     stick: np.ndarray  # fraction of the exact period spent in stick
 
     def deviation(self, quantity: str, without: str, with_: str) -> np.ndarray:
-        """Return |Q1 - Q2|/Q2, Eq. 9."""
+        """Return the relative deviation |Q1 - Q2|/Q2 (Eq. 9)."""
         one, two = self.mean[without][quantity], self.mean[with_][quantity]
         return np.asarray(np.abs(one - two) / two)
 
@@ -140,7 +140,7 @@ def distance(reading: dict[str, Any], quantity: str) -> float:
 
 
 def combinations() -> list[tuple[str, str]]:
-    """Return every pair of a method without stick and one with it."""
+    """Return every pair of a method without stick and a method with stick."""
     return [(a.name, b) for a in SIGNS for b in (*(v.name for v in MATTERING), EXACT)]
 
 

@@ -46,7 +46,7 @@ _SCALES = (40.0, 7.3, 1234.5)  # N
 
 @dataclass(frozen=True)
 class Reduction:
-    """A/A0 and E/E0 by method over ratios (rows) and forces (columns), and the test to rounding.
+    """A/A0 and E/E0 by method over ratios (rows) and forces (columns), and deviations from scaling.
 
     rounding : largest relative difference of A, E and stick fraction between scales, over points of the plane.
     """

@@ -107,7 +107,7 @@ def by_steps(
     steps: int = STEPS_PER_PERIOD,
     eps_v: float | None = None,
 ) -> Periods:
-    """Return A and E of each of the last periods of a run with a fixed-step method."""
+    """Return amplitude A and energy E of each of the last periods of a fixed-step run."""
     return periods_of(solve_by_steps(point, variant, periods, last, steps, eps_v), point, periods, last)
 
 
@@ -135,7 +135,7 @@ def solve_by_steps(
 
 
 def periods_of(solution: Solution, point: Point, periods: int, last: int) -> Periods:
-    """Return A and E per period from the steps as in the paper: extremes of x at the steps."""
+    """Return A and E of each period from the values at the steps, as in the paper."""
     t, (x, v) = solution.t, solution.y
     edges = point.period * np.arange(periods - last, periods + 1)
     first = np.searchsorted(t, edges[:-1] - 1e-9 * point.period)
