@@ -21,7 +21,7 @@ def at_times(times: Sequence[float]) -> str:
 
 
 def exact_stick(component: str, held: Mapping[str, float], rest: tuple[str, ...] = ()) -> Check:
-    """Return a check that held states are exact in stick, and that those in `rest` are constant."""
+    """Return a check that held states are exact in stick, and that the states in `rest` are constant."""
 
     def check(solution: Any) -> list[str]:
         names = [state.name for state in solution.model.states]

@@ -139,7 +139,7 @@ class Question:
         return OverRun(solution)
 
     def read(self, motion: Any) -> Number:
-        """Return the value for a motion, or for a closed form if it has the quantity.
+        """Return the value of the quantity for a motion or a closed form.
 
         A value is zero if it is below the accuracy relative to the largest value of the same quantity in the
         motion.
@@ -159,7 +159,7 @@ class Question:
         if head == "period":
             found = float(getattr(motion, "period", math.nan))
             if math.isnan(found):
-                raise NoAnswer("it does not oscillate")
+                raise NoAnswer("the motion does not oscillate")
             return found
         if head == "harmonic":
             if not is_run:
@@ -183,19 +183,19 @@ class Question:
         try:
             found = complex(value) if isinstance(value, complex) else float(value)
         except (TypeError, ValueError, OverflowError):
-            raise NoAnswer(f"it returned {value!r}, which is not a number") from None
+            raise NoAnswer(f"the function returned {value!r}, which is not a number") from None
         if not math.isfinite(abs(found)):
-            raise NoAnswer(f"it returned {value!r}")
+            raise NoAnswer(f"the function returned {value!r}")
         return found
 
     def _event_time(self, motion: Any) -> float:
         if not isinstance(motion, Measures):
-            raise NoAnswer("it has no events")
+            raise NoAnswer("a closed form has no events")
         system = motion.solution.model
         known = {c.name for c in system.all_components()} | {m.name for m in system.monitors}
         times = motion.solution.event_times(self.name).tolist() if self.name in known else []
         if len(times) < self.number:
-            raise NoAnswer(f"it has {len(times)} events of {self.name}")
+            raise NoAnswer(f"the run has only {len(times)} events of {self.name}")
         return float(times[self.number - 1])
 
 
@@ -207,7 +207,7 @@ def _require_limit_cycle(model: Model, steady: SteadyState) -> None:
     if steady.kind != "periodic" or system_period(system_of(model)) is not None:
         return
     if max(abs(steady.multipliers), default=0.0) > 1.0 - _NEUTRAL:
-        raise NoAnswer("it is undamped: its amplitude depends on the initial state")
+        raise NoAnswer("the motion is undamped, so the amplitude depends on the initial state")
 
 
 def stuck(solution: Solution, contact: str) -> float:
@@ -239,7 +239,7 @@ def _speed(contact: str) -> str:
 
 
 def with_contact_outputs(model: Model) -> Model:
-    """Return the model with the velocity, speed and power of each contact as outputs, which all rungs keep."""
+    """Return the model with velocity, speed and power of each contact as outputs; all rungs keep these."""
     known = {output.name for output in model.outputs}
     more = []
     for contact in model.contacts:

@@ -96,7 +96,7 @@ def over_region(
 
 
 def _steps(found: Sweep, ladder_steps: Sequence[LadderStep], tol: float) -> list[Step]:
-    """Return for each rung the count of points where it is adequate, and its largest error."""
+    """Return, for each rung, its largest error and the number of points at which it is adequate."""
     done = ~found.failed
     total = int(done.sum())
     errors, simplest = found["errors"][done], found["simplest"][done]

@@ -51,7 +51,7 @@ class Setting:
 
     Parameters
     ----------
-    integrator, options : as for `simulate`; "steady_state" stands for a call of that function.
+    integrator, options : as for `simulate`; "steady_state" means a call of that function.
     value, error : the quantity, and its error relative to the accurate value.
     seconds : the measured time.
     verdict : "adequate", "not adequate", "does not apply" if the integrator cannot run the model, "failed",

@@ -63,7 +63,7 @@ def compare(
     steps : sequence of int, optional
         Steps per period of the fixed-step integrators; without a period, a tenth of the run counts as one.
     params, x0 : mapping of str to float, optional
-        Parameter values and initial values by name, in place of the declared ones.
+        Parameter values and initial values by name, instead of the declared values.
     repeat : int, optional
         Timed repetitions of each run, in turns over all runs, after one that warms up; runs of seconds are
         repeated less often.

@@ -86,7 +86,7 @@ class Yardstick:
         return CompletedGraph(trajectory, jumps, self.period or t1 - t0, self.amplitude)
 
     def measure(self, run: Trajectory) -> Errors:
-        """Return the errors of a run from the same start, up to the end of the shorter of the two."""
+        """Return the errors of a run with the same start, up to the end of the shorter motion."""
         matched = match_events(self.trajectory, run)
         end = min(self.trajectory.t_span[1], run.t_span[1])
         shared = self.times <= end

@@ -94,11 +94,11 @@ def choose_series(
         for item in row_of_integrators(requested):
             chosen.append(item if isinstance(item, Series) else line(*named_options(item)))
     if not chosen:
-        raise UsageError("no integrators to compare", remedy="name some, see hybridsim.list_integrators()")
+        raise UsageError("no integrators to compare", remedy="use names from hybridsim.list_integrators()")
     labels = [series.label for series in chosen]
     repeated = [label for label in labels if labels.count(label) > 1]
     if repeated:
-        raise UsageError(f"two lines have the label {repeated[0]!r}", remedy="give one of them another label")
+        raise UsageError(f"two lines have the label {repeated[0]!r}", remedy="give each line its own label")
     return tuple(chosen)
 
 

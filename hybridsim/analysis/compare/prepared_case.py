@@ -42,7 +42,7 @@ class PreparedCase:
     _forms: dict[tuple[str, float], Model] = field(default_factory=dict, repr=False, compare=False)
 
     def simulate(self, integrator: str, *, model: Model | None = None, **options: Any) -> Solution:
-        """Run the model, or another form of it, with an integrator."""
+        """Run the model, or a modified form of the model, with an integrator."""
         from hybridsim.simulate import simulate
 
         return simulate(model or self.model, self.t_span, integrator=integrator, **options)

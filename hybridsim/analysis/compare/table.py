@@ -104,7 +104,7 @@ def _heading(comparison: Comparison) -> list[str]:
 
 
 def differences(comparison: Comparison, errors: Errors | None = None) -> str:
-    """Return errors as text in the units of the table; by default those of the second reference."""
+    """Return errors as text in the units of the table; by default the errors of the second reference."""
     readings = {name: comparison.scaled(errors or comparison.difference, name) for name in QUANTITIES}
     return ", ".join(f"{_NAMES[name]} {value:.1e}" for name, value in readings.items() if value) or "nothing"
 

@@ -113,7 +113,7 @@ def timed_rows(
 
 
 def _predicted(entries: Sequence[Entry], rows: dict[_Run, Row], run: _Run) -> float:
-    """Return the predicted seconds of a run, from two settings before it on its line; 0 if unknown."""
+    """Return the predicted seconds of a run from the two previous settings of its line; 0 if unknown."""
     before = [rows[replace(run, level=level)] for level in range(run.level)]
     done = [(row.setting[1], row.cost) for row in before if row.cost is not None]
     if any(row.status == STOPPED for row in before):

@@ -63,7 +63,7 @@ class Equilibrium(Readable):
 
     @property
     def is_point(self) -> bool:
-        """Whether it is a single point."""
+        """Whether the equilibrium is a single point."""
         return bool((self.low == self.high).all())
 
 
@@ -120,7 +120,7 @@ def equilibria(
     if count > _MAX_COMBINATIONS:
         raise UsageError(
             f"model {model.name} has {count} combinations of modes; at most {_MAX_COMBINATIONS} are tried",
-            remedy="find one with hs.linearize(model, mode)",
+            remedy="choose modes and use hs.linearize(model, mode)",
         )
     found = []
     for numbers in product(*(range(len(a.modes)) for a in system.automata)):

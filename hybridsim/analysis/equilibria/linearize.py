@@ -197,7 +197,7 @@ def _refuse_borders(field: Field, x: np.ndarray, A: np.ndarray) -> None:
         raise UsageError(
             f"the point lies on the corner {system.automata[c].name}: the linearizations on its two sides "
             "differ",
-            remedy="give a point on one side of it with at=",
+            remedy="give a point on one side of the corner with at=",
         )
 
 

@@ -93,7 +93,7 @@ class NoStopMotion:
 
 @dataclass(frozen=True)
 class _Held:
-    """The numbers of the closed form: amplitude, forcing angle at the turning point, and whether it is unique."""
+    """The solution of the closed form: amplitude, forcing angle at the turning point, and uniqueness."""
 
     found: Recognised
     amplitude: float
@@ -138,7 +138,7 @@ def held(model: Model) -> _Held:
 
 
 def _angle_at_top(system: ForcedCoulombOscillator, amplitude: float) -> float:
-    """Return the forcing angle at the upper turning point from which half a period leads to the lower one.
+    """Return the forcing angle at the upper turning point, half a period before the lower turning point.
 
     Half a period maps (x, v) of the free motion by a matrix M and negates the forced part. Two linear
     equations therefore give the forced part (Fx, Fv) at the turning point: (M + 1) (Fx, Fv) = M (A - c, 0) +

@@ -22,7 +22,7 @@ _SMALLEST = 1e-280  # a smaller change has been reduced to nothing by stick
 
 
 def largest_exponents(motion: Motion, start: Point, period: float) -> tuple[float, float]:
-    """Return the mean growth rates of a change over the first and second 150 periods; -inf if it vanishes.
+    """Return the mean growth rates of a change over the first and second 150 periods; -inf for zero change.
 
     Exponential growth has the same rate in both halves. Growth like a power of time has not.
     """

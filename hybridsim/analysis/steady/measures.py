@@ -76,7 +76,7 @@ class ByName(Mapping[str, float]):
 
 
 class Measures:
-    """Measures of one period; `solution` is the run over it."""
+    """Measures of one period of a motion; `solution` is the run over this period."""
 
     solution: Solution
 

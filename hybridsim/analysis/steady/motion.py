@@ -44,7 +44,7 @@ class Point:
         return np.concatenate([self.x, self.discrete])
 
     def moved(self, change: np.ndarray) -> Point:
-        """Return the same point with states and discrete states changed by (n + d,)."""
+        """Return a copy of the point with states and discrete states changed by (n + d,)."""
         n = len(self.x)
         return replace(self, x=self.x + change[:n], discrete=self.discrete + change[n:])
 
@@ -185,7 +185,7 @@ class Motion:
         return solution
 
     def _longer(self, solution: Solution, duration: float, is_carried: bool) -> Solution:
-        """Continue a run that has reached its limits, for as many steps again, if it can still finish."""
+        """Continue a run that has reached its limits for as many steps again, within the cost limit."""
         spent, reached = _cost_of(solution), solution.t_end - solution.t_start
         spent += _cost_of_carrying(solution) if is_carried else 0.0
         if (

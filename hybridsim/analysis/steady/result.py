@@ -94,7 +94,7 @@ class SteadyState(Readable, Measures):
 
     @cached_property
     def solution(self) -> Solution:  # type: ignore[override]  # computed on demand
-        """The run over one period; for a motion without a period, over part of it.
+        """The run over one period, or over part of a motion without a period.
 
         With forcing it begins at t = 0, or between two events if an event is there, so that it contains each
         event once.

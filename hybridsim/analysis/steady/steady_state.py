@@ -252,7 +252,7 @@ class _Search:
 
     @property
     def share(self) -> float:
-        """The finished fraction of the periods after which the motion is classified as it is."""
+        """The finished fraction of the largest number of periods."""
         return min(self.periods / self.max_periods, 1.0)
 
     def _follow(self, last: Passings | None) -> Passings:
@@ -450,7 +450,7 @@ def _check_period(model: Model, period: float, own: float | None) -> None:
     if own is not None and abs(period / own - max(round(period / own), 1)) > _COMMENSURATE * period / own:
         raise UsageError(
             f"period is {period!r}, but model {model.name} is forced with the period {own!r}",
-            remedy="leave it out, or give a whole multiple",
+            remedy="leave period out, or give a whole multiple of it",
         )
 
 

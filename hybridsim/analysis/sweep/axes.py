@@ -112,7 +112,7 @@ def points_of(model: Model, values: Any, mode: Any) -> Points:
         counted = ", ".join(f"{name} {length}" for name, length in lengths.items())
         raise UsageError(
             f"the lists of the sweep have different lengths: {counted}",
-            remedy="give one value of each for each point, or mode='grid'",
+            remedy="give lists of equal length, or mode='grid'",
         )
     axes = tuple(
         Axis(
@@ -198,7 +198,7 @@ def _dependencies(declared: Mapping[str, Expression], name: str) -> dict[str, Ex
 
 
 def _number(name: str, dependencies: Mapping[str, Expression]) -> float:
-    """Return the value of a parameter; NaN if it has none, which is an error of that point only."""
+    """Return the value of a parameter; a NaN, for a missing value, is an error of this point only."""
     try:
         return resolve(dependencies)[name]
     except ExpressionError:

@@ -114,7 +114,7 @@ class _Describer:
         return f"{self.of(type(value))}({self._state(value)})"
 
     def _class(self, value: type) -> str:
-        """Return the identity of a class: all definitions of it and its bases."""
+        """Return the identity of a class: all definitions of the class and its bases."""
         defined = {name: part for name, part in vars(value).items() if name not in _NOT_READ}
         parts = (value.__qualname__, type(value), value.__bases__, defined)
         return f"class({', '.join(map(self.of, parts))})"

@@ -116,7 +116,7 @@ class Journal:
             found = None
         if not isinstance(found, dict) or found.get("format") != _FORMAT:
             raise UsageError(
-                f"{self.path} is not a journal of a sweep", remedy="give another path, or delete it"
+                f"{self.path} is not a journal of a sweep", remedy="give another path, or delete the file"
             )
         if found.get("sweep") != head["sweep"]:
             raise UsageError(
@@ -125,7 +125,7 @@ class Journal:
             )
 
     def note(self, numbers: range, outcomes: Sequence[Outcome]) -> None:
-        """Add the outcomes of some points; a later kill does not lose them."""
+        """Add the outcomes of some points; they are safe if the process is killed later."""
         rows = [[o.status, {n: _written(v) for n, v in (o.found or {}).items()}] for o in outcomes]
         if rows:
             self._write([list(numbers[: len(rows)]), rows])
@@ -163,7 +163,7 @@ def _piece(line: Any) -> tuple[list[int], list[Outcome]]:
         For any other content.
     """
     if not (isinstance(line, list) and len(line) == 2 and all(isinstance(part, list) for part in line)):
-        raise ValueError("it is not a pair of points and results")
+        raise ValueError("the line is not a pair of points and results")
     numbers, rows = line
     if not all(type(number) is int for number in numbers):
         raise ValueError("its points are not numbers")
@@ -178,7 +178,7 @@ def _outcome(row: Any) -> Outcome:
 
 
 def _written(value: Reading) -> Any:
-    """Return a reading for JSON: numbers and texts unchanged, others with their kind."""
+    """Return a reading for JSON: numbers and texts are unchanged, other values are stored with their kind."""
     if isinstance(value, np.ndarray):
         parts = [value.real.tolist(), value.imag.tolist()] if value.dtype.kind == "c" else [value.tolist()]
         return {"array": parts}

@@ -136,7 +136,7 @@ def named_measure(
         if AFTER in options and word in _OF_MOTION and word not in OF_MOTION:
             raise UsageError(
                 f"{word} belongs to a steady state, but after= reads one period of an ordinary run",
-                remedy="leave one of them out; residual measures how far a run is from repeating",
+                remedy=f"leave {word} or after out; residual measures how far a run is from repeating",
             )
         if (f"{stem}.1" if is_harmonic else word) not in known:
             raise UsageError(
@@ -153,7 +153,7 @@ def _last_period(reading_names: tuple[str, ...], model: Model, options: dict[str
     for name in ("t_span", "save", "t_eval"):
         if name in options:
             raise UsageError(
-                f"{name} and after cannot be combined", remedy="leave it out: the last period is kept"
+                f"{name} and after cannot be combined", remedy=f"leave {name} out: the last period is kept"
             )
     period_of(model)  # an unforced model is refused here, once for all points
     return LastPeriod(reading_names, after, options, _reading)

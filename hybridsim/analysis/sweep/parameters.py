@@ -65,7 +65,7 @@ class Setter:
         return np.array(sound, dtype=np.int64)
 
     def _number(self, setting: float | Expression) -> float:
-        """Return the value of a setting; NaN if it depends on others."""
+        """Return the value of a setting; NaN if the setting depends on other settings."""
         if not isinstance(setting, Expression):
             return setting
         if setting not in self._known:

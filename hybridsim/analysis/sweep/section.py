@@ -39,7 +39,7 @@ class Passings(NamedTuple):
 
 @dataclass(frozen=True)
 class Section:
-    """Samples of a motion at a section, after it has settled.
+    """Samples of a settled motion at a section.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def with_section(model: Model, section: str | None) -> tuple[Model, str]:
 
 
 def repeats_after(states: np.ndarray, tols: np.ndarray) -> int:
-    """Return the least number of samples (k, n) after which all repeat within the tolerances; 0 if none."""
+    """Return the least period of samples (k, n) within the tolerances, as a number of samples; 0 if none."""
     for n in range(1, len(states) // 2 + 1):
         if (np.abs(states[n:] - states[:-n]) <= tols).all():
             return n

@@ -125,7 +125,7 @@ def sweep(
         if warm_start:
             raise UsageError(
                 "warm_start and after cannot be combined: the periods are counted from the start of each point",
-                remedy="leave one of them out",
+                remedy="leave warm_start or after out",
             )
         options["after"] = after
     count = None if workers is None else whole(workers, "workers")

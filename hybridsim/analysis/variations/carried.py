@@ -169,7 +169,7 @@ class Carrier:
         return np.concatenate([self._scale, np.where(discrete > 0.0, discrete, 1.0)])[:, None]
 
     def own_sizes(self, directions: Directions) -> np.ndarray:
-        """Return the change along each direction (M,) that is as large as the first quantity that it changes."""
+        """Return the step along each direction (M,) with the size of the first quantity that changes."""
         system = self.system
         constants = np.abs(np.concatenate([system.discrete_start, list(system.values.values())]))
         scale = np.concatenate([self._scale, np.where(constants > 0.0, constants, 1.0)])

@@ -45,7 +45,7 @@ class EventTimes:
         Y: np.ndarray,
         Yd: np.ndarray,
     ) -> np.ndarray:
-        """Return the derivatives (M,) of the time of the events at local time s, which all located events share."""
+        """Return the derivatives (M,) of the common time of all located events at local time s."""
         width = self._changes.G.shape[1]
         if not happened:
             return np.zeros(width)
@@ -83,7 +83,7 @@ class EventTimes:
     def recorded(
         self, segment: Segment, one: Occurrence, s: float, x: np.ndarray, Y: np.ndarray, Yd: np.ndarray
     ) -> np.ndarray:
-        """Return the derivatives of a recording monitor's time (M,); NaN if it only touches zero."""
+        """Return the derivatives of a recording monitor's time (M,); NaN if the monitor only touches zero."""
         shift = self._located(segment, one, s, x, Y, Yd, is_first=False)
         return np.full(self._changes.G.shape[1], np.nan) if shift is None else shift.values
 
@@ -124,7 +124,7 @@ class EventTimes:
         return Shift(-found.by / rate, found.sizes / abs(rate))
 
     def scheduled(self, one: Occurrence) -> list[np.ndarray]:
-        """Return the derivatives (M,) of a scheduled event, for each time of its schedule that it may be."""
+        """Return the derivatives (M,) of a scheduled time, one array for each entry that it may be."""
         width = self._changes.G.shape[1]
         declared = next((c for c in self.system.model.schedules if c.name == one.component), None)
         if declared is None:

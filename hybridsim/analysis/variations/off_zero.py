@@ -67,7 +67,7 @@ def limits_reached(changes: Changes, at: Place, components: Sequence[int]) -> li
 
 
 def monitors_reached(changes: Changes, at: Place, later: Place) -> list[OffZero]:
-    """Return monitors at zero at the start of a run, which from one side would fire a little later.
+    """Return monitors at zero at the start of a run that would fire soon after a start on one side.
 
     later : a later place; it gives the side if the rate at the start is zero.
     """

@@ -37,7 +37,7 @@ def refuse_limits(solution: Solution) -> None:
         if event.guard == LIMIT and LIMIT not in names:
             if event.t - before > _ROUNDINGS * math.ulp(event.t):
                 raise UsageError(
-                    f"the events that accumulate at t = {event.t!r} were not followed to rounding: derivatives are "
+                    f"events accumulate at t = {event.t:.9g} and were not followed to rounding: derivatives are "
                     "not carried through them",
                     remedy="use finite differences of runs",
                 )

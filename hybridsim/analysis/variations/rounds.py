@@ -1,4 +1,4 @@
-"""This module applies the resets of one instant with their derivatives, in rounds that follow from each other."""
+"""This module applies the resets of one instant with their derivatives, in successive rounds."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ class Rounds:
             pending = [one for one in pending if not any(one is other for other in fired)]
 
     def _has_fired(self, one: Occurrence, p: np.ndarray, s: float, origin: float) -> bool:
-        """Return whether a guard or monitor is at or below zero; otherwise it follows from another reset."""
+        """Return whether a guard or monitor is at or below zero, so that no other reset caused its event."""
         system = self.system
         if one.kind == "monitor":
             chosen: tuple[tuple[int, ...], tuple[int, ...]] = (
@@ -147,7 +147,7 @@ class Rounds:
         return has_fired
 
     def _delay(self, p: np.ndarray, s: float, origin: float, fired: Sequence[Occurrence]) -> None:
-        """Move to the time when the guards of a round fire, if a change has moved them off zero.
+        """Move to the time when the guards of a round fire, if a change of the start shifts that time.
 
         They must fire together, and no other event may happen before that.
         """

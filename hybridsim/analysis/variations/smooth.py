@@ -125,7 +125,7 @@ def _work(slopes: Slopes, begins: np.ndarray, ends: np.ndarray) -> tuple[float, 
 def stiff_transition(
     slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: np.ndarray
 ) -> np.ndarray:
-    """Return the same transition if changes decay much faster than the run, piece by piece with Radau's formula.
+    """Return the transition of stiff variations with Radau's formula, which takes longer pieces.
 
     The formula damps unresolved changes, so that only those that have not decayed need to be resolved.
     """

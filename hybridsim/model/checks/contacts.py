@@ -32,7 +32,7 @@ def check_contacts(scope: Scope) -> None:
 
 
 def check_law(scope: Scope, law: FrictionLaw) -> None:
-    """Report names in a law other than v, N, dN and the names that it declares."""
+    """Report names in a law that are neither v, N, dN nor declared by the law."""
     what = f"law {law.name}"
     names = _own_names(scope, law)
     known = names | {SPEED, NORMAL, LOAD_RATE} | ({INDEX} if law.copies else set())

@@ -43,7 +43,7 @@ class Caution:
 
 
 def warnings_of(model: Model) -> tuple[Caution, ...]:
-    """Return the warnings about a valid model; those about guards come first.
+    """Return the warnings about a valid model; warnings about guards come first.
 
     Warnings concern guards and monitors that are of one sign, constant in their mode, or without units if all other
     states have units; pulses in t; jumps that are not treated as switching surfaces; fractional powers of a contact's

@@ -110,12 +110,12 @@ class FrictionLaw(Declared):
         forms = [name for name in ("slip", "stick") if getattr(self, name) is not None]
         if self.force is None and len(forms) < 2:
             raise self._fault(
-                "it has neither slip and stick nor force",
+                "the law has neither slip and stick nor force",
                 "set slip and stick (magnitudes), or force (with its sign)",
             )
         if self.force is not None and forms:
             raise self._fault(
-                "it has force together with slip or stick", "set either slip and stick, or force"
+                "the law has force together with slip or stick", "set either slip and stick, or force"
             )
 
     @property

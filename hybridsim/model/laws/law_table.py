@@ -57,7 +57,7 @@ class LawTable(Declared):
                 "use one value for each number in at",
             )
         if len(self.at) < 2:
-            raise self._fault(f"it has {len(self.at)} points", "use at least two points")
+            raise self._fault(f"the table has {len(self.at)} points", "use at least two points")
         for first, second in zip(self.at, self.at[1:], strict=False):
             if not first < second:
                 raise self._fault(f"the argument {second:g} follows {first:g}", "sort the arguments")

@@ -236,7 +236,7 @@ def _knots(system: System, segment: Segment, instant: Instant, forward: bool) ->
 def _knots_text(
     system: System, names: list[str], instant: Instant, at: Situation, forward: bool
 ) -> list[str]:
-    """Describe the inputs that have a knot, and the values of those that jump there."""
+    """Describe the inputs that have a knot, and the values of inputs that jump there."""
     if not names:
         return []
     vectors = (system.vector(instant, system.discrete(at.p), not forward), at.p)

@@ -135,7 +135,7 @@ def spirals_in(solution: Any) -> list[str]:
 
 
 def _along_the_circle() -> Scene:
-    """The motion is the same until t = 3.5 and still slides then."""
+    """The motion is that of `_circle` until t = 3.5, and is still sliding then."""
     scene = _circle()
     events = (scene.truth.events or ())[:1]
     truth = replace(scene.truth, events=events, states=scene.truth.states[:2])

@@ -123,7 +123,7 @@ def test_belt_has_a_limit_cycle_by_its_law_alone() -> None:
     check(found, values, full)
     assert found.simplest.name == "karnopp"
     for name in ("constant-mu-at-rest", "constant-mu-mean"):
-        assert "it is undamped" in found[name].why
+        assert "the motion is undamped" in found[name].why
     assert found["viscous"].verdict == "does not apply"
 
 

@@ -99,7 +99,7 @@ def test_widths_unasked_are_fractions_of_the_velocity() -> None:
         ("dfcs", {"v0": [1e-3]}, "v0 is given without regularized"),
         ("thermostat", {"regularized": "tanh"}, "no contact to regularise"),
         ("dfcs", {"regularized": "tanhh"}, "no regularisation 'tanhh'"),
-        ("dfcs", {"regularized": "tanh", "integrators": [("dop853", {})]}, "integrators holds"),
+        ("dfcs", {"regularized": "tanh", "integrators": [("dop853", {})]}, "integrators cannot contain"),
     ],
 )
 def test_bad_requests(model: str, keywords: dict[str, object], message: str) -> None:

@@ -243,7 +243,7 @@ def test_labelled_arrays() -> None:
     "given, message",
     [
         ({"values": {"F": [1]}}, "did you mean 'F0'"),
-        ({"values": {}}, "values is"),
+        ({"values": {}}, "values cannot be"),
         ({"values": {"F0": []}}, "F0 has no values"),
         ({"values": {"F0": 3.0}}, "give a list of numbers"),
         ({"values": {"F0": [math.inf]}}, "finite"),

@@ -29,7 +29,7 @@ Settings = tuple[float | Expression, ...]
 
 
 class Measure(Protocol):
-    """The protocol of a measure: it measures a model and selects the readings to keep."""
+    """The protocol of a measure, which measures a model and selects the readings to keep."""
 
     def run(self, model: Model, previous: Any) -> Any:
         """Return the result at a point; ``previous`` is that of the neighbour in a chain, or None."""
@@ -40,7 +40,7 @@ class Measure(Protocol):
 
 @dataclass(frozen=True)
 class Job:
-    """A sweep as its workers need it.
+    """The description of a sweep that its workers receive.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class Batch(NamedTuple):
 
 
 class Watch(NamedTuple):
-    """The link to a worker that shares memory: it asks whether to go on, and reports finished points."""
+    """The link from a worker thread to the sweep: asks whether to go on, and reports finished points."""
 
     may_continue: Callable[[], bool]
     tell: Callable[[int], None]
@@ -153,7 +153,7 @@ def _message(error: Exception) -> str:
 
 
 def _first_copy(job: Job) -> Job:
-    """Return the job as it arrived first, because the engine's data of a model belongs to that object."""
+    """Return the first received copy of a job, because the engine's data belongs to that model object."""
     known = _jobs.get(job.token)
     if known is not None:
         return known

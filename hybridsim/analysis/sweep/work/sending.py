@@ -32,7 +32,7 @@ class Points(Protocol):
 
 
 def worker_count(executor: Any, workers: int | None) -> int:
-    """Return the number of workers: as requested, else that of the executor, else one per processor."""
+    """Return the number of workers: the requested number, that of the executor, or one per processor."""
     if workers is not None:
         return workers
     # The pools of the standard library have no public attribute for it; others count as one worker per
