@@ -51,6 +51,7 @@ USUAL = {
     ("engine", "runs"): "runs of a model",
     ("engine", "crossings"): "crossings of zero, as roots of odd order are called",
     ("engine", "lanes"): "lanes of a SIMD register",
+    ("engine", "needed"): "parts of numba without which nothing is compiled",
     ("ensemble", "lanes"): "lanes of a SIMD register",
     ("studies", "runs"): "runs of a model",
     ("preparation", "runs"): "runs that are stored with a system",

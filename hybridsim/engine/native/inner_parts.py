@@ -27,7 +27,7 @@ _TEXT = "define double @first(ptr %x) {\n  %y = load double, ptr %x\n  ret doubl
 
 
 @cache
-def _told(text: str) -> None:
+def _print_once(text: str) -> None:
     print(f"hybridsim: {text}", file=sys.stderr, flush=True)
 
 
@@ -40,7 +40,7 @@ def find_part(module: str, name: str, without: str) -> Any:
     """Return a part of numba or llvmlite; without it return None and print once what follows."""
     found = _found(module, name)
     if found is None:
-        _told(f"{_version()} has no {module}.{name}; {without}")
+        _print_once(f"{_version()} has no {module}.{name}; {without}")
     return found
 
 
@@ -66,7 +66,7 @@ def is_complete() -> bool:
         except RuntimeError:
             lacking = "an LLVM without opaque pointers"
     if lacking is not None:
-        _told(f"{_version()} has {lacking}; the engine is not compiled, and runs are slow")
+        _print_once(f"{_version()} has {lacking}; the engine is not compiled, and runs are slow")
     return lacking is None
 
 
@@ -80,8 +80,12 @@ def options() -> dict[str, bool]:
     target = find_part(
         "numba.core.registry", "cpu_target", "kernels are compiled with numba's own settings, and run slower"
     )
-    wanted = {"_nrt": False, "no_cfunc_wrapper": True}
-    known = {name: value for name, value in wanted.items() if hasattr(getattr(target, "options", None), name)}
-    if target is not None and known != wanted:
-        _told(f"{_version()} lacks the options {', '.join(wanted.keys() - known)}; kernels are slower")
+    requested = {"_nrt": False, "no_cfunc_wrapper": True}
+    known = {
+        name: value for name, value in requested.items() if hasattr(getattr(target, "options", None), name)
+    }
+    if target is not None and known != requested:
+        _print_once(
+            f"{_version()} lacks the options {', '.join(requested.keys() - known)}; kernels are slower"
+        )
     return known

@@ -40,8 +40,8 @@ def _as_tuple(typingctx: Any, array: Any, count: Any) -> Any:
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         data = context.make_array(array)(context, builder, args[0]).data
-        places = [builder.gep(data, [context.get_constant(types.intp, i)]) for i in range(len(kind))]
-        return context.make_tuple(builder, kind, [builder.load(place) for place in places])
+        pointers = [builder.gep(data, [context.get_constant(types.intp, i)]) for i in range(len(kind))]
+        return context.make_tuple(builder, kind, [builder.load(place) for place in pointers])
 
     return kind(array, count), generate
 
