@@ -61,7 +61,7 @@ def _primitive(primitive: Primitive) -> str:
 
 
 def _flat(expression: Expression) -> str:
-    """Return the text of an expression on one line; a file may break it."""
+    """Return the text of an expression on one line, without the line breaks of its file."""
     return " ".join(expression.text.split())
 
 

@@ -48,7 +48,7 @@ def sweep_lines(
     if len(dimensions) > 2:
         raise UsageError(
             f"the sweep has {len(dimensions)} parameters",
-            remedy="at most two can be drawn; select a part of it with to_xarray().sel(...)",
+            remedy="at most two can be drawn; select a part of the sweep with to_xarray().sel(...)",
         )
     lengths = dict(zip(dimensions, result.status.shape, strict=True))
     across = over
@@ -62,7 +62,7 @@ def sweep_lines(
         axes = tuple(figure.subplots(len(found), 1, sharex=True, squeeze=False)[:, 0])
         style.head(axes[0], title_of(result))
     if len(axes) != len(found):
-        raise UsageError(f"{len(axes)} axes for {len(found)} readings", remedy="give one for each")
+        raise UsageError(f"{len(axes)} axes for {len(found)} readings", remedy="give an axes for each")
     others = [name for name in dimensions if name != across]
     for panel, name in zip(axes, found, strict=True):
         _draw(panel, result, name, across, others[0] if others else None, dimensions)

@@ -47,7 +47,7 @@ def sweep_map(result: Sweep, *names: str, axes: tuple[Axes, ...] | None = None) 
     if len(result.axes) != 2 or result.mode != "grid":
         raise UsageError(
             f"a map needs a grid of two parameters, but this sweep is a {result.mode} of {len(result.axes)}",
-            remedy="draw lines, or select a part of it with to_xarray().sel(...)",
+            remedy="draw lines, or select a part of the sweep with to_xarray().sel(...)",
         )
     found = chosen_names(result, names, arrays=False)
     if axes is None:
@@ -61,7 +61,7 @@ def sweep_map(result: Sweep, *names: str, axes: tuple[Axes, ...] | None = None) 
             empty.remove()
         axes = tuple(panels[: len(found)])
     if len(axes) != len(found):
-        raise UsageError(f"{len(axes)} axes for {len(found)} readings", remedy="give one for each")
+        raise UsageError(f"{len(axes)} axes for {len(found)} readings", remedy="give an axes for each")
     for panel, name in zip(axes, found, strict=True):
         _draw(panel, result, name)
     return axes

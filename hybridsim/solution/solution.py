@@ -113,7 +113,7 @@ class Solution(InTables):
 
     @property
     def t_start(self) -> float:
-        """First time of the run, or of the part of it that was kept."""
+        """First time of the run, or of the stored part of the run."""
         whole = self._save in ("all", "events", "nothing") or not self._segments
         return self._span[0] if whole else float(self._starts[0])
 
@@ -236,7 +236,7 @@ class Solution(InTables):
             whole = "the run" if self._save == "all" else f"what save={self._save!r} keeps of the run"
             raise UsageError(
                 f"t = {float(bad)!r} is outside of {whole}, which covers t = {low!r} to {high!r}",
-                remedy="give times within it",
+                remedy="give times in this range",
             )
         sign = 1.0 if self.t_end >= self.t_start else -1.0
         # Right-continuous in time: at an event time take the later segment forward, the earlier one backward.
@@ -336,7 +336,7 @@ class Solution(InTables):
 
     @property
     def components(self) -> tuple[Component, ...]:
-        """Components listed in `modes`: those of the model, and those created for jumps in its rates."""
+        """Components listed in `modes`: components of the model, and components for jumps in its rates."""
         return tuple(self._system.model.all_components()[: len(self._system.declared)])
 
     @cached_property

@@ -135,7 +135,7 @@ def advise(
     if over is not None:
         if ranges is not None:
             raise UsageError(
-                "over and uncertain are both given", remedy="pass one: uncertain is for a single point"
+                "over and uncertain are both given", remedy="pass only one: uncertain is for a single point"
             )
         options = {"mode": mode, "workers": workers, "progress": progress}
         limits = Limits(spending, _LEAST_AT_A_POINT, repeat=False)

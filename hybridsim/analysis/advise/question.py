@@ -38,7 +38,7 @@ Number = float | complex
 
 
 class NoAnswer(Exception):
-    """The model has no such quantity, or no steady motion to read it from; the text gives the reason."""
+    """A model lacks the quantity, or the steady motion that defines the quantity; the text says why."""
 
 
 class OverRun(Measures):

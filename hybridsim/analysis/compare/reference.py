@@ -180,7 +180,7 @@ def _two_runs(run: Run, yardstick: Callable[[Trajectory], Yardstick]) -> Referen
 def _held_against(
     best: Yardstick, run: Run, second: tuple[str, Mapping[str, Any]]
 ) -> tuple[Errors | None, tuple[str, ...]]:
-    """Return the distance of a second reference from the best one, and warnings about it."""
+    """Return the distance of a second reference from the best reference, and warnings about the distance."""
     try:
         solution = run(second[0], **second[1])
     except HybridsimError as error:

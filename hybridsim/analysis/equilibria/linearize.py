@@ -229,8 +229,8 @@ def equilibrium_near(field: Field, x: np.ndarray) -> np.ndarray:
     raise SimulationError(
         f"no equilibrium of model {field.system.model.name} was found from its start"
         + (f", in the modes {modes}" if modes else ""),
-        remedy="start the model closer to it, declare nominal values of its states, or pass a point to linearise about "
-        "with at=",
+        remedy="start the model closer to one, declare nominal values of its states, or pass a point "
+        "to linearise about with at=",
     )
 
 

@@ -83,7 +83,7 @@ def _mean(row: Affine, inputs: Iterable[Input], values: Mapping[str, float]) -> 
 
 
 def first_harmonic(declared: Input, frequency: float, values: Mapping[str, float]) -> complex:
-    """Return the amplitude of a periodic input at a frequency; 0 if its own frequency differs."""
+    """Return the complex amplitude of a periodic input at a frequency; 0 for any other frequency."""
     if declared.kind != "wave" or declared.period is None:
         raise NotLinear(f"the input {declared.name} is not periodic")
     number = {name: float(evaluate(e, values)) for name, e in declared.expressions.items()}

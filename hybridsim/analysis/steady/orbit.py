@@ -66,8 +66,8 @@ class Orbit:
         if name in self.too_fast:
             raise SimulationError(
                 f"{name} varies too fast, or jumps too often, to be resolved on an orbit: it has no readings",
-                remedy="sample it from steady.solution at the resolution that it needs, and remove it from the outputs "
-                "to read all the others at once",
+                remedy="sample this quantity from steady.solution, and remove it from the outputs to read all other "
+                "quantities at once",
             )
         return self.names.index(name)
 

@@ -133,7 +133,7 @@ class SteadyState(Readable, Measures):
 
     @property
     def stable(self) -> bool:
-        """Whether all multipliers are inside the unit circle, or on it within the tolerance of 100 rtol."""
+        """Whether all multipliers are inside the unit circle, or on the circle within 100 rtol."""
         return bool((np.abs(self.multipliers) <= 1.0 + max(_NEUTRAL, 100.0 * self._motion.rtol)).all())
 
     def to_dict(self, harmonics: int = 5) -> dict[str, Any]:

@@ -16,7 +16,7 @@ _LOOSEST = 1e-10  # largest tolerance used here, because a looser one hides slow
 
 
 def coupled_sizes(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Return sizes (n,) of the states at x, in units in which coupled states have equal sizes.
+    """Return the sizes (n,) of the states at x; a state near zero takes its size from the coupled states.
 
     A velocity at rest next to a spring of length x has the size sqrt(k/m) x, because a rounding error of the
     spring force changes it by that size times rounding. For two states that act on each other, the ratio of

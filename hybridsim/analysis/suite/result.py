@@ -29,7 +29,7 @@ class SceneResult:
     comparison: Comparison
 
     def cheapest(self, accuracy: float) -> Row | None:
-        """Return the fastest row with the right modes whose states are within an accuracy over the whole run."""
+        """Return the fastest row with correct modes and an error of the states within an accuracy."""
         good = [row for row in self.comparison.rows if self._reaches(row, accuracy)]
         # other rows include the time of warming up
         timed = [row for row in good if row.cost and row.cost.repetitions]

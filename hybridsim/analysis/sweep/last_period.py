@@ -124,7 +124,7 @@ def period_of(model: Model) -> float:
     if period is None:
         raise UsageError(
             f"model {model.name} has no periodic forcing: there is no last period",
-            remedy="leave out after: the steady state of an unforced model is found without it",
+            remedy="leave out after; hs.steady_state finds the motion of an unforced model",
         )
     return period
 

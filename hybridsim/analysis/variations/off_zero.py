@@ -61,7 +61,7 @@ def off_zero(changes: Changes, at: Place) -> tuple[np.ndarray, list[OffZero]]:
 
 
 def limits_reached(changes: Changes, at: Place, components: Sequence[int]) -> list[OffZero]:
-    """Return the limits that are exactly reached by components that have just begun to hold, or pass a surface."""
+    """Return the limits that a component reaches exactly when it begins to hold or passes a surface."""
     sides = _Sides(changes, at)
     return [one for c in components for one in sides.limits(c)]
 

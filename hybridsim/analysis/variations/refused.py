@@ -46,7 +46,7 @@ def refuse_limits(solution: Solution) -> None:
 
 
 def refuse_inputs(model: Model, G: np.ndarray) -> None:
-    """Refuse parameters that change an input's shape, because the derivatives by them are unknown."""
+    """Refuse parameters that change the shape of an input, since such derivatives are unknown."""
     moving = {p.name for p, row in zip(model.parameters, G, strict=True) if row.any()}
     starts = {part.name: part.start.names for part in model.discrete}
     for declared in model.inputs:

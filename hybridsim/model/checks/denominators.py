@@ -49,7 +49,7 @@ class Denominator:
 
 
 def denominators(model: Model) -> tuple[Denominator, ...]:
-    """Return the denominators of rates, of states, parameters and t only, that can change their sign.
+    """Return denominators in rates that depend only on states, parameters and t and can change their sign.
 
     Denominators inside a condition are omitted, because the condition may exclude the zero. Denominators that are never
     negative by their form are omitted too.

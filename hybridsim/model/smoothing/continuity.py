@@ -57,7 +57,7 @@ def sides_of_product(meanings: Meanings, node: ast.expr, left: Set[Family] = fro
 
 
 def rooted_in(meanings: Meanings, node: ast.expr) -> frozenset[Family]:
-    """Return the borders of signs in a continuous product with a root or power that is zero there.
+    """Return the arguments of signs that a continuous product multiplies by a root or power with the same zero.
 
     An example is sign(d)*sqrt(abs(d)), which has no Taylor series at d = 0 on either side.
     """

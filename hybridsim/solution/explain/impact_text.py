@@ -23,7 +23,7 @@ _AT_LIMIT = 1e-9  # relative distance of an impulse to its limit; a closer impul
 
 
 def restitution(model: Model, stage: Stage, c: int, impact_guard: GuardView) -> str:
-    """Describe the speeds at which a gap closed and opens, and the coefficient of restitution."""
+    """Describe the speed at which a gap closed, the speed at which it opens, and the restitution."""
     resolution, outcome = stage.resolution, stage.outcome
     system, automaton = resolution.system, resolution.system.automata[c]
     declared = next(i for i in model.impacts if i.name == automaton.name).restitution
@@ -56,7 +56,7 @@ def errors_beside(stage: Stage, c: int) -> np.ndarray:
 
 
 def friction(stage: Stage, c: int) -> str:
-    """Describe the friction during an impact: at its limit, or within it and stopped; empty without friction.
+    """Describe the friction during an impact: slip at the limit, or stick; empty without friction.
 
     The impulses are computed from the changes of the states. The text is empty if several sets of impulses
     fit.

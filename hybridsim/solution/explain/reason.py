@@ -150,7 +150,7 @@ def _decided(system: System, decision: Decision, c: int) -> str:
 
 
 def _of_several(system: System, decision: Decision) -> str:
-    """Describe which of several admissible combinations was taken, and by which rule."""
+    """Describe the choice between several admissible combinations, with the rule of the choice."""
     fine, taken = decision.fine, decision.taken
     ways = " and ".join(f"({way(system, look)})" for look in fine)
     first = taken or fine[0]
@@ -161,7 +161,7 @@ def _of_several(system: System, decision: Decision) -> str:
 
 
 def _open(system: System, undecided: Sequence[Look], taken: Look) -> str:
-    """Describe the combinations that rounding leaves open, and whether they are the same motion as the one taken."""
+    """Describe the combinations that rounding leaves open, and whether they differ from the chosen motion."""
     ways = " and ".join(f"({way(system, look)})" for look in undecided)
     are = "is a question" if len(undecided) == 1 else "are questions"
     same = ": the same motion to rounding" if all(look.is_as(taken) for look in undecided) else ""

@@ -159,6 +159,6 @@ def _safe(reason: str) -> str:
 
 
 def _note_on_design(reason: str, lacks: Mapping[str, str]) -> str:
-    """Return a note if a method stops falsely because, by design, it does not locate events."""
+    """Return a note for a false stop by a method that, by design, does not locate events."""
     is_stop = re.search(r"and is (\w+):stick at", reason) is not None
     return f" (by design: {lacks['located']})" if is_stop and "located" in lacks else ""

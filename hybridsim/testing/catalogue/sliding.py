@@ -162,7 +162,7 @@ def _circle() -> Scene:
 
 
 def _decay() -> Scene:
-    """The solution is v = -t, x = 1 - t**2/2 until x + v = 0 at sqrt(3) - 1; then both decay as exp(-t)."""
+    """The solution is v = -t, x = 1 - t**2/2 until x + v = 0 at sqrt(3) - 1; then x decays as exp(-t)."""
     onto = math.sqrt(3) - 1
     states = [(0.5, (0.875, -0.5))]
     states += [(t, (onto * math.exp(onto - t), -onto * math.exp(onto - t))) for t in (1.0, 2.0, 5.0)]
@@ -177,7 +177,7 @@ def _decay() -> Scene:
 
 
 def _rubbing_servo() -> Scene:
-    """v' = 1.7 + sin(3t)/2 until x - 1 + v = 0; then both decay as exp(-t), and the friction slips."""
+    """The speed has v' = 1.7 + sin(3t)/2 until x - 1 + v = 0; then v and x - 1 decay as exp(-t)."""
 
     def speed(t: float) -> float:
         return 1.7 * t + (1.0 - math.cos(3.0 * t)) / 6.0

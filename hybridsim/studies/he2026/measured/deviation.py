@@ -92,7 +92,7 @@ _RIDGE_FROM, _RIDGE_WIDTH = 0.54, 0.12
 
 
 def read(found: Maps, quantity: str, without: str, with_: str) -> dict[str, Any]:
-    """Read one of our maps in the same way: the ridge, its end at each level, its maximum, the side of the threshold.
+    """Return the features of one of our maps: ridge, its end at each level, maximum, side of the threshold.
 
     near the threshold: the median over r at the smallest F0/N. beyond resonance: the largest at r > 1.
     """

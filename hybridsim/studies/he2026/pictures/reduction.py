@@ -1,4 +1,4 @@
-"""This module draws figures 8 and 9: A and E relative to those without friction as F0 grows at fixed F0/N."""
+"""This module draws figures 8 and 9: A/A0 and E/E0 over F0 at fixed F0/N."""
 
 from __future__ import annotations
 
