@@ -55,7 +55,7 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
     steps = _steps_for_stability(system, x0, z0, span)
     in_python = is_monitored or system.has_corners or span[1] < span[0]
     if steps > _MANY or (steps > _MANY_IN_PYTHON and in_python and _is_apart(system, x0, z0, span[0])):
-        return Choice("rodas5p", f"stability would hold an explicit method to {steps:.0e} steps")
+        return Choice("rodas5p", f"for stability an explicit method would need {steps:.0e} steps")
     if system.has_corners:
         return Choice(
             "dop853",
@@ -69,7 +69,7 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
 def _for_functions(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float]) -> Choice:
     """Choose an integrator for rates that are a Python function; closed forms and series cannot use them."""
     steps = _steps_for_stability(system, x0, z0, span)
-    stiff = f"stability would hold an explicit method to {steps:.0e} steps" if steps > _MANY else ""
+    stiff = f"for stability an explicit method would need {steps:.0e} steps" if steps > _MANY else ""
     if isinstance(system.code, PythonCode) and system.code.refused:
         return Choice(
             "scipy-radau" if stiff else "scipy-dop853", stiff or "numba cannot compile its functions"

@@ -10,8 +10,8 @@ from hybridsim.engine.native.kernels import kernel
 # Step control of Hairer, Norsett and Wanner 1993, section II.4: safety factor and bounds of the change of a step.
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
 _LEAST = 1e-2  # smaller errors, as shares of the tolerance, are not used for extrapolation
-SMALLEST = 10.0  # a rest of fewer ulps of the local time is merged into the last step
-# So is a rest of less than this share of the step: thousands of equal steps add up to their span up to
+SMALLEST = 10.0  # a remainder of fewer ulps of the local time is merged into the last step
+# So is a remainder of less than this share of the step: thousands of equal steps add up to their span up to
 # roundings of that size, and a step that is longer by it has the same error up to a part in 10**8.
 LAST_STEP_FACTOR = 1.0 + 2.0**-30
 

@@ -111,7 +111,7 @@ class ArraysResult(InTables):
             bad = float(times[~inside][0])
             raise UsageError(
                 f"t = {bad!r} is outside of the run, which covers t = {self.t_start!r} to {self.t_end!r}",
-                remedy="give times within it",
+                remedy="use times within the run",
             )
         return times
 
@@ -125,15 +125,15 @@ class ArraysResult(InTables):
     def _require_states(self) -> None:
         if self._save != "all":
             raise UsageError(
-                f"the run was made with save={self._save!r}, which keeps no states between the ends",
-                remedy="run it with save='all'",
+                f"the run was made with save={self._save!r}, which stores only the states at the start and the end",
+                remedy="run the simulation with save='all'",
             )
 
     def _require_events(self) -> None:
         if self._save == "nothing":
             raise UsageError(
-                "the run was made with save='nothing', which keeps no events",
-                remedy="run it with save='events'",
+                "the run was made with save='nothing', which stores no events",
+                remedy="run the simulation with save='events'",
             )
 
     def __getattr__(self, name: str) -> NoReturn:

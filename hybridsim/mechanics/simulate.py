@@ -68,7 +68,7 @@ def simulate_mechanical(
     if system.impacts and name != "moreau":
         raise UsageError(
             f"{name} does not run a MechanicalSystem with impacts",
-            remedy=f'choose integrator="moreau", step=..., or simulate to_model() of a small one {_INDEPENDENT}',
+            remedy=f'use integrator="moreau", step=..., or simulate to_model() of a small system {_INDEPENDENT}',
         )
     method: Any = None
     if name == "moreau":
@@ -91,7 +91,7 @@ def simulate_mechanical(
     if span[1] < span[0]:
         raise UsageError(
             f"t_span is {t_span!r}",
-            remedy="give t1 >= t0, as it runs forward only, or simulate system.to_model()",
+            remedy="use t1 >= t0, or simulate system.to_model(), which also runs backward",
         )
     if not (isinstance(save, str) and save in ("all", "events", "nothing")):
         raise UsageError(

@@ -175,5 +175,5 @@ def test_a_cascade_beside_a_body_at_rest_is_counted_once(monkeypatch: pytest.Mon
     )
     sol = hs.simulate(model, (0, 2))
     assert sol.status == "cascade" and sol.t_end == pytest.approx(1.0)
-    said = int(re.search(r"(\d+) rounds without rest", sol.message)[1])
+    said = int(re.search(r"(\d+) rounds \(modes", sol.message)[1])
     assert len(rounds) <= said + 10

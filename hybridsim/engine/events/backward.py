@@ -16,7 +16,7 @@ def held(system: System, z: np.ndarray) -> str:
     """Return why a state held at a surface has no unique past, or an empty text if no component is held."""
     names = [a.name for a, m in zip(system.automata, z, strict=True) if a.has_surface and m == a.hold]
     return (
-        f"{', '.join(names)} is in a holding mode, which several different motions can enter, so the past is not unique"
+        f"{', '.join(names)} is in a holding mode, which several motions can enter: the past is not unique"
         if names
         else ""
     )
@@ -105,6 +105,6 @@ def cross_backward(system: System, at: Situation, fired: tuple[int, ...]) -> Out
         could_rest = forward.verdict(rest, [c]) != LEAVES
         if outcome.status or could_rest or outcome.z[c] != other:
             outcome.status = "backward-nonunique"
-            outcome.message = f"{automaton.name} reaches a surface that several motions can have reached"
+            outcome.message = f"{automaton.name} reaches a surface at which its past is not unique"
             break
     return outcome

@@ -150,7 +150,7 @@ class EventResolution:
         )
         return (
             "cascade",
-            f"transitions repeat without time advancing, {self.most_rounds} rounds without rest (modes {names}); "
+            f"transitions repeat without time advancing, {self.most_rounds} rounds (modes {names}); "
             f"guards that fire: {guards}{message_on_cascade(self)}",
         )
 

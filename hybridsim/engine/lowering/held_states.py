@@ -127,7 +127,7 @@ class HeldStates:
         return ModelError(
             f"the {' and '.join(titles)} of "
             + ", ".join(lowering.components[c].name for c in components)
-            + " are not independent: they cannot all be held at zero by separate states",
+            + " are not independent: no choice of one state for each keeps all of them at zero",
             place=lowering.place(components[0]),
             remedy=remedy,
         )
@@ -137,8 +137,8 @@ class HeldStates:
         names = ", ".join(self.lowering.components[c].name for c in components)
         titles = dict.fromkeys(self.lowering.title(c, plural=True) for c in components)
         return ModelError(
-            f"the {' and '.join(titles)} of {names} depend on each other in a circle: no order of them determines "
-            "one state from each",
+            f"the {' and '.join(titles)} of {names} depend on each other in a circle: in no order does each "
+            "determine one state",
             place=self.lowering.place(components[0]),
             remedy="declare one of them as a state, or use an hs.MechanicalSystem",
         )

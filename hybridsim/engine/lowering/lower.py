@@ -240,7 +240,7 @@ class Lowering:
                     f"{self.components[c].name}: its {self.title(c)} '{self.written(c)}' uses {names}, which "
                     "depends on a mode",
                     place=self.place(c),
-                    remedy="use only states, inputs, parameters and t in it",
+                    remedy="use only states, inputs, parameters and t in this function",
                 )
 
     def _foreign(self, e: Any) -> list[Any]:
@@ -308,7 +308,7 @@ class Lowering:
                 if not self.components[c].surface.unique:
                     raise ModelError(
                         f"{declared_name(unknown[c])} does not act on its own {self.title(c)} "
-                        f"'{self.written(c)}' ({self.components[c].name}), so it cannot hold this at zero",
+                        f"'{self.written(c)}' ({self.components[c].name}), so the force cannot keep it at zero",
                         place=self.place(c),
                         remedy=f"use {declared_name(unknown[c])} in the derivative of the velocity state",
                     )

@@ -58,7 +58,7 @@ class LimitMonitor:
         if limits.megabytes < inf:
             if self._looks % _OFTEN == 0 and (grown := resident_megabytes() - self._size) >= limits.megabytes:
                 raise LimitReached(
-                    f"{grown:.0f} MB more than at the start, and {limits.megabytes:g} were allowed"
+                    f"memory grew by {grown:.0f} MB since the start, and {limits.megabytes:g} MB were allowed"
                 )
             self._looks += 1
 

@@ -1,4 +1,4 @@
-"""How much of a run is kept after it ends."""
+"""The part of a run that is stored after the run has ended."""
 
 from __future__ import annotations
 

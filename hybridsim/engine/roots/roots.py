@@ -308,7 +308,7 @@ def find_roots(
         if subdivisions > _MAX_SUBDIVISIONS:
             raise StepFailure(
                 f"its zeros in one step could not be separated with {subdivisions} subintervals: lower max_step, or "
-                "write it so that it has no pole and is defined on both sides of its zero"
+                "write the function without a pole, and so that it is defined on both sides of its zero"
             )
         coefficients = np.empty(DEGREE + 1)
         error, largest = _represent(samples, coefficients)

@@ -310,7 +310,7 @@ class SegmentRun:
         t = float(self.origin.plus(s))
         raise StepFailure(
             f"{self.system.guard_title(guard, self.flow.z)} is not a number from t = {t:.9g} on: "
-            f"write it so that it has a value on both sides of its zero"
+            f"write the guard so that it has a value on both sides of its zero"
         )
 
     def _fires_in(self, monitor: int, direction: int) -> bool:

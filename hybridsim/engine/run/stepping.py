@@ -179,7 +179,7 @@ class CompiledLoop(Protocol):
 
     @property
     def place(self) -> tuple[np.ndarray, ...]:
-        """Return the state kept between calls as arrays that are never modified, for a checkpoint."""
+        """Return the state between calls as arrays that are never modified, for a checkpoint."""
 
     @place.setter
     def place(self, place: np.ndarray) -> None:

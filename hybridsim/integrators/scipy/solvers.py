@@ -88,7 +88,7 @@ class ScipyIntegrator(Integrator):
         return SolverStepper(solver, self.implicit, flow, x0, s_bound, tolerances, first_step)
 
     def _first(self, first_step: float | None, left: float) -> float | None:
-        """Return a first step no longer than the rest of the segment."""
+        """Return a first step that is not longer than the remaining segment."""
         return None if first_step is None else min(first_step, abs(left))
 
 

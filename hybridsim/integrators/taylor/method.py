@@ -23,7 +23,7 @@ from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.integrators.contract import NEEDS_TAPE, Integrator
 
-_SMALLEST = 10.0  # a rest of fewer ulps of the local time is merged into the last step
+_SMALLEST = 10.0  # a remainder of fewer ulps of the local time is merged into the last step
 _SHORTER = 0.25  # factor on a step at whose end the series does not satisfy the equation
 _DEFECT = 100.0  # largest defect of a step, in tolerances: in the slope the last term of order p is p times as large
 _WORTH_ITS_OWN = 0.9  # a first step that covers more than this share of the segment covers all of it
@@ -90,8 +90,8 @@ class TaylorStepper:
             self.creeping, self.since, self.shortest = 1, self.s, h
         if self.creeping == _CREEPING:
             raise Creeping(
-                f"{_CREEPING} consecutive steps, which are left out, were a hundredth of the reach of their series, "
-                f"the last {h:.3g}",
+                f"{_CREEPING} consecutive steps were a hundredth as long as their series allow, and were discarded; "
+                f"the last step was {h:.3g}",
                 self.since,
             )
         if not h > 0.0:

@@ -239,15 +239,15 @@ class MechanicalSystem:
         if not isinstance(forcing, Mapping) and len(forcing) != self.n:
             raise UsageError(
                 f"{self.name}: forcing has {len(forcing)} entries for {self.n} coordinates",
-                remedy="give one for each, or a mapping from coordinates",
+                remedy="give one entry for each coordinate, or a mapping from coordinates",
             )
         pairs = dict(forcing if isinstance(forcing, Mapping) else enumerate(forcing))
         found: dict[int, tuple[float | Harmonic, ...]] = {}
         for i, entry in pairs.items():
             if not (isinstance(i, int | np.integer) and 0 <= i < self.n):
                 raise UsageError(
-                    f"{self.name}: forcing has the coordinate {i!r}, but there are {self.n}",
-                    remedy="count from 0",
+                    f"{self.name}: forcing has the coordinate {i!r}, but there are {self.n} coordinates",
+                    remedy="number the coordinates from 0",
                 )
             terms = entry if isinstance(entry, tuple | list) else (entry,)
             for term in terms:
@@ -285,13 +285,13 @@ class MechanicalSystem:
             if contact.weights not in (0, self.n):
                 raise UsageError(
                     f"{what} {contact.name}: its direction has {contact.weights} weights for {self.n} coordinates",
-                    remedy="give one for each, or a mapping from coordinates",
+                    remedy="give one weight for each coordinate, or a mapping from coordinates",
                 )
             for i, _ in contact.direction:
                 if not 0 <= i < self.n:
                     raise UsageError(
                         f"{what} {contact.name}: its direction has the coordinate {i}, but there are {self.n}",
-                        remedy="count from 0",
+                        remedy="number the coordinates from 0",
                     )
 
     @property

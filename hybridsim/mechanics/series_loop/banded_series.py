@@ -62,7 +62,7 @@ def gather_neighbours(arrays: Any, state: Any, scratch: Any, count: int, tau: fl
 def clear_beside(arrays: Any, scratch: Any, count: int, top: int) -> None:
     """Write zeros into the lanes on both sides of consecutive nodes, as far as coupling reaches."""
     wide, offsets = scratch.Q.shape[1], arrays.offsets
-    before, after = -min(offsets[0], 0), max(offsets[-1], WIDTH)  # including the rest of the last vector
+    before, after = -min(offsets[0], 0), max(offsets[-1], WIDTH)  # including padding of the last vector
     for k in range(top + 1):
         clear(scratch.Q, k * wide - whole_vectors(before), before)
         clear(scratch.Q, k * wide + count, after)

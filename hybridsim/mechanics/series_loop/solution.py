@@ -240,7 +240,7 @@ class MechanicalSolution(ArraysResult):
         names = [self.model.contacts[i].name for i in self._run.node_contacts]
         shown = ", ".join(names[:8]) + (f", ... ({len(names)} contacts)" if len(names) > 8 else "")
         reasons = {
-            INCONSISTENT: "no combination of stick and slip is admissible just after it: each needs a force beyond a "
+            INCONSISTENT: "no combination of stick and slip is admissible after this time: each needs a force beyond a "
             "friction limit or a motion against a friction force. Check that no law has a slip force at v = 0 above "
             "its stick limit",
             CASCADE: "events follow each other without time advancing",

@@ -111,11 +111,11 @@ class Holding:
         except ZeroDivisionError:
             raise UsageError(
                 f"the holding forces {', '.join(self.names)} are not unique",
-                remedy="merge contacts that act as one",
+                remedy="merge contacts that have the same relative velocity",
             ) from None
 
     def _powerless(self, name: str) -> UsageError:
         return UsageError(
             f"the force {name} does not act on the velocity of its own contact",
-            remedy="let it enter the rate of that velocity",
+            remedy="use this force in the rate of the velocity",
         )

@@ -122,7 +122,7 @@ class Quotient(Node):
         if b.c[0] == 0:
             raise UsageError(
                 "division by zero",
-                remedy="use reference='runs', as the multiple-precision run cannot pass it",
+                remedy="use reference='runs', as the multiple-precision run cannot pass this point",
             )
         value = a.coefficient(n)
         if n and not b.constant:

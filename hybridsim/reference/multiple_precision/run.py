@@ -249,6 +249,6 @@ class Run:
         last_times = self._event_times[-_CROWD:]
         if len(last_times) == _CROWD and t - last_times[0] <= _CROWDED * (self.t1 - self.t0):
             raise UsageError(
-                f"events accumulate at t = {float(t)!r}: the multiple-precision run cannot continue past it",
-                remedy="declare the mode that they lead to",
+                f"events accumulate at t = {float(t)!r}: the multiple-precision run cannot pass this time",
+                remedy="declare the mode that begins after this time",
             )

@@ -266,7 +266,7 @@ def test_a_mode_is_to_be_declared_only_where_there_is_none() -> None:
 
     automata = [automaton("p", -1), automaton("q", 1), automaton("r", 1)]
     assert accumulated(Limit(2.5, (0,), 0.1), automata, has_rtol=True).endswith(
-        'events of p accumulate at t = 2.5: declare the limit that they lead to, limit = "MODE" of the component'
+        'events of p accumulate at t = 2.5: declare the mode after this time, limit = "MODE" of the component'
     )
     held = accumulated(Limit(2.5, (1, 2), 0.1), automata, has_rtol=True)
     assert "of q, r" in held

@@ -137,7 +137,7 @@ def refused(resolution: EventResolution, members: list[int], message: str) -> tu
     if slow:
         names = ", ".join(system.automata[c].name for c in slow)
         return "inconsistent", (
-            f"{message}; {names} acts on higher derivatives of its switching function alone; sliding of such a "
+            f"{message}; {names} acts only on higher derivatives of its switching function; sliding of this "
             "higher order is not supported"
         )
     pull = np.diag(_pull(resolution, unique, np.maximum(resolution.at.z, 0))) if unique else np.ones(0)

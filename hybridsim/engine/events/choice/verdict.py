@@ -91,7 +91,7 @@ def guard_verdict(
 
 @inlined
 def preference(modes: Any, current: Any, holds: Any, n: int) -> int:
-    """Return the rank of a joint candidate: most modes kept, then most holding; n*(n + 1) or more if all are kept."""
+    """Return the rank of a joint candidate: unchanged modes, then holding ones; >= n*(n + 1) if none changes."""
     unchanged, held = 0, 0
     for i in range(n):
         unchanged += modes[i] == current[i]

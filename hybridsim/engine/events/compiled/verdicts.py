@@ -28,7 +28,7 @@ from hybridsim.engine.native.kernels import (
 from hybridsim.engine.series.bounded import ORDER, run_series
 from hybridsim.engine.system.programs.modes_index import find_modes
 
-UNKNOWN = -2  # in place of a verdict
+UNKNOWN = -2  # there are no tables for the modes, so no verdict
 
 
 def interpreted_series(

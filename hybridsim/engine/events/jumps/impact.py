@@ -35,7 +35,7 @@ def strike(resolution: EventResolution, open_: set[int]) -> Failure | None:
         names = ", ".join(sorted(resolution.system.automata[c].name for c in unilateral))
         return (
             "backward-nonunique",
-            f"the gap of {names} closes: different motions before an impact lead to the same motion after it",
+            f"the gap of {names} closes, and the past of an impact is not unique",
         )
     has_collided = False
     for cluster in resolution.system.clusters:
@@ -175,7 +175,7 @@ class _Collision:
         if count(problem) > MAX_COMBINATIONS:
             return (
                 "inconsistent",
-                f"{len(members)} contacts take part in one impact ({names}), which are too many to solve",
+                f"{len(members)} contacts take part in one impact ({names}), too many to solve",
             )
         found = answers(problem)
         if len(found) != 1:

@@ -376,7 +376,7 @@ def accumulated(limit: Limit, automata: Sequence[Automaton], has_rtol: bool) -> 
     if not changed:
         return f"{head}: let a monitor end the run before that time"
     if not holding:
-        return f'{head}: declare the limit that they lead to, limit = "MODE" of the component'
+        return f'{head}: declare the mode after this time, limit = "MODE" of the component'
     other = (
         "a smaller rtol or another integrator"
         if has_rtol

@@ -33,7 +33,7 @@ _ALL = 27  # largest number of vectors of modes that are all present from the st
 
 
 class Automata(NamedTuple):
-    """The constant structure of a model: components, guards, clusters and choices. -1 stands for none."""
+    """The constant structure of a model: components, guards, clusters and choices; -1 means none."""
 
     guards_of: np.ndarray  # guard numbers (C, M, W) of component and mode
     hold: np.ndarray  # holding mode (C,)

@@ -187,7 +187,7 @@ class PythonCode:
             except Exception as fault:  # user code may raise anything; the error names its place
                 name = function_name(function)
                 message = f"the function {name} raised {type(fault).__name__}: {fault} at t = {t!r}"
-                remedy = f"call {name}(t, x, p) with the initial values to see where"
+                remedy = f"call {name}(t, x, p) with the initial values to see where it fails"
                 raise ModelError(message, remedy=remedy) from fault
 
     # -- functions called once per event, in plain Python ---------------------------------------------------
@@ -223,7 +223,7 @@ def _refuse_other_arguments(parts: Parts) -> None:
             name = function_name(function)
             raise ModelError(
                 f"the function {name} takes {inspect.signature(function)}, but is called with (t, x, p)",
-                remedy="let it take three arguments: the time, the states in order, and the parameters by name "
+                remedy="give it three arguments: the time, the states in order, and the parameters by name "
                 "(p.NAME), whether it uses them or not",
             ) from None
 

@@ -106,7 +106,7 @@ class Compiler:
         if (id(function), is_flow) in self._written:
             return ""
         if not (inspect.isfunction(function) or hasattr(function, "py_func")):
-            return f"{function_name(function)}: it compiles plain functions only"
+            return f"{function_name(function)}: numba compiles plain functions only"
         own = function if hasattr(function, "py_func") else compiled_with_helpers(function)
         named = numba.typeof(self.parts.parameters(*[0.0] * self.count))
         signature = (types.float64, types.Array(types.float64, 1, "C"), named)
