@@ -1,4 +1,4 @@
-"""Dense output for stiff modes: interpolation through the ends of the last steps.
+"""Interpolate dense output through the ends of the last steps, for stiff modes.
 
 In a stiff mode a state deviates from its slow motion by a rounding error or a tolerance. Its derivatives are
 this deviation times powers of a rate far above one over the step, and are useless. The values themselves are

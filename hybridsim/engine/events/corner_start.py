@@ -1,4 +1,4 @@
-"""Find surfaces that are at zero within rounding although no event was located there."""
+"""Find surfaces that are zero within rounding although no event was located at them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Decide which monitors fire at an instant: those that leave their side of zero."""
+"""Decide which monitors fire at an instant: a monitor fires if it leaves its side of zero."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class MonitorSides:
         return due
 
     def _left(self, k: int, outcome: Outcome) -> int:
-        """Return the direction in which a monitor left its side, 0 if it did not."""
+        """Return the direction in which a monitor left its side, or 0 if the monitor stayed on it."""
         before, after = int(self.before[k]), int(outcome.monitor_sides[k])
         if after == before or (after == 0 and (self.is_open[k] or math.isnan(outcome.monitor_floors[k]))):
             return 0

@@ -66,7 +66,7 @@ class Outcome:
 
     @classmethod
     def of_arrays(cls, arrays: dict[str, np.ndarray]) -> Outcome:
-        """Return an outcome with copies of these arrays."""
+        """Return an outcome with copies of the given arrays."""
         state: dict[str, Any] = {name: arrays[name].copy() for name in _STATE}
         return cls(**state, continuous=bool(arrays["continuous"]))
 

@@ -425,7 +425,7 @@ class EventResolution:
         return self.system.project(self.at.s, self.at.x, self.at.p, z)
 
     def with_modes(self, components: list[int], modes: np.ndarray) -> np.ndarray:
-        """Return the modes with some of them replaced, and corners on the sides that hold along that motion."""
+        """Return the modes after a change of some modes, with corners on their sides along the motion."""
         z = self.at.z.copy()
         z[components] = modes
         return sides_along(self, np.maximum(z, 0), self.at.x)[0] if self.system.led else np.maximum(z, 0)

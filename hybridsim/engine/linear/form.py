@@ -141,7 +141,7 @@ class LinearReader:
                 self.forms[register] = math.nan if p is None else p[source]
 
     def read(self, rows: Iterable[tuple[int, ...]]) -> None:
-        """Process these rows; a result that is not a linear form is stored as the reason."""
+        """Process rows of the tape; for a result that is not a linear form, store the reason."""
         for op, a, b, c, out in rows:
             if op == COPY:
                 self.forms[out] = self.forms[a]

@@ -71,7 +71,7 @@ class NoMode:
 def modes_of(
     system: System, atoms: Atoms, met: np.ndarray, p: Sequence[float] | None, first: int = 0
 ) -> list[LinearMode | NoMode]:
-    """Return the linear form of each mode vector in `met` (K, components), or the reason why it has none.
+    """Return the linear form of each mode vector in `met` (K, components), or why it is not linear.
 
     Some of the vectors may only be neighbours of those that the run entered. first: number of vectors to
     skip.

@@ -126,7 +126,7 @@ def errors_of_time(lin: Any, s_error: float, factors: Any, w_error: Any) -> None
 def linear_coefficient(
     lin: Any, k: int, g: int, order: int, x: Any, x_error: Any, work: Any
 ) -> tuple[float, float]:
-    """Return a Taylor coefficient of a guard of the modes in row k at y = (x, w), with its bound."""
+    """Return a Taylor coefficient of a guard in the modes of row k at y = (x, w), with its error bound."""
     w, w_error, sizes, w_sizes, bound = work.w, work.w_error, work.sizes, work.w_sizes, 0.0
     for m in range(x.shape[0]):
         short_loop()

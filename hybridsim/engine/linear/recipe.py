@@ -67,7 +67,7 @@ class Numbers:
 
 
 class Traced(float):
-    """A float with its register."""
+    """A float that knows its register in the recipe."""
 
     __slots__ = ("numbers", "register")
     numbers: Numbers
@@ -135,7 +135,7 @@ class Recipe:
         self._left, self._right, self._found = compared[:, 0], compared[:, 1], compared[:, 2] != 0
 
     def values(self, inputs: Any) -> np.ndarray | None:
-        """Return all registers at these inputs, or None if a comparison has another result."""
+        """Return all registers for the given inputs, or None if a comparison has another result."""
         V = self._start.copy()
         V[: self._inputs, 0] = inputs
         advance(self._rows, V, 0)

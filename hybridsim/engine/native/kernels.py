@@ -487,7 +487,7 @@ class Precompiled:
 
 @cache
 def announce_compilation() -> None:
-    """Print once, on stderr, that the engine is being compiled, unless an earlier run has printed it."""
+    """Print on stderr, once for each cache, that the engine is being compiled."""
     # an existing folder is no proof, because it is created when a kernel is defined
     folder = kernel_folder() if ENABLED else None
     if ENABLED and (folder is None or not (folder / "announced").exists()):

@@ -178,7 +178,7 @@ else:
         )
 
     def times(row_blocks: Any, at: tuple[int, ...], vectors: tuple[Any, ...]) -> tuple[float, ...]:
-        """Compute the four sums."""
+        """Compute the four sums of a panel's rows."""
         entries = _entries(vectors)
         return tuple((entries @ row_blocks[at][: len(entries)]).tolist())
 

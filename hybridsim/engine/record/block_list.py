@@ -72,7 +72,7 @@ class BlockList(Sequence[Item]):
             self.forgotten += 1
 
     def set_end(self, item: Item) -> None:
-        """Replace all items by this one."""
+        """Replace all items by a single item."""
         self.forgotten += len(self.blocks)
         last = self._loose()
         last.append(item)
@@ -97,7 +97,7 @@ class BlockList(Sequence[Item]):
         return rest + sum(map(len, self.blocks[max(number, 0) :]))
 
     def without_last(self, count: int) -> list[Any]:
-        """Return the blocks without the last `count` items, to continue from there."""
+        """Return the blocks without the last `count` items, as a start for further items."""
         blocks = list(self.blocks)
         while blocks and count >= len(blocks[-1]):
             count -= len(blocks.pop())
@@ -175,7 +175,7 @@ class SegmentBlockList(BlockList[Segment]):
             self.set_end(last.at_end())
 
     def cut(self, instant: Instant) -> None:
-        """Discard everything before an instant. The segment that contains it starts there from now on."""
+        """Discard everything before an instant, also the first part of the segment at this instant."""
         origins, spans = self.origins(), self.spans()
         moved = (origins[:, 0] - instant.high) + (origins[:, 1] - instant.low) + spans[:, 0]
         sign = 1.0 if spans[-1, 1] >= spans[-1, 0] else -1.0
@@ -193,7 +193,7 @@ class SegmentBlockList(BlockList[Segment]):
         self.blocks.insert(0, head)
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """Return states (k, n) in the segments of these numbers, at local times (k,)."""
+        """Return states (k, n) at local times (k,) in the segments with the given numbers."""
         if len(self.blocks) == 1:
             return self.blocks[0].states(index, s)
         starts = self.starts()

@@ -31,7 +31,7 @@ class Block(Protocol[Item]):
         """Return the instant of the last item: the end of a segment, or the time of an event."""
 
     def since(self, first: int) -> Block[Item]:
-        """Return a block without the items before this number."""
+        """Return a block of the items from the given number on."""
 
 
 class SegmentBlock(Block[Segment], Protocol):
@@ -53,7 +53,7 @@ class SegmentBlock(Block[Segment], Protocol):
     def modes(self) -> np.ndarray: ...
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """Return states (k, n) in the segments of these numbers (k,), at local times (k,) within their spans.
+        """Return states (k, n) at local times (k,) in the segments with the given numbers (k,).
 
         Held states are on their constraints. One compiled call computes all states, because there may be thousands.
         """
@@ -68,7 +68,7 @@ class SegmentBlock(Block[Segment], Protocol):
         """Return all steps: ascending numbers of segments (m,), local times (m,), states (m, n), with ends."""
 
     def since(self, first: int) -> SegmentBlock:
-        """Return a block without the segments before this number."""
+        """Return a block of the segments from the given number on."""
 
 
 class OccurrenceBlock(Block[Occurrence], Protocol):
@@ -91,7 +91,7 @@ class OccurrenceBlock(Block[Occurrence], Protocol):
         """Return instants (k, 2) and states x-, x+ (k, 2, n) of the transitions from this number on."""
 
     def since(self, first: int) -> OccurrenceBlock:
-        """Return the events from this number on."""
+        """Return a block of the events from the given number on."""
 
 
 class SegmentList(list[Segment]):
@@ -122,7 +122,7 @@ class SegmentList(list[Segment]):
         return np.array([segment.z for segment in self], dtype=np.int64).reshape(len(self), -1)
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """Return states (k, n) of some segments at local times (k,); at knots those that the run used."""
+        """Return states (k, n) of some segments at local times (k,), exact at the knots of the run."""
         system = self._system
         out = np.empty((len(s), system.n))
         for i in np.unique(index):
@@ -155,7 +155,7 @@ class SegmentList(list[Segment]):
         return index, np.concatenate(s), np.concatenate(x)
 
     def since(self, first: int) -> SegmentList:
-        """Return the segments from this number on."""
+        """Return a block of the segments from the given number on."""
         return SegmentList(self._system, self[first:])
 
 
@@ -196,5 +196,5 @@ class OccurrenceList(list[Occurrence]):
         return np.array([o.instant for o in chosen]), np.array([(o.x_minus, o.x_plus) for o in chosen])
 
     def since(self, first: int) -> OccurrenceList:
-        """Return the events from this number on."""
+        """Return a block of the events from the given number on."""
         return OccurrenceList(self[first:])

@@ -38,7 +38,7 @@ def _taking_part(
 
 @kernel
 def _times_at(instants: Any, participants: Any, first: int, component: int, times: Any) -> int:
-    """Write the times of the events of a component from a number on, and return how many there are."""
+    """Write the times of a component's events from a given event on, and return their count."""
     count = 0
     for i in range(first, participants.shape[1]):
         if participants[1, i] == component:
@@ -50,7 +50,7 @@ def _times_at(instants: Any, participants: Any, first: int, component: int, time
 
 @kernel
 def _states_at(states: Any, participants: Any, first: int, component: int, side: int, out: Any) -> int:
-    """Write the states at the events of a component on one side, and return how many there are."""
+    """Write the states on one side of a component's events, and return the number of events."""
     count = 0
     for i in range(first, participants.shape[1]):
         if participants[1, i] == component:
@@ -150,7 +150,7 @@ class EventBlock(Sequence[Occurrence]):
         return self._instants[events], self._states[events]
 
     def since(self, first: int) -> EventBlock:
-        """Return the events from this number on."""
+        """Return a block of the events from the given number on."""
         later = copy(self)
         later._first += first
         return later

@@ -57,7 +57,7 @@ class StepSegments(Sequence[Segment]):
 
     @classmethod
     def of_arrays(cls, system: System, arrays: dict[str, np.ndarray]) -> StepSegments:
-        """Return the block made from these arrays."""
+        """Return a block with the given arrays."""
         origin = Instant(*arrays["origin"].tolist())
         return cls(system, origin, *(arrays[name] for name in ("p", "s", "x", "z", "cuts")))
 
@@ -85,7 +85,7 @@ class StepSegments(Sequence[Segment]):
         return self._z[self._first]
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """Return states (k, n) in the segments of these numbers, at local times (k,)."""
+        """Return states (k, n) at local times (k,) in the segments with the given numbers."""
         distinct, place = np.unique(index, return_inverse=True)
         return SegmentList(self._system, (self[i] for i in distinct.tolist())).states(place, s)
 
@@ -108,7 +108,7 @@ class StepSegments(Sequence[Segment]):
         return self._s[first : last + 1], self._x[first : last + 1], self._p, self._z[first]
 
     def since(self, first: int) -> StepSegments:
-        """Return the segments from this number on."""
+        """Return a block of the segments from the given number on."""
         later = copy(self)
         later._first, later._last = self._first[first:], self._last[first:]
         return later
@@ -184,7 +184,7 @@ class StepOccurrences(Sequence[Occurrence]):
         return np.array(instants).reshape(-1, 2), states
 
     def since(self, first: int) -> StepOccurrences:
-        """Return the events from this number on."""
+        """Return a block of the events from the given number on."""
         later = copy(self)
         later._components, later._changes = self._components[first:], self._changes[first:]
         later._s, later._x = self._s[first:], self._x[first:]

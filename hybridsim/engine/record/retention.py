@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 class Retention(NamedTuple):
-    """Which part of a run is stored: a time before its end, for segments and for events; None: nothing."""
+    """How long before its end a run stores segments and events, in the unit of t; None: nothing."""
 
     segments: float | None = math.inf
     events: float | None = math.inf

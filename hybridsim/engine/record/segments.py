@@ -26,12 +26,12 @@ class Segment:
 
     @property
     def start(self) -> Instant:
-        """Return the instant at which it begins."""
+        """Return the instant at which the segment begins."""
         return self.origin.plus(float(self.s[0]))
 
     @property
     def end(self) -> Instant:
-        """Return the instant at which it ends."""
+        """Return the instant at which the segment ends."""
         return self.origin.plus(float(self.s[-1]))
 
 

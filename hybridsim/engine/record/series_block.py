@@ -152,7 +152,7 @@ class SeriesBlock(Sequence[Segment]):
         return Instant(high, low).plus(s + h)
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """Return states (k, n) in the segments of these numbers, at local times (k,)."""
+        """Return states (k, n) at local times (k,) in the segments with the given numbers."""
         out, pinned = np.empty((len(s), self.system.n)), self.system.can_hold
         project = self.system.address("project" if pinned else "flow")
         record = (self.modes, self.vectors, self.jumps)
@@ -171,7 +171,7 @@ class SeriesBlock(Sequence[Segment]):
         return index, s, self.states(index, s)
 
     def since(self, first: int) -> SeriesBlock:
-        """Return the segments from this number on."""
+        """Return a block of the segments from the given number on."""
         rows = (self.origins, self.modes, self.vectors, self.jumps)
         ends, gone = self.ends[first:], self.ends[first]
         steps, series = self.steps[gone:], self.series[gone:]

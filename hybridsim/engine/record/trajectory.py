@@ -179,7 +179,7 @@ class Task:
 
     @cached_property
     def setups(self) -> dict[str, Any]:
-        """Return the storage for `hybridsim.engine.run.setup`."""
+        """Return the dictionary in which the task stores its set-ups."""
         return {}
 
     @cached_property

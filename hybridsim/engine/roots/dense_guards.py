@@ -1,4 +1,4 @@
-"""Guards along a polynomial dense output: each gets its own series piece by piece, and its first exit."""
+"""Expand guards along a polynomial dense output in series, and find the first guard that becomes negative."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def shifted(coefficients: Any, q: float, out: Any) -> None:
 def series_along(
     code: int, rows: Any, inputs: Any, s: float, x: Any, guard_registers: Any, V: Any, W: Any, out: Any
 ) -> None:
-    """Compute the series of the guards, a row each, from local time s along states with coefficients x.
+    """Compute one row of series coefficients per guard from local time s, along states with coefficients x.
 
     rows: tape rows that the functions need. V, W: registers that hold the tape's constants. code: address of
     a function that does the same (`along` of `hybridsim.engine.series.emit_series`); 0 for none.

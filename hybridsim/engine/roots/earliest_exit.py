@@ -12,7 +12,7 @@ from hybridsim.engine.series.bounded import UNIT
 
 @inlined
 def parts_for_exit(scratch: Any) -> Any:
-    """Return the scratch arrays that `earliest_exit` needs: sides, orders and floors of guards, and others."""
+    """Return the scratch arrays of `earliest_exit`, such as sides, orders and floors of guards."""
     return (scratch.sides, scratch.orders, scratch.floors), (scratch.a, scratch.b, scratch.stack)
 
 

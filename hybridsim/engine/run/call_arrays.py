@@ -76,13 +76,13 @@ class CallArrays(NamedTuple):
 
     @classmethod
     def of(cls, like: StateBuffer, work: Any, scratch: Any) -> CallArrays:
-        """Return arrays for states with this layout."""
+        """Return arrays for states with the layout of a given buffer."""
         buffer = like.copy()
         state = State(**{name: buffer.part(name) for name in buffer.slices})
         return cls(buffer, state, packed(state), work, scratch, *np.zeros((2, 2)))
 
     def set_state(self, buffer: StateBuffer) -> None:
-        """Start from this state."""
+        """Set the state from which the next call starts."""
         self.buffer.float_slots[:], self.buffer.int_slots[:] = buffer.float_slots, buffer.int_slots
 
     def final_state(self) -> StateBuffer:

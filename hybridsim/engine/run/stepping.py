@@ -183,7 +183,7 @@ class CompiledLoop(Protocol):
 
     @place.setter
     def place(self, place: np.ndarray) -> None:
-        """Restore that state from one concatenated array."""
+        """Restore the state between calls from one concatenated array."""
 
     def fresh_copy(self) -> CompiledLoop:
         """Return a fresh copy for another run; this object must not have been used."""
@@ -218,7 +218,7 @@ class Method(Protocol):
 
     @property
     def lacks(self) -> Mapping[str, str]:
-        """Return its missing capabilities with reasons; "adaptive" if it has a fixed step and no rtol."""
+        """Return the missing capabilities with reasons; "adaptive" means a fixed step without rtol."""
 
     @property
     def dense_is_accurate(self) -> bool:
@@ -226,18 +226,18 @@ class Method(Protocol):
 
     @property
     def has_compiled_loop(self) -> bool:
-        """Return whether it has a compiled loop."""
+        """Return whether the method has a compiled loop."""
 
     @property
     def stable_to(self) -> float:
-        """Return the stability limit of -h*lambda on the negative axis; 0 if there is none."""
+        """Return the stability limit of -h*lambda on the negative real axis; 0 means no limit."""
 
     @property
     def rounding(self) -> float:
-        """Return the largest rounding error of its steps, in units of rounding of the distance moved."""
+        """Return the largest rounding error of a step, in units of rounding of the change of the states."""
 
     def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> CompiledLoop | None:
-        """Return its compiled loop for one run with segments up to `longest`, or None if the model rules it out."""
+        """Return the method's compiled loop for one run, or None if the method cannot compile this model."""
 
     def start(
         self,

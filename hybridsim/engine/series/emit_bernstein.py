@@ -30,7 +30,7 @@ def bernstein_code(order: int) -> tuple[list[int], Any]:
 
 
 def bernstein_text(order: int) -> str:
-    """Return the text of a module with these functions."""
+    """Return the text of a module with the conversion functions."""
     sizes = range(order + 1, order + 1 - LEADING, -1)
     return "".join(_function(f"bernstein_{size}", size) for size in sizes)
 

@@ -42,7 +42,7 @@ class Signal:
             self._corners = square if self.shape == "square" else _SHAPES[str(self.shape)]
 
     def piece(self, origin: Instant, forward: bool) -> tuple[float, ...]:
-        """Return the six numbers of the piece at `origin`: to its right, or to its left backward in time."""
+        """Return the six numbers of the piece just after `origin`, or just before it backward in time."""
         if self.kind == "table":
             return self._table_piece(origin, forward)
         if self.kind == "step":

@@ -135,7 +135,7 @@ def series_of(
     out: Any,
     guards: Any,
 ) -> bool:
-    """Compute coefficients of the states (n, K) along the flow from (s, x) and of the guards, a row each.
+    """Compute coefficients of the states (n, K) and of the guards (one row each) along the flow from (s, x).
 
     code: address of a function that does so; 0 for none. Return whether those of the states are finite.
     """

@@ -141,7 +141,7 @@ def _quotient(V: Any, x: int, out: int, b: int, k: int) -> Any:
 
 @inlined
 def _with_constant(op: int, x: Any, c: Any) -> Any:
-    """Return order 0 of a series and a constant."""
+    """Return order 0 of an operation on a series and a constant."""
     if op == ADD_CONSTANT:
         return x + c
     return x - c if op == SUB_CONSTANT else c - x

@@ -63,7 +63,7 @@ class Holding:
         return self._solve([[row[i] for i in self.pins] for row in self._slopes], values)
 
     def coupled(self, index: int) -> set[int]:
-        """Return the surfaces that are coupled with one of them through an unknown."""
+        """Return the surfaces that an unknown couples with a given surface."""
         product = self._product
         return {j for j in range(len(product)) if product[index][j] != 0 or product[j][index] != 0}
 

@@ -72,7 +72,7 @@ class Program:
         self._first_coefficients()
 
     def expand(self, point: Point) -> Expansion:
-        """Return the series from a point on."""
+        """Return the Taylor series of the motion from a point."""
         self.begin(point)
         zero = self.context.zero
         self._states(1)
@@ -125,7 +125,7 @@ class Program:
         return replace(point, x=tuple(x))
 
     def coupled(self, index: int) -> set[int]:
-        """Return the held surfaces that are coupled with one of them through an unknown."""
+        """Return the held surfaces that an unknown couples with a given surface."""
         return set() if self.holding is None else self.holding.coupled(index)
 
     # -- orders ---------------------------------------------------------------------------------------------

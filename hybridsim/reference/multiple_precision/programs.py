@@ -70,7 +70,7 @@ class Programs:
         return tuple(changed)
 
     def program(self, modes: Modes) -> Program:
-        """Return the equations in these modes."""
+        """Return the equations of the motion in the given modes."""
         if modes not in self._programs:
             reading = Reading(self.model, modes, self.precision, self.signals)
             self._programs[modes] = Program(reading, self.precision, self.longest)
@@ -81,7 +81,7 @@ class Programs:
         self._expansions.clear()
 
     def expand(self, point: Point, modes: Modes) -> Expansion:
-        """Return the series from a point on."""
+        """Return the Taylor series of the motion from a point."""
         key = (modes, point)
         if key not in self._expansions:
             self._expansions[key] = self.program(modes).expand(point)

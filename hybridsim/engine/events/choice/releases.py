@@ -28,7 +28,7 @@ class Releases:
             self._by[c] = next((j for j, g in enumerate(guards) if g in located), _NO_GUARD)
 
     def has(self, c: int, z: np.ndarray) -> bool:
-        """Return whether component c leaves its holding mode through the guard that was located for it."""
+        """Return whether the located guard makes component c leave its holding mode."""
         hold = self.system.automata[c].hold
         if hold < 0 or self.before[c] != hold or z[c] == hold:
             return False

@@ -179,7 +179,7 @@ def _message_on_drift(resolution: EventResolution) -> str:
 
 
 def _message_on_negative_guard(resolution: EventResolution) -> str:
-    """Return a hint on a guard that is negative after its own transition."""
+    """Return a hint on a guard that stays negative after its transition."""
     if not resolution.changes:
         return ""
     change, system = resolution.changes[-1], resolution.system

@@ -167,7 +167,7 @@ def resolve_and_advance(
     state: Any,
     work: Any,
 ) -> bool:
-    """Resolve an ordinary event and start the next segment there. False leaves the state unchanged.
+    """Resolve an ordinary event and begin the next segment; return False for other events.
 
     y, y_error of the work space are the state at the event, after `steps` steps. lin: tables of linear modes, empty for
     others. state: `State`, advanced together with the clock.

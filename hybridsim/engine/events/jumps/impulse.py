@@ -84,7 +84,7 @@ def answers(problem: ImpactProblem) -> list[Answer]:
 
 
 def energy(problem: ImpactProblem, impulses: np.ndarray) -> tuple[float, float]:
-    """Return the work of the impulses, and a bound of its rounding error."""
+    """Return the work of the impulses, and a bound of the rounding error of the work."""
     n = problem.normal
     sign = np.where(np.arange(len(impulses)) < n, 1.0, -1.0)
     p, metric = sign * impulses, problem.effects * sign
@@ -103,7 +103,7 @@ def _rounding(problem: ImpactProblem) -> float:
 
 
 def _answers(problem: ImpactProblem, rebound: np.ndarray) -> list[Answer]:
-    """Solve for the impulses of all combinations, and return those that the law admits."""
+    """Solve for the impulses of all combinations, and return the solutions that satisfy the impact law."""
     m, n = len(problem.before), problem.normal
     state = _combinations(problem)
     matrix, right = np.tile(np.eye(m), (len(state), 1, 1)), np.zeros((len(state), m))

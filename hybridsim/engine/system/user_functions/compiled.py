@@ -1,4 +1,4 @@
-"""Compile a user's Python functions with numba into the form of the engine, or call them back. Needs the compiler."""
+"""Compile a user's Python functions with numba, or wrap functions that numba cannot compile."""
 
 from __future__ import annotations
 
