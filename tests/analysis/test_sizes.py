@@ -100,7 +100,10 @@ def test_the_command_line(
     ],
 )
 def test_counts_that_no_time_suffices_for(name: str, ask: Callable[[int], object], count: int) -> None:
-    refused(lambda: ask(count), f"{name} cannot be 1000.*\n.*give a whole number above zero, 1000000(000)? at most")
+    refused(
+        lambda: ask(count),
+        f"{name} cannot be 1000.*\n.*give a whole number above zero, 1000000(000)? at most",
+    )
 
 
 @pytest.mark.parametrize(

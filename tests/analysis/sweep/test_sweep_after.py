@@ -183,7 +183,7 @@ def test_points_that_fail_leave_a_status_and_all_the_others() -> None:
 def test_what_has_no_last_period_is_refused() -> None:
     with pytest.raises(UsageError, match="no periodic forcing"):
         hs.sweep("belt", {"v_belt": [0.1]}, ["amplitude.x"], after=10)
-    with pytest.raises(UsageError, match="after is 0"):
+    with pytest.raises(UsageError, match="after cannot be 0"):
         hs.sweep("dfcs", {"F0": [30.0]}, ["amplitude.x"], after=0)
     with pytest.raises(UsageError, match="save and after cannot be combined"):
         hs.sweep("dfcs", {"F0": [30.0]}, ["amplitude.x"], after=3, save="all")
