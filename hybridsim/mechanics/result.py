@@ -125,7 +125,7 @@ class ArraysResult(InTables):
     def _require_states(self) -> None:
         if self._save != "all":
             raise UsageError(
-                f"the run was made with save={self._save!r}, which stores only the states at the start and the end",
+                f"the run was made with save={self._save!r}, which stores no states between start and end",
                 remedy="run the simulation with save='all'",
             )
 

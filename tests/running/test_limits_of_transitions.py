@@ -44,7 +44,7 @@ def test_a_ball_comes_to_the_rest_that_is_declared(integrator: str) -> None:
 def test_without_one_it_ends_there_and_says_what_to_declare() -> None:
     sol = hs.simulate(ball(None), (0, 5), integrator="exact")
     assert sol.status == "accumulation"
-    assert "declare the limit" in sol.message
+    assert "declare the mode after this time" in sol.message
 
 
 def test_it_is_written_and_read_and_in_the_structure() -> None:

@@ -90,7 +90,7 @@ def take_corners(resolution: EventResolution) -> bool:
 
 
 def _guard_towards(automaton: Automaton, mode: int, target: int) -> str:
-    """Return the name of the guard through which a mode is left towards another, possibly via modes in between."""
+    """Return the name of the guard that leads from one mode to another, directly or over other modes."""
     for name, targets in zip(automaton.guard_names[mode], automaton.targets[mode], strict=True):
         if (targets[0] > mode) == (target > mode):
             return name

@@ -1,4 +1,4 @@
-"""Find the modes that are needed before modes at surfaces are chosen: for resets, and for automata."""
+"""Find the modes in which resets read the state, and the automata that leave their modes in any case."""
 
 from __future__ import annotations
 

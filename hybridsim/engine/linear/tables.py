@@ -103,7 +103,7 @@ class _Rows:
         self.size = sum(field.nbytes for field in fields.values())  # bytes
 
     def first(self, count: int) -> dict[str, np.ndarray]:
-        """Return the first rows of each field."""
+        """Return the first `count` rows of each field."""
         return {name: field[:count] for name, field in self._fields.items()}
 
     def gone_on_with(self, first: int, new: dict[str, np.ndarray]) -> _Rows:

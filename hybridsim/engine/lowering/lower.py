@@ -250,7 +250,7 @@ class Lowering:
         return [n for n in e.free_symbols - allowed if n.name.startswith("v_")]
 
     def title(self, c: int, plural: bool = False) -> str:
-        """Return the term for a surface's function."""
+        """Return what messages call a surface's function, such as gap or relative velocity."""
         one, many = "relative velocity", "relative velocities"
         if self.components[c].surface.unique:
             one, many = "switching function", "switching functions"

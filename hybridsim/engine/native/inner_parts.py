@@ -1,4 +1,4 @@
-"""The parts of numba and llvmlite that their documentation does not offer, and what happens without each.
+"""The undocumented parts of numba and llvmlite that kernels use, and the effect if a part is missing.
 
 A later version may rename or drop them. Each is looked up here, and nowhere else. Without one of `_NEEDED` the engine
 runs as plain Python, as with ``HYBRIDSIM_JIT=0``. Without one of the others compiling takes longer or more often. One
@@ -37,7 +37,7 @@ def _version() -> str:
 
 
 def find_part(module: str, name: str, without: str) -> Any:
-    """Return a part of numba or llvmlite; without it return None and print once what follows."""
+    """Return a part of numba or llvmlite; if it is missing, return None and print the consequence once."""
     found = _found(module, name)
     if found is None:
         _print_once(f"{_version()} has no {module}.{name}; {without}")
@@ -58,7 +58,7 @@ def needed(name: str) -> Any:
 
 @cache
 def is_complete() -> bool:
-    """Return whether this numba has all that compiled kernels consist of; print once if not."""
+    """Return whether this numba has every part that kernels need; print a note once if not."""
     lacking = next((f"no {module}.{name}" for module, name in _NEEDED if _found(module, name) is None), None)
     if lacking is None:
         try:
@@ -72,7 +72,7 @@ def is_complete() -> bool:
 
 @cache
 def options() -> dict[str, bool]:
-    """Return the options of kernels that numba knows, among those that it does not document.
+    """Return the undocumented options of kernels that this version of numba has.
 
     `_nrt`: without it each read of an array from a pack includes two calls that count references, and no value
     stays in a register across them. `no_cfunc_wrapper`: without it each kernel gets a wrapper that nothing calls.

@@ -1,4 +1,4 @@
-"""Named tuples of many arrays that are passed to kernels by one pointer.
+"""Named tuples of many arrays, which are passed to kernels by one pointer.
 
 A kernel that is given a tuple of arrays receives seven words per array, copied at every call, and counts
 references to each. With a hundred arrays that costs more than the kernel's own work and most of its compile

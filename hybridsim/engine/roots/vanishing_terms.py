@@ -202,7 +202,7 @@ def _extremum(u: Any, order: int, near: float, far: float, rises: bool) -> float
 
 @kernel
 def _becomes_near(u: Any, order: int, sign: float, high: float, low: float, far: float, near: float) -> float:
-    """Find where |u| is between high and low, between a place with a larger and one with a smaller |u|."""
+    """Find a place where |u| is between low and high, by bisection between a larger and a smaller |u|."""
     d = near
     for _ in range(_HALVED):
         d = 0.5 * (far + near)

@@ -12,7 +12,7 @@ from hybridsim.engine.system.system import System
 
 
 def passed_events(system: System, origin: Instant, run: SegmentRun, record: Trajectory) -> list[Occurrence]:
-    """Return these events in order of time, and add warnings for near-grazings to the record."""
+    """Return recorded monitors and near-grazings in order of time; warn of near-grazings in the record."""
     passed = [(seen.s, _passed_monitor(system, origin, seen)) for seen in run.passed_monitors]
     declared = [g for g in run.grazings if not system.is_corner[system.owner[g[0]]]]
     if declared:

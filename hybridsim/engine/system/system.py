@@ -467,7 +467,7 @@ class System:
         return self._optimised[key]
 
     def high_rows(self, z: np.ndarray) -> list[tuple[int, ...]]:
-        """Return the rows of that tape for high orders of states, active guards and monitors."""
+        """Return the tape's rows for high orders of states, active guards and monitors."""
         key = z.tobytes()
         if key in self._high:
             return self._high[key]

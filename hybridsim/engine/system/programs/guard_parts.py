@@ -43,14 +43,14 @@ class _ModeParts(NamedTuple):
 
 
 class GuardParts:
-    """The parts of the most recent tapes, which depend on the structure of a model alone."""
+    """The rows for guards, made from the most recent tapes; they depend only on the model's structure."""
 
     def __init__(self) -> None:
         self._known: tuple[Tapes, Parts] | None = None
         self._of_modes: dict[bytes, _ModeParts] = {}  # reused when tapes grow
 
     def of(self, tapes: Tapes) -> Parts:
-        """Return the parts of these tapes."""
+        """Return the rows for guards of the given tapes."""
         known = self._known  # read once, because other threads may replace it
         if known is None or known[0] is not tapes:
             self._known = known = tapes, self._parts(tapes)

@@ -151,11 +151,11 @@ class Compiler:
 
 def _put(result: Any, out: Any, at: int, width: int) -> None:
     """Write the result of a function, `width` numbers or (-1) a scalar; raise an error for other results."""
-    raise NotImplementedError("compiled code only")
+    raise NotImplementedError("the function runs in compiled code only")
 
 
 def _put_compiled(result: Any, out: Any, at: Any, width: Any) -> Any:
-    """Return code that writes a result of this type, or None for a type that is not numeric."""
+    """Return code that writes results of a type, or None for a type that is not numeric."""
     real = (types.Float, types.Integer, types.Boolean)
     parts = result.types if isinstance(result, types.BaseTuple) else (getattr(result, "dtype", result),)
     if not all(isinstance(part, real) for part in parts):

@@ -130,7 +130,7 @@ class Forms:
         return next(f for m, f in self.parts.flows if m in (mode, -1))
 
     def row(self, scalars: tuple[Scalar, ...]) -> Function:
-        """Return the form of several numbers; those of inactive modes are 1."""
+        """Return one function that writes several numbers; numbers of inactive modes are 1."""
 
         def form(s: float, x: Any, p: Any, z: Any, out: Any) -> int:
             status = 0
