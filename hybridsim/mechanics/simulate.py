@@ -91,7 +91,7 @@ def simulate_mechanical(
     if span[1] < span[0]:
         raise UsageError(
             f"t_span is {t_span!r}",
-            remedy="use t1 >= t0 (it runs forward only), or simulate system.to_model()",
+            remedy="use t1 >= t0 (time runs forward only), or simulate system.to_model()",
         )
     if not (isinstance(save, str) and save in ("all", "events", "nothing")):
         raise UsageError(
