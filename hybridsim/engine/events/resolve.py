@@ -418,7 +418,7 @@ class EventResolution:
         return mask
 
     def _pinned(self, components: list[int]) -> np.ndarray:
-        """Return x with the surfaces of these components exactly zero."""
+        """Return x with the surfaces of some components exactly zero."""
         z = np.maximum(self.at.z, 0)
         for c in components:
             z[c] = self.system.automata[c].hold

@@ -88,7 +88,7 @@ class OccurrenceBlock(Block[Occurrence], Protocol):
         """Return the number of events of each kind."""
 
     def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return instants (k, 2) and states x-, x+ (k, 2, n) of the transitions from this number on."""
+        """Return instants (k, 2) and states x-, x+ (k, 2, n) of all transitions from a given number on."""
 
     def since(self, first: int) -> OccurrenceBlock:
         """Return a block of the events from the given number on."""

@@ -99,7 +99,7 @@ class EventBlock(Sequence[Occurrence]):
 
     @property
     def _participants(self) -> np.ndarray:
-        """Return event and component (2, events) of each recorded event."""
+        """Return two rows: the number of each recorded event, and its component."""
         return self._all_participants[:, self._first :]
 
     @property

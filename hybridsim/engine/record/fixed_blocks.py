@@ -164,7 +164,7 @@ class StepOccurrences(Sequence[Occurrence]):
         return self.times[self._are_of(component, kind)]
 
     def states_of(self, component: str, kind: str | None, side: int) -> np.ndarray:
-        """Return states (k, n) at these events, the same on both sides."""
+        """Return states (k, n) at some events; they are the same on both sides."""
         return self._x[self._are_of(component, kind)]
 
     def _are_of(self, component: str, kind: str | None) -> np.ndarray:

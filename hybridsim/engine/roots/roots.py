@@ -44,7 +44,7 @@ POINTS = 0.5 - 0.5 * np.cos(np.pi * np.arange(SAMPLES) / (SAMPLES - 1))
 
 
 def _transforms() -> tuple[np.ndarray, np.ndarray]:
-    """Return matrices from the values at every second point to Bernstein coefficients and to the other points."""
+    """Return matrices that map values at every second point to Bernstein coefficients and to other points."""
     nodes = POINTS[::2]
     basis = np.array(
         [[comb(DEGREE, i) * x**i * (1 - x) ** (DEGREE - i) for i in range(DEGREE + 1)] for x in POINTS]

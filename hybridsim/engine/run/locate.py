@@ -257,7 +257,7 @@ class Locator:
     def _falls(
         self, step: Step, number: int, is_monitor: bool, errors: Callable[[], np.ndarray]
     ) -> Callable[[int], bool]:
-        """Return a function of a side: whether a guard or monitor on it certainly leaves it at the end of a step."""
+        """Return a function that tests whether a guard or monitor certainly leaves a side by a step's end."""
 
         def falls(side: int) -> bool:
             flow = self.flow

@@ -182,7 +182,7 @@ def others_near(system: System, at: Situation, series: Any, arrival: Arrival, sh
 
 
 def _zero_count(system: System, origin: Instant, at: Situation, arrival: Arrival, series: Any) -> int:
-    """Return the number of guards that leave at an event, plus that of monitors that are zero there."""
+    """Return the number of guards that leave zero at an event plus the number of monitors at zero."""
     bounded_monitors = zip(series.monitors, series.monitor_bounds, strict=True)
     monitors = sum(abs(value[0]) <= bound[0] for value, bound in bounded_monitors)
     return len(coincident(system, origin, at, arrival.fired, series)) + monitors

@@ -86,7 +86,7 @@ class Timetable:
         return Appointment(latest, tuple(k for k in due for _ in range(self._count(k, nearest))))
 
     def _count(self, k: int, instant: Instant) -> int:
-        """Return how often an instant, within rounding, is in the list of a due schedule; 1 for a clock."""
+        """Return how many times in a due schedule's list equal an instant within rounding; 1 for a clock."""
         times, slack = self._schedules[k][0], self._slack(instant)
         if not times:
             return 1

@@ -65,7 +65,7 @@ def take_choice(
     p: Any,
     work: Any,
 ) -> bool:
-    """Apply the declared transition of the guard with its reset. Return False if it may move surfaces."""
+    """Apply the declared transition of the guard and its reset; return False if surfaces may move."""
     for d in range(z.shape[0]):
         if automata.hold[d] >= 0 and not automata.is_corner[automata.owner[fired]]:
             return False
