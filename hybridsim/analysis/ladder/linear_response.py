@@ -28,7 +28,7 @@ class LinearResponse:
     def __init__(self, model: Model, frequency: float) -> None:
         automata = model.surfaces or model.impacts or model.components
         if automata or model.discrete or model.schedules or model.flow is not None:
-            raise NotLinear("it has modes, schedules or Python functions")
+            raise NotLinear("the model has modes, schedules or Python functions")
         states, forces = [s.name for s in model.states], [c.name for c in model.contacts]
         values, definitions = model.parameter_values(), dict(model.definitions)
         unknowns = {*states, *forces, *(i.name for i in model.inputs)}
@@ -36,7 +36,7 @@ class LinearResponse:
             rates = [affine(s.der, unknowns, values, definitions) for s in model.states]
             slides = [affine(c.velocity, unknowns, values, definitions) for c in model.contacts]
         except NotAffine as fault:
-            raise NotLinear("its rates are not linear in the states") from fault
+            raise NotLinear("the rates are not linear in the states") from fault
         inputs = {i.name: first_harmonic(i, frequency, values) for i in model.inputs}
         self._frequency = frequency
         self._A, self._B = _matrix(rates, states), _matrix(rates, forces)

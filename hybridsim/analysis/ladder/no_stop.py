@@ -59,7 +59,7 @@ class NoStopMotion:
 
     @property
     def energy(self) -> dict[str, float]:
-        """Integrals of the squares over a period."""
+        """Integral of the square of each quantity over a period."""
         found = {}
         for name in self.amplitude:
             swing, mean = self._swing(name), self.mean[name]
@@ -113,7 +113,7 @@ def held(model: Model) -> _Held:
     found = recognise(model)
     if found is None or not found.system.force:
         raise DoesNotApply(
-            "it applies only to a linear oscillator with one Coulomb contact and one sine force"
+            "the formula applies only to a linear oscillator with one Coulomb contact and one sine force"
         )
     s = found.system
     natural = math.sqrt(s.stiffness / s.mass)

@@ -156,7 +156,7 @@ def _settings(name: str, row: Any) -> tuple[float | Expression, ...]:
         raise UsageError(f"the values of {name} are {row!r}", remedy="give a list of numbers or expressions")
     found = tuple(_setting(name, value) for value in islice(row, MOST_POINTS + 1))
     if not found:
-        raise UsageError(f"{name} has no values", remedy="give at least one")
+        raise UsageError(f"{name} has no values", remedy="give at least one value")
     return found
 
 

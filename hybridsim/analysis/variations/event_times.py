@@ -66,7 +66,7 @@ class EventTimes:
             raise UsageError(
                 f"the cause of the change of {happened[0].component} at t = {float(happened[0].instant):.9g} is "
                 "unknown, and so are the derivatives of its time",
-                remedy="take other parameters, or a run that ends before",
+                remedy="use other parameters, or a run that ends before",
             )
         first = shifts[0]
         if any(
@@ -76,7 +76,7 @@ class EventTimes:
             raise UsageError(
                 f"several events at t = {float(happened[0].instant):.9g} separate when the run is changed "
                 f"({', '.join(sorted({o.component for o in happened}))}): there is no derivative",
-                remedy="take other parameters, or a run that ends before",
+                remedy="use other parameters, or a run that ends before",
             )
         return first.values
 
@@ -119,7 +119,7 @@ class EventTimes:
             raise UsageError(
                 f"{one.component} has an event at t = {float(one.instant):.9g} at which its guard does "
                 "not fall: the time of such an event has no derivatives",
-                remedy="take other parameters, or a run that ends before",
+                remedy="use other parameters, or a run that ends before",
             )
         return Shift(-found.by / rate, found.sizes / abs(rate))
 

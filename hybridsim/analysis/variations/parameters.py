@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def value_slopes(model: Model, chosen: Sequence[str]) -> np.ndarray:
-    """Return d(value of each parameter)/d(each chosen one), (P, C), including dependent parameters."""
+    """Return derivatives (P, C) of all parameters by the chosen ones, including dependent parameters."""
     names = [p.name for p in model.parameters]
     slopes = {name: np.zeros(len(chosen)) for name in names}
     values = model.parameter_values()

@@ -176,7 +176,7 @@ class Surface(Declared):
         self._expressions("function", "jump_above", "jump_below", "restitution")
         if (self.below is None) == (self.restitution is None):
             raise self._fault(
-                f"below is {self.below!r} and restitution {self.restitution!r}",
+                f"below is {self.below!r}, restitution is {self.restitution!r}: exactly one must be set",
                 "set either below or restitution",
             )
 

@@ -111,7 +111,7 @@ def _led(place: Place) -> tuple[list[str], list[str]]:
 
 
 def _transitions(system: System, changes: Sequence[Change]) -> list[str]:
-    """List the transitions of other components that set no state."""
+    """List the transitions of other components that do not set any state."""
     found = []
     for one in changes:
         automaton = system.automata[one.component]

@@ -16,7 +16,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _twisting() -> Scene:
-    """For x'' = -2 sign(x) - sign(x') each half turn has 1/3 of the width and 1/sqrt(3) of the duration before."""
+    """With x'' = -2 sign(x) - sign(x') each half turn is 3 times narrower and sqrt(3) times shorter."""
     half, end = 4 * math.sqrt(2) / 3, 4 * math.sqrt(2) / 3 / (1 - 1 / math.sqrt(3))
     first, second = half, half * (1 + 1 / math.sqrt(3))
 
