@@ -131,7 +131,7 @@ def hold(handle: int, busy: str) -> None:
     try:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise UsageError(busy, remedy="wait until it has finished, or use another path") from None
+        raise UsageError(busy, remedy="wait until the lock is released, or use another path") from None
     except OSError:  # a file system without locks
         return
 

@@ -460,7 +460,7 @@ def _refuse_what_ends(system: System, has_period: bool) -> None:
     if system.is_unilateral.any():
         raise UsageError(
             f"model {model.name} has impacts, through which derivatives are not carried: steady states are not found",
-            remedy="write it with a guard and a reset, or run it until it has settled",
+            remedy="write impacts as a guard and a reset, or simulate until the motion repeats",
         )
     for declared in model.inputs:
         if declared.period is None:

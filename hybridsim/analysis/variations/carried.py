@@ -76,7 +76,7 @@ class Carrier:
         if self.system.is_unilateral.any():
             raise UsageError(
                 f"model {solution.model.name} has impacts, through which derivatives are not carried",
-                remedy="write it with a guard and a reset, or compare runs with different parameters",
+                remedy="write impacts as a guard and a reset, or compare runs with different parameters",
             )
         module: Any = self.system.code.module
         self._project = differentiated(module.project)

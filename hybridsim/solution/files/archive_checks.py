@@ -83,7 +83,7 @@ def check_header(header: Header) -> None:
     """Refuse a header with an entry of the wrong type."""
     for name in _TEXTS:
         if not isinstance(header[name], str):
-            raise ValueError(f"its {name} is {header[name]!r}")
+            raise ValueError(f"its {name} cannot be {header[name]!r}")
     for name in ("warnings", "warnings_there"):
         entries = header[name]
         if not isinstance(entries, dict):
@@ -102,7 +102,7 @@ def check_header(header: Header) -> None:
     taken_over = header.get("taken_over")
     if taken_over is not None:
         if not (isinstance(taken_over, list) and len(taken_over) == 2 and isinstance(taken_over[0], str)):
-            raise ValueError(f"the integrator that took over is {taken_over!r}")
+            raise ValueError(f"the integrator that took over cannot be {taken_over!r}")
         check_number("the time at which another integrator took over", taken_over[1])
     kinds = header["kinds"]
     if not (isinstance(kinds, list) and all(isinstance(kind, str) for kind in kinds)):
@@ -192,7 +192,7 @@ def check_checkpoint(header: Header, arrays: Arrays, system: System, span: tuple
             check_range(f"{name} of the checkpoint", arrays[name], 0, ORDER + 1)
         step = float(arrays["step_size"])
         if not (math.isnan(step) or 0.0 < step < math.inf):
-            raise ValueError(f"the next step of the checkpoint is {step!r}")
+            raise ValueError(f"the next step of the checkpoint cannot be {step!r}")
         if "headway" in arrays:
             check_forms("the checkpoint", arrays, {"headway": (float, (HEADWAY_SIZE,))}, {})
             if (
@@ -211,7 +211,7 @@ def check_checkpoint(header: Header, arrays: Arrays, system: System, span: tuple
 def _check_pace(row: object, components: int) -> None:
     what = "the pace of a component"
     if not (isinstance(row, list) and len(row) == 2 and isinstance(row[1], list) and len(row[1]) == 5):
-        raise ValueError(f"{what} is {row!r}")
+        raise ValueError(f"{what} cannot be {row!r}")
     component, (last, intervals, longest, forecast, steadiest) = row
     if type(component) is not int or not _NOBODY <= component < components:
         raise ValueError(f"{what} is of {component!r}")
@@ -225,6 +225,6 @@ def _check_pace(row: object, components: int) -> None:
         if values is None:
             continue
         if not isinstance(values, list) or len(values) != count:
-            raise ValueError(f"{what} is {values!r}")
+            raise ValueError(f"{what} cannot be {values!r}")
         for value in values:
             check_number(what, value, is_finite=False)
