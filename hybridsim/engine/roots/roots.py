@@ -223,34 +223,33 @@ def _before(
 
 
 def _with_touches(
-    coefficients: np.ndarray,
-    bounds: np.ndarray,
-    rows: np.ndarray,
-    last: int | None,
-    falls: Callable[[int], bool] | None,
+    coefficients: np.ndarray, bounds: np.ndarray, rows: np.ndarray, is_first: bool, is_last: bool
 ) -> np.ndarray:
     """Return the pattern of a piece, with undecided intervals at values within their rounding errors.
 
     The misfit only shows roundings that differ from sample to sample. A common one, such as that of the steps
-    before, shifts the dip and stays hidden. A certain change of sign is no touch: its place is already known.
-
-    last: for the first piece of a step, the side before it. falls: for the last piece, whether a function on a
-    side leaves it at the end.
+    before, shifts the dip and stays hidden. The ends of a step have their own rules for rounding. Where the
+    sign changes, the pattern is already known.
     """
     found, count = sign_pattern(coefficients, bounds)
-    signs = [last, *found[:count, 2].tolist(), None]
-    for (begin, end, sign), before, after in zip(found[:count].tolist(), signs[:-2], signs[2:], strict=True):
-        is_touch = sign == 0 and (before is None or after is None or before == after)
-        if not is_touch or (end == 1.0 and falls is not None and falls(int(before or 0))):
-            continue
-        # a change of side between two pieces keeps its place
-        is_open = before is None or (end == 1.0 and falls is None)
-        if is_open and count > 1 and not any(a <= begin and end <= b for a, b, _ in rows.tolist()):
-            continue
-        parts = [(left, min(right, begin), s) for left, right, s in rows.tolist()] + [(begin, end, 0.0)]
-        parts += [(max(left, end), right, s) for left, right, s in rows.tolist()]
-        rows = np.array([part for part in parts if part[0] < part[1]])
-    return rows
+    signs = [None, *found[:count, 2].tolist(), None]
+    if (is_first and signs[1] == 0) or (is_last and signs[-2] == 0):
+        return rows
+    touches = [
+        (left, right)
+        for (left, right, sign), before, after in zip(
+            found[:count].tolist(), signs[:-2], signs[2:], strict=True
+        )
+        if sign == 0 and (before is None or after is None or before == after)
+    ]
+    parts = []
+    for left, right, sign in rows.tolist():
+        for begin, end in touches if sign else ():
+            if left <= begin and end <= right:
+                parts += [(left, begin, sign), (begin, end, 0.0)]
+                left = end
+        parts.append((left, right, sign))
+    return np.array([part for part in parts if part[0] < part[1]])
 
 
 def find_roots(
@@ -263,7 +262,6 @@ def find_roots(
     before: Callable[[float], float],
     floor: float = 0.0,
     begins: bool = False,
-    falls: Callable[[int], bool] = lambda _: False,
 ) -> tuple[list[Crossing], list[Grazing], int, float]:
     """Find all changes of side of one guard over a step, theta in (0, 1].
 
@@ -280,8 +278,6 @@ def find_roots(
         values are ignored
     begins : whether a segment begins here; a value within rounding of zero then leaves zero and is not a
         touch
-    falls : function of a side (0: unknown); returns whether a function on it that is within rounding of zero at
-        the end of the step leaves it there; called only if needed
     stop_at_first : direction of the first crossing after which the search may end (0: find all)
 
     Returns the crossings and grazings in order, the sign at the end of the step (0 if it is within the
@@ -324,14 +320,12 @@ def find_roots(
         bounds = np.full(DEGREE + 1, max(error, floor))
         n = _deflated(coefficients, bounds, order, side) if a == 0.0 else DEGREE + 1
         rows, count = sign_pattern(coefficients[:n], bounds[:n])
-        changes = count > 1 or rows[0, 2] not in (0, last)
-        if changes or (rows[0, 2] and (rows[0, 2] * coefficients[:n]).min() <= touching):
+        if count > 1 or (rows[0, 2] and (rows[0, 2] * coefficients[:n]).min() <= touching):
             bounds[:] = max(error, floor, _ROUNDINGS_BEFORE * rounding(), before(b))
             if n <= DEGREE:
                 _represent(samples, coefficients)
                 _deflated(coefficients, bounds, order, side)
-            starts, ends = last if a == 0.0 else None, falls if b == 1.0 else None
-            rows = _with_touches(coefficients[:n], bounds[:n], rows[:count], starts, ends)
+            rows = _with_touches(coefficients[:n], bounds[:n], rows[:count], a == 0.0, b == 1.0)
             count = len(rows)
         for left, right, sign in rows[:count]:
             x, y = a + (b - a) * left, a + (b - a) * right

@@ -374,7 +374,7 @@ def event_loop(
                     s_error = max(s_error, abs(values[i] / slope))
         state_errors(automata, s_error, y, scale, x_error, z, rates_now, y_error)
         if is_shallow(slope, bend, steps[n_steps - 1, 1]) and is_hidden(
-            automata, tapes, inputs, lin, fired, slope, bend, s, s_error, n_steps - first_step, state, work
+            automata, tapes, inputs, lin, fired, slope, bend, s, s_error, state, work
         ):
             return STOPPED, first_step, n_segments
         if not resolve_and_advance(

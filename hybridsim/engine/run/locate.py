@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hybridsim.engine.events.choice.verdict import side_after, side_before
 from hybridsim.engine.roots.roots import POINTS, Crossing, Grazing, find_roots, quiet
 from hybridsim.engine.run.stepping import Flow, Step, Watch
 from hybridsim.engine.series.bounded import UNIT
@@ -89,19 +88,6 @@ def polish(sample: Callable[[np.ndarray], np.ndarray], crossing: Crossing) -> fl
     return right
 
 
-def side_at_end(series: np.ndarray, bounds: np.ndarray, before: int, forward: bool) -> tuple[int, int]:
-    """Return the side of a function just after the end of a step, and the order that decides it.
-
-    A function that is within its bound and turns back before it leaves the bound only touches zero: it has no side yet.
-    """
-    side, order = (side_after if forward else side_before)(series, bounds, 0)
-    value, slope, bend = series[:3].tolist()
-    turns = side == -before and order == 1 and before * bend > 0.0
-    if turns and before * value - slope * slope / (4.0 * abs(bend)) >= -bounds[0]:
-        return 0, len(series)
-    return int(side), int(order)
-
-
 def _in_order(hits: list[Hit]) -> tuple[Hit, ...]:
     return tuple(sorted(hits, key=lambda hit: (hit.theta, hit.number)))
 
@@ -111,21 +97,15 @@ class Locator:
 
     def __init__(self, flow: Flow, watch: Watch) -> None:
         self.flow = flow
-        self.numbers = watch.guards
+        self.numbers, self.x_error = watch.guards, watch.x_error
         self.sides, self.orders = watch.sides.copy(), watch.orders.copy()
         self.floors, self.monitor_floors = watch.guard_floors, watch.monitor_floors
         self.monitor_numbers = np.arange(len(watch.monitor_sides))
         self.monitor_sides, self.monitor_orders = watch.monitor_sides.copy(), watch.monitor_orders.copy()
         self.samples: list[np.ndarray] = []  # of guards and monitors, on the last searched step
 
-    def search(
-        self, step: Step, rounding: Callable[[], np.ndarray], rounding_of_steps: Callable[[], np.ndarray]
-    ) -> Findings:
-        """Return all zeros in a step.
-
-        rounding: returns the errors of the states on the segment so far. rounding_of_steps: includes those of all
-        steps up to the end of this one.
-        """
+    def search(self, step: Step, rounding: Callable[[], np.ndarray]) -> Findings:
+        """Return all zeros in a step; rounding: returns the errors of the states on the segment so far."""
         flow, width = self.flow, step.s1 - step.s0
         times = step.s0 + width * POINTS
         times[-1] = step.s1
@@ -151,10 +131,9 @@ class Locator:
                         side or 1,
                         -1,
                         self._rounding(step, int(g), False),
-                        self._before(step, int(g), False, rounding_of_steps),
+                        self._before(step, int(g), False),
                         floor,
                         step.s0 == 0.0,
-                        self._falls(step, int(g), False, rounding_of_steps),
                     )
                 except StepFailure as failure:
                     raise StepFailure(f"{flow.system.guard_title(int(g), flow.z)}: {failure}") from None
@@ -179,9 +158,8 @@ class Locator:
                         side,
                         0,
                         self._rounding(step, int(k), True),
-                        self._before(step, int(k), True, rounding_of_steps),
+                        self._before(step, int(k), True),
                         self.monitor_floors[k],
-                        falls=self._falls(step, int(k), True, rounding_of_steps),
                     )
                 except StepFailure as failure:
                     if np.isfinite(values[:, k]).all():
@@ -235,16 +213,14 @@ class Locator:
 
         return bound
 
-    def _before(
-        self, step: Step, number: int, is_monitor: bool, errors: Callable[[], np.ndarray]
-    ) -> Callable[[float], float]:
-        """Return how errors at the start of the step affect a guard or monitor, as a function of theta."""
+    def _before(self, step: Step, number: int, is_monitor: bool) -> Callable[[float], float]:
+        """Return a function of theta: the error of a guard or monitor due to the errors at the start of the segment."""
         known: list[list[float]] = []
 
         def bound(theta: float) -> float:
             if not known:
                 flow = self.flow
-                series = flow.system.series(step.s0, step.x0, flow.p, flow.z, errors(), math.ulp(step.s0))
+                series = flow.system.series(step.s0, step.x0, flow.p, flow.z, self.x_error, math.ulp(step.s0))
                 bounds = series.monitor_bounds if is_monitor else series.guard_bounds
                 known.append(bounds[number].tolist())
             d, total = abs(theta * (step.s1 - step.s0)), 0.0
@@ -253,22 +229,6 @@ class Locator:
             return total if math.isfinite(total) else 0.0
 
         return bound
-
-    def _falls(
-        self, step: Step, number: int, is_monitor: bool, errors: Callable[[], np.ndarray]
-    ) -> Callable[[int], bool]:
-        """Return a function that tests whether a guard or monitor certainly leaves a side by a step's end."""
-
-        def falls(side: int) -> bool:
-            flow = self.flow
-            x = flow.project(np.array([step.s1]), step.x1[None, :])[0]
-            series = flow.system.series(step.s1, x, flow.p, flow.z, errors(), math.ulp(step.s1))
-            values = series.monitors if is_monitor else series.guards
-            bounds = series.monitor_bounds if is_monitor else series.guard_bounds
-            before = side or int(self.monitor_sides[number] if is_monitor else 1)
-            return side_at_end(values[number], bounds[number], before, flow.forward)[0] == -before
-
-        return falls
 
     def _bound(self, step: Step, number: int, errors: np.ndarray, is_monitor: bool = False) -> float:
         """Return the error of a guard or monitor at the end of a step, given the errors of the states."""

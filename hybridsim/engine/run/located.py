@@ -156,7 +156,7 @@ def located(
 def as_stepped(system: System, at: Situation, arrival: Arrival, segment: SegmentRun) -> tuple[Situation, Any]:
     """Return the state at an event with error bounds that include the rounding of the steps, and the series there."""
     with np.errstate(invalid="ignore"):  # a state may have become infinite
-        wide, way = replace(at), segment.way + np.abs(arrival.x - segment.states[-1])
+        wide, way = replace(at), np.abs(np.diff([*segment.states, arrival.x], axis=0)).sum(axis=0)
     add_steps(system, wide, segment.scale + way, len(segment.knots), segment.method.rounding * way)
     return wide, system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
 

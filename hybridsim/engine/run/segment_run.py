@@ -10,11 +10,12 @@ from typing import NoReturn
 import numpy as np
 
 from hybridsim.engine.events.backward import Entry, entries
+from hybridsim.engine.events.choice.verdict import side_after, side_before
 from hybridsim.engine.native.constants import IN_A_ROW, STANDSTILL
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.segments import Dense, PiecewiseDense, Segment
 from hybridsim.engine.roots.roots import POINTS, find_roots
-from hybridsim.engine.run.locate import Findings, Hit, Locator, polish, side_at_end
+from hybridsim.engine.run.locate import Findings, Hit, Locator, polish
 from hybridsim.engine.run.stepping import Flow, Method, Step, Stepper, Watch
 from hybridsim.engine.series.bounded import ORDER, UNIT
 from hybridsim.engine.system.failures import Creeping, StepFailure
@@ -99,8 +100,9 @@ class SegmentRun:
         self.monitors = system.model.monitors
         self.knots, self.states = [0.0], [x]
         self.interpolants: list[Dense] = []
-        # largest magnitude of each state on the segment, and the distance it moved, to which rounding is relative
-        self.scale, self.way = np.abs(x), np.zeros_like(x)
+        self.scale = np.abs(
+            x
+        )  # largest magnitude of each state on the segment, to which rounding is relative
         self.passed_monitors: list[PassedMonitor] = []
         self.grazings: list[tuple[int, float, float]] = []  # guard, local time, distance
         self.undefined: set[int] = set()  # monitors that were not a number somewhere
@@ -146,7 +148,6 @@ class SegmentRun:
             ):  # only a part is used; the states at the end of the whole step may be far larger
                 parts = np.array([step.s0, 0.5 * (step.s0 + step.s1), step.s1])
                 self.scale = np.maximum(known, np.abs(step.dense(parts)).max(axis=0))
-            self.way = self.way + np.abs(step.x1 - step.x0)
             self.knots.append(step.s1)
             self.states.append(step.x1)
             self.interpolants.append(step.dense)
@@ -225,15 +226,6 @@ class SegmentRun:
         """Return error bounds of the states on the segment: its rounding plus the errors at its start."""
         return 4.0 * UNIT * self.scale + self.watch.x_error
 
-    def rounding_of_steps(self, step: Step) -> np.ndarray:
-        """Return error bounds of the states at the end of the next step, with the rounding of all steps to it.
-
-        Each step adds a rounded change to a rounded state. The change is a sum of stages, which cancel each other.
-        """
-        way = self.way + np.abs(step.x1 - step.x0)
-        errors = 16.0 * len(self.knots) * self.scale + self.method.rounding * way
-        return UNIT * errors + self.rounding()
-
     def segment(self) -> Segment:
         """Return the finished segment of the trajectory."""
         knots, flow = np.array(self.knots), self.flow
@@ -258,7 +250,7 @@ class SegmentRun:
 
     def _examine(self, stepper: Stepper, step: Step) -> tuple[Step, Arrival | None]:
         """Search a step. If an event stops the segment, return the step up to it and the arrival."""
-        found = self.locator.search(step, self.rounding, lambda: self.rounding_of_steps(step))
+        found = self.locator.search(step, self.rounding)
         first = self._first_stop(found)
         if first is not None and self._has_not_moved(step, *first):
             return self._examine(stepper, stepper.restep(step, step.s0 + _SHORTER * (step.s1 - step.s0)))
@@ -356,13 +348,14 @@ class SegmentRun:
         if not open_guards and not open_monitors:
             return step, None
         x = self._projected(step)
-        errors, forward = self.rounding_of_steps(step), self.flow.forward
+        errors = self.rounding()
         series = self.system.series(step.s1, x, self.flow.p, self.flow.z, errors, math.ulp(step.s1))
+        side_of = side_after if self.flow.forward else side_before
         fired: list[int] = []
         passed: list[int] = []
         stopping: list[int] = []
         for g in open_guards:
-            locator.sides[g], order = side_at_end(series.guards[g], series.guard_bounds[g], 1, forward)
+            locator.sides[g], order = side_of(series.guards[g], series.guard_bounds[g], 0)
             locator.orders[g] = order if order <= ORDER else 0
             locator.floors[g] = series.guard_bounds[g, 0] if order > 0 else 0.0
             if locator.sides[g] < 0:
@@ -375,7 +368,7 @@ class SegmentRun:
                 return self._examine(stepper, ended)
             return ended, Arrival(ended.s1, self._projected(ended), fired=(hit.number,))
         for k in open_monitors:
-            side, order = side_at_end(series.monitors[k], series.monitor_bounds[k], int(before[k]), forward)
+            side, order = side_of(series.monitors[k], series.monitor_bounds[k], 0)
             locator.monitor_sides[k], locator.monitor_orders[k] = side, order if order <= ORDER else 0
             locator.monitor_floors[k] = series.monitor_bounds[k, 0] if order > 0 else 0.0
             if math.isnan(series.monitors[k, 0]):

@@ -486,7 +486,7 @@ def rk_event_loop(
         call(functions.flow, s, y, p, z, slopes)
         state_errors(automata, s_error, y, scale, x_error, z, slopes, work.y_error)
         if is_shallow(slope, bend, d) and is_hidden(
-            automata, tapes, inputs, lin, fired, slope, bend, s, s_error, n_steps - first_step, state, work
+            automata, tapes, inputs, lin, fired, slope, bend, s, s_error, state, work
         ):
             return STOPPED, first_step, n_segments
         if not resolve_and_advance(

@@ -97,16 +97,15 @@ def is_hidden(
     bend: float,
     s: float,
     s_error: float,
-    steps: int,
     state: Any,
     work: Any,
 ) -> bool:
-    """Return whether a guard turns back before it exceeds the rounding error of its expression and of the steps.
+    """Return whether a guard turns back before it exceeds the rounding error of its expression.
 
-    The state is that in the work space, at local time s, after `steps` steps.
+    The state is that in the work space, at local time s.
     """
     fill_guard_series(automata, tapes, inputs, lin, s, s_error, state, work)
-    return slope * slope < _HIDDEN * bend * spread(steps, STAGES) * work.judged[1, g, 0]
+    return slope * slope < _HIDDEN * bend * work.judged[1, g, 0]
 
 
 @kernel
