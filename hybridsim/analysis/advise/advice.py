@@ -85,7 +85,7 @@ class Advice(Readable):
         return next((s for s in self.settings if s.is_adequate), None)
 
     def __getitem__(self, name: str) -> Step:
-        """Return the step of the ladder that has this name."""
+        """Return the simpler model with this name."""
         for step in self.ladder:
             if step.name == name:
                 return step

@@ -52,7 +52,7 @@ class LadderStep(ABC):
 
     @abstractmethod
     def apply(self, scene: Scene) -> Model | Any:
-        """Return the simpler model, or for a closed form a motion with the measures of a steady state.
+        """Return the simpler model. A step with a closed form returns its motion as a steady state.
 
         Raises
         ------

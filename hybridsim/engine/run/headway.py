@@ -100,7 +100,7 @@ class Headway:
             self._check_pace(now, run)
 
     def check_compiled(self, now: Instant) -> None:
-        """Judge the pace after steps in compiled code."""
+        """Check whether a run in compiled code progresses fast enough."""
         if self._spent() >= _WINDOW:
             self._check_pace(now, None)
 

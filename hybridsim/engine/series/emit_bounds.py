@@ -34,7 +34,7 @@ Term = tuple[str, str]  # a coefficient and the bound of its error
 
 @dataclass(frozen=True)
 class ConstantSources:
-    """Sources of a tape's constants: numbers with their errors, places in p, and which of these are phases."""
+    """Values of a tape's constants: numbers with errors, indices into the parameter vector, and phases."""
 
     numbers: Mapping[int, tuple[float, float]]
     sources: Mapping[int, int]

@@ -394,7 +394,7 @@ class Rewriting:
         return bool(may_be_timed) and self.borders.is_timed(argument) and not self.borders.refusal(argument)
 
     def _step(self, family: Family, argument: ast.expr) -> TimeStep | None:
-        """Return the signal of a border in time, or None if its zeros cannot be computed."""
+        """Return the step signal of a condition on time, or None if its switching times cannot be computed."""
         if family not in self.steps:
             tree = self.meanings.written_out(argument)
             found = step_of(f"{STEP}{len(self.steps) + 1}", tree, self._parameters, write(argument))

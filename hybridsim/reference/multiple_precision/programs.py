@@ -92,7 +92,7 @@ class Programs:
         return self.program(self.decided(modes)).value(expr, point)
 
     def leaving(self, expansion: Expansion) -> list[tuple[int, int]]:
-        """Return the guards, as (component, number), that are negative just after."""
+        """Return the guards, as (component, number), that are negative just after the point of the expansion."""
         return [
             (c, j)
             for c, row in enumerate(expansion.guards)

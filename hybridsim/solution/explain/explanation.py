@@ -228,7 +228,7 @@ def _of_accumulation(solution: Solution, event: Event) -> str:
 
 
 def _without_a_segment(solution: Solution, event: Event) -> str:
-    """Explain a change of mode at the start of a run, or at its end, where no motion leads to it."""
+    """Explain a change of mode that no motion precedes, as at the start of a run."""
     if event.t == solution.t[0]:
         return (
             "the run starts here: the sides of corners and the admissible modes are found from the initial values, "

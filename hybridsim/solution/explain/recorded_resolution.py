@@ -92,7 +92,7 @@ class Decision:
 
 
 class RecordedResolution(EventResolution):
-    """A resolution that judges all candidates, including those that the choice does not need."""
+    """Resolve an event and record the verdict on every combination of modes, also after one is chosen."""
 
     is_thorough = True
 

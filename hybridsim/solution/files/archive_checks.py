@@ -172,7 +172,7 @@ def check_checkpoint(header: Header, arrays: Arrays, system: System, span: tuple
     for name in ("segments", "occurrences"):
         check_count(f"the checkpoint's number of {name}", header[name])
     if not isinstance(header["paces"], list):
-        raise ValueError("its paces are not rows")
+        raise ValueError("the checkpoint's event rates are not a list")
     for row in header["paces"]:
         _check_pace(row, len(system.automata))
     if not isinstance(header["names"], list) or sorted(map(str, header["names"])) != sorted(arrays):

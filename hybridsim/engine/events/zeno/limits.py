@@ -20,7 +20,7 @@ _REACH = 2.0  # a surface farther away than this many times its possible motion 
 def behind(
     limit: Limit, system: System, outcome: Outcome, p: np.ndarray, s: float
 ) -> tuple[float, Outcome] | None:
-    """Return the outcome after a limit of events at local time s, or None if no motion continues.
+    """Return how the motion continues after infinitely many events at local time s, or None if it cannot.
 
     The first item is the local time from which it holds. That is the present time if another event may come before the
     limit.
@@ -90,7 +90,7 @@ def _moved(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, s0: floa
 def _held_at(
     system: System, outcome: Outcome, p: np.ndarray, s: float, near: list[int], x: np.ndarray, z: np.ndarray
 ) -> Outcome | None:
-    """Return the outcome at local time s with x on these surfaces, or None unless switching surfaces are held."""
+    """Return the outcome at local time s with the near surfaces at zero, or None if one of them is not held."""
     if not np.isfinite(x).all():
         return None
     z = z.copy()

@@ -109,7 +109,7 @@ def _response(point: Point, variant: Variant | None, size: Size) -> Response:
 
 
 def claim_figure_3(runs: dict[str, Response]) -> Claim:
-    """Judge the claim of a periodic motion with odd harmonics only and significant high ones."""
+    """Check the claim that the motion is periodic, with odd harmonics only and large high harmonics."""
     ours = {name: _spectrum(run) for name, run in runs.items() if name != EXACT}
     exact = _spectrum(runs[EXACT])
     keeps = [name for name, row in ours.items() if row["holds"]]

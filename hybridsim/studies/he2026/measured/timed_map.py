@@ -1,4 +1,4 @@
-"""This module times amplitude and energy over a whole map, for `exact`, the published method and shooting.
+"""Measure the run time of a map of amplitude and energy by `exact`, the published method and shooting.
 
 `exact` computes the map with `hybridsim.sweep`; the others compute point by point on the same threads.
 """
