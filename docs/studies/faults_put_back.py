@@ -23,7 +23,7 @@ from typing import Any
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT / "tests"))
 
-from reference.put_back.copies import Fault, copied, faults  # noqa: E402
+from reference.put_back.copies import Fault, copied, faults  # noqa: E402  # after the path
 
 PAGE = ROOT / "docs" / "studies" / "faults-put-back.md"
 RESULTS = "## Results"

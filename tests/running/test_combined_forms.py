@@ -63,7 +63,7 @@ def test_a_corner_over_a_contacts_own_speed_stays_in_its_load(method: str) -> No
 # -- the judge -----------------------------------------------------------------------------------------------------
 
 
-def value(motion, time: float, model: Abstract) -> dict[str, float]:  # type: ignore[no-untyped-def]
+def value(motion, time: float, model: Abstract) -> dict[str, float]:  # type: ignore[no-untyped-def]  # any motion
     return motion.at(time, list(model.states))
 
 

@@ -60,7 +60,7 @@ class _Place:
         return str(self.line)
 
 
-class _Form(CompileResultCacheImpl or object):  # type: ignore[misc]
+class _Form(CompileResultCacheImpl or object):  # type: ignore[misc]  # a numba without it
     """The format of numba's compiled functions, stored in our cache folder regardless of numba's settings."""
 
     def __init__(self, function: Any, folder: Path) -> None:
@@ -94,7 +94,7 @@ class _Versions:
         """Do nothing: no index is held in memory."""
 
 
-class KernelCache(FunctionCache or object):  # type: ignore[misc]
+class KernelCache(FunctionCache or object):  # type: ignore[misc]  # a numba without it
     """A numba cache of one function that stores files in our format."""
 
     def __init__(self, function: Any, folder: Path) -> None:

@@ -289,7 +289,7 @@ def test_what_reads_itself_or_names_no_value_yet_is_told() -> None:
             return factor if n < 1 else inner(n - 1) + later
 
         return inner
-        later = 1.0  # type: ignore[unreachable]
+        later = 1.0  # type: ignore[unreachable]  # an empty cell
 
     assert identity(ring(1.0)) == identity(ring(1.0)) != identity(ring(2.0))
 

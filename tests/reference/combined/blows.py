@@ -75,7 +75,7 @@ def blow(judge: Any) -> bool:
     return True
 
 
-def impulses(judge, pushing, ways, loaded, gain, turn, speed, back):  # type: ignore[no-untyped-def]
+def impulses(judge, pushing, ways, loaded, gain, turn, speed, back):  # type: ignore[no-untyped-def]  # any numbers
     """The impulses of one combination; None where it is not admissible."""
     tol = judge.tol
     coefficient = {f: judge.value(judge.m.contacts[f].mu_s) for f in ways}

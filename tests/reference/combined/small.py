@@ -19,7 +19,7 @@ def small(seed: int, draw: int, integrator: str, tries: int = 150) -> str:
     numbers = number_set(model, seed, draw)
     kinds: list[str] = []
 
-    def shows(style: Style, names: dict[str, str]):  # type: ignore[no-untyped-def]
+    def shows(style: Style, names: dict[str, str]):  # type: ignore[no-untyped-def]  # local
         def holds(m: Abstract) -> bool:
             renderer = Renderer(m, style, names)
             try:
@@ -30,7 +30,7 @@ def small(seed: int, draw: int, integrator: str, tries: int = 150) -> str:
                 if v.kind not in ("agrees", "cannot"):
                     truth = second_look(m, numbers, truth, v)
                     v = hold(m, compiled, renderer, integrator, truth)
-            except Exception:
+            except Exception:  # a smaller model may be invalid in any way
                 return False
             if not kinds:
                 kinds.append(v.kind)
