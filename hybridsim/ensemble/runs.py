@@ -92,7 +92,7 @@ class Ensemble:
         self.hold = np.array([a.hold for a in system.automata], dtype=np.int64)
 
     def runs(self, parameters: np.ndarray, starts: np.ndarray, periods: int) -> Iterator[LastPeriods]:
-        """Yield the last period of each run, some together, in any order. Unsupported runs are missing.
+        """Yield the last periods of all supported runs, in any order; runs of a group come together.
 
         parameters (N, P), in the order of the model; starts (N, n). The iteration ends early if `may_continue` returns
         False.
@@ -165,7 +165,7 @@ class Ensemble:
         spare.append(group_scratch)
 
     def _may_begin(self, starts: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-        """Return a mask (N,) of runs in which each contact opposes its own velocity; the others must be refused."""
+        """Return a mask (N,) of runs in which each contact opposes its own velocity, as is required."""
         found = np.empty(len(starts), dtype=np.bool_)
         scratch = np.zeros(len(self.system.surface_of))
         _opposing(self.system.address("effects"), starts, vectors, self.first, scratch, found)
@@ -178,7 +178,7 @@ def _period(rates: np.ndarray) -> float:
 
 
 class _GroupScratch:
-    """Scratch arrays for runs with tables of one form, and their packs in order."""
+    """Scratch arrays for runs whose tables have the same shapes, and their packs for the kernel."""
 
     def __init__(self, ensemble: Ensemble, tables: Any, p: np.ndarray) -> None:
         system = ensemble.system

@@ -39,7 +39,7 @@ def plain_start(
     state: Any,
     work: Any,
 ) -> bool:
-    """Decide all modes at t0 from the state, whose p holds the parameters. Return False if the outcome is uncertain.
+    """Decide all modes at `t0`; the parameters are in `state.p`. Return False if the outcome is uncertain.
 
     none: empty tables, so that guards are judged by the tape. vector_positions: rates, and the positions of the origin,
     the phases and the pin in p. surfaces: from the tape of the first modes, the constant rows, the rows, the
@@ -74,7 +74,7 @@ def plain_start(
 
 @inline_always
 def _take_sides(automata: Any, inputs: Any, surfaces: Any, pin_at: int, state: Any, work: Any) -> bool:
-    """Set each component to the mode of its side, or to _UNKNOWN on its surface. Return False if a value is NaN."""
+    """Set each mode by the component's side, or _UNKNOWN on its surface. Return False if a value is NaN."""
     constant, rows, derivatives, registers, owners = surfaces
     V, E, z, p = work.V, work.E, state.z, state.p
     p[pin_at] = 0.0  # the states as they are, not projected by a holding mode
@@ -96,7 +96,7 @@ def _take_sides(automata: Any, inputs: Any, surfaces: Any, pin_at: int, state: A
 def _choose_cluster(
     automata: Any, tapes: Any, inputs: Any, none: Any, state: Any, first: int, work: Any
 ) -> bool:
-    """Set the one motion that `choose` prefers for a component on its surface. Return whether it is certain."""
+    """Choose the modes of a component on its surface and of its cluster. Return whether they are certain."""
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     members, candidates, current, holds = work.members, work.candidates, work.current, work.holds
     verdicts, trial, y = work.verdicts, work.trial, work.y
@@ -185,7 +185,7 @@ def keeps_holding(tapes: Any, lin: Any, state: Any, work: Any, c: Any) -> bool:
 
 @kernel
 def opposing(effects: Any, x: Any, p: Any, z: Any, scratch: Any, out: Any) -> None:
-    """Write to out (N,) whether every contact opposes its own velocity at starts x (N, n), p (N, P); scratch (C,)."""
+    """Write to `out` (N,) whether every contact opposes its own velocity at starts x (N, n), p (N, P)."""
     for i in range(x.shape[0]):
         call(effects, 0.0, x[i], p[i], z, scratch)
         out[i] = True

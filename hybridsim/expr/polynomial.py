@@ -78,7 +78,7 @@ def scaled(p: Polynomial, factor: Fraction) -> Polynomial:
 
 
 def is_multiple(p: Polynomial, of: Polynomial) -> bool:
-    """Return whether p is a polynomial multiple of another one, up to denominators that are names."""
+    """Return whether `p` is a polynomial multiple of `of`, apart from denominators that are names."""
     rest, divisor = _cleared(p), _cleared(of)
     if not divisor:
         return False
@@ -120,7 +120,7 @@ def _cleared(p: Polynomial) -> Polynomial:
 
 
 def direction(p: Polynomial) -> tuple[frozenset[tuple[Monomial, Fraction]], int]:
-    """Return the normalised form that p shares with all its multiples, and the sign of p in it."""
+    """Return `p` divided by its leading coefficient, and the sign of this coefficient."""
     first = min((m for m in p if m), default=())
     lead = p[first]
     return frozenset(scaled(p, 1 / lead).items()), 1 if lead > 0 else -1

@@ -74,7 +74,7 @@ def _with_error(node: ast.expr, values: Mapping[str, float], exact: Collection[s
 
 
 def _carried(node: ast.BinOp | ast.Call, arguments: list[tuple[float, float]], value: float) -> float:
-    """Return the error of a function's value: its own, and that from the errors of its arguments."""
+    """Return the error of a function's value: its own rounding and the errors passed on by its arguments."""
     names = [f"a{k}" for k in range(len(arguments))]
     parts: list[ast.expr] = [ast.Name(name) for name in names]
     again = (

@@ -25,7 +25,7 @@ class exp(sympy.exp):  # SymPy's printers use the name of the class
         return super().__new__(cls, arg, **(options | {"evaluate": False} if arg.is_Add else options))
 
     def as_base_exp(self) -> tuple[Any, Any]:
-        """Return itself as base, so that a product merges it only with equal factors."""
+        """Return the exponential itself as base, so that SymPy merges it only with equal factors."""
         return self, sympy.Integer(1)
 
     def _eval_power(self, other: Any) -> Any:

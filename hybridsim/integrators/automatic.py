@@ -35,7 +35,7 @@ class Choice(NamedTuple):
 
 
 def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float], rtol: float) -> Choice:
-    """Choose an integrator for a model, a start and a tolerance.
+    """Choose an integrator for a model with given initial values and tolerance.
 
     The closed form is chosen for linear modes if it runs in compiled code, a stiff method if stability would
     limit the step of an explicit one, and an explicit method otherwise. Stiffness is detected at the start,

@@ -27,13 +27,13 @@ def with_first_steps(
     watch: Watch,
     make: Callable[[float, np.ndarray], Stepper],
 ) -> Stepper:
-    """Start a multistep method by `make`, after first steps of high order if a guard grows late."""
+    """Start a multistep method; if a guard grows late, the first steps are of high order."""
     late = [int(g) for g in watch.guards if watch.sides[g] > 0 and watch.orders[g] >= _LATE]
     return FirstSteps(flow, x0, bound, tolerances, watch, late, make) if late else make(0.0, x0)
 
 
 class FirstSteps:
-    """Take steps of DOP853 until late guards exceed the errors of the states, then steps of the method.
+    """Take steps of DOP853 until each late guard exceeds its error, then steps of the multistep method.
 
     A multistep method begins at order one with errors of the size of its tolerance, while a gap that opens
     grows with the cube of time. Without these steps a gap that has opened would seem to close again.
@@ -55,7 +55,7 @@ class FirstSteps:
         self.count, self.is_over = 0, False
 
     def step(self) -> Step:
-        """Return the next step, by DOP853 or by the method."""
+        """Return the next step, by DOP853 or by the multistep method."""
         step = self.stepper.step()
         if not self.is_over:
             self.count += 1
@@ -71,7 +71,7 @@ class FirstSteps:
         return self.stepper.restep(step, s)
 
     def _first(self, x0: np.ndarray, watch: Watch) -> float:
-        """Return a first step length after which the leading terms of late guards are significant."""
+        """Return a first step length at which the leading terms of late guards exceed their errors."""
         series = self.flow.system.series(0.0, x0, self.flow.p, self.flow.z, np.zeros(self.flow.n), 0.0)
         orders = watch.orders[self.late]
         leading = np.abs(series.guards[self.late, orders])
@@ -81,7 +81,7 @@ class FirstSteps:
         return 2.0 * float(max(steps, default=np.inf))
 
     def _errors(self, s: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the late guards, and how much tolerated errors of the states change them."""
+        """Return the values of late guards, and their changes by tolerated errors of the states."""
         sizes = self.tolerances.atol + self.tolerances.rtol * np.abs(x)
         states = np.vstack([x, x + np.diag(sizes)])
         values = self.flow.guards(np.full(len(states), s), states)[:, self.late]

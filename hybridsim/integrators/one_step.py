@@ -31,7 +31,7 @@ class Point:
 
     @cached_property
     def dx(self) -> np.ndarray:
-        """Return the slope."""
+        """Return the rates of the states."""
         self.flow.counters.rhs_evaluations += 1
         return self.flow.rhs(self.s, self.x)
 

@@ -24,7 +24,7 @@ _CONVERGES = 0.1
 
 @kernel
 def converges(series: Any, h: float, x1: Any) -> bool:
-    """Return whether Taylor coefficients (n, k) of the states at one end of a step h reproduce its other end."""
+    """Return whether Taylor coefficients (n, k) at one end of a step give the states at the other end."""
     for i in range(series.shape[0]):
         power, largest, total = 1.0, 0.0, 0.0
         for k in range(series.shape[1]):

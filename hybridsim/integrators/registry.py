@@ -89,7 +89,7 @@ def integrator_class(name: str) -> type[Integrator]:
 
 @contextmanager
 def registered(method: str | type[Integrator]) -> Iterator[str]:
-    """Yield an integrator's name, by which even an unregistered class is available inside the context."""
+    """Make an integrator class available by name inside the context, even if it is not registered."""
     if isinstance(method, str):
         yield integrator_class(method).name
         return
@@ -151,7 +151,7 @@ class UnknownOption(UsageError):
 
 
 def make_integrator(name: str, options: dict[str, Any], keywords: Iterable[str] = ()) -> Integrator:
-    """Return the integrator with this name and options; keywords: names the user may have meant."""
+    """Return the integrator with this name and options; `keywords` are further names for suggestions."""
     cls = integrator_class(name)
     known = option_names(cls)
     for option in options:

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def free_name(taken: Iterable[str], wish: str) -> str:
-    """Return the wished name, with underscores appended until it differs from all taken names."""
+    """Return the preferred name, with underscores appended until it differs from all taken names."""
     names = frozenset(taken)
     while wish in names:
         wish += "_"

@@ -21,7 +21,7 @@ _MOST_PARTS = 2_000  # largest tree with inserted definitions; larger ones are c
 
 
 class Meanings:
-    """Definitions, varying names and force-dependent names of one model."""
+    """The definitions, varying names and force-dependent names of one model."""
 
     def __init__(self, model: Model) -> None:
         trees = {name: expr.tree for name, expr in model.definitions}
@@ -38,7 +38,7 @@ class Meanings:
         self.definitions = {name: self.with_single_signs(tree) for name, tree in trees.items()}
 
     def with_single_signs(self, node: ast.expr) -> ast.expr:
-        """Return a tree in which the sign of a varying product is the product of the signs."""
+        """Return a tree with the sign of each varying product written as a product of signs."""
         if not any(isinstance(part, ast.Name) and part.id == "sign" for part in ast.walk(node)):
             return node
         match rebuilt(node, self.with_single_signs):
@@ -86,7 +86,7 @@ class Meanings:
         return inner
 
     def family(self, node: ast.expr) -> tuple[Family, int]:
-        """Return the family of an expression and its sign in it; a number has the empty family."""
+        """Return the family that an expression shares with its multiples, and its sign relative to it."""
         p: Polynomial = polynomial(self.written_out(node))
         number = constant_of(p)
         if number is not None:

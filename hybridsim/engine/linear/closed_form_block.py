@@ -80,7 +80,7 @@ class ClosedFormBlock(Sequence[Segment]):
 
     @property
     def until(self) -> Instant:
-        """Return the end of the last segment."""
+        """Return the instant at which the last segment ends."""
         high, low = self.origins[-1].tolist()
         return Instant(high, low).plus(float(self.ends[-1]))
 
@@ -112,7 +112,7 @@ class ClosedFormBlock(Sequence[Segment]):
         )
 
     def at_end(self) -> Segment:
-        """Return the data at the end of the last segment."""
+        """Return a segment of zero length at the end of the last segment."""
         return end_point(self.until, self.modes[-1], self.vectors[-1], self.jumps[-1, 1])
 
     def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

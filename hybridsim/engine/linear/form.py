@@ -56,7 +56,7 @@ class DividesByZero(NotLinear):
 
 @dataclass(frozen=True)
 class Atom:
-    """An angle or exponent rate*s + offset + sum of weights*p[source], a value, or local time (rate 1)."""
+    """Local time, a value, or an angle or exponent: rate*s + offset + sum of weight*p[source]."""
 
     kind: int
     rate: float
@@ -158,7 +158,7 @@ class LinearReader:
                 self.forms[out + 1] = found[1]
 
     def form(self, register: int) -> Form:
-        """Return the linear form of a register; raise NotLinear."""
+        """Return the linear form of a register, or raise NotLinear."""
         return _form(self._read(register))
 
     def _read(self, register: int) -> Read:
@@ -248,7 +248,7 @@ def _sum(a: Form, b: Form, sign: float) -> Form:
 
 
 def _product(a: Form, b: Form) -> Form:
-    """Return the product of two forms if it is a form, else raise NotLinear."""
+    """Return the product of two linear forms if it is a linear form, or raise NotLinear."""
     result: Form = {}
     for left, u in a.items():
         for right, v in b.items():

@@ -49,7 +49,7 @@ class MatrixTemplate:
         motion = [(place[m], atoms.derivative(m)) for m in monomials]  # the same in all modes
 
         def entries(rows: Iterable[tuple[int, Form]]) -> Entries:
-            """Return positions in a matrix of `size` columns, and registers."""
+            """Return positions of matrix entries in row-major order, and registers of their values."""
             found = [(row * size + place[k], numbers.place(w)) for row, form in rows for k, w in form.items()]
             return np.array(found, dtype=np.int64).reshape(-1, 2).T.copy()
 

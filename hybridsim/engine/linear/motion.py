@@ -157,7 +157,7 @@ def size_of_point(x: Any, x_error: Any, w: Any, w_error: Any) -> float:
 
 @inlined
 def clear_sign(lin: Any, k: int, g: int, order: int, x: Any, w: Any, size: float) -> int:
-    """Return the sign of a guard's Taylor coefficient in row k at y = (x, w) of that size, or 0 if uncertain."""
+    """Return the sign of a guard's Taylor coefficient at y = (x, w), or 0 if rounding may change it."""
     value = dot(lin.series, (k, g, order), (x, w))
     if not abs(value) > lin.largest[k, g, order] * size:
         return 0

@@ -113,7 +113,7 @@ def _between(
     v: Any,
     extremes: Any,
 ) -> None:
-    """Extend a state's extremes by those between two times at which the state's rates are known.
+    """Extend a state's extremes by its extremes between two times at which the state's rates are known.
 
     The rate x' has two zeros in an interval of length h only if |x'| is at most max |x'''| h**2/2 at both of
     its ends. Such an interval is halved until a possible extremum in it is below rounding.

@@ -152,7 +152,7 @@ class Recipe:
 
 
 def _gone_on_with(known: np.ndarray, written: Sequence[Any]) -> np.ndarray:
-    """Return the recorded rows as an array (entries, width); the first entries are given."""
+    """Return the recorded rows as an array (entries, width) that starts with the given entries."""
     new = np.array(written[len(known) :], dtype=known.dtype).reshape(-1, known.shape[1])
     return np.concatenate([known, new])
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def normal_loads(
     lowering: Lowering, unknown: dict[int, Any], definitions: dict[Any, Any]
 ) -> dict[tuple[int, int], dict[str, Any]]:
-    """Return the derivative of a contact's slip force by a normal force, by (contact, impact) and mode.
+    """Return derivatives of slip forces by normal forces; keys are (contact, impact) and the contact's mode.
 
     A normal force that only the contact's guards use has an entry without modes.
     """

@@ -249,7 +249,7 @@ class Emitter:
         return found
 
     def _choose(self) -> str:
-        """Return the function for the number of the chosen branch; component, mode and guard index follow z."""
+        """Return the function that chooses a branch; component, mode and guard index follow the modes z."""
         count = len(self.program.components)
         lines = ["def choose(t, x, p, z, out):", "    out[0] = -1.0"]
         for (c, m, g), conditions in self.program.conditions.items():

@@ -58,7 +58,7 @@ class HeldStates:
         self._lengths: dict[Held, Any] = {c: lowering.sp.Integer(0) for c in self.projected}
 
     def by_component(self, states: dict[Held, Any]) -> dict[int, tuple[int, ...]]:
-        """Return the states of each component's constraints, given one or several per constraint."""
+        """Collect the states of each component's constraints; a constraint has one state or a tuple."""
         found: dict[int, tuple[int, ...]] = {}
         for (c, _), i in states.items():
             found[c] = tuple(sorted({*found.get(c, ()), *(i if isinstance(i, tuple) else (i,))}))
@@ -83,7 +83,7 @@ class HeldStates:
         return tuple(i for i, x in enumerate(self.states) if x in self.surfaces[c].free_symbols)
 
     def _without_choice(self, choices: dict[Held, list[int]]) -> set[Held]:
-        """Return the constraints to project: nonlinear ones, and those that share states with them."""
+        """Return the constraints to project: nonlinear ones, and those coupled to them by shared states."""
         found = {c for c, states in choices.items() if not states}
         for c in found:
             surface = self.lowering.components[c[0]].surface
@@ -216,7 +216,7 @@ class HeldStates:
         return self._in_hold(c[0], name, _where_pinned(sp, value, raw), before)
 
     def holding(self, i: int) -> list[int]:
-        """Return the components whose holding modes determine a state."""
+        """Return the components whose holding modes determine states."""
         return [c for (c, _), j in self.pins.items() if i == j]
 
     def _in_hold(self, c: int, name: str, value: Any, otherwise: Any) -> Switch:
@@ -227,7 +227,7 @@ class HeldStates:
         )
 
     def _projection(self, moved: list[int]) -> list[Item]:
-        """Return corrections x -= sum over held c of l_c grad s_c, where sum_d (grad s_c . grad s_d) l_d = s_c."""
+        """Return items that project the states onto nonlinear surfaces, by a few Newton corrections."""
         sp, states = self.lowering.sp, self.states
         items: list[Item] = []
         order = list(self.projected)
@@ -268,7 +268,7 @@ class HeldStates:
         return items
 
     def turned(self, derivatives: list[str]) -> tuple[list[Item], list[str]]:
-        """Return the rates of the integrated states; the normals of held surfaces turn with the motion.
+        """Return the rates of the integrated states, corrected for the rotation of surface normals.
 
         The projection of x + sum of l_c grad s_c(x) is x. The integrated point is off the surface by its
         errors and moves by x' + sum of l_c d(grad s_c)/dt with constant l_c. Its projection then moves by x'
@@ -301,5 +301,5 @@ def _raw(sp: Any, i: int) -> Any:
 
 
 def _where_pinned(sp: Any, value: Any, raw: Any) -> Any:
-    """Return an expression: the value if held states are evaluated, else the integrated state."""
+    """Return an expression: its value if held states are evaluated, or the integrated state otherwise."""
     return sp.Piecewise((value, sp.Symbol("pin", real=True) > 0), (raw, True))

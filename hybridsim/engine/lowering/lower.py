@@ -244,13 +244,13 @@ class Lowering:
                 )
 
     def _foreign(self, e: Any) -> list[Any]:
-        """Return the names in an expression that depend on a mode."""
+        """Return the names in an expression whose values depend on a mode."""
         allowed = self.parameters | set(self.states) | {self.t, self.s}
         allowed |= {self.symbols[d.name] for d in self.model.discrete}
         return [n for n in e.free_symbols - allowed if n.name.startswith("v_")]
 
     def title(self, c: int, plural: bool = False) -> str:
-        """Return what messages call a surface's function, such as gap or relative velocity."""
+        """Return the term for a surface's function in messages, such as 'gap' or 'relative velocity'."""
         one, many = "relative velocity", "relative velocities"
         if self.components[c].surface.unique:
             one, many = "switching function", "switching functions"
@@ -333,7 +333,7 @@ class Lowering:
         return items, clusters
 
     def _blends(self) -> dict[Any, Any]:
-        """Return the variables that surfaces set, as expressions of the unknowns that are valid in all their modes."""
+        """Return the variables that surfaces set, as expressions of the unknowns that hold in all modes."""
         found: dict[Any, Any] = {}
         for component in self.components:
             if component.surface and component.surface.unique:
@@ -399,7 +399,7 @@ class Lowering:
         return items + eliminated(cluster, unknown, matrix, right)
 
     def in_modes(self, c: int, name: str, in_hold: Any, otherwise: Any = None, without: Any = None) -> Switch:
-        """Return an item that sets a name to one value in the holding mode, and to another in other modes.
+        """Return an item that sets a name to one value in the holding mode and a second one in other modes.
 
         otherwise : value by mode; without it, the unknown's declared value. without : values substituted in
             declared values.

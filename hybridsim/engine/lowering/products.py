@@ -1,4 +1,4 @@
-"""Products of unknowns in the rate of a surface, which is linear if all unknowns but one have known values.
+"""Linearise products of unknowns in the rate of a surface, by the known values of all factors but one.
 
 An unknown is known beforehand, also in sliding, if no other unknown acts on its surface. If at most one of
 the other factors holds its surface, the others have the values that their modes declare, and the rate is
@@ -28,7 +28,7 @@ class Products:
         self.known: set[tuple[int, int]] = set()  # (surface, unknown with a known value in its rate)
 
     def linear(self, c: int, totals: dict[int, Any], row: dict[int, Any]) -> tuple[dict[int, Any], Any]:
-        """Return the effects of all unknowns on the rate of surface c, and its remainder, at the declared values.
+        """Return the effects of all unknowns on the rate of surface c, and the rest of this rate.
 
         totals : the rates of all surfaces as functions of the unknowns. row : the derivatives of this rate by
             the unknowns.
@@ -55,7 +55,7 @@ class Products:
         return effects, rest - sum(value * effects[self.number[u]] for u, value in values_by_mode.items())
 
     def items(self) -> list[Item]:
-        """Return items for the values that modes give to unknowns, and for whether the modes hold."""
+        """Return items that set the declared values of unknowns, and flags of holding modes."""
         found: list[Item] = []
         for d in sorted({d for pair in self.pairs for d in pair}):
             component = self.lowering.components[d]
@@ -65,13 +65,13 @@ class Products:
         return found
 
     def not_together(self, c: int, pull: Any) -> Any:
-        """Return how strongly surface c attracts; it is negative if a factor of its unknown holds as well."""
+        """Return how strongly surface c attracts; this is negative while a factor of its unknown holds."""
         for d in sorted({e for pair in self.pairs if c in pair for e in pair} - {c}):
             pull = pull * (1 - self._holds(d)) - self._holds(d)
         return pull
 
     def diagonal(self, c: int, entry: Any) -> Any:
-        """Return the effect of c on its own surface, plus 1 while a factor of its unknown also holds."""
+        """Return the effect of unknown c on its own surface, plus 1 if c and a factor of c both hold."""
         return entry + sum(
             self._holds(c) * self._holds(d)
             for d in sorted({e for p in self.pairs if c in p for e in p} - {c})

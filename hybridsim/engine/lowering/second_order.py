@@ -35,7 +35,7 @@ class Partner:
     factor: Any
 
     def share(self, c: int, d: int, sp: Any) -> Any:
-        """Return a matrix entry of the condition that relay c takes the same fraction as its partner."""
+        """Return a matrix entry of the condition that relay c and its partner slide with the same weight."""
         if d == c:
             return sp.Integer(1)
         return -sp.sign(self.factor) if d == self.component else sp.Integer(0)

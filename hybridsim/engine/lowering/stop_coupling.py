@@ -52,7 +52,7 @@ def stop_couplings(
 def without_share(
     lowering: Lowering, pairs: list[StopCoupling], c: int, d: int, entry: Any, of_held: Any
 ) -> tuple[list[Item], Any]:
-    """Return items and name of a matrix entry of contact c: `of_held` while a gap along c is closed."""
+    """Return items and value of a matrix entry of contact c: `of_held` while a gap along c is closed."""
     items: list[Item] = []
     for tie in pairs:
         if tie.along == c:
@@ -68,7 +68,7 @@ def without_share(
 def coupling_help(
     lowering: Lowering, pairs: list[StopCoupling], p: int, effect: dict[tuple[int, int], Any]
 ) -> tuple[list[Item], Any]:
-    """Return items and value of the pull by sticking friction that keeps a gap closed."""
+    """Return the pull of sticking friction that keeps a gap closed, and the items that compute this pull."""
     sp, total = lowering.sp, lowering.sp.Integer(0)
     items: list[Item] = []
     for tie in pairs:

@@ -181,7 +181,7 @@ def load_whole(path: Path | None) -> bytes | None:
 
 
 def _made_by_us(root: Path) -> tuple[list[Path], list[Path]]:
-    """List the folders of compiled code with our mark, and the folders with such a name but without mark."""
+    """List folders of compiled code that carry hybridsim's mark, and similarly named ones without it."""
     ours, others = [], []
     for entry in sorted(root.glob("engine-*")):
         is_folder = entry.is_dir() and not entry.is_symlink()
@@ -195,7 +195,7 @@ def _made_by_us(root: Path) -> tuple[list[Path], list[Path]]:
 
 
 def clear() -> tuple[int, list[Path]]:
-    """Delete the folders that carry our mark; return the freed bytes and the similar folders without a mark."""
+    """Delete the folders that carry hybridsim's mark; return the freed bytes and the remaining folders."""
     root = cache_root()
     if root is None:
         return 0, []

@@ -391,7 +391,7 @@ else:
     def compile_series(
         stored: Path | None, names: Sequence[str], written: Callable[[], str]
     ) -> tuple[list[int], Any]:
-        """Raise an error: without a compiler this is never called."""
+        """Raise an error, because without a compiler no code is translated."""
         raise NotImplementedError
 
     def is_stored(stored: Path | None) -> bool:
@@ -405,7 +405,7 @@ else:
     def call_series(
         address: int, s: float, error: float, x: Any, guards: Any, constants: Any, out: Any
     ) -> None:
-        """Raise an error: without a compiler this is never called."""
+        """Raise an error, because series functions exist only with a compiler."""
         raise NotImplementedError
 
     def _type_by_address(value: Any) -> Any:

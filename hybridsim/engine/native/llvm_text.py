@@ -27,7 +27,7 @@ declare double @c_tanh(double)
 
 
 class TooLong(Exception):
-    """An error that means that the code of a tape would take too long to compile."""
+    """An error for a tape whose code would take too long to compile."""
 
 
 def number(value: float) -> str:

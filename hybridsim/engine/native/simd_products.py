@@ -113,7 +113,7 @@ if ENABLED:
 
     @intrinsic
     def times(typingctx: Any, row_blocks: Any, at: Any, vectors: Any) -> Any:
-        """Multiply a panel by the concatenated vectors of a tuple: four sums; `at` holds the panel's indices."""
+        """Multiply a block of four rows by the concatenated vectors of a tuple; `at`: the block's indices."""
         result = types.UniTuple(types.float64, LANES)
 
         def body(builder: Any, entries: Any, rows: Any, sums: Any) -> Any:
@@ -178,12 +178,12 @@ else:
         )
 
     def times(row_blocks: Any, at: tuple[int, ...], vectors: tuple[Any, ...]) -> tuple[float, ...]:
-        """Compute the four sums of a panel's rows."""
+        """Compute the products of a block of four rows with the vectors."""
         entries = _entries(vectors)
         return tuple((entries @ row_blocks[at][: len(entries)]).tolist())
 
     def dot(rows: Any, at: tuple[int, ...], vectors: tuple[Any, ...]) -> float:
-        """Compute the sum."""
+        """Compute the product of a row with the vectors."""
         entries = _entries(vectors)
         return float(entries @ rows[at][: len(entries)])
 

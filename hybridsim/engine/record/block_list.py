@@ -151,15 +151,15 @@ class SegmentBlockList(BlockList[Segment]):
         self._shape = (system.n, len(system.automata))
 
     def origins(self) -> np.ndarray:
-        """Return origins of local time (N, 2)."""
+        """Return the origin of local time of each segment (N, 2)."""
         return _joined([block.origins for block in self.blocks])
 
     def spans(self) -> np.ndarray:
-        """Return first and last local times (N, 2)."""
+        """Return the first and last local time of each segment (N, 2)."""
         return _joined([block.spans for block in self.blocks])
 
     def modes(self) -> np.ndarray:
-        """Return modes (N, C)."""
+        """Return the modes of each segment (N, C)."""
         none = np.empty((0, self._shape[1]), dtype=np.int64)
         return np.concatenate([none, *(block.modes for block in self.blocks)])
 

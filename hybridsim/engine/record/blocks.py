@@ -76,13 +76,13 @@ class OccurrenceBlock(Block[Occurrence], Protocol):
 
     @property
     def times(self) -> np.ndarray:
-        """Return the times, rounded to doubles."""
+        """Return the times of the events, rounded to doubles."""
 
     def times_of(self, component: str, kind: str | None) -> np.ndarray:
         """Return the times of the events of a component and kind."""
 
     def states_of(self, component: str, kind: str | None, side: int) -> np.ndarray:
-        """Return states (k, n) at these events, before (side 0) or after (1) them, in a new array."""
+        """Return a new array of states (k, n) at events, before (side 0) or after (side 1) each event."""
 
     def kinds(self) -> Counter[str]:
         """Return the number of events of each kind."""
@@ -103,22 +103,22 @@ class SegmentList(list[Segment]):
 
     @property
     def until(self) -> Instant:
-        """Return the end of the last segment."""
+        """Return the instant at which the last segment ends."""
         return self[-1].end
 
     @property
     def origins(self) -> np.ndarray:
-        """Return origins of local time (N, 2)."""
+        """Return the origin of local time of each segment (N, 2)."""
         return np.array([segment.origin for segment in self]).reshape(-1, 2)
 
     @property
     def spans(self) -> np.ndarray:
-        """Return first and last local times (N, 2)."""
+        """Return the first and last local time of each segment (N, 2)."""
         return np.array([(segment.s[0], segment.s[-1]) for segment in self]).reshape(-1, 2)
 
     @property
     def modes(self) -> np.ndarray:
-        """Return modes (N, C)."""
+        """Return the modes of each segment (N, C)."""
         return np.array([segment.z for segment in self], dtype=np.int64).reshape(len(self), -1)
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
@@ -139,7 +139,7 @@ class SegmentList(list[Segment]):
         return out
 
     def at_end(self) -> Segment:
-        """Return the end of the last segment."""
+        """Return a segment of zero length at the end of the last segment."""
         last = self[-1]
         return end_point(last.end, last.z, last.p, last.x[-1])
 
@@ -164,12 +164,12 @@ class OccurrenceList(list[Occurrence]):
 
     @property
     def until(self) -> Instant:
-        """Return the time of the last event."""
+        """Return the instant of the last event."""
         return self[-1].instant
 
     @property
     def times(self) -> np.ndarray:
-        """Return the times, rounded to doubles."""
+        """Return the times of the events, rounded to doubles."""
         return np.array([float(o.instant) for o in self])
 
     def times_of(self, component: str, kind: str | None) -> np.ndarray:
@@ -177,7 +177,7 @@ class OccurrenceList(list[Occurrence]):
         return np.array([float(o.instant) for o in self._of(component, kind)])
 
     def states_of(self, component: str, kind: str | None, side: int) -> np.ndarray:
-        """Return states (k, n) at these events, before (side 0) or after (1) them."""
+        """Return the states (k, n) at events, before (side 0) or after (side 1) each event."""
         found = [(o.x_minus, o.x_plus)[side] for o in self._of(component, kind)]
         return np.array(found) if found else np.empty((0, 0))
 
@@ -189,7 +189,7 @@ class OccurrenceList(list[Occurrence]):
         return Counter(o.kind for o in self)
 
     def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return instants (k, 2) and states (k, 2, n) of the transitions from this number on."""
+        """Return instants (k, 2) and states (k, 2, n) of the transitions from the given number on."""
         chosen = [o for o in self[first:] if o.kind == "transition"]
         if not chosen:
             return np.empty((0, 2)), np.empty((0, 2, 0))

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 def _taking_part(
     fired: Any, before: Any, after: Any, owner: Any, has_surface: Any, participants: Any
 ) -> tuple[int, bool]:
-    """Return the number of mode changes and resets without one, and whether each event has exactly one.
+    """Count the components that change mode or are reset; return also whether each event has exactly one.
 
     participants (2, m): receives event and component of each, up to its length.
     """
@@ -99,17 +99,17 @@ class EventBlock(Sequence[Occurrence]):
 
     @property
     def _participants(self) -> np.ndarray:
-        """Return two rows: the number of each recorded event, and its component."""
+        """Return the event number and the component of each recorded participant, as two rows."""
         return self._all_participants[:, self._first :]
 
     @property
     def until(self) -> Instant:
-        """Return the time of the last event."""
+        """Return the instant of the last event."""
         return Instant(*self._instants[-1].tolist())
 
     @property
     def times(self) -> np.ndarray:
-        """Return the times, rounded to doubles."""
+        """Return the times of the events, rounded to doubles."""
         times = self._instants[:, 0] + self._instants[:, 1]
         return times[self._first :] if self._is_plain else times[self._participants[0]]
 
@@ -123,7 +123,7 @@ class EventBlock(Sequence[Occurrence]):
         return np.empty(0)
 
     def states_of(self, component: str, kind: str | None, side: int) -> np.ndarray:
-        """Return states (k, n) at these events, before (side 0) or after (1) them, in a new array."""
+        """Return a new array of states (k, n) at events, before (side 0) or after (side 1) each event."""
         for c, automaton in enumerate(self._system.automata):
             if automaton.name == component and kind in (None, automaton.kind):
                 states = np.empty((len(self), self._system.n))
@@ -140,7 +140,7 @@ class EventBlock(Sequence[Occurrence]):
         return +found
 
     def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return instants (k, 2) and states (k, 2, n) of the transitions from this number on."""
+        """Return instants (k, 2) and states (k, 2, n) of the transitions from the given number on."""
         has_corners = len(self._system.declared) < len(self._system.automata)
         if self._is_plain and not has_corners:
             return self._instants[self._first + first :], self._states[self._first + first :]

@@ -66,22 +66,22 @@ class StepSegments(Sequence[Segment]):
 
     @property
     def until(self) -> Instant:
-        """Return the end of the last segment."""
+        """Return the instant at which the last segment ends."""
         return self._origin.plus(float(self._s[self._last[-1]]))
 
     @property
     def origins(self) -> np.ndarray:
-        """Return origins of local time (N, 2)."""
+        """Return the origin of local time of each segment (N, 2)."""
         return np.tile(np.array(self._origin), (len(self), 1))
 
     @property
     def spans(self) -> np.ndarray:
-        """Return first and last local times (N, 2)."""
+        """Return the first and last local time of each segment (N, 2)."""
         return np.stack([self._s[self._first], self._s[self._last]], axis=1)
 
     @property
     def modes(self) -> np.ndarray:
-        """Return modes (N, C)."""
+        """Return the modes of each segment (N, C)."""
         return self._z[self._first]
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
@@ -98,7 +98,7 @@ class StepSegments(Sequence[Segment]):
         return index, self._s[rows], self._x[rows]
 
     def at_end(self) -> Segment:
-        """Return the end of the last segment."""
+        """Return a segment of zero length at the end of the last segment."""
         last = int(self._last[-1])
         return end_point(self.until, self._z[int(self._first[-1])], self._p, self._x[last])
 
@@ -151,12 +151,12 @@ class StepOccurrences(Sequence[Occurrence]):
 
     @property
     def until(self) -> Instant:
-        """Return the time of the last event."""
+        """Return the instant of the last event."""
         return self._origin.plus(float(self._s[-1]))
 
     @property
     def times(self) -> np.ndarray:
-        """Return the times, rounded to doubles."""
+        """Return the times of the events, rounded to doubles."""
         return np.array([float(self._origin.plus(s)) for s in self._s.tolist()])
 
     def times_of(self, component: str, kind: str | None) -> np.ndarray:
@@ -164,7 +164,7 @@ class StepOccurrences(Sequence[Occurrence]):
         return self.times[self._are_of(component, kind)]
 
     def states_of(self, component: str, kind: str | None, side: int) -> np.ndarray:
-        """Return states (k, n) at some events; they are the same on both sides."""
+        """Return the states (k, n) at events; they are equal on both sides of an event."""
         return self._x[self._are_of(component, kind)]
 
     def _are_of(self, component: str, kind: str | None) -> np.ndarray:
@@ -178,7 +178,7 @@ class StepOccurrences(Sequence[Occurrence]):
         return Counter({"transition": len(self)})
 
     def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return instants and states of the events from this number on, the same on both sides."""
+        """Return instants and states of the events from the given number on; both sides have equal states."""
         instants = [self._origin.plus(s) for s in self._s[first:].tolist()]
         states = np.stack([self._x[first:]] * 2, axis=1)
         return np.array(instants).reshape(-1, 2), states

@@ -139,14 +139,14 @@ class SeriesBlock(Sequence[Segment]):
 
     @cached_property
     def spans(self) -> np.ndarray:
-        """Return first and last local times (N, 2)."""
+        """Return the first and last local time of each segment (N, 2)."""
         spans = np.empty((len(self), 2))
         _spans_of(self.ends, self.steps, spans)
         return spans
 
     @property
     def until(self) -> Instant:
-        """Return the end of the last segment."""
+        """Return the instant at which the last segment ends."""
         high, low = self.origins[-1].tolist()
         s, h = self.steps[self.ends[-1] - 1].tolist()
         return Instant(high, low).plus(s + h)
@@ -197,7 +197,7 @@ class SeriesBlock(Sequence[Segment]):
         return type(self)(self.system, ends, steps, series, *(r[i : i + 1] for r in rows))
 
     def at_end(self) -> Segment:
-        """Return the end of the last segment."""
+        """Return a segment of zero length at the end of the last segment."""
         return end_point(self.until, self.modes[-1], self.vectors[-1], self.jumps[-1, 0])
 
     def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

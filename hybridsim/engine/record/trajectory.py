@@ -148,7 +148,7 @@ class Trajectory:
         return earlier
 
     def warn(self, message: str) -> None:
-        """Count a warning; each message is stored once."""
+        """Count one occurrence of a warning; each message is stored once."""
         self.warnings[message] = self.warnings.get(message, 0) + 1
 
 

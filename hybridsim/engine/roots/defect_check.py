@@ -25,7 +25,7 @@ def ahead_size(order: int, n: int, guards: int) -> int:
 
 @inlined
 def parts_of(ahead: Any, order: int, n: int, count: int) -> tuple[Any, Any, Any, Any]:
-    """Return the parts of the array: states, rates, function values, values of the functions' series."""
+    """Return the parts of `look_ahead`'s array: states, rates, function values, and sums of their series."""
     x, f = order + 1, order + 1 + 4 * n
     return ahead[x : x + n], ahead[x + n : x + 2 * n], ahead[f : f + count], ahead[f + count : f + 2 * count]
 
@@ -102,7 +102,7 @@ def look_ahead(
     W: Any,
     ahead: Any,
 ) -> None:
-    """Fill the array from series (n, order + 1) of states and U of the guards from local time s.
+    """Fill the array `ahead` at a distance d from the start of series of the states and guards.
 
     code: address of a function that does the same; 0 for none. W: the registers of the tape with its
     constants.

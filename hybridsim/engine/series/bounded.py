@@ -149,7 +149,7 @@ def _multiply(V: Any, E: Any, out: int, k: int, factor: float, error: float, b: 
 
 @kernel
 def _leading(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int) -> None:
-    """Compute order 0 of the operations whose higher orders follow from a differential equation."""
+    """Compute order 0 of operations whose higher orders follow from a differential equation."""
     u, du = V[a, 0], E[a, 0]
     if op == EXP:
         y = math.inf if u >= 709.0 else math.exp(u)  # math.exp raises an exception if it overflows
@@ -189,7 +189,7 @@ def _leading(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int) -> None:
 
 @kernel
 def _higher(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) -> None:
-    """Compute order k >= 1 of the operations that follow a differential equation."""
+    """Compute order k >= 1 of operations whose coefficients follow from a differential equation."""
     part = 1.0 / k
     if op == EXP:
         y, e = _slope(V, E, a, out, k)

@@ -98,7 +98,7 @@ class ModeTape:
 
 
 class _Expansion(Lines):
-    """The coefficients 0..order of every register; is_known: order 0 of sines etc. is in their registers."""
+    """The coefficients 0..order of every register; `is_known`: order 0 of sines, roots etc. is loaded."""
 
     def __init__(self, tape: ModeTape, order: int, stride: int, is_known: bool = False) -> None:
         super().__init__("v" if is_known else "u")
@@ -182,7 +182,7 @@ class _Expansion(Lines):
         return self.fused(self.at(a, k), self.at(b, 0), self.op("fmul", inner, part))
 
     def _factor(self, flags: int, b: int, c: int) -> str:
-        """Combine two constants according to flags; see `hybridsim.engine.series.high_orders`."""
+        """Combine two constants into a factor, as encoded in flags of `engine.series.high_orders`."""
         f = ONE
         for has, over, r in ((HAS_B, OVER_B, b), (HAS_C, OVER_C, c)):
             if flags & has:
@@ -281,7 +281,7 @@ class _Expansion(Lines):
 
 
 def series_function(name: str, tape: ModeTape, order: int) -> str:
-    """Return the function that writes the series (n, order + 1) of the states and (guards + fading, order + 1)."""
+    """Return a function that writes series (order + 1 columns) of states, guards and fading functions."""
     code, size = _Expansion(tape, order, order + 1, is_known=True), order + 1
     for array, registers in (("%out", tape.states), ("%g", tape.guards + tape.fading)):
         for i, r in enumerate(registers):
@@ -292,7 +292,7 @@ def series_function(name: str, tape: ModeTape, order: int) -> str:
 
 
 def short_function(name: str, tape: ModeTape, order: int, count: int, stride: int) -> str:
-    """Return the function that writes the coefficients (n, order + 1) of the states and (guards, count) of the guards.
+    """Return a function that writes coefficients of states (n, order + 1) and of guards (guards, count).
 
     stride: columns of the array with the constants.
     """
@@ -314,7 +314,7 @@ def values_function(name: str, tape: ModeTape, stride: int) -> str:
 
 
 class _Ahead(_Expansion):
-    """Order 0 at a distance %e from the origin of series of some order, and sums of these series."""
+    """Rates and guards at a distance %e from the origin of given series, and sums of these series there."""
 
     def __init__(self, tape: ModeTape, order: int) -> None:
         Lines.__init__(self, "u")
@@ -381,7 +381,7 @@ def sizes_function(name: str, guards: int, order: int) -> str:
 
 
 def _start(tape: ModeTape, stride: int) -> _Expansion:
-    """Return the code for order 0, whose costly values stay in their registers."""
+    """Return code that computes order 0 in the order of the tape, and keeps costly values for later use."""
     return _in_fixed_order(_Expansion(tape, 0, stride))
 
 

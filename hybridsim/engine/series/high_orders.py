@@ -45,7 +45,7 @@ _EARLY = -(10**6)  # cycle of a value that does not depend on a state
 
 @dataclass(frozen=True)
 class _Scaled:
-    """A register as a multiple of another: constants, each with whether it is a divisor, and a sign."""
+    """A register as a multiple of another register: constant factors, constant divisors and a sign."""
 
     base: int
     constants: tuple[tuple[int, bool], ...] = ()
@@ -97,7 +97,7 @@ class _Rewriting:
             self._rewrite(row)
 
     def scaled(self, register: int) -> _Scaled:
-        """Return a register as a multiple of another."""
+        """Return a register as a multiple of another register."""
         return self._forms.get(register, _Scaled(register))
 
     def _cycles_after(self, cycles: dict[int, int]) -> dict[int, int]:
@@ -151,7 +151,7 @@ class _Rewriting:
             total = to
 
     def _take_apart(self, row: Row) -> None:
-        """Record the registers of a sum, each with whether it is subtracted, and its inner sums with no other reader.
+        """Record the terms of a sum with their signs, and the inner sums that no other operation reads.
 
         A sum that has only negative terms stays unchanged.
         """

@@ -395,7 +395,7 @@ def rough_inverse_root(x: float, n: int) -> float:
 
 @inlined
 def shorter_reach(U: Any, r: int, order: int, rtol: float, h: float, is_before: bool) -> float:
-    """Return a step below h over which the last term of a series is below rtol of one of its first four, or h/2.
+    """Return a step below h over which the last term is below rtol times one of the first four terms, or h/2.
 
     is_before: use the last term but one, which is larger. Over a useful step one of the first four terms is
     the largest, or not much smaller; for exp(w t) with rtol = 1e-12 and order 24 it is the fourth. These

@@ -75,7 +75,7 @@ class OptimisedTape:
 
 
 def separate_registers(tape: dict[str, Any]) -> dict[int, int]:
-    """Return separate registers for values that are constant in some modes and vary in others.
+    """Return separate registers for values that are constant in some modes and vary in other modes.
 
     A compiled loop keeps its registers from mode to mode and writes only the leading coefficient of a
     constant. Without separate registers, the higher coefficients of another mode would remain.

@@ -13,7 +13,7 @@ from hybridsim.expr import own_roundoff
 
 
 class Inputs(NamedTuple):
-    """Registers of a tape's inputs, as index arrays.
+    """Numbers of the registers of a tape's inputs, one index array for each kind of input.
 
     These are constants with values and error bounds (m, 2), parameters and their places in p, phases, time
     (1,) (-1: none) and states.
@@ -29,7 +29,7 @@ class Inputs(NamedTuple):
 
 
 class Registers:
-    """Registers of a tape's inputs, as index arrays for kernels."""
+    """The registers of one structure's tape: their count, and the inputs that kernels read."""
 
     def __init__(self, tape: dict[str, Any], layout: Layout) -> None:
         self.separate = separate_registers(tape)

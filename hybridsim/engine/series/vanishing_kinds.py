@@ -1,4 +1,4 @@
-"""Kinds of functions whose series does not show what happens later, such as exponentials, and their numbers."""
+"""Codes of functions, such as exponentials, that may vanish in a series although they change later."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ MAX_POWER = 64  # largest power that is distinguished
 
 @inlined
 def register_of(number: int) -> int:
-    """Return the register to which a number of `hybridsim.engine.system.programs.mode_code.fading` belongs."""
+    """Return the register in a code made by `hybridsim.engine.system.programs.mode_code.fading`."""
     return number // (KINDS * MAX_POWER)
 
 

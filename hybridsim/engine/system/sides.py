@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 def modes_by_state(
     system: System, components: Iterable[int], s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray
 ) -> np.ndarray:
-    """Return the modes z in which some components have the modes that are valid at x.
+    """Return the modes z with some components set to the mode that is valid at x.
 
     A component on a border keeps its mode if that is one of the two; on a surface it holds if possible. An argument may
     have corners itself, so the modes are computed again until none changes.
@@ -36,7 +36,7 @@ def modes_by_state(
         return automaton.above if above else automaton.below
 
     def on_side(c: int, automaton: Automaton) -> int:
-        """Return the mode of a corner or a table at x, found from one mode to the next."""
+        """Return the mode of a corner or a table at x, by steps from each mode to a neighbouring mode."""
         mode = int(z[c])
         for _ in automaton.modes:
             k = violated(c, mode)

@@ -56,12 +56,12 @@ class Automaton:
 
     @property
     def kind(self) -> str:
-        """Return the kind of event that a change of its mode is."""
+        """Return the kind of event that is recorded when the component changes its mode."""
         return CORNER if self.is_corner else "transition"
 
     @property
     def limit_mode(self) -> int:
-        """Return the mode that it may take at the limit of its events, or -1."""
+        """Return the mode that the component takes when its events accumulate, or -1."""
         return self.hold if self.has_surface else self.limit
 
     @property
@@ -265,11 +265,11 @@ class System:
         return bool(self.pins or self.projected)
 
     def holds(self, z: np.ndarray) -> bool:
-        """Return whether a mode in z holds states on a surface."""
+        """Return whether a mode in the vector z holds states on a surface."""
         return any(z[c] == self.automata[c].hold for c in (*self.pins, *self.projected))
 
     def evaluated(self, z: np.ndarray) -> list[int]:
-        """Return the states that the modes in z evaluate exactly from their constraints."""
+        """Return the states that the modes z evaluate exactly from their constraints."""
         return [i for c, held in self.pins.items() if z[c] == self.automata[c].hold for i in held]
 
     # -- values ---------------------------------------------------------------------------------------------
@@ -370,7 +370,7 @@ class System:
     def impulses(
         self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return for m surfaces the slopes of u (m, n), changes of states by impulses (m, n), and loads (2, m, m).
+        """Return slopes of surface rates u (m, n), changes of states by impulses (m, n), and loads (2, m, m).
 
         u is the rate of a gap, or a relative velocity; see `hybridsim.engine.lowering.impulse_rows`.
         """

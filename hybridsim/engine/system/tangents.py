@@ -192,7 +192,7 @@ class TangentTape:
         return np.array_equal(self._rows, other._rows) and np.array_equal(self._outputs, other._outputs)
 
     def __call__(self, s: np.ndarray, x: np.ndarray, p: np.ndarray, seeds: np.ndarray) -> Tangents:
-        """Evaluate at local times s (m,) and states x (m, n), along the directions seeds (n + 1 + len(p), D)."""
+        """Evaluate at times s (m,) and states x (m, n), with derivatives along the D columns of `seeds`."""
         count, outputs, directions = self._registers.count, len(self._outputs), seeds.shape[1]
         values, slopes = np.empty((len(s), outputs)), np.empty((len(s), outputs, directions))
         run_tangents(

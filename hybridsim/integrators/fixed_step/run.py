@@ -72,7 +72,7 @@ class March(Protocol):
         ...
 
     def warnings(self) -> list[str]:
-        """Return warnings about the run for the user."""
+        """Return warnings about the run."""
         ...
 
 
@@ -234,7 +234,7 @@ class FixedStepRun:
         return self._declared_event(s, p, why)
 
     def _sides_taken(self) -> np.ndarray:
-        """Return the modes, where held components that an input jump moved are on their new sides."""
+        """Return the modes after a jump of an input, which may move held components to a side."""
         z, p = self.z.copy(), self._vector()
         p[self.system.layout.pin_at] = 0.0
         values = self.system.rows(
@@ -250,7 +250,7 @@ class FixedStepRun:
         return z
 
     def _gaps(self) -> dict[int, tuple[int, bool]]:
-        """Return the signs of all gaps at the present states; see `gaps`."""
+        """Return the signs of all gaps at the present states; see `hybridsim.integrators.fixed_step.gaps`."""
         if not self.system.is_unilateral.any():
             return {}
         p = self._vector()
@@ -464,7 +464,7 @@ class FixedStepRun:
         record.occurrences.add(StepOccurrences(self.system, self.origin, rows, components, changes, s, x))
 
     def _side_of_zeros(self, z: np.ndarray) -> None:
-        """Give rows with exactly zero velocity the mode of the next row, because sgn has no third mode."""
+        """Give rows with zero velocity the mode of the following row, because sgn has no third mode."""
         for c, _, _, hold, *_ in surface_table(self.system):
             for k in np.flatnonzero(z[:-1, c] == hold)[::-1]:
                 z[k, c] = z[k + 1, c]

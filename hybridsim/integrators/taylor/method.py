@@ -120,7 +120,7 @@ class TaylorStepper:
         )
 
     def _holds(self, coefficients: np.ndarray, x0: np.ndarray, x1: np.ndarray, s0: float, d: float) -> bool:
-        """Return whether the series from s0 still satisfies the equation at a distance d, where the state is x1.
+        """Return whether the series from s0 satisfy the equation at a distance d, at which the state is x1.
 
         The terms of a series do not show effects below rounding at its origin: a saturated tanh, the other
         branch of a root, or a friction that is larger only near rest.
@@ -135,7 +135,7 @@ class TaylorStepper:
         return bool((defect <= _DEFECT * (scale + self.series.rtol * change)).all())
 
     def restep(self, step: Step, s: float) -> Step:
-        """Prepare a shorter repetition of a step, because its series is inaccurate at s."""
+        """Prepare a shorter repetition of a step whose series is inaccurate at s."""
         self.flow.counters.rejected += 1
         self.s, self.x, self.longest = step.s0, step.x0, _SHORTER * abs(s - step.s0)
         return self.step()

@@ -32,7 +32,7 @@ def check_contacts(scope: Scope) -> None:
 
 
 def check_law(scope: Scope, law: FrictionLaw) -> None:
-    """Report names in a law that are neither v, N, dN nor declared by the law."""
+    """Report names in a law other than `v`, `N`, `dN` and the names that the law declares."""
     what = f"law {law.name}"
     names = _own_names(scope, law)
     known = names | {SPEED, NORMAL, LOAD_RATE} | ({INDEX} if law.copies else set())
@@ -83,7 +83,7 @@ def _own_names(scope: Scope, law: FrictionLaw) -> frozenset[str]:
 
 
 def _form(scope: Scope, law: FrictionLaw, what: str) -> None:
-    """Report fields that this form of law cannot have, and modes that set anything but the force."""
+    """Report fields that do not fit the kind of law, and modes of a law that set more than the force."""
     if law.is_set_valued:
         for table in law.tables:
             if table.over.text == SPEED and table.at[0] < 0.0:

@@ -1,4 +1,4 @@
-"""Denominators of rates, whose zeros are poles or 0/0 that an integration step can miss."""
+"""Find denominators in rates that may become zero, because an integration step can miss a pole or a 0/0."""
 
 from __future__ import annotations
 

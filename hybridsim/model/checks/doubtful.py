@@ -81,7 +81,7 @@ def jumps_of(model: Model) -> tuple[Caution, ...]:
 
 
 class _Reading:
-    """The meaning of names in one mode of a component, and the set of varying quantities."""
+    """The definitions and variables in one mode of a component, and the set of varying quantities."""
 
     def __init__(self, model: Model, component: Component | None = None, mode: Mode | None = None) -> None:
         self.numbers = model.parameter_values()
@@ -178,7 +178,7 @@ def _of_signs(model: Model) -> Iterator[Caution]:
 
 
 def _of_units(model: Model) -> Iterator[Caution]:
-    """Yield warnings about guards and monitors of quantities without units, if all other states have units.
+    """Yield warnings about guards and monitors without units in a model whose other states have units.
 
     Discrete states are left out: they count, as often as not.
     """

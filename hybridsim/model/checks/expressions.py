@@ -127,7 +127,7 @@ def _circles(scope: Scope) -> None:
 
 
 def _over_modes(exprs: list[Expression]) -> Expression:
-    """Return an expression with the dependencies of all modes."""
+    """Return an expression together with the dependencies that it has in any mode."""
     first = exprs[0]
     return Expression(first.text, frozenset().union(*(expr.names for expr in exprs)), first.place, first.tree)
 
@@ -141,7 +141,7 @@ def _size(expr: Expression, sizes: dict[str, int]) -> int:
 
 
 def _constants(scope: Scope, items: list[Item]) -> None:
-    """Report expressions that exceed a limit, such as that of powers, once constants are inserted."""
+    """Report expressions that exceed a limit, such as the largest power, after constants are inserted."""
     known: dict[str, Expression | str | float] = {}
     definitions = dict(scope.model.definitions)
     for name in dependency_order(definitions, "definitions"):

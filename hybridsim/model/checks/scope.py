@@ -47,7 +47,7 @@ class Scope:
         self.errors.append(part.error(message, remedy))
 
     def unknown(self, part: Declared, what: str, name: str, known: Iterable[str], kind: str) -> None:
-        """Report a name that is not among the known ones, with similar names."""
+        """Report an unknown name, with similar known names."""
         self.fail(part, f"{what} '{name}'", nearest(name, known, kind=kind))
 
     @cached_property
@@ -99,7 +99,7 @@ class Scope:
         return frozenset(parameter.name for parameter in self.model.parameters)
 
     def need(self, expr: Expression, what: str, known: Iterable[str], *, boolean: bool = False) -> None:
-        """Report unknown names, and a number instead of a condition or the reverse."""
+        """Report unknown names, and an expression of the wrong kind (a number or a condition)."""
         allowed = frozenset(known)
         if expr.names <= allowed and (expr.is_boolean == boolean or isinstance(expr, FunctionExpression)):
             return  # the value of a function is checked when it is called
@@ -128,7 +128,7 @@ class Scope:
             self.errors.append(ExpressionError(f"{what}: {fault.message}", place=place, remedy=fault.remedy))
 
     def _require(self, expr: Expression, allowed: frozenset[str]) -> None:
-        """Check that every name is known; the remedy explains friction forces if there are no contacts."""
+        """Check that every name is known; the remedy explains friction forces to models without contacts."""
         try:
             require_names(expr, allowed)
         except ExpressionError as fault:
@@ -140,7 +140,7 @@ class Scope:
             ) from None
 
     def need_own(self, expr: Expression, what: str, known: Iterable[str]) -> None:
-        """Report names of the model in an expression of a friction law, and conditions."""
+        """Report names of the model and conditions inside an expression of a friction law."""
         foreign = sorted(expr.names - frozenset(known))
         if foreign or expr.is_boolean:
             reason = f"unknown name '{foreign[0]}'" if foreign else f"'{expr.text}' is a condition"

@@ -31,7 +31,7 @@ def starting_facts(model: Model) -> tuple[str, ...]:
 
 
 def _starts(model: Model, component: Component, meanings: Meanings) -> Iterator[str]:
-    """Yield the facts about a component that starts at zero of a guard or surface."""
+    """Yield the facts about a component if one of its guards or its surface is zero at the start."""
     name, surface = component.name, component.surface
     if isinstance(component, Corner):
         return

@@ -143,7 +143,7 @@ def _contact(scope: Scope, contact: Contact, values: dict[str, float]) -> None:
 
 
 def _onset(scope: Scope, contact: Contact, values: dict[str, float], backward: bool) -> None:
-    """Check that the stick limit is at least the slip force at v = 0, in one direction."""
+    """Check that the stick limit is not below the slip force at v = 0, in one direction of slip."""
     what = f"contact {contact.name}"
     if backward and contact.law.slip_backward is None and contact.law.stick_backward is None:
         return
@@ -165,7 +165,7 @@ def _onset(scope: Scope, contact: Contact, values: dict[str, float], backward: b
 
 
 def _slip_at_points(scope: Scope, contact: Contact, values: dict[str, float], backward: bool) -> None:
-    """Check that the slip force is not negative at the points of tables, in one direction."""
+    """Check that the slip force is not negative at the points of tables, in one direction of slip."""
     if backward and contact.law.slip_backward is None:
         return
     speeds = {speed for table in contact.law.tables if table.over.text == SPEED for speed in table.at}

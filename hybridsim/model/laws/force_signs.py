@@ -27,7 +27,7 @@ _FRICTION = "a friction force must not be negative: correct the sign"
 
 
 def wrong_signs(model: Model) -> Iterator[tuple[Contact, str, str]]:
-    """Yield contacts with a wrong sign, a message and a remedy; constant values are errors elsewhere.
+    """Yield each contact whose load or friction force has the wrong sign, with a message and a remedy.
 
     Expressions are evaluated at the start, t = 0. Those that depend on an input or a mode are not checked.
     """

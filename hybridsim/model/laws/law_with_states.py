@@ -1,4 +1,4 @@
-"""Contacts with a single-valued friction law: its states and automata in the names of the model."""
+"""States and automata of contacts with a single-valued friction law, in the names of the model."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def states_of(contact: Contact, values: Mapping[str, Expression]) -> tuple[State
 def components_of(
     contact: Contact, values: Mapping[str, Expression], loaded: tuple[Guard, ...]
 ) -> Iterator[Component]:
-    """Yield the automaton of the law, or those of its copies and one that adds their forces."""
+    """Yield the automaton of the law, or for copies one automaton per copy and one that adds the forces."""
     law, name, parts = contact.law, contact.name, []
     for index in _indices(contact, values):
         names = _names(contact, values, index)
@@ -95,7 +95,7 @@ def _force(contact: Contact, names: Mapping[str, Expression]) -> Expression:
 
 
 def _names(contact: Contact, values: Mapping[str, Expression], index: int | None) -> dict[str, Expression]:
-    """Return the expressions for the names of the law in one copy."""
+    """Return the expression for each name of the law, for one copy of the contact."""
     law = contact.law
     names = {SPEED: contact.velocity, **values}
     if contact.opens and LOAD_RATE in names:

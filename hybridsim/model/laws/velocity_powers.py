@@ -171,7 +171,7 @@ def _vanishes(node: ast.expr, family: Family, numbers: Mapping[str, float], mean
 
 
 def _rounded(base: str, power: float | None, is_force: bool) -> str:
-    """Return the remedy: a smooth power over a small speed b, even for forces and odd for rates."""
+    """Return the remedy: replace the power by a smooth function that contains a small speed b."""
     if power is None or power < 0.0 or not base.isidentifier():
         return "smooth it with a small speed b, such as (v**2 + b**2)**0.75 - b**1.5 for abs(v)**1.5"
     if is_force:

@@ -13,7 +13,7 @@ from hybridsim.model.parts.frozen_map import FrozenMap
 
 @dataclass(frozen=True)
 class Choice(Declared):
-    """A transition of a guard: to mode ``to`` if ``when`` is true, after ``reset``; both evaluated at x-.
+    """A transition of a guard to the mode ``to`` if ``when`` is true; the new state is given by ``reset``.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ class Surface(Declared):
 
     @property
     def modes(self) -> tuple[str, ...]:
-        """The modes that the surface selects from."""
+        """The modes from which the surface selects."""
         return (self.above, self.hold) if self.below is None else (self.above, self.below, self.hold)
 
 

@@ -153,12 +153,12 @@ class Contact(Declared):
             yield table.component(self.variable(table.name), argument, from_zero)
 
     def variable(self, name: str) -> str:
-        """Return the name in the model of a state, table or load of the friction law."""
+        """Return the name that a state, table or load of the friction law has in the model."""
         return f"{self.name}_{name}"
 
     @property
     def table_speed(self) -> str | None:
-        """The variable that contains the speed for tables over it, or None without such tables."""
+        """The name of the variable that tables of the speed use as argument, or None without such tables."""
         asked = any(SPEED in table.over.names for table in self.law.tables)
         return self.variable(SPEED) if asked and self.law.is_set_valued else None
 
@@ -219,7 +219,7 @@ class Contact(Declared):
         return substitute(self._form("slip", slip=slip), {SPEED: speed, **self.values()})
 
     def slip_force_at(self, speed: float, backward: bool = False) -> Expression:
-        """Return the magnitude of the slip force at a numeric speed, where tables over it have a value."""
+        """Return the magnitude of the slip force at a numeric speed, with the values of tables there."""
         names = {t.name: parse(t.value(speed)) for t in self.law.tables if t.over.text == SPEED}
         slip = (self.law.slip_backward if backward else None) or self.law.slip
         assert slip is not None  # always set in a set-valued law
@@ -252,7 +252,7 @@ class Contact(Declared):
     def values(
         self, varies: bool = True, load_rate: Callable[[], Expression] | None = None
     ) -> dict[str, Expression]:
-        """Return the expressions for the names of the law, except the speed and its states."""
+        """Return the expression for each name of the law, except for the speed and the law's states."""
         law = self.law
         for name, value in self.arguments.items():
             if name not in law.parameters:

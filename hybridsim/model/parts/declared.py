@@ -47,7 +47,7 @@ class Declared(metaclass=_Refusing):
     place: Place | None = field(default=None, compare=False, repr=False, kw_only=True)
 
     def _texts(self, *fields: str, known: Iterable[str] = ()) -> None:
-        """Check that the fields are strings, or None if that is the default.
+        """Check that the fields are strings; None is accepted if it is the default.
 
         `known` lists the allowed words for the remedy.
         """

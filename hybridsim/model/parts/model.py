@@ -363,7 +363,7 @@ class Model(Declared):
         return names
 
     def _never_negative_names(self) -> frozenset[str]:
-        """Return the names for which a load needs no guard: constants and the normal forces of impacts."""
+        """Return names that need no guard as a load: constants and the normal forces of impacts."""
         return self.constant_names() | {impact.name for impact in self.impacts}
 
     def _constant_names(self) -> frozenset[str]:

@@ -111,7 +111,7 @@ class SwitchingSurface(Declared):
         return Component(self.name, modes, surface=surface, place=self.place)
 
     def blends(self) -> dict[str, Expression]:
-        """Return the further variables in sliding, which for u = +1 and -1 equal those on the sides."""
+        """Return further variables in sliding; for u = +1 and u = -1 they equal the values on the sides."""
         return {
             name: of_tree(blend(value.tree, self.below[name].tree, self.name), self.place)
             for name, value in self.above.items()

@@ -24,7 +24,7 @@ class TooManyConditions(Exception):
 
 
 def single_comparisons(meanings: Meanings, node: ast.IfExp) -> ast.expr:
-    """Return an equal expression of single smooth comparisons, or the node itself if it is one.
+    """Return an equal expression in which every condition is a single smooth comparison.
 
     Raises
     ------
@@ -76,7 +76,7 @@ class _Conditions:
         return whole if whole is not None and whole.test is test else ast.IfExp(test, yes, no)
 
     def _compared(self, apart: ast.expr, op: ast.cmpop, yes: ast.expr, no: ast.expr) -> ast.expr | None:
-        """Split a comparison of a non-smooth expression with zero; return None if it is smooth."""
+        """Split a comparison of a non-smooth expression with zero; return None for a smooth expression."""
         tree = self.meanings.written_out(apart)
         match tree:
             case ast.BinOp(
@@ -114,7 +114,7 @@ class _Conditions:
         return self.chosen(test, first, second)
 
     def _rough(self, tree: ast.expr) -> tuple[ast.expr | None, Sides | None]:
-        """Return the first varying non-smooth part of a tree, and its sides."""
+        """Return the first varying non-smooth part of a tree, and the values of this part on its sides."""
         for part in ast.walk(tree):
             if isinstance(part, ast.Call | ast.IfExp) and self.meanings.moves(part):
                 if isinstance(part, ast.Call) and len(part.args) > 2:
@@ -149,7 +149,7 @@ class _Conditions:
         return ast.BinOp(below, ast.Add(), ast.BinOp(number_tree(factor), ast.Mult(), larger))
 
     def _factor(self, tree: ast.expr, node: ast.expr) -> float:
-        """Return the factor of an abs, min or max in a tree that is linear in it, otherwise 0."""
+        """Return the factor of an abs, min or max if the tree is linear in this part, otherwise 0."""
         if not (isinstance(node, ast.Call) and ast.unparse(node.func) in ("abs", "min", "max")):
             return 0.0
         slopes = [

@@ -15,7 +15,7 @@ _POWER_OF_ZERO = re.compile(r"\(0\)\*\*\((?!-)")
 
 
 def is_continuous(meanings: Meanings, border: ast.expr, body: ast.expr, orelse: ast.expr) -> bool:
-    """Return whether body = orelse wherever border = 0, as far as polynomials show.
+    """Return whether `body` equals `orelse` wherever `border` is zero, as far as polynomials can show it.
 
     They agree if their difference is a multiple of the border, or vanishes when the border is solved for one of its
     names. A power of zero with a parameter as exponent counts as zero.
@@ -57,7 +57,7 @@ def sides_of_product(meanings: Meanings, node: ast.expr, left: Set[Family] = fro
 
 
 def rooted_in(meanings: Meanings, node: ast.expr) -> frozenset[Family]:
-    """Return the arguments of signs that a continuous product multiplies by a root or power with the same zero.
+    """Return signs that a continuous product multiplies by a root with the same zero, by their arguments.
 
     An example is sign(d)*sqrt(abs(d)), which has no Taylor series at d = 0 on either side.
     """

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def jump_inside(work: Rewriting, node: ast.expr, here: Here) -> ast.expr | None:
-    """Return the argument of a jump that enters a node nonlinearly, or None if all enter linearly.
+    """Return the argument of a jump in which a node is nonlinear, or None if the node is linear in all jumps.
 
     Jumps that depend on time alone are excluded, because the modes or signals for them have only two values.
     """

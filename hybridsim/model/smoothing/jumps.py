@@ -109,7 +109,7 @@ class Borders:
         return "the compared expression may stay at zero, since neither time nor a changing state moves it"
 
     def is_only_passed(self, argument: ast.expr) -> bool:
-        """Return whether a motion can only cross a border, since no force or jump acts on its rate."""
+        """Return whether motions can only cross a border, because no force or jump acts on its argument."""
         names = names_of(self._meanings.written_out(argument)) & self._moving
         if names & self._changed:
             return False
@@ -139,7 +139,7 @@ class Borders:
         )
 
     def _slopes(self, argument: ast.expr) -> list[Fraction] | None:
-        """Return the coefficients of the states in a border for generic values, or None if not linear."""
+        """Return the coefficients of the states in a border at sample parameters; None if nonlinear."""
         slopes = dict.fromkeys(sorted(self._moving), Fraction(0))
         for monomial, coefficient in polynomial(self._meanings.written_out(argument)).items():
             moved = [factor for factor in monomial if not self._moving.isdisjoint(_WORD.findall(factor[0]))]
@@ -178,7 +178,7 @@ def _rank(rows: list[list[Fraction]]) -> int:
 def apart_by(
     meanings: Meanings, first: ast.expr, second: ast.expr
 ) -> tuple[Polynomial, Polynomial, Polynomial]:
-    """Return n, d and g = n*first - d*second of two parallel borders, with constant g; otherwise empty ones.
+    """Return `n`, `d` and the constant `g` = n*first - d*second for parallel borders, else empty polynomials.
 
     n and d are numbers times products of parameters, n / d the ratio of the slopes of the second to those of the first.
     """
@@ -214,7 +214,7 @@ def _times(one: Monomial, other: Monomial, power: int = 1) -> Monomial:
 
 
 def product_of_signs(meanings: Meanings, first: ast.expr, second: ast.expr) -> ast.expr | None:
-    """Return sign(first)*sign(second) as a linear function of both signs, or None if not parallel.
+    """Return sign(first)*sign(second) as a linear function of both signs, or None without parallel borders.
 
     With n, d and g of `apart_by` and n', d', g' their signs, the product is n' d' - d' g' u + n' g' w. Where n or d has
     the value 0, one border is constant, and has the sign that this gives it.
@@ -227,7 +227,7 @@ def product_of_signs(meanings: Meanings, first: ast.expr, second: ast.expr) -> a
 
 
 def not_linear(trees: Iterable[tuple[str, ast.expr]], carried: Mapping[str, Set[str]]) -> set[str]:
-    """Return the signs that enter nonlinearly for given values of all others.
+    """Return the signs in which an expression is nonlinear, with all other signs held fixed.
 
     `trees` contains the expressions of names, and of rates without a name. `carried` maps signs, forces and variables
     that jump with them to these signs.

@@ -249,7 +249,7 @@ class Rewriting:
         return reason or self.refusal or self.refused.get(family, "") or self._border(family, argument)
 
     def _signs(self, here: Here, family: Family, sign: int) -> Mapping[Family, int]:
-        """Return the known signs together with that of a family."""
+        """Return the known signs extended by the sign of one more family."""
         known = {**here.signs, family: sign}
         return self._known_signs.setdefault(frozenset(known.items()), known)
 
@@ -347,7 +347,7 @@ class Rewriting:
     def _pair(
         self, above: ast.expr, below: ast.expr, family: Family, sign: int, here: Here
     ) -> tuple[ast.expr, ast.expr]:
-        """Return both sides rewritten, each with the sign of the border known.
+        """Rewrite both sides of a primitive; on each side the sign of the border is known.
 
         Signs without influence are dropped, because corners nested twenty times would otherwise be visited a million
         times.
@@ -362,7 +362,7 @@ class Rewriting:
         return first, second
 
     def _is_met(self, family: Family, node: ast.expr) -> bool:
-        """Return whether a tree contains a corner at a border, or any jump."""
+        """Return whether a tree contains a corner at this border, or a jump at any border."""
         return None in (met := self._borders_in(node)) or family in met
 
     def _borders_in(self, node: ast.expr) -> frozenset[Family | None]:
@@ -413,7 +413,7 @@ class Rewriting:
     def _stepped(
         self, node: ast.expr, step: TimeStep, parts: Sides, family: Family, sign: int, here: Here
     ) -> ast.expr:
-        """Return a condition on time as a sum of its sides, weighted by the signal."""
+        """Return a condition on time as the sum of its two values, weighted by the signal."""
         self.note(node, TIMED, step.title, here)
         pair = self._pair(parts[1], parts[2], family, sign, here)
         pair = pair if sign == self.steps[family][1] else pair[::-1]

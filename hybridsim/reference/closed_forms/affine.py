@@ -15,7 +15,7 @@ TIME = "t"
 
 @dataclass(frozen=True)
 class Affine:
-    """constant + sum of linear[name] * name + sum over w of Im(waves[w] exp(i w t)), w > 0."""
+    """A linear form plus waves: constant + sum of linear[n] n + sum of Im(waves[w] exp(i w t)) for w > 0."""
 
     constant: float = 0.0
     linear: Mapping[str, float] = field(default_factory=dict)

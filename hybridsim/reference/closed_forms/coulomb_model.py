@@ -35,7 +35,7 @@ class Recognised:
 
 
 def coulomb_oscillator(model: Model, t_span: tuple[float, float]) -> ClosedForm | None:
-    """Return the exact motion of the model forward in time, or None if it is another system."""
+    """Return the exact motion of the model forward in time, or None if the model has another form."""
     found = recognise(model)
     if found is None or t_span[1] < t_span[0]:
         return None

@@ -21,7 +21,7 @@ _SAMPLES = 801
 
 
 def linear_amplitude(r: float, zeta: float) -> float:
-    """Return R, the amplitude without friction in F0/k."""
+    """Return the amplitude without friction, in units of F0/k."""
     return 1.0 / math.hypot(1.0 - r * r, 2.0 * zeta * r)
 
 

@@ -27,7 +27,7 @@ _TURN, _TURN_LOW = (
 
 @dataclass(frozen=True)
 class ForcedCoulombOscillator:
-    """The oscillator, with w the `frequency` and b the `offset`.
+    """A forced oscillator; in its equation of motion w is the `frequency` and b is the `offset`.
 
     Raises ValueError if the closed form does not hold (overdamped) or would lose half of its digits
     (driven at resonance without damping).

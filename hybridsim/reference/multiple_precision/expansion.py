@@ -24,7 +24,7 @@ _FOREVER = 1000.0
 
 @dataclass(frozen=True)
 class Term:
-    """A term of a sum, whose size bounds the rounding of the sum; ``late``: it is a term of the rate."""
+    """A term of a sum, whose size bounds the sum's rounding; it is `late` if it is a term of a rate."""
 
     log2_factor: int
     c: Coefficients
@@ -92,13 +92,13 @@ class Expansion:
         return reach
 
     def _log2(self, c: Coefficients) -> list[tuple[int, int]]:
-        """Return (n, binary magnitude) of the non-zero coefficients."""
+        """Return the index n and the binary magnitude of each non-zero coefficient."""
         if id(c) not in self._logs:
             self._logs[id(c)] = [(n, self.precision.log2(value)) for n, value in enumerate(c) if value != 0]
         return self._logs[id(c)]
 
     def side_after(self, quantity: QuantitySeries) -> tuple[int, int]:
-        """Return the sign just after the start, and the order of the first non-zero coefficient (0: all are zero).
+        """Return the sign just after the start, and the order of the first non-zero coefficient (or 0, 0).
 
         A coefficient counts as zero if it is below 10^-20 (for 32 digits) of the terms of its sum.
         """

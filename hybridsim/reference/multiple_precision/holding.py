@@ -16,7 +16,7 @@ from hybridsim.reference.multiple_precision.reading import Reading
 
 
 class Holding:
-    """The held surfaces of one combination of modes, with the numbers at the start of a series."""
+    """The held surfaces of one combination of modes, and their slopes at the start of a series."""
 
     def __init__(self, reading: Reading, context: Any) -> None:
         self.context = context
@@ -37,7 +37,7 @@ class Holding:
         self.pins = self._choose_pins()
 
     def coefficients(self, n: int) -> list[Number]:
-        """Return the n-th coefficients of the surfaces from those of the states, without storing them."""
+        """Compute the n-th coefficients of the surfaces from the stored n-th coefficients of the states."""
         for node in self._nodes:
             if len(node.c) <= n:
                 node.extend(n)
@@ -47,7 +47,7 @@ class Holding:
         return values
 
     def values(self) -> list[Number]:
-        """Return the surfaces at the start."""
+        """Return the values of the surfaces at the start of the series."""
         return [surface.coefficient(0) for surface in self._surfaces]
 
     def unknowns_for(self, rates: list[Number]) -> list[Number]:

@@ -28,7 +28,7 @@ class Node:
 
     @property
     def delayed(self) -> tuple[Node, ...]:
-        """Return operands of which only lower coefficients are used, and which may be computed later."""
+        """Return the operands whose n-th coefficient is not needed for the n-th coefficient of this node."""
         return ()
 
     def coefficient(self, n: int) -> Number:
@@ -45,7 +45,7 @@ class Node:
 
 
 class Held(Node):
-    """A number that is fixed during a mode: a parameter, a discrete state, a literal."""
+    """A number that is constant during a mode: a parameter, a discrete state, a literal."""
 
     __slots__ = ("value",)
 

@@ -152,7 +152,7 @@ class Program:
             self._solve(0)
 
     def _again(self, n: int) -> None:
-        """Recompute the n-th coefficients of all nodes that depend on the unknowns."""
+        """Recompute the n-th coefficients of all nodes that depend on the unknowns of held surfaces."""
         for node in self.forced:
             node.forget(n)
         self._extend(self.nodes, n)

@@ -43,7 +43,7 @@ class Programs:
         return tuple(component.initial or UNDECIDED for component in self.components)
 
     def decided(self, modes: Modes) -> Modes:
-        """Return the modes with every undecided component holding, which does not affect the surfaces."""
+        """Return the modes with every undecided component set to hold, which does not change the surfaces."""
         return self.held(modes, [c for c, mode in enumerate(modes) if mode == UNDECIDED])
 
     def held(self, modes: Modes, components: Iterable[int]) -> Modes:
@@ -70,7 +70,7 @@ class Programs:
         return tuple(changed)
 
     def program(self, modes: Modes) -> Program:
-        """Return the equations of the motion in the given modes."""
+        """Return the equations of motion in these modes."""
         if modes not in self._programs:
             reading = Reading(self.model, modes, self.precision, self.signals)
             self._programs[modes] = Program(reading, self.precision, self.longest)

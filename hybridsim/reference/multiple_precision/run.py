@@ -153,7 +153,7 @@ class Run:
         return side, sign_changes(quantity.c[order:], h, self.precision) if side else []
 
     def _first_departure(self, expansion: Expansion, h: Number) -> tuple[list[tuple[int, int]], Number]:
-        """Return the guard that becomes negative first, and its time; none and h if no guard does."""
+        """Return the guard that becomes negative first, and the time; without one, no guard and h."""
         first: list[tuple[int, int]] = []
         for c, row in enumerate(expansion.guards):
             for j, guard in enumerate(row):
@@ -183,7 +183,7 @@ class Run:
             self._adopt(self.rules.resolve_event(settled.point, settled.modes, (), resets))
 
     def _act(self, monitors: Sequence[int], point: Point) -> None:
-        """Process the monitors, located at a point, that reset or end the run."""
+        """Process the given monitors at a point: they reset states or end the run."""
         settled = self.rules.resolve_event(
             point, self.now.modes, (), self._record_monitors(monitors, point.t)
         )
@@ -201,7 +201,7 @@ class Run:
     def _pass_monitors(
         self, expansion: Expansion, t: Number, s: Number, arriving: bool
     ) -> tuple[list[int], Number]:
-        """Record monitors that change sides before s; return the first with another action, and the time."""
+        """Record monitors that change sides before s; return the first that act on the run, and the time."""
         seen: list[tuple[Number, int, int]] = []
         tolerance = self.precision.zero * s
         for k, quantity in enumerate(expansion.monitors):

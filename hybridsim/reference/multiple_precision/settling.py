@@ -58,7 +58,7 @@ _MAX_ROUNDS = 50  # rounds at one instant; a cascade of resets is far shorter
 
 @dataclass
 class Settled:
-    """The state after an event."""
+    """The result of an event: the state, the modes and the series just after it, and the mode changes."""
 
     point: Point
     modes: Modes
@@ -67,7 +67,7 @@ class Settled:
 
 
 class Rules:
-    """The decisions of one model."""
+    """The rules that choose state and modes after an event, for one model."""
 
     def __init__(self, programs: Programs) -> None:
         self.programs, self.components = programs, programs.components
@@ -207,7 +207,7 @@ class Rules:
         return surface is not None and modes[c] == surface.hold
 
     def _best(self, point: Point, modes: Modes, chosen: Sequence[int], deciding: set[int]) -> Modes:
-        """Return the admissible combination with the fewest changes, first of components without an event."""
+        """Return the admissible modes with the fewest changes, above all of components without an event."""
         scores: dict[tuple[int, int, int], list[Modes]] = {}
         for combination in itertools.product(*([m.name for m in self.components[c].modes] for c in chosen)):
             candidate = list(self.programs.decided(modes))

@@ -1,4 +1,4 @@
-"""This module implements rule 0 of `settling`: sides of corners and loads, and automata that surely leave."""
+"""This module implements rule 0 of `settling`: sides of corners and loads, and guards that surely fire."""
 
 from __future__ import annotations
 

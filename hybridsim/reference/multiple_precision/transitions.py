@@ -27,7 +27,7 @@ class Move:
 
 
 class Transitions:
-    """The declared transitions, rule 1 of `settling`."""
+    """The declared transitions of one model, which are rule 1 of `settling`."""
 
     def __init__(self, programs: Programs) -> None:
         self.programs = programs

@@ -48,7 +48,7 @@ class CodeCache(ABC):
         """Return the source of a module with the functions of a mode, whose names end with _0."""
 
     def _blank(self, count: int) -> Any:
-        """Return codes without addresses for so many vectors of modes."""
+        """Return codes without addresses for a given number of mode vectors."""
         return self.codes(*(np.zeros(count, dtype=np.int64) for _ in self.codes._fields))
 
     def of(self, tapes: Tapes) -> Any:

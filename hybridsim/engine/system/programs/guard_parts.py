@@ -22,7 +22,7 @@ _LINEAR = {ADD, SUB, NEG, ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB, SCALE, DIVID
 
 
 class Parts(NamedTuple):
-    """Rows for the guards of each vector of modes, one slice each, and whether these are linear in states and time.
+    """Rows for the guards of each mode vector, and whether these guards are linear in states and time.
 
     The step rows are those that a step needs: of the flow, and of guards that are linear.
     """

@@ -47,7 +47,7 @@ def mode_tape(system: System, z: np.ndarray) -> ModeTape:
 
 
 def _holding(system: System, z: np.ndarray) -> Iterator[int]:
-    """Yield the registers of the condition pin > 0, which is true except outside of modes."""
+    """Yield registers of the condition that held states follow from constraints; it is true in every mode."""
     tape = system.code.data["tape"]
     zeros = [register for register, value, _ in tape["constants"] if value == 0.0]
     pins = [register for register, source in tape["parameters"] if source == system.layout.pin_at]
@@ -99,7 +99,7 @@ def _highest_power(rows: Iterable[tuple[int, ...]], first: int, count: int) -> i
 
 
 def most_fading(system: System) -> int:
-    """Return the largest number of such functions in any modes."""
+    """Return an upper bound of the number of functions that may vanish in one vector of modes."""
     parts = system.code.data["tape"]["parts"]
     return sum(_may_fade(op, b) for _, branches in parts for rows in branches for op, _, b, *_ in rows)
 

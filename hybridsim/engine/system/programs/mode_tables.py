@@ -159,7 +159,7 @@ class TapeCache:
         self.tapes = self._stacked()
 
     def look(self) -> None:
-        """Prepare code for the short series that were often missed."""
+        """Prepare code for modes in which many short series were computed without it."""
         tapes = self.tapes
         if not ENABLED or max(tapes.lacked.tolist(), default=0) < KNOWN:
             return

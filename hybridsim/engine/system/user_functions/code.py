@@ -27,7 +27,7 @@ class RunRecord(Protocol):
     message: str
 
     def warn(self, message: str) -> None:
-        """Count a warning."""
+        """Count one occurrence of a warning."""
 
 
 class PythonCode:
@@ -96,7 +96,7 @@ class PythonCode:
         return is_live or surroundings(self._functions) == self._surroundings
 
     def shared(self, name: str, make: Callable[[], Any]) -> Any:
-        """Return a value made once, as in `Compiled`."""
+        """Return a value that is computed once, as in `hybridsim.engine.system.modules.Compiled`."""
         if name not in self._things:
             self._things.setdefault(name, make())
         return self._things[name]

@@ -56,7 +56,7 @@ def _mark(address: int, function: int, t: float, x: Any, p: Any) -> None:
 
 
 class Compiler:
-    """Compiles the functions of one model; `refused` is the reason if numba cannot."""
+    """Compiles the functions of one model; `refused` is the reason why numba cannot compile them."""
 
     def __init__(self, parts: Parts) -> None:
         self.parts = parts
