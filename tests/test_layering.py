@@ -76,15 +76,17 @@ def floor_of(path: Path) -> str:
     return str(MAP["floor_of"](path))
 
 
-def imports(path: Path) -> Iterator[tuple[str, int]]:
+@cache
+def imports(path: Path) -> tuple[tuple[str, int], ...]:
     """Every module that a file imports, at its top or inside a function, types included, with the line."""
+    found = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            yield from ((alias.name, node.lineno) for alias in node.names)
+            found += [(alias.name, node.lineno) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             assert not node.level, f"{path}: imports name the whole path"
-            yield node.module or "", node.lineno
-    yield from MAP["imports"](path)
+            found.append((node.module or "", node.lineno))
+    return (*found, *MAP["imports"](path))
 
 
 def named(path: Path) -> str:
@@ -92,6 +94,7 @@ def named(path: Path) -> str:
     return ".".join(path.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__")
 
 
+@cache
 def imports_for_types(path: Path) -> set[int]:
     """Lines that only a type checker reads."""
     return {

@@ -11,7 +11,7 @@ import ast
 import hashlib
 import re
 from collections import Counter
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -67,19 +67,20 @@ def floor_of_module(module: str) -> str:
     return ".".join(parts[:2] if parts[:1] == ["engine"] else parts[:1])
 
 
-def imports(path: Path) -> Iterator[tuple[str, int]]:
+@cache
+def imports(path: Path) -> tuple[tuple[str, int], ...]:
     """Every module of the package that a file imports, at its top, for types or inside a function, with the line."""
+    found = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            yield from (
-                (alias.name, node.lineno) for alias in node.names if alias.name.startswith("hybridsim")
-            )
+            found += [(alias.name, node.lineno) for alias in node.names if alias.name.startswith("hybridsim")]
         elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("hybridsim"):
             for alias in node.names:
                 name = f"{node.module}.{alias.name}"
                 place = PACKAGE.joinpath(*name.split(".")[1:])
                 is_module = place.with_suffix(".py").exists() or (place / "__init__.py").exists()
-                yield (name if is_module else str(node.module)), node.lineno
+                found.append((name if is_module else str(node.module), node.lineno))
+    return tuple(found)
 
 
 def first_sentence(path: Path) -> str:

@@ -33,7 +33,7 @@ def test_the_judge_sees_a_run_of_other_numbers() -> None:
     assert "apart by" in distance(s, draw, right, wrong)
 
 
-@pytest.mark.parametrize(("number", "draw_number"), [(138, 8), (169, 20)])
+@pytest.mark.parametrize(("number", "draw_number"), [pytest.param(138, 8, marks=pytest.mark.slow), (169, 20)])
 def test_neighbours_without_a_motion_are_no_obstacle(number: int, draw_number: int) -> None:
     """A contact and a relay that would both hold one speed: their joint hold has no forces, and is not met."""
     s = structure(number, SEED)

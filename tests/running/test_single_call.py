@@ -104,25 +104,25 @@ def test_events_and_states_alone_make_no_record(engine: str) -> None:
 @pytest.mark.parametrize("engine", ENGINES)
 def test_what_waits_takes_no_more_memory_than_what_is_made(engine: str, save: str) -> None:
     model = pair()
-    for _ in range(100):  # machine code is made, or read, once modes have taken many steps
-        hs.simulate(model, (0, 60), integrator=engine, save=save)
+    for _ in range(40):  # machine code is made, or read, once modes have taken many steps
+        hs.simulate(model, (0, 20), integrator=engine, save=save)
 
     def held(**options: Any) -> int:
-        """Bytes that forty solutions hold."""
+        """Bytes that sixteen solutions hold."""
         # leaves free as many blocks of memory as are ever kept to be handed on
-        before = [hs.simulate(model, (0, 60), integrator=engine, save=save, **options) for _ in range(8)]
+        before = [hs.simulate(model, (0, 20), integrator=engine, save=save, **options) for _ in range(8)]
         del before
         gc.collect()
         tracemalloc.start()
-        kept = [hs.simulate(model, (0, 60), integrator=engine, save=save, **options) for _ in range(40)]
+        kept = [hs.simulate(model, (0, 20), integrator=engine, save=save, **options) for _ in range(16)]
         gc.collect()
         size = tracemalloc.get_traced_memory()[0]
         tracemalloc.stop()
         del kept
         return size
 
-    # the least of three: what is made once meanwhile, such as machine code of another thread, is not held by solutions
-    made, waiting = (min(held(**options) for _ in range(3)) for options in ({"limits": ENOUGH}, {}))
+    # the least of two: what is made once meanwhile, such as machine code of another thread, is not held by solutions
+    made, waiting = (min(held(**options) for _ in range(2)) for options in ({"limits": ENOUGH}, {}))
     assert waiting <= 1.1 * made
 
 

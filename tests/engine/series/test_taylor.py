@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import random
 
 import mpmath
 import numpy as np
@@ -22,12 +23,13 @@ MODELS = [info.name for info in hs.list_models()] + [str(path) for path in sorte
 
 @pytest.mark.parametrize("name", MODELS, ids=lambda name: name.rsplit("/")[-1])
 def test_the_optimised_tape_is_the_tape(name: str) -> None:
-    """States, guards and monitors to third order in every mode, to the last bit."""
+    """States, guards and monitors to third order in every mode, or in 500 at random, to the last bit."""
     model = hs.load(name)
     system = System(model)
     p = system.vector(Instant(0.3), np.array(list(model.discrete_values().values()), dtype=float))
     x, zero = 0.5 + 0.3 * np.sin(np.arange(1.0, 1.0 + system.n)), np.zeros(system.n)
-    for modes in itertools.product(*(range(len(a.modes)) for a in system.automata)):
+    every = list(itertools.product(*(range(len(a.modes)) for a in system.automata)))
+    for modes in random.Random(1).sample(every, min(500, len(every))):
         z = np.array(modes, dtype=np.int64)
         full = system.series(0.1, x, p, z, zero, 0.0)
         run = SeriesRun(system, p, z, Tolerances(1e-9, zero))
