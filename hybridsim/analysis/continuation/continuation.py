@@ -168,14 +168,13 @@ class _Follower:
         # start of the orbit, its period if that is free, the parameter
         self.unit = np.concatenate([scale, [orbit.period] if is_free else [], [bounds[1] - bounds[0]]])
         self.fault = ""  # the reason of the last failure
-        first = solution._segments[0]
-        rates = np.abs(rates_of(solution._system, float(first.s[0]), first.x[0], first.p, first.z))
-        self.section = int(np.argmax(rates / scale[: len(rates)])) if len(rates) else 0
+        self.section = self.first_section = self._fastest(solution)
 
     def follow(self, first: _Closing, sign: float) -> tuple[list[BranchPoint], str]:
         """Return the points of the branch towards lower (sign -1) or higher parameters, and why it ends."""
         found: list[BranchPoint] = []
-        here, step = first, _FIRST
+        here, step, is_moved = first, _FIRST, False
+        self.section = self.first_section
         direction = np.zeros(len(self.unit))
         direction[-1] = sign
         tangent = self._tangent(here, direction)
@@ -183,6 +182,17 @@ class _Follower:
             unknowns = self._unknowns(here.point) + step * tangent
             there, count = self._correct(here.point, unknowns, tangent)
             if there is None:
+                moved = None if is_moved else self._elsewhere(here)
+                is_moved = True
+                if moved is not None:
+                    here = moved
+                    towards = np.zeros(len(tangent))
+                    count = len(here.point.orbit.start.values)
+                    towards[count:] = tangent[
+                        count:
+                    ]  # the period and the parameter are the same from any start
+                    tangent = self._tangent(here, towards)
+                    continue
                 step *= _LESS
                 if step < _SMALLEST:
                     at = here.point.parameter
@@ -198,10 +208,33 @@ class _Follower:
                 ), f"{self.parameter} = {self.bounds[0 if value < self.bounds[0] else 1]:g} (the bound)"
             found.append(there.point)
             tangent = self._tangent(there, tangent)
-            here = there
+            here, is_moved = there, False
             if count <= _QUICK_CORRECTIONS:
                 step = min(step * _MORE, _LARGEST)
         return found, f"{self.parameter} = {here.point.parameter:g} (after {self.max_points} points)"
+
+    def _elsewhere(self, here: _Closing) -> _Closing | None:
+        """Return the same free orbit from the middle of its longest smooth part; None for a forced one.
+
+        The next orbit starts at the same value of one state, which must lie between the events of that orbit, too.
+        """
+        point = here.point
+        if not self.is_free:
+            return None
+        solution = point.motion.run(point.orbit.start, point.orbit.period)
+        times = np.unique([solution.t_start, *(event.t for event in solution.events), solution.t_end])
+        longest = int(np.argmax(np.diff(times)))
+        middle = float(times[longest : longest + 2].mean())
+        reached = point.motion.run(point.orbit.start, middle - solution.t_start)
+        start = replace(point_at_end(reached), at=point.orbit.start.at)
+        moved = replace(point, orbit=replace(point.orbit, start=start))
+        self.section = self._fastest(point.motion.run(start, point.orbit.period))
+        return self._closing(moved, self._unknowns(moved))
+
+    def _fastest(self, solution: Solution) -> int:
+        """Return the state that changes fastest, by its unit, as a run begins."""
+        rates = np.abs(self._rates(solution, 0, len(solution.names)))
+        return int(np.argmax(rates / self.unit[: len(rates)])) if len(rates) else 0
 
     def _at_bound(self, inside: BranchPoint, outside: BranchPoint) -> list[BranchPoint]:
         """Return the orbit at the bound between two points, if Newton's method finds it."""

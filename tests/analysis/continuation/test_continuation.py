@@ -105,3 +105,28 @@ def test_a_pitchfork_is_marked_where_it_is() -> None:
 
 def test_a_fold_is_no_branch_point(branch: hs.Branch) -> None:
     assert "branch point" not in {special.kind for special in branch.special}
+
+
+def test_a_thermostat_is_followed_over_its_first_starting_value() -> None:
+    """The first orbit starts at T = 20, which those with hi < 20 do not pass; each has a period in closed form."""
+    model = hs.Model(
+        "room",
+        parameters={"hi": 21.0},
+        states=[hs.State("T", 15, "(5 + heat - T)/2", nominal=10)],
+        components=[
+            hs.Component(
+                "heater",
+                [
+                    hs.Mode("on", hs.Guard("warm", "hi - T", "off"), set={"heat": 25}),
+                    hs.Mode("off", hs.Guard("cold", "T - 19", "on"), set={"heat": 0}),
+                ],
+                initial="on",
+            )
+        ],
+    )
+    branch = hs.continuation(model, "hi", (19.2, 22.0))
+    high = branch.parameter
+    assert (high.min(), high.max()) == (19.2, 22.0)
+    assert branch.period == pytest.approx(
+        2 * np.log(11 / (30 - high)) + 2 * np.log((high - 5) / 14), abs=1e-7
+    )
