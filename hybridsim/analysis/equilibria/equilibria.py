@@ -88,7 +88,7 @@ def equilibria(
     Returns
     -------
     tuple of Equilibrium
-        One for each combination of modes.
+        One for each combination of modes. Of a point on a corner of the rates, `growth` is the larger of both sides.
 
     Raises
     ------
@@ -127,8 +127,18 @@ def equilibria(
         field = Field(system, np.array(numbers, dtype=np.int64))
         equilibrium = _in_modes(field)
         if equilibrium is not None:
-            found.append(equilibrium)
+            _add(found, equilibrium, INSIDE * field.sizes(equilibrium.x))
     return tuple(found)
+
+
+def _add(found: list[Equilibrium], new: Equilibrium, rounding: np.ndarray) -> None:
+    """Add an equilibrium, but a point on a corner only once, with the larger growth of its two sides."""
+    for i, old in enumerate(found):
+        is_same = old.is_point and new.is_point and old.modes == new.modes
+        if is_same and (np.abs(old.x - new.x) <= rounding).all():
+            found[i] = max(old, new, key=lambda one: one.growth)
+            return
+    found.append(new)
 
 
 def _in_modes(field: Field) -> Equilibrium | None:

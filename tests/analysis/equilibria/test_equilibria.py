@@ -154,3 +154,12 @@ def test_where_no_rest_is_found_it_is_said_how_to_go_on() -> None:
     with pytest.raises(hs.SimulationError, match=r"from its start\n.*nominal") as caught:
         hs.linearize(adrift)
     assert "in the modes" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("rate", "at", "growth"), [("-x - 0.5*abs(x)", 0.0, -0.5), ("2 - 2*x - abs(x - 1)", 1.0, -1.0)]
+)
+def test_a_point_on_a_corner_is_one_equilibrium(rate: str, at: float, growth: float) -> None:
+    """Its growth is the larger of both slopes: -1.5 and -0.5, or -3 and -1."""
+    (found,) = hs.equilibria(hs.Model("corner", states=[hs.State("x", 0.5, rate)]))
+    assert found.x == pytest.approx([at]) and found.growth == pytest.approx(growth)
