@@ -122,7 +122,7 @@ def equilibria(
             f"model {model.name} has {count} combinations of modes; at most {_MAX_COMBINATIONS} are tried",
             remedy="choose modes and use hs.linearize(model, mode)",
         )
-    found = []
+    found: list[Equilibrium] = []
     for numbers in product(*(range(len(a.modes)) for a in system.automata)):
         field = Field(system, np.array(numbers, dtype=np.int64))
         equilibrium = _in_modes(field)
