@@ -10,6 +10,7 @@ import sys
 from importlib import import_module
 from types import ModuleType
 from typing import Any
+from warnings import warn
 
 __version__ = "0.1.0.dev0"
 
@@ -45,8 +46,6 @@ _HOME = {
     "three_coupled_blocks": "hybridsim.mechanics.declaration.scenes",
     "two_blocks_on_belt": "hybridsim.mechanics.declaration.scenes",
     # simulation
-    "MechanicalSolution": "hybridsim.mechanics.series_loop.solution",
-    "SteppedSolution": "hybridsim.mechanics.time_stepping.solution",
     "Event": "hybridsim.solution",
     "Explanation": "hybridsim.solution",
     "Solution": "hybridsim.solution",
@@ -84,6 +83,9 @@ _HOME = {
     "UsageError": "hybridsim.errors",
 }
 
+# Former names of `Solution`, which give a warning.
+_FORMER = dict.fromkeys(("MechanicalSolution", "SteppedSolution"), "hybridsim.mechanics.deprecated")
+
 __all__ = ["__version__", *_HOME]
 
 
@@ -100,6 +102,10 @@ class _Package(ModuleType):
 
 
 def __getattr__(name: str) -> Any:
+    if name in _FORMER:
+        what = f"hybridsim.{name} is deprecated; it will go in version 0.2. Use hybridsim.Solution"
+        warn(what, DeprecationWarning, stacklevel=2)
+        return getattr(import_module(_FORMER[name]), name)
     if name not in _HOME:
         raise AttributeError(f"module 'hybridsim' has no attribute {name!r}")
     value = globals()[name] = getattr(import_module(_HOME[name]), name)

@@ -35,8 +35,8 @@ from hybridsim.mechanics.declaration.scenes import two_blocks_on_belt as two_blo
 from hybridsim.mechanics.declaration.system import Harmonic as Harmonic
 from hybridsim.mechanics.declaration.system import MechanicalContact as MechanicalContact
 from hybridsim.mechanics.declaration.system import MechanicalSystem as MechanicalSystem
-from hybridsim.mechanics.series_loop.solution import MechanicalSolution as MechanicalSolution
-from hybridsim.mechanics.time_stepping.solution import SteppedSolution as SteppedSolution
+from hybridsim.mechanics.deprecated import MechanicalSolution as MechanicalSolution
+from hybridsim.mechanics.deprecated import SteppedSolution as SteppedSolution
 from hybridsim.model import Choice as Choice
 from hybridsim.model import Component as Component
 from hybridsim.model import Contact as Contact

@@ -13,15 +13,11 @@ from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.model import Model
 
 if TYPE_CHECKING:
-    from hybridsim.mechanics.series_loop.solution import MechanicalSolution
-    from hybridsim.mechanics.time_stepping.solution import SteppedSolution
     from hybridsim.solution import Solution
 
 
 @overload
-def simulate(
-    model: MechanicalSystem, t_span: tuple[float, float], **arguments: Any
-) -> MechanicalSolution | SteppedSolution: ...
+def simulate(model: MechanicalSystem, t_span: tuple[float, float], **arguments: Any) -> Solution: ...
 @overload
 def simulate(
     model: Model | str | PathLike[str],
@@ -58,7 +54,7 @@ def simulate(
     limits: Mapping[str, float] | None = None,
     progress: Callable[[float], None] | None = None,
     **options: Any,
-) -> Solution | MechanicalSolution | SteppedSolution:
+) -> Solution:
     """Simulate a model from t0 to t1 and return its trajectory, its events and its cost.
 
     Parameters
@@ -107,8 +103,7 @@ def simulate(
     Returns
     -------
     Solution
-        The solution, also of a run that stopped early; ``sol.status`` and ``sol.message`` state the reason. For a
-        `MechanicalSystem` it is a `MechanicalSolution`, or a `SteppedSolution` with ``moreau``.
+        The solution, also of a run that stopped early; ``sol.status`` and ``sol.message`` state the reason.
 
     Raises
     ------

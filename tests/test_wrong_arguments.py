@@ -47,7 +47,7 @@ _ALSO = {
 }
 # Made by calls and not by users; errors.
 _RESULTS = {
-    *("Event", "Explanation", "Solution", "MechanicalSolution", "SteppedSolution", "SteadyState", "Sweep"),
+    *("Event", "Explanation", "Solution", "SteadyState", "Sweep"),
     *("Comparison", "SuiteComparison", "Advice", "Branch", "Equilibrium", "Linearization", "Sensitivities"),
     *(
         "HybridsimError",
@@ -137,13 +137,13 @@ def branch() -> hs.Branch:
 
 
 @cache
-def moved() -> hs.MechanicalSolution:
+def moved() -> hs.Solution:
     """A run of a mechanical system, whose methods are called."""
     return hs.simulate(mechanical(), (0, 0.1))
 
 
 @cache
-def stepped() -> hs.SteppedSolution:
+def stepped() -> hs.Solution:
     """The same by time stepping."""
     return hs.simulate(mechanical(), (0, 0.1), integrator="moreau", step=0.01)
 
@@ -271,20 +271,20 @@ CALLS: dict[str, tuple[Callable[[], Callable[..., Any]], Callable[[], dict[str, 
     "Solution.to_npz": (lambda: sliding().to_npz, lambda: {"path": "s.npz"}),
     "Solution.to_pandas": (lambda: sliding().to_pandas, dict),
     "Solution.to_xarray": (lambda: sliding().to_xarray, dict),
-    "MechanicalSolution.output": (lambda: moved().output, lambda: {"name": moved().names[0]}),
-    "MechanicalSolution.event_times": (lambda: moved().event_times, lambda: {"component": "f"}),
-    "MechanicalSolution.table": (lambda: moved().table, dict),
-    "MechanicalSolution.to_csv": (lambda: moved().to_csv, lambda: {"path": "m.csv"}),
-    "MechanicalSolution.to_npz": (lambda: moved().to_npz, lambda: {"path": "m.npz"}),
-    "MechanicalSolution.to_pandas": (lambda: moved().to_pandas, dict),
-    "MechanicalSolution.to_xarray": (lambda: moved().to_xarray, dict),
-    "SteppedSolution.output": (lambda: stepped().output, lambda: {"name": stepped().names[0]}),
-    "SteppedSolution.event_times": (lambda: stepped().event_times, lambda: {"component": "f"}),
-    "SteppedSolution.table": (lambda: stepped().table, dict),
-    "SteppedSolution.to_csv": (lambda: stepped().to_csv, lambda: {"path": "t.csv"}),
-    "SteppedSolution.to_npz": (lambda: stepped().to_npz, lambda: {"path": "t.npz"}),
-    "SteppedSolution.to_pandas": (lambda: stepped().to_pandas, dict),
-    "SteppedSolution.to_xarray": (lambda: stepped().to_xarray, dict),
+    "Solution.output by series": (lambda: moved().output, lambda: {"name": moved().names[0]}),
+    "Solution.event_times by series": (lambda: moved().event_times, lambda: {"component": "f"}),
+    "Solution.table by series": (lambda: moved().table, dict),
+    "Solution.to_csv by series": (lambda: moved().to_csv, lambda: {"path": "m.csv"}),
+    "Solution.to_npz by series": (lambda: moved().to_npz, lambda: {"path": "m.npz"}),
+    "Solution.to_pandas by series": (lambda: moved().to_pandas, dict),
+    "Solution.to_xarray by series": (lambda: moved().to_xarray, dict),
+    "Solution.output by time stepping": (lambda: stepped().output, lambda: {"name": stepped().names[0]}),
+    "Solution.event_times by time stepping": (lambda: stepped().event_times, lambda: {"component": "f"}),
+    "Solution.table by time stepping": (lambda: stepped().table, dict),
+    "Solution.to_csv by time stepping": (lambda: stepped().to_csv, lambda: {"path": "t.csv"}),
+    "Solution.to_npz by time stepping": (lambda: stepped().to_npz, lambda: {"path": "t.npz"}),
+    "Solution.to_pandas by time stepping": (lambda: stepped().to_pandas, dict),
+    "Solution.to_xarray by time stepping": (lambda: stepped().to_xarray, dict),
     "SteadyState.harmonic": (lambda: settled().harmonic, lambda: {"name": "x"}),
     "SteadyState.held_mode": (lambda: settled().held_mode, lambda: {"contact": "f"}),
     "SteadyState.to_dict": (lambda: settled().to_dict, dict),

@@ -198,11 +198,11 @@ def _final(solution: Solution) -> list[tuple[str, float]]:
 
 
 def _summary(solution: Solution) -> list[str]:
-    from hybridsim.solution.summary import kinds
-
     model, stats = solution.model, solution.stats
     has_events = _has_events(solution)
-    found = {kind: n for kind, n in kinds(solution).items() if kind != "corner"} if has_events else {}
+    found = (
+        {kind: n for kind, n in solution._of_model.kinds().items() if kind != "corner"} if has_events else {}
+    )
     counted = ", ".join(f"{n} {kind}" for kind, n in found.items())
     lines = [
         f"{model.name}: {model.title}" if model.title else model.name,

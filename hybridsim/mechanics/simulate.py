@@ -14,8 +14,7 @@ from hybridsim.errors import UsageError, nearest
 
 if TYPE_CHECKING:
     from hybridsim.mechanics.declaration.system import MechanicalSystem
-    from hybridsim.mechanics.series_loop.solution import MechanicalSolution
-    from hybridsim.mechanics.time_stepping.solution import SteppedSolution
+    from hybridsim.solution import Solution
 
 # Arguments of `simulate` that are not supported here, with the alternatives.
 _OF_MODELS = {
@@ -42,7 +41,7 @@ def simulate_mechanical(
     limits: Mapping[str, float] | None = None,
     progress: Callable[[float], None] | None = None,
     **refused: Any,
-) -> MechanicalSolution | SteppedSolution:
+) -> Solution:
     """Run a `MechanicalSystem`; see `hybridsim.simulate.simulate` for the arguments.
 
     Raises
@@ -56,7 +55,8 @@ def simulate_mechanical(
     from hybridsim.integrators.registry import integrator_class, keyword_elsewhere
     from hybridsim.mechanics.series_loop.mechanical_arrays import build
     from hybridsim.mechanics.series_loop.run import MechanicalRun
-    from hybridsim.mechanics.series_loop.solution import MechanicalSolution
+    from hybridsim.mechanics.series_loop.series_trajectory import SeriesTrajectory
+    from hybridsim.solution.solution import Solution
 
     name = arguments.integrator_name(integrator)
     if name not in ("auto", "taylor", "moreau"):
@@ -107,20 +107,21 @@ def simulate_mechanical(
     began = time.perf_counter()
     if method is not None:
         from hybridsim.mechanics.time_stepping.run import SteppedRun
-        from hybridsim.mechanics.time_stepping.solution import SteppedSolution
+        from hybridsim.mechanics.time_stepping.stepped_trajectory import SteppedTrajectory
 
         stepped = SteppedRun(system, method, span, start, save == "all", most)
         refuse_longer(stepped.step, longest, name)
         built_in = time.perf_counter() - began
         stepped.go(callback)
         built_in += stepped.compile_time
-        return SteppedSolution(stepped, grid, str(save), time.perf_counter() - began - built_in, built_in)
+        wall_time = time.perf_counter() - began - built_in
+        return Solution(SteppedTrajectory(stepped, grid, str(save), (wall_time, built_in)))
     run = MechanicalRun(build(system), span, start, relative, absolute, longest, save == "all", most)
     built_in = time.perf_counter() - began
     run.go(callback)
     built_in += run.compile_time
     wall_time = time.perf_counter() - began - built_in
-    return MechanicalSolution(system, run, grid, str(save), wall_time, built_in)
+    return Solution(SeriesTrajectory(system, run, grid, str(save), (wall_time, built_in)))
 
 
 def _start(system: MechanicalSystem, x0: Any) -> np.ndarray:

@@ -23,7 +23,7 @@ def resumed(
     progress: Callable[[float], None] | None,
 ) -> Solution:
     """Return the solution of the whole run after continuing it; see `Solution.resume`."""
-    run, trajectory = solution._run, solution._trajectory
+    run, trajectory = solution._run, solution._of_model.record
     task, checkpoint = run.task, trajectory.checkpoint
     if solution.status not in ("finished", *_EARLY) or checkpoint is None:
         raise UsageError(

@@ -15,6 +15,7 @@ from hybridsim.engine.system.user_functions.code import PythonCode
 from hybridsim.errors import RunInterrupted
 from hybridsim.model.checks.denominators import denominators
 from hybridsim.model.checks.doubtful import jumps_of
+from hybridsim.solution.model_trajectory import ModelTrajectory
 from hybridsim.solution.poles import end_at_pole, passed_unseen
 from hybridsim.solution.solution import Solution
 
@@ -68,7 +69,7 @@ class Run:
         # The solution keeps only what the run left, not its start.
         if self.task.record is not None:
             run = replace(self, task=replace(self.task, record=None))
-        solution = Solution(run, trajectory, before + wall_time, compile_time + within)
+        solution = Solution(ModelTrajectory(run, trajectory, before + wall_time, compile_time + within))
         # A compiled loop that took the run from start to end was not interrupted.
         if not isinstance(trajectory, LazyTrajectory) and trajectory.status == "interrupted":
             raise RunInterrupted(solution)

@@ -2,40 +2,23 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from html import escape
 from typing import TYPE_CHECKING
 
 from hybridsim.errors import printable
 from hybridsim.presentation.notebook import run_html
+from hybridsim.solution.model_trajectory import ModelTrajectory
 
 if TYPE_CHECKING:
     from hybridsim.solution.solution import Solution
 
 
-def kinds(solution: Solution) -> Counter[str]:
-    """Count the events of each kind, including corners, without creating event objects."""
-    found: Counter[str] = Counter()
-    for block in solution._trajectory.occurrences.blocks:
-        found += block.kinds()
-    return found
-
-
 def as_text(solution: Solution) -> str:
     """Return a summary as text: status, end state, events by kind, cost and warnings."""
-    counted = ", ".join(f"{n} {kind}" for kind, n in sorted(kinds(solution).items())) or "none"
-    counted = "not kept" if solution._save == "nothing" else counted
     lines = [
         f"Solution of {solution.model.name} by {solution.integrator}: {solution.status}",
         f"  {solution.message}",
-    ]
-    if solution._segments:
-        last = solution._segments[-1].x[-1]
-        final = ", ".join(f"{n} = {v:.9g}" for n, v in zip(solution.names, last, strict=True))
-        lines += [f"  t from {solution.t_start:.9g} to {solution.t_end:.9g}; at the end {final}"]
-    stats = solution.stats
-    lines += [
-        f"  events: {counted}",
-        f"  cost: {stats['steps']} steps, {stats['rhs_evaluations']} right-hand sides, {stats['wall_time']:.3g} s",
+        *solution._trajectory.summary(),
         *(f"  warning: {w}" for w in solution.warnings),
     ]
     return printable("\n".join(lines))
@@ -43,6 +26,8 @@ def as_text(solution: Solution) -> str:
 
 def in_html(solution: Solution) -> str:
     """Return a summary as HTML: status, a strip of modes for each component, events and warnings."""
+    if not isinstance(solution._trajectory, ModelTrajectory):
+        return f"<pre>{escape(as_text(solution))}</pre>"
     stats, model = solution.stats, solution.model
     head = {
         solution.status: f"{model.title or model.name}, by {solution.integrator}",

@@ -30,7 +30,7 @@ class Balance:
         return abs(self.gained - self.forcing + self.damping + self.friction) / self.dissipated
 
 
-def balance(sol: hs.MechanicalSolution, order: int = 20) -> Balance:
+def balance(sol: hs.Solution, order: int = 20) -> Balance:
     """Works over the whole run, by Gauss-Legendre quadrature of that order over each piece between two times."""
     system = sol.model
     M, C, K = (matrix.toarray() for matrix in (system.M, system.C, system.K))

@@ -61,31 +61,53 @@ def test_forms_of_a_table(kind: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize(
-    ("name", "remedy"),
-    [
-        ("explain", "to_model"),
-        ("save", "to_npz"),
-        ("resume", "x_end"),
-        ("nfev", "to_model"),
-        ("corners", "laws"),
-    ],
-)
-def test_what_it_has_not_says_what_to_do_instead(kind: str, name: str, remedy: str) -> None:
-    with pytest.raises(AttributeError, match=f"Solution has no {name}: .*{remedy}"):
-        getattr(run(kind), name)
-    assert not hasattr(run(kind), name)
+def test_every_run_gives_the_one_class(kind: str) -> None:
+    """All attributes of the runs of models are there, and those of mechanical systems are there for models."""
+    sol, model = run(kind), as_model()
+    assert type(sol) is type(model) is hs.Solution
+    assert (sol.t_events, sol.y_events, sol.corners, sol.chosen_because) == ([], [], (), "")
+    assert [part.name for part in sol.components] == list(sol.modes)
+    assert kind in repr(sol) and kind in sol._repr_html_()
+    np.testing.assert_allclose(model.x_end, model.y[:, -1], rtol=0.0)
+    assert set(sol.quantities) <= {*model.quantities}
+    contact = sol.events[0].component
+    assert abs(sol.event_times(contact)[0] - model.event_times(contact)[0]) < 0.02  # two steps of moreau
+    for side, other in (("-", "x_minus"), ("+", "x_plus")):
+        states = np.array([getattr(e, other) for e in sol.events if e.component == contact])
+        assert (sol.event_states(contact, side=side) == states).all()
+    for name in (*sol.names, *sol.quantities):
+        assert (sol.output(name) == sol.table().columns[name]).all()
+
+
+def test_former_names_warn_and_are_still_types_of_their_runs() -> None:
+    for name, kind in (("MechanicalSolution", "taylor"), ("SteppedSolution", "moreau")):
+        with pytest.warns(DeprecationWarning, match=r"Use hybridsim\.Solution"):
+            former = getattr(hs, name)
+        assert [isinstance(run(each), former) for each in KINDS] == [each == kind for each in KINDS]
+        assert not isinstance(as_model(), former)
+        assert issubclass(former, hs.Solution) and name not in dir(hs)
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_what_nothing_has_is_an_ordinary_error(kind: str) -> None:
-    with pytest.raises(AttributeError, match=r"has no 'xplain'$"):
-        _ = run(kind).xplain
+@pytest.mark.parametrize("call", ["explain", "save", "resume"])
+def test_what_it_has_not_says_what_to_do_instead(kind: str, call: str, tmp_path: Path) -> None:
+    arguments = {"explain": (0,), "save": (tmp_path / "run.hsol",), "resume": ()}[call]
+    with pytest.raises(hs.UsageError, match="two-blocks is a MechanicalSystem") as caught:
+        getattr(run(kind), call)(*arguments)
+    assert all(part in str(caught.value) for part in ("to_model()", "to_npz()", "x0=sol.x_end"))
+
+
+def test_what_was_not_measured_is_no_attribute() -> None:
+    with pytest.raises(AttributeError, match="no nfev: only a run of a Model"):
+        _ = run("taylor").nfev
+    with pytest.raises(AttributeError, match="no work: only a run of a MechanicalSystem"):
+        _ = as_model().work
+    assert run("moreau").work["friction"] < 0.0 and as_model().nfev > 0
 
 
 @pytest.mark.parametrize("picture", [plot.time_history, plot.phase_portrait, plot.friction_loop])
 def test_pictures_are_refused_with_a_way_to_one(picture: Any) -> None:
-    with pytest.raises(hs.UsageError, match=r"MechanicalSolution of two-blocks") as caught:
+    with pytest.raises(hs.UsageError, match=r"Solution of two-blocks") as caught:
         picture(run("taylor"))
     assert "to_model()" in str(caught.value)
 

@@ -64,7 +64,7 @@ def content(sol: hs.Solution, save: str) -> list[Any]:
 
 def is_at_once(sol: hs.Solution) -> bool:
     """Whether most of the record has still to be made."""
-    record = sol._trajectory
+    record = sol._of_model.record
     return isinstance(record, LazyTrajectory) and "warnings" not in vars(record)
 
 

@@ -220,5 +220,5 @@ def test_closed_forms_of_earlier_versions_are_read(tmp_path: Path) -> None:
     assert {kind for kind, _ in blocks} == {"tables", "closed-form"}
     found = put_together(sol._system, blocks)
     times = np.linspace(0.0, 0.2, 50)
-    index, s = sol._segment_at(times, "+")
+    index, s = sol._of_model.segment_at(times, "+")
     assert np.allclose(found[0].states(index, s).T, sol(times), rtol=0.0, atol=1e-15)

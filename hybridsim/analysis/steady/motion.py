@@ -217,7 +217,7 @@ class Motion:
 
 def _cost_of(solution: Solution) -> float:
     steps, events = solution.stats["steps"], solution.stats["events"]
-    is_compiled = solution.stats["kernel_time"] > 0.0 and solution._trajectory.taken_over is None
+    is_compiled = solution.stats["kernel_time"] > 0.0 and solution._of_model.record.taken_over is None
     ends = max(solution.stats["restarts"] - events, 0)
     return cost(0 if is_compiled else steps, steps if is_compiled else 0, events) + _RENEWED * ends
 
@@ -234,7 +234,7 @@ def point_at_end(solution: Solution) -> Point:
 
 def point_at(solution: Solution, t: float) -> Point:
     """Return the point of a run just before time t."""
-    index, _ = solution._segment_at(np.array([t]), "-")
+    index, _ = solution._of_model.segment_at(np.array([t]), "-")
     segment = solution._segments[int(index[0])]
     point = _point(solution, segment, side=-1)
     return replace(point, x=solution(t, side="-"))

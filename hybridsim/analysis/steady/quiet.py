@@ -18,13 +18,15 @@ _LOOKED_AT = 4  # last periods whose events are used
 
 def event_times(solution: Solution) -> np.ndarray:
     """Return the times (K,), ascending, of all events of a forward run."""
-    return np.concatenate([np.empty(0), *(block.times for block in solution._trajectory.occurrences.blocks)])
+    return np.concatenate(
+        [np.empty(0), *(block.times for block in solution._of_model.record.occurrences.blocks)]
+    )
 
 
 def is_event_near(solution: Solution, times: np.ndarray, t: float, period: float) -> bool:
     """Return whether an event other than a near-grazing or a corner is next to time t, given all `event_times`."""
     first, end = np.searchsorted(times, [t - _NEAR * period, t + _NEAR * period])
-    occurrences = solution._trajectory.occurrences
+    occurrences = solution._of_model.record.occurrences
     return any(occurrences[k].kind not in _WITHOUT_EFFECT for k in range(int(first), int(end)))
 
 

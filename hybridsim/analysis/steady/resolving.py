@@ -94,7 +94,7 @@ class Sampler:
 
     def _others(self, i: int, s: np.ndarray, x: np.ndarray) -> np.ndarray:
         system, segment = self.system, self.segments[i]
-        named = self.solution._quantities((*self.quantities, *self.discrete), segment, s, x)
+        named = self.solution._of_model.values_in((*self.quantities, *self.discrete), segment, s, x)
         columns = [np.reshape(named, (-1, len(s))).T]
         if not system.has_tape:  # for Python functions: no contacts, and guards without series
             return columns[0]

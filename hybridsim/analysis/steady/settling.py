@@ -128,7 +128,7 @@ def scale_of(solution: Solution, since: float) -> np.ndarray:
     """
     low, high = ranges(solution, since)
     if solution._system.layout.discrete:
-        index = np.flatnonzero(solution._ends > since)
+        index = np.flatnonzero(solution._of_model.frame.ends > since)
         held = np.array([solution._segments[int(i)].p[solution._system.layout.discrete_slice] for i in index])
         low, high = np.append(low, held.min(axis=0)), np.append(high, held.max(axis=0))
     return np.maximum(0.5 * (high - low), _DIGITS * np.maximum(np.abs(low), np.abs(high)))
@@ -153,7 +153,7 @@ def forced_passings(motion: Motion, start: Point | None, period: float, count: i
     values = solution(times, side="-").T
     system = solution._system
     if system.layout.discrete:
-        index, _ = solution._segment_at(times, "-")
+        index, _ = solution._of_model.segment_at(times, "-")
         discrete = [solution._segments[int(i)].p[system.layout.discrete_slice] for i in index]
         values = np.concatenate([values, discrete], axis=1)
     late = solution.t_end - max(1, count // 4) * period
@@ -221,7 +221,7 @@ def _without_events(
     begin = float(times[-2])
     inside = events[(events >= begin) & (events < begin + period)] - begin
     middle = begin + (middle_of_longest(inside, period) if len(inside) else 0.5 * period)
-    index, s = late._segment_at(np.array([middle]), "-")
+    index, s = late._of_model.segment_at(np.array([middle]), "-")
     segment = late._segments[int(index[0])]
     x = late(middle)
     rates = rates_of(late._system, float(s[0]), x, segment.p, segment.z)

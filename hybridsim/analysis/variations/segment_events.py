@@ -37,7 +37,7 @@ class Last(NamedTuple):
 
 def segment_events_of(solution: Solution) -> Iterator[SegmentEvents]:
     """Yield the segments, each with the events before the next segment that changed modes or states."""
-    waiting = [o for o in solution._trajectory.occurrences if o.kind != "near-grazing"]
+    waiting = [o for o in solution._of_model.record.occurrences if o.kind != "near-grazing"]
     at, segments = 0, list(solution._segments)
     for segment, following in zip(segments, [*segments[1:], None], strict=True):
         # an event and the end of its segment are one instant if they differ by no more than this
@@ -66,7 +66,7 @@ def at_start(solution: Solution) -> list[Occurrence]:
     """Return the events of the first instant of a run."""
     first = solution._segments[0].start
     found = []
-    for one in solution._trajectory.occurrences:
+    for one in solution._of_model.record.occurrences:
         if one.instant.minus(first) > 0.0:
             break
         found.append(one)

@@ -114,7 +114,7 @@ class Explanation(Readable):
 
 def explain(solution: Solution, number: int | Event) -> Explanation:
     """Return the explanation of one event of a solution; see `Solution.explain`."""
-    events, occurrences = solution.events, solution._trajectory.occurrences
+    events, occurrences = solution.events, solution._of_model.record.occurrences
     if isinstance(number, Event) and number in solution.corners:
         corner = [o for o in occurrences if o.kind == CORNER][solution.corners.index(number)]
         found = Explanation(number, (), (), change_of_side(solution, corner), _state(solution, number))
@@ -328,7 +328,7 @@ def _segment_before(solution: Solution, occurrence: Occurrence) -> Segment | Non
             remedy="run it with save='all' to have events explained",
         )
     segments = solution._segments
-    last = int(np.searchsorted(solution._starts, float(occurrence.instant), side="right"))
+    last = int(np.searchsorted(solution._of_model.frame.starts, float(occurrence.instant), side="right"))
     for k in range(last - 1, max(last - 4, -1), -1):  # segments of zero length may follow it
         segment = segments[k]
         if abs(segment.end.minus(occurrence.instant)) == 0.0 and len(segment.s) > 1:

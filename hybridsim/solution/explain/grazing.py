@@ -23,7 +23,7 @@ def grazed(solution: Solution, occurrence: Occurrence) -> tuple[GuardView, ...]:
     system, x = solution._system, occurrence.x_minus
     c = next(k for k, a in enumerate(system.automata) if a.name == occurrence.component)
     automaton = system.automata[c]
-    last = int(np.searchsorted(solution._starts, float(occurrence.instant), side="right"))
+    last = int(np.searchsorted(solution._of_model.frame.starts, float(occurrence.instant), side="right"))
     for k in range(last - 1, max(last - 4, -1), -1):
         segment = solution._segments[k]
         mode = int(segment.z[c])

@@ -31,7 +31,7 @@ def way_of_monitor(solution: Solution, event: Event, occurrence: Occurrence) -> 
 
 def _side_after(solution: Solution, occurrence: Occurrence) -> int | None:
     """Return the side of a monitor just after an instant; None if no motion is known there."""
-    last = int(np.searchsorted(solution._starts, float(occurrence.instant), side="right")) - 1
+    last = int(np.searchsorted(solution._of_model.frame.starts, float(occurrence.instant), side="right")) - 1
     if last < 0:
         return None
     system, segment = solution._system, solution._segments[last]

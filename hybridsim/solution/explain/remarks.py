@@ -142,7 +142,7 @@ def _trees(model: Model, occurrence: Occurrence) -> Iterator[ast.expr]:
 def _loads(solution: Solution, t: float) -> Iterator[str]:
     """Describe the contacts whose normal load reaches, leaves or touches zero at an instant."""
     times = sorted(
-        {solution.t_start, solution.t_end, *(float(o.instant) for o in solution._trajectory.occurrences)}
+        {solution.t_start, solution.t_end, *(float(o.instant) for o in solution._of_model.record.occurrences)}
     )
     k = times.index(t)
     if not 0 < k < len(times) - 1:
@@ -179,7 +179,7 @@ def _load(solution: Solution, contact: Contact, t: float) -> float | None:
 
 def _modes_after(solution: Solution, t: float) -> np.ndarray:
     """Return the modes of all components just after an instant."""
-    index, _ = solution._segment_at(np.array([t]), "+")
+    index, _ = solution._of_model.segment_at(np.array([t]), "+")
     return np.maximum(solution._segments[int(index[0])].z, 0)
 
 

@@ -56,7 +56,7 @@ def _stored(solution: Solution) -> dict[str, np.ndarray]:
     from hybridsim import __version__
     from hybridsim.solution.block_arrays import taken_apart
 
-    run, trajectory = solution._run, solution._trajectory
+    run, trajectory = solution._run, solution._of_model.record
     task, counters = run.task, trajectory.counters
     arrays: dict[str, np.ndarray] = {
         "x0": task.x0,
@@ -97,7 +97,7 @@ def _stored(solution: Solution) -> dict[str, np.ndarray]:
         "warnings": trajectory.warnings,
         "warnings_there": trajectory.warnings_there,
         "counters": asdict(counters),
-        "cost": list(solution._cost),
+        "cost": list(solution._of_model.cost),
     }
     if checkpoint is not None:
         arrays |= {f"checkpoint/{name}": array for name, array in checkpoint.arrays.items()}
@@ -185,6 +185,7 @@ def _put_together(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Solu
     from hybridsim.engine.record.trajectory import Trajectory
     from hybridsim.engine.system.instant import Instant
     from hybridsim.solution.block_arrays import put_together
+    from hybridsim.solution.model_trajectory import ModelTrajectory
     from hybridsim.solution.solution import Solution
 
     check_header(header)
@@ -211,7 +212,7 @@ def _put_together(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Solu
         noted, span = header["checkpoint"], (run.task.t0, run.task.t1)
         check_checkpoint(noted, _below(arrays, "checkpoint/"), run.system, span)
         trajectory.checkpoint = _checkpoint(noted, arrays)
-    return Solution(run, trajectory, *header["cost"])
+    return Solution(ModelTrajectory(run, trajectory, *header["cost"]))
 
 
 def _run(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Run:

@@ -11,7 +11,7 @@ from hybridsim.model.checks.units import time_unit, units_of
 from hybridsim.presentation.tables import Table
 
 if TYPE_CHECKING:
-    from hybridsim.solution.solution import Solution
+    from hybridsim.solution.model_trajectory import ModelTrajectory
 
 MOST_POINTS = 1 << 27  # rows per column: one gigabyte
 
@@ -21,25 +21,25 @@ def equal_steps(t0: float, t1: float, points: int) -> np.ndarray:
     return np.linspace(t0, t1, whole_number(points, "points", 2, MOST_POINTS))
 
 
-def tabulated(solution: Solution, points: int | None) -> Table:
-    """Return the table of a solution; see `Solution.table`."""
-    model, own_steps = solution.model, points is None and solution._grid is None
-    if own_steps:
-        t, ends = solution.t, np.cumsum([len(g.s) for g in solution._segments], dtype=int)
-        x = solution.y.T
+def tabulated(trajectory: ModelTrajectory, times: np.ndarray | None) -> Table:
+    """Return the table of a run of a `Model`, at its own steps or at other times; see `Solution.table`."""
+    model = trajectory.model
+    if times is None:
+        t, ends = trajectory.own_times, np.cumsum([len(g.s) for g in trajectory.segments], dtype=int)
+        x = trajectory.own_states.T
         parts = [
-            (g, np.arange(end - len(g.s), end), g.s) for g, end in zip(solution._segments, ends, strict=True)
+            (g, np.arange(end - len(g.s), end), g.s) for g, end in zip(trajectory.segments, ends, strict=True)
         ]
     else:
-        t = solution.t if points is None else equal_steps(solution.t_start, solution.t_end, points)
-        x, parts = solution._by_segment(t, "+") if len(t) else (np.zeros((0, len(solution.names))), [])
+        t = times
+        x, parts = trajectory.by_segment(t, "+") if len(t) else (np.zeros((0, len(trajectory.names))), [])
     names = [d.name for d in model.discrete]
-    names += [q for q in solution._system.quantities if " in " not in q]
-    columns = {name: np.empty(len(t)) for name in (*solution.names, *names)}
-    declared = solution._system.declared
+    names += [q for q in trajectory.system.quantities if " in " not in q]
+    columns = {name: np.empty(len(t)) for name in (*trajectory.names, *names)}
+    declared = trajectory.system.declared
     numbers = np.empty((len(declared), len(t)), dtype=np.int64)
     for segment, chosen, s in parts:
-        found = solution._quantities(names, segment, s, x[chosen])
+        found = trajectory.values_in(names, segment, s, x[chosen])
         for name, values in zip(columns, (*x[chosen].T, *found), strict=True):
             columns[name][chosen] = values
         numbers[:, chosen] = segment.z[: len(declared), None]
@@ -51,7 +51,7 @@ def tabulated(solution: Solution, points: int | None) -> Table:
         {
             "model": model.name,
             "title": model.title,
-            "integrator": solution.integrator,
-            "status": solution.status,
+            "integrator": trajectory.integrator,
+            "status": trajectory.status,
         },
     )

@@ -110,17 +110,17 @@ def run(request: pytest.FixtureRequest) -> hs.Solution:
 
 
 def test_compiled_calls_leave_blocks(run: hs.Solution) -> None:
-    kinds = {type(block) for block in run._trajectory.segments.blocks}
+    kinds = {type(block) for block in run._of_model.record.segments.blocks}
     assert any(issubclass(kind, SeriesBlock) for kind in kinds)
-    assert (SegmentList in kinds) == (run.model.name == "stirred") or len(run._trajectory.segments) > 1
+    assert (SegmentList in kinds) == (run.model.name == "stirred") or len(run._of_model.record.segments) > 1
 
 
 def test_segments_follow_each_other(run: hs.Solution) -> None:
     """Each begins where the one before it ended, in time and, but for resets, in state."""
-    segments = run._trajectory.segments
+    segments = run._of_model.record.segments
     for a, b in pairwise(segments):
         assert abs(b.start.minus(a.end)) <= 4 * math.ulp(float(b.start))
-    times = [float(e.instant) for e in run._trajectory.occurrences]
+    times = [float(e.instant) for e in run._of_model.record.occurrences]
     assert times == sorted(times)
     assert len(times) == len(run.events) > 10
 
@@ -128,7 +128,7 @@ def test_segments_follow_each_other(run: hs.Solution) -> None:
 def test_a_segment_and_its_block_agree(run: hs.Solution) -> None:
     """States at random places: by the object, by the block, by the solution."""
     draw = np.random.default_rng(1)
-    segments = run._trajectory.segments
+    segments = run._of_model.record.segments
     index = np.sort(draw.integers(0, len(segments), 400))
     spans = segments.spans()[index]
     s = spans[:, 0] + draw.uniform(size=400) * (spans[:, 1] - spans[:, 0])
@@ -140,7 +140,7 @@ def test_a_segment_and_its_block_agree(run: hs.Solution) -> None:
         assert (np.abs(alone - together[chosen]) <= 1e-14 * size).all()
     high, low = segments.origins()[index].T
     t = high + (s + low)
-    inside = (t > run._starts[index]) & (t < run._ends[index])
+    inside = (t > run._of_model.frame.starts[index]) & (t < run._of_model.frame.ends[index])
     slopes = (
         1e-15
         * np.abs(t)
@@ -152,7 +152,7 @@ def test_a_segment_and_its_block_agree(run: hs.Solution) -> None:
 
 
 def test_knots_are_those_of_the_segments(run: hs.Solution) -> None:
-    segments = run._trajectory.segments
+    segments = run._of_model.record.segments
     index, s, x = segments.knots()
     assert index.tolist() == [i for i, g in enumerate(segments) for _ in g.s]
     assert s.tolist() == [value for g in segments for value in g.s]
@@ -178,7 +178,7 @@ def test_held_states_are_exact(run: hs.Solution) -> None:
 
 
 def test_the_rest_of_a_block(run: hs.Solution) -> None:
-    for block in run._trajectory.segments.blocks:
+    for block in run._of_model.record.segments.blocks:
         for first in {0, len(block) // 2, len(block) - 1}:
             rest = block.since(first)
             assert len(rest) == len(block) - first
@@ -190,7 +190,7 @@ def test_the_rest_of_a_block(run: hs.Solution) -> None:
 
 def test_events_out_of_arrays(run: hs.Solution) -> None:
     """Counted, one by one, in a row, by component: always the same."""
-    for block in run._trajectory.occurrences.blocks:
+    for block in run._of_model.record.occurrences.blocks:
         if not isinstance(block, EventBlock):
             continue
         every = list(block)

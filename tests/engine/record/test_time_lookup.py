@@ -51,7 +51,7 @@ def test_states_at_many_times_are_those_at_each(integrator: str) -> None:
     together = sol(times)
     for k in rng.permutation(len(times))[:200].tolist():
         np.testing.assert_array_equal(together[:, k], sol(times[k]))
-    index, s = sol._segment_at(times, "+")
+    index, s = sol._of_model.segment_at(times, "+")
     for i, segment in enumerate(sol._segments):
         inside = (index == i) & (s > segment.s[0]) & (s < segment.s[-1])
         np.testing.assert_allclose(together.T[inside], segment.dense(s[inside]), rtol=0, atol=1e-15)

@@ -216,6 +216,9 @@ def test_a_segment_of_more_steps_than_there_is_room_for(
     cramped = hs.simulate(hs.Model("cramped", states=states), (0, 200), integrator=integrator, rtol=1e-12)
     assert cramped.stats["steps"] == pytest.approx(whole.stats["steps"], rel=0.02)
     assert cramped(200.0) == pytest.approx(whole(200.0), abs=1e-9)
-    kinds = {type(b).__name__ for b in cramped._trajectory.segments.blocks}
+    kinds = {type(b).__name__ for b in cramped._of_model.record.segments.blocks}
     assert kinds in ({"SeriesBlock"}, {"HermiteBlock"})
-    assert len(cramped._trajectory.segments.blocks) >= whole.stats["steps"] // compiled_loop.MIN_STEPS_IN_PART
+    assert (
+        len(cramped._of_model.record.segments.blocks)
+        >= whole.stats["steps"] // compiled_loop.MIN_STEPS_IN_PART
+    )

@@ -1,0 +1,35 @@
+"""This module keeps the former names of the results of mechanical systems, whose class is `Solution`.
+
+They are deprecated and will go in version 0.2.
+"""
+
+from __future__ import annotations
+
+from abc import ABCMeta
+from typing import TYPE_CHECKING, ClassVar
+
+from hybridsim.mechanics.series_loop.series_trajectory import SeriesTrajectory
+from hybridsim.mechanics.time_stepping.stepped_trajectory import SteppedTrajectory
+from hybridsim.solution.solution import Solution
+
+if TYPE_CHECKING:
+    MechanicalSolution = SteppedSolution = Solution
+else:
+
+    class _Former(ABCMeta):
+        """The class of a former name, of which those solutions are instances that once had it."""
+
+        trajectory: ClassVar[type]
+
+        def __instancecheck__(cls, instance: object) -> bool:
+            return isinstance(instance, Solution) and isinstance(instance._trajectory, cls.trajectory)
+
+    class MechanicalSolution(Solution, metaclass=_Former):
+        """The former name of a `Solution` of a `MechanicalSystem` by ``taylor``."""
+
+        trajectory = SeriesTrajectory
+
+    class SteppedSolution(Solution, metaclass=_Former):
+        """The former name of a `Solution` of a `MechanicalSystem` by ``moreau``."""
+
+        trajectory = SteppedTrajectory

@@ -1,0 +1,300 @@
+"""This module reads the answers of a solution from the record of a run of a `Model`."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.engine.record.time_lookup import Frame, locate_times
+from hybridsim.solution.by_name import ByName
+from hybridsim.solution.event import Event, ModeInterval
+
+if TYPE_CHECKING:
+    from hybridsim.engine.record.block_list import SegmentBlockList
+    from hybridsim.engine.record.segments import Segment
+    from hybridsim.engine.record.trajectory import Trajectory
+    from hybridsim.model.parts.component import Component
+    from hybridsim.presentation.tables import Table
+    from hybridsim.solution.run import Run
+
+
+def relative_velocity(contact: str) -> str:
+    """Return the name under which `Solution.output` gives the relative velocity of a contact."""
+    return f"v_rel({contact})"
+
+
+class ModelTrajectory:
+    """The trajectory of a run of a `Model`; see `hybridsim.solution.run_trajectory.RunTrajectory`."""
+
+    work = None
+
+    def __init__(self, run: Run, record: Trajectory, wall_time: float, compile_time: float) -> None:
+        self.model, self.integrator = run.model, run.method.name
+        self.run, self.system, self.record = run, run.system, record
+        self.grid, self.save, self.reason = run.grid, run.save, run.reason
+        self.cost = (wall_time, compile_time)
+
+    # -- times and states -----------------------------------------------------------------------------------
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Return the names of the states."""
+        return self.system.names
+
+    @property
+    def segments(self) -> SegmentBlockList:
+        """Return the stored segments."""
+        return self.record.segments
+
+    @property
+    def has_states(self) -> bool:
+        """Return whether there is a segment."""
+        return bool(self.segments)
+
+    @property
+    def t_start(self) -> float:
+        """Return the first time of the run, or of its stored part."""
+        whole = self.save in ("all", "events", "nothing") or not self.segments
+        return self.run.task.t0 if whole else float(self.frame.starts[0])
+
+    @property
+    def t_end(self) -> float:
+        """Return the last time that the run reached."""
+        if self.status == "finished":
+            return self.run.task.t1
+        return float(self.segments[-1].end) if self.segments else self.run.task.t0
+
+    @cached_property
+    def frame(self) -> Frame:
+        """Return the times of all segments."""
+        return Frame.of(self.segments.origins(), self.segments.spans(), self.t_end)
+
+    @cached_property
+    def _knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        return self.segments.knots()
+
+    @property
+    def own_times(self) -> np.ndarray:
+        """Return the steps (m,), with every event time twice."""
+        (index, s, _), (starts, ends, origins, _) = self._knots, self.frame
+        times = origins[index, 0] + (s + origins[index, 1])
+        counts = np.bincount(index, minlength=len(starts))
+        last = np.cumsum(counts) - 1
+        times[last - counts + 1], times[last] = starts, ends  # s is rounded there
+        return times
+
+    @property
+    def own_states(self) -> np.ndarray:
+        """Return the states (n, m) at the steps."""
+        return self._knots[2].T
+
+    @property
+    def x_end(self) -> np.ndarray:
+        """Return the states (n,) at the end."""
+        return self.segments[-1].x[-1].copy() if self.segments else self.run.task.x0.copy()
+
+    def segment_at(self, times: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return the number of the segment that holds each time, and the local time in it."""
+        sign = 1.0 if self.t_end >= self.t_start else -1.0
+        # Right-continuous in time: at an event time take the later segment forward, the earlier one backward.
+        later = (side == "+") == (sign > 0)
+        index, s = np.empty(len(times), dtype=np.int64), np.empty(len(times))
+        locate_times(np.ascontiguousarray(times), *self.frame, sign, later, index, s)
+        return index, s
+
+    def states(self, times: np.ndarray, side: str) -> np.ndarray:
+        """Return states (k, n)."""
+        return self.segments.states(*self.segment_at(times, side))
+
+    def by_segment(
+        self, times: np.ndarray, side: str
+    ) -> tuple[np.ndarray, list[tuple[Segment, np.ndarray, np.ndarray]]]:
+        """Return states (k, n) at some times, and (segment, indices, local times) for each segment."""
+        index, s = self.segment_at(times, side)
+        parts = [(i, np.flatnonzero(index == i)) for i in np.unique(index)]
+        by_segment = [(self.segments[int(i)], chosen, s[chosen]) for i, chosen in parts]
+        return self.segments.states(index, s), by_segment
+
+    # -- quantities -----------------------------------------------------------------------------------------
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """Return the names of outputs, inputs and definitions, discrete states and relative velocities."""
+        common = (q for q in self.system.quantities if " in " not in q)
+        return (*common, *(d.name for d in self.model.discrete), *self._velocities)
+
+    @cached_property
+    def _velocities(self) -> dict[str, int]:
+        """The relative velocities of contacts by name, each with its index among the surfaces."""
+        contacts = {contact.name for contact in self.model.contacts}
+        components = [self.system.automata[c].name for c in self.system.surface_of]
+        return {relative_velocity(name): k for k, name in enumerate(components) if name in contacts}
+
+    def own_values(self, name: str) -> np.ndarray:
+        """Return a quantity at the steps."""
+        parts = [self._value(name, g, g.s, g.x) for g in self.segments]
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    def values(self, name: str, times: np.ndarray, side: str) -> np.ndarray:
+        """Return a quantity (k,)."""
+        out = np.empty(len(times))
+        x, by_segment = self.by_segment(times, side)
+        for segment, chosen, s in by_segment:
+            out[chosen] = self._value(name, segment, s, x[chosen])
+        return out
+
+    def _value(self, name: str, segment: Segment, s: np.ndarray, x: np.ndarray) -> np.ndarray:
+        if name in self.names:
+            return x[:, self.names.index(name)]
+        if name in self._velocities:
+            system = self.system
+            rows = system.rows("surfaces", len(system.surface_of), s, x, segment.p, segment.z)
+            return rows[:, self._velocities[name]]
+        return self.values_in([name], segment, s, x)[0]
+
+    def values_in(
+        self, names: Sequence[str], segment: Segment, s: np.ndarray, x: np.ndarray
+    ) -> list[np.ndarray]:
+        """Return discrete states and other quantities that are not states, at points of a segment."""
+        system = self.system
+        discrete = [d.name for d in self.model.discrete]
+        known = system.quantities
+        values = np.zeros((len(s), 0))
+        if any(name not in discrete for name in names):
+            values = system.rows("quantities", len(known), s, np.ascontiguousarray(x), segment.p, segment.z)
+        modes = [f"{a.name}.{a.modes[m]}" for a, m in zip(system.automata, segment.z, strict=True)]
+        found = []
+        for name in names:
+            if name in discrete:
+                found.append(np.full(len(s), segment.p[system.layout.discrete_at + discrete.index(name)]))
+                continue
+            special = [f"{name} in {mode}" for mode in modes if f"{name} in {mode}" in known]
+            found.append(values[:, known.index(special[-1] if special else name)])
+        return found
+
+    def table(self, times: np.ndarray | None) -> Table:
+        """Return states, quantities and modes as columns."""
+        from hybridsim.solution.files.tabulated import tabulated
+
+        return tabulated(self, times)
+
+    # -- events and modes -----------------------------------------------------------------------------------
+
+    @property
+    def components(self) -> tuple[Component, ...]:
+        """Return the components of the model, and those for jumps in its rates."""
+        return tuple(self.system.model.all_components()[: len(self.system.declared)])
+
+    @property
+    def event_names(self) -> Sequence[str]:
+        """Return the names of components, monitors and schedules."""
+        return self.system.event_names
+
+    @cached_property
+    def _happened(self) -> tuple[Event, ...]:
+        return tuple(Event(float(o.instant), *o[1:]) for o in self.record.occurrences)
+
+    @cached_property
+    def events(self) -> tuple[Event, ...]:
+        """Return all events but the corners."""
+        return tuple(event for event in self._happened if event.kind != "corner")
+
+    @property
+    def corners(self) -> tuple[Event, ...]:
+        """Return the instants at which a corner changed its side."""
+        return tuple(event for event in self._happened if event.kind == "corner")
+
+    def event_times(self, component: str, kind: str | None) -> np.ndarray:
+        """Return times (m,)."""
+        found = [block.times_of(component, kind) for block in self.record.occurrences.blocks]
+        return found[0] if len(found) == 1 else np.concatenate([np.empty(0), *found])
+
+    def event_states(self, component: str, kind: str | None, side: str) -> np.ndarray:
+        """Return states (m, n)."""
+        blocks: list[Any] = self.record.occurrences.blocks
+        found = [block.states_of(component, kind, "-+".index(side)) for block in blocks]
+        if len(found) == 1 and len(found[0]):
+            return found[0]
+        return np.concatenate([np.empty((0, self.system.n)), *(states for states in found if len(states))])
+
+    @cached_property
+    def modes(self) -> dict[str, tuple[ModeInterval, ...]]:
+        """Return the modes of each component."""
+        if self.save == "events":
+            return self._modes_of_events()
+        numbers, (starts, ends, *_) = self.segments.modes(), self.frame
+        result = ByName[tuple[ModeInterval, ...]]()
+        for c, automaton in enumerate(self.system.declared):
+            changed = np.flatnonzero(np.diff(numbers[:, c])) + 1
+            first = np.concatenate([[0], changed]) if len(numbers) else changed
+            last = np.append(changed, len(numbers))[: len(first)] - 1
+            names = [automaton.modes[m] for m in numbers[first, c].tolist()]
+            intervals = zip(names, starts[first].tolist(), ends[last].tolist(), strict=True)
+            result[automaton.name] = tuple(ModeInterval(*interval) for interval in intervals)
+        return result
+
+    def _modes_of_events(self) -> dict[str, tuple[ModeInterval, ...]]:
+        result = ByName[tuple[ModeInterval, ...]]()
+        for automaton, last in zip(self.system.declared, self.segments.modes()[-1].tolist(), strict=False):
+            changes = [e for e in self.events if e.component == automaton.name and e.source != e.target]
+            times = [self.t_start, *(e.t for e in changes), self.t_end]
+            names = [*(e.source for e in changes), automaton.modes[last]]
+            intervals = zip(names, times[:-1], times[1:], strict=True)
+            result[automaton.name] = tuple(
+                ModeInterval(n, a, b) for n, a, b in intervals if a != b or b == times[-1]
+            )
+        return result
+
+    # -- how the run ended ----------------------------------------------------------------------------------
+
+    @property
+    def status(self) -> str:
+        """Return how the run ended."""
+        return self.record.status
+
+    @property
+    def message(self) -> str:
+        """Return one sentence about how the run ended."""
+        why = f", chosen because {self.reason}" if self.reason else ""
+        how = " backward in time" if self.t_end < self.t_start else ""
+        if taken_over := self.record.taken_over:
+            why += (
+                f"; from t = {taken_over[1]:.9g} on with {taken_over[0]}, because stability, not accuracy, limited its "
+                "steps"
+            )
+        return self.record.message or f"reached t = {self.t_end!r}{how} with {self.integrator}{why}"
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Return the warnings of the run."""
+        return tuple(f"{m} ({n} times)" if n > 1 else m for m, n in self.record.warnings.items())
+
+    @property
+    def stats(self) -> dict[str, float]:
+        """Return the cost summed over all restarts."""
+        return {**vars(self.record.counters), "wall_time": self.cost[0], "compile_time": self.cost[1]}
+
+    def kinds(self) -> Counter[str]:
+        """Count the events of each kind, including corners, without creating event objects."""
+        found: Counter[str] = Counter()
+        for block in self.record.occurrences.blocks:
+            found += block.kinds()
+        return found
+
+    def summary(self) -> list[str]:
+        """Return the end state, the events by kind, and the cost."""
+        counted = ", ".join(f"{n} {kind}" for kind, n in sorted(self.kinds().items())) or "none"
+        lines, stats = [], self.stats
+        if self.segments:
+            last = self.segments[-1].x[-1]
+            final = ", ".join(f"{n} = {v:.9g}" for n, v in zip(self.names, last, strict=True))
+            lines.append(f"  t from {self.t_start:.9g} to {self.t_end:.9g}; at the end {final}")
+        return [
+            *lines,
+            f"  events: {'not kept' if self.save == 'nothing' else counted}",
+            f"  cost: {stats['steps']} steps, {stats['rhs_evaluations']} right-hand sides, {stats['wall_time']:.3g} s",
+        ]

@@ -1,0 +1,80 @@
+"""This module defines what a solution reads its answers from: one implementation for each kind of run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from hybridsim.presentation.tables import Table
+    from hybridsim.solution.event import Event, ModeInterval
+
+
+class RunTrajectory(Protocol):
+    """The trajectory of a run; `hybridsim.solution.solution.Solution` checks the arguments of every method."""
+
+    model: Any  # the Model or MechanicalSystem
+    integrator: str
+    save: str | float  # the stored part of the run, as in `simulate`
+    grid: np.ndarray | None  # requested times of the solution
+    reason: str  # why "auto" chose the integrator
+
+    @property
+    def names(self) -> tuple[str, ...]: ...  # states, in the order of rows of y
+    @property
+    def quantities(self) -> tuple[str, ...]: ...  # what `values` knows in addition to the states
+    @property
+    def components(self) -> Sequence[Any]: ...  # named objects, those of `modes`
+    @property
+    def event_names(self) -> Sequence[str]: ...  # what `event_times` knows
+    @property
+    def t_start(self) -> float: ...
+    @property
+    def t_end(self) -> float: ...
+    @property
+    def has_states(self) -> bool: ...  # whether anything was computed
+    @property
+    def own_times(self) -> np.ndarray: ...  # (m,), event times twice
+    @property
+    def own_states(self) -> np.ndarray: ...  # (n, m) at `own_times`
+    @property
+    def x_end(self) -> np.ndarray: ...  # (n,)
+    @property
+    def events(self) -> Sequence[Event]: ...
+    @property
+    def corners(self) -> tuple[Event, ...]: ...
+    @property
+    def modes(self) -> dict[str, tuple[ModeInterval, ...]]: ...
+    @property
+    def status(self) -> str: ...
+    @property
+    def message(self) -> str: ...
+    @property
+    def warnings(self) -> tuple[str, ...]: ...
+    @property
+    def stats(self) -> dict[str, float]: ...
+    @property
+    def work(self) -> dict[str, float] | None: ...  # energy by source; None if the run did not measure it
+
+    def states(self, times: np.ndarray, side: str) -> np.ndarray:
+        """Return states (k, n) at times (k,), just after ("+") or before ("-") events."""
+
+    def values(self, name: str, times: np.ndarray, side: str) -> np.ndarray:
+        """Return a state or a quantity (k,) at times (k,)."""
+
+    def own_values(self, name: str) -> np.ndarray:
+        """Return a state or a quantity (m,) at `own_times`."""
+
+    def event_times(self, component: str, kind: str | None) -> np.ndarray:
+        """Return the times (m,) of the events of a component."""
+
+    def event_states(self, component: str, kind: str | None, side: str) -> np.ndarray:
+        """Return the states (m, n) at these events, in a new array."""
+
+    def table(self, times: np.ndarray | None) -> Table:
+        """Return states, quantities and modes at these times, or at `own_times`."""
+
+    def summary(self) -> list[str]:
+        """Return the lines of a summary between the message and the warnings."""
