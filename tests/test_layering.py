@@ -54,6 +54,7 @@ HANDED_ON = {
     "reference.multiple_precision.reading",
     "engine.lowering.lower",
     "engine.events.resolve",
+    "solution.model_trajectory",
     "solution.solution",
     "solution.run",
     "analysis.compare.comparison",

@@ -12,6 +12,7 @@ import numpy as np
 from hybridsim.engine.record.time_lookup import Frame, locate_times
 from hybridsim.solution.by_name import ByName
 from hybridsim.solution.event import Event, ModeInterval
+from hybridsim.solution.files.tabulated import tabulated
 
 if TYPE_CHECKING:
     from hybridsim.engine.record.block_list import SegmentBlockList
@@ -178,8 +179,6 @@ class ModelTrajectory:
 
     def table(self, times: np.ndarray | None) -> Table:
         """Return states, quantities and modes as columns."""
-        from hybridsim.solution.files.tabulated import tabulated
-
         return tabulated(self, times)
 
     # -- events and modes -----------------------------------------------------------------------------------
