@@ -66,7 +66,7 @@ FUNCTIONS = {
     "engine/run/event_loop.py::event_loop": 232,
     "integrators/closed_form/segments.py::linear_event_loop": 101,
     "integrators/runge_kutta/segments.py::rk_event_loop": 232,
-    "mechanics/simulate.py::simulate_mechanical": 88,
+    "mechanics/simulate.py::simulate_mechanical": 86,
     "testing/catalogue/coincidences.py::scenes": 105,
     "testing/catalogue/events.py::monitored": 120,
 }

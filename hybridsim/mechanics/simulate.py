@@ -11,10 +11,11 @@ import numpy as np
 
 from hybridsim import arguments
 from hybridsim.errors import UsageError, nearest
+from hybridsim.mechanics.series_loop.series_trajectory import SeriesTrajectory
+from hybridsim.solution.solution import Solution
 
 if TYPE_CHECKING:
     from hybridsim.mechanics.declaration.system import MechanicalSystem
-    from hybridsim.solution import Solution
 
 # Arguments of `simulate` that are not supported here, with the alternatives.
 _OF_MODELS = {
@@ -55,8 +56,6 @@ def simulate_mechanical(
     from hybridsim.integrators.registry import integrator_class, keyword_elsewhere
     from hybridsim.mechanics.series_loop.mechanical_arrays import build
     from hybridsim.mechanics.series_loop.run import MechanicalRun
-    from hybridsim.mechanics.series_loop.series_trajectory import SeriesTrajectory
-    from hybridsim.solution.solution import Solution
 
     name = arguments.integrator_name(integrator)
     if name not in ("auto", "taylor", "moreau"):
@@ -114,14 +113,14 @@ def simulate_mechanical(
         built_in = time.perf_counter() - began
         stepped.go(callback)
         built_in += stepped.compile_time
-        wall_time = time.perf_counter() - began - built_in
-        return Solution(SteppedTrajectory(stepped, grid, str(save), (wall_time, built_in)))
+        cost = (time.perf_counter() - began - built_in, built_in)
+        return Solution(SteppedTrajectory(stepped, grid, str(save), cost))
     run = MechanicalRun(build(system), span, start, relative, absolute, longest, save == "all", most)
     built_in = time.perf_counter() - began
     run.go(callback)
     built_in += run.compile_time
-    wall_time = time.perf_counter() - began - built_in
-    return Solution(SeriesTrajectory(system, run, grid, str(save), (wall_time, built_in)))
+    cost = (time.perf_counter() - began - built_in, built_in)
+    return Solution(SeriesTrajectory(system, run, grid, str(save), cost))
 
 
 def _start(system: MechanicalSystem, x0: Any) -> np.ndarray:
