@@ -90,7 +90,7 @@ __all__ = ["__version__", *_HOME]
 
 
 class _Package(ModuleType):
-    """A package in which submodules do not replace the public names of the same name.
+    """A module type whose submodules do not hide public names that are spelled like them.
 
     The import system binds every submodule to its package on first import, so that after
     `import hybridsim.simulate` anywhere, `hs.simulate` would be the module and not the function.

@@ -1,4 +1,4 @@
-"""Check the arguments of `simulate`; every error names the argument, its value and the remedy."""
+"""This module checks the arguments of `simulate`; errors name the argument, its value and the remedy."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ RTOL = 1e-9
 
 
 def without_a_name(value: Any) -> UsageError:
-    """Return the error for a positional argument after t_span, such as y0 in SciPy's solve_ivp."""
+    """Return the error for a positional argument after `t_span`, such as `y0` in SciPy's `solve_ivp`."""
     shown = repr(value)
     if isinstance(value, Mapping):
         remedy = f"pass params={shown} for parameters, or x0={shown} for initial values"
@@ -36,16 +36,21 @@ def without_a_name(value: Any) -> UsageError:
     return UsageError(f"simulate() accepts {shown} only as a keyword argument", remedy=remedy)
 
 
+def cannot_be(what: str, value: Any, remedy: str) -> UsageError:
+    """Return the error for a wrong value; `what` is the name of an argument, or a phrase that contains it."""
+    return UsageError(f"{f'`{what}`' if what.isidentifier() else what} cannot be {value!r}", remedy=remedy)
+
+
 def number(value: Any, what: str, remedy: str = "use a number") -> float:
-    """Return a real number as float; strings, bools, complex numbers and sequences raise an error."""
+    """Return a real number as float; other types raise an error."""
     found = as_real(value)
     if found is None:
-        raise UsageError(f"{what} cannot be {value!r}", remedy=remedy)
+        raise cannot_be(what, value, remedy)
     return found
 
 
 def as_real(value: Any) -> float | None:
-    """Return a real number as float, or None; NumPy would drop the imaginary part of a complex number."""
+    """Return a real number as float, or None for other types, including complex numbers."""
     if isinstance(value, str | bytes | bool | np.bool_ | complex | np.complexfloating) or is_row(value):
         return None
     if isinstance(value, np.ndarray) and value.dtype.kind not in "iufO":
@@ -60,7 +65,7 @@ def finite_number(value: Any, what: str) -> float:
     """Return a finite real number as float, or raise an error."""
     found = number(value, what, "use a finite number")
     if not math.isfinite(found):
-        raise UsageError(f"{what} cannot be {value!r}", remedy="use a finite number")
+        raise cannot_be(what, value, "use a finite number")
     return found
 
 
@@ -68,19 +73,19 @@ def whole_number(value: Any, what: str, least: int, most: int) -> int:
     """Return an integer within bounds; bools are rejected."""
     found = int(value) if isinstance(value, int | np.integer) and not isinstance(value, bool) else least - 1
     if not least <= found <= most:
-        raise UsageError(f"{what} cannot be {value!r}", remedy=f"use a whole number from {least} to {most}")
+        raise cannot_be(what, value, f"use a whole number from {least} to {most}")
     return found
 
 
 def text(value: Any, what: str) -> str:
     """Return a string, or raise an error."""
     if not isinstance(value, str):
-        raise UsageError(f"{what} cannot be {value!r}", remedy="use a name (a string)")
+        raise cannot_be(what, value, "use a name (a string)")
     return value
 
 
 def known_name(value: Any, known: Sequence[str], what: str, kind: str) -> str:
-    """Return a known name; the error message is `what`, such as "The run has no contact", and the name."""
+    """Return a name if it is known, or raise an error that begins with `what` ("The run has no contact")."""
     if not isinstance(value, str) or value not in known:
         raise UsageError(f"{what} {value!r}", remedy=nearest(str(value), known, kind=kind))
     return value
@@ -89,14 +94,14 @@ def known_name(value: Any, known: Sequence[str], what: str, kind: str) -> str:
 def flag(value: Any, what: str) -> bool:
     """Return a bool, or raise an error."""
     if not isinstance(value, bool | np.bool_):
-        raise UsageError(f"{what} cannot be {value!r}", remedy="use True or False")
+        raise cannot_be(what, value, "use True or False")
     return bool(value)
 
 
 def side_of_event(side: Any) -> str:
     """Return the requested side of an event, '-' or '+'."""
     if not (isinstance(side, str) and side in ("+", "-")):
-        raise UsageError(f"side cannot be {side!r}", remedy="use '-' (before the event) or '+' (after it)")
+        raise cannot_be("side", side, "use '-' (before the event) or '+' (after it)")
     return side
 
 
@@ -105,17 +110,17 @@ def real_array(value: Any, what: str, remedy: str) -> np.ndarray:
     try:
         found = np.asarray(value)
     except ValueError:  # rows of different lengths
-        raise UsageError(f"{what} cannot be {value!r}", remedy=remedy) from None
+        raise cannot_be(what, value, remedy) from None
     if found.dtype.kind == "O":
         items = [as_real(item) for item in found.flat]
         found = np.array([math.nan if item is None else item for item in items]).reshape(found.shape)
     if found.dtype.kind not in "iuf" or not np.isfinite(found).all():
-        raise UsageError(f"{what} cannot be {value!r}", remedy=remedy)
+        raise cannot_be(what, value, remedy)
     return found.astype(float)
 
 
 def is_row(value: Any) -> bool:
-    """Return whether a value is a sequence; strings, mappings and zero-dimensional arrays are not."""
+    """Return whether a value is a sequence, but not a string, a mapping or a zero-dimensional array."""
     if type(value) in (tuple, list):
         return True
     if isinstance(value, np.ndarray):
@@ -126,10 +131,10 @@ def is_row(value: Any) -> bool:
 def numbers(value: Any, what: str, remedy: str) -> np.ndarray:
     """Return a sequence of real numbers as a one-dimensional array."""
     if not is_row(value):
-        raise UsageError(f"{what} cannot be {value!r}", remedy=remedy)
+        raise cannot_be(what, value, remedy)
     if isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "iuf":
         return value.astype(float)
-    return np.array([number(item, f"a value of {what}", remedy) for item in value], dtype=float)
+    return np.array([number(item, f"a value of `{what}`", remedy) for item in value], dtype=float)
 
 
 def as_times(t: Any) -> np.ndarray:
@@ -138,27 +143,24 @@ def as_times(t: Any) -> np.ndarray:
     try:
         found = np.asarray(t)
     except ValueError:  # rows of different lengths
-        raise UsageError(f"t cannot be {t!r}", remedy=remedy) from None
+        raise cannot_be("t", t, remedy) from None
     if found.dtype.kind == "O" and found.ndim == 1:
         return numbers(found.tolist(), "t", remedy)
     if found.dtype.kind == "O" and found.ndim == 0:
         return np.array([number(t, "t", remedy)])
     if found.dtype.kind not in "iuf" or found.ndim > 1:
-        raise UsageError(f"t cannot be {t!r}", remedy=remedy)
+        raise cannot_be("t", t, remedy)
     return np.atleast_1d(found.astype(float, copy=False))
 
 
 def chosen_model(model: Any, params: Any) -> Model:
-    """Return the model itself, or load it by name or path, with changed parameters."""
+    """Return the model itself, or load it by name or path; `params` changes its parameters."""
     if not isinstance(model, Model):
         model = load(model)
     if params is None:
         return model
     if not isinstance(params, Mapping) or not all(isinstance(name, str) for name in params):
-        raise UsageError(
-            f"params cannot be {params!r}",
-            remedy="use a dict of parameter names and values, such as {'F0': 30.0}",
-        )
+        raise cannot_be("params", params, "use a dict of parameter names and values, such as {'F0': 30.0}")
     return model.with_(**params)
 
 
@@ -167,25 +169,25 @@ def time_span(t_span: Any) -> tuple[float, float]:
     remedy = "use two numbers, (t0, t1)"
     if is_row(t_span):
         t_span = t_span if isinstance(t_span, tuple | list | np.ndarray) else list(t_span)
-        remedy += "; pass output times as t_eval" if len(t_span) > 2 else ""
+        remedy += "; pass output times as `t_eval`" if len(t_span) > 2 else ""
     return two_numbers(t_span, "t_span", remedy, "; a monitor can end a run early")
 
 
 def two_numbers(value: Any, what: str, remedy: str, but: str = "") -> tuple[float, float]:
-    """Return two finite numbers; `but` completes the remedy for infinite ones."""
+    """Return two finite numbers; `but` is appended to the remedy for infinite numbers."""
     if not is_row(value):
-        raise UsageError(f"{what} cannot be {value!r}", remedy=remedy)
-    ends = [number(t, f"a value of {what}", remedy) for t in value]
+        raise cannot_be(what, value, remedy)
+    ends = [number(t, f"a value of `{what}`", remedy) for t in value]
     if len(ends) != 2:
         shown = repr(value) if len(ends) < 5 else f"{len(ends)} numbers from {ends[0]!r} to {ends[-1]!r}"
-        raise UsageError(f"{what} cannot be {shown}", remedy=remedy)
+        raise UsageError(f"`{what}` cannot be {shown}", remedy=remedy)
     if not all(map(math.isfinite, ends)):
-        raise UsageError(f"{what} cannot be {value!r}", remedy=f"use two finite numbers{but}")
+        raise cannot_be(what, value, f"use two finite numbers{but}")
     return ends[0], ends[1]
 
 
 def _states_in_order(name: str, states: list[str], discrete: list[str]) -> str:
-    """Return the remedy for an unknown state: similar names, or all states in their order."""
+    """Return the remedy for an unknown state: similar names, or all states in order."""
     remedy = nearest(name, states + discrete, kind="states")
     if "did you mean" in remedy or not states or len(states) > 12:
         return remedy
@@ -195,7 +197,7 @@ def _states_in_order(name: str, states: list[str], discrete: list[str]) -> str:
 
 
 def start_values(model: Model, x0: Any, what: str = "x0") -> tuple[dict[str, float], Model]:
-    """Return the initial values by name, and the model with new discrete states; `what` names the argument."""
+    """Return initial values by name, and the model with changed discrete states; `what` is the argument."""
     names = [s.name for s in model.states]
     if x0 is None:
         return {}, model
@@ -204,7 +206,7 @@ def start_values(model: Model, x0: Any, what: str = "x0") -> tuple[dict[str, flo
         values = numbers(x0, what, each)
         if len(values) != len(names):
             raise UsageError(
-                f"{what} has {len(values)} values, but model '{model.name}' has {len(names)} states "
+                f"`{what}` has {len(values)} values, but model '{model.name}' has {len(names)} states "
                 f"({', '.join(names)})",
                 remedy="use one value for each state, or a dict of names and values",
             )
@@ -214,14 +216,14 @@ def start_values(model: Model, x0: Any, what: str = "x0") -> tuple[dict[str, flo
     for name, value in x0.items():
         if name not in names + discrete:
             raise UsageError(
-                f"{what} contains {name!r}, which is not a state of model '{model.name}'",
+                f"`{what}` contains {name!r}, which is not a state of model '{model.name}'",
                 remedy=_states_in_order(str(name), names, discrete),
             )
         found[name] = number(
-            value, f"{what} of {name}", f"use a number; for an expression use model.with_start({name}=...)"
+            value, f"`{what}` of {name}", f"use a number; for an expression use model.with_start({name}=...)"
         )
         if not math.isfinite(found[name]):
-            raise UsageError(f"{what} of {name} cannot be {value!r}", remedy="use a finite number")
+            raise UsageError(f"`{what}` of {name} cannot be {value!r}", remedy="use a finite number")
     changed = {n: v for n, v in found.items() if n in discrete}
     return {n: v for n, v in found.items() if n in names}, model.with_start(**changed) if changed else model
 
@@ -229,14 +231,12 @@ def start_values(model: Model, x0: Any, what: str = "x0") -> tuple[dict[str, flo
 def integrator_name(integrator: Any) -> str:
     """Return the name of an integrator or "auto", or raise an error."""
     if not isinstance(integrator, str):
-        raise UsageError(
-            f"integrator cannot be {integrator!r}", remedy="use a name; hs.list_integrators() lists them"
-        )
+        raise cannot_be("integrator", integrator, "use a name; hs.list_integrators() lists them")
     return integrator
 
 
 def refuse_unused(method: Integrator, **tolerances: Any) -> None:
-    """Reject tolerances that a fixed-step method would ignore; None means not set."""
+    """Reject tolerances that a fixed-step method would ignore; None means that a tolerance was not set."""
     unused = [name for name, value in tolerances.items() if value is not None]
     if unused and "adaptive" in method.lacks:
         raise UsageError(
@@ -248,7 +248,7 @@ def refuse_unused(method: Integrator, **tolerances: Any) -> None:
 def callback(progress: Any) -> Any:
     """Return the progress function or None, or raise an error."""
     if progress is not None and not callable(progress):
-        raise UsageError(f"progress cannot be {progress!r}", remedy="use a function of the finished fraction")
+        raise cannot_be("progress", progress, "use a function of the finished fraction")
     return progress
 
 
@@ -257,15 +257,15 @@ def relative_tolerance(rtol: Any) -> float:
     remedy = f"use a number from {SMALLEST_RTOL!r} to below 1"
     value = RTOL if rtol is None else number(rtol, "rtol", remedy)
     if not (SMALLEST_RTOL <= value < 1.0):
-        raise UsageError(f"rtol cannot be {rtol!r}", remedy=remedy)
+        raise cannot_be("rtol", rtol, remedy)
     return value
 
 
 def step_bound(value: Any, name: str) -> float:
-    """Return a positive limit of the step size."""
+    """Return a limit of the step size as a positive number."""
     bound = number(value, name, "use a positive number")
     if not bound > 0.0:
-        raise UsageError(f"{name} cannot be {value!r}", remedy="use a positive number")
+        raise cannot_be(name, value, "use a positive number")
     return bound
 
 
@@ -279,10 +279,10 @@ def absolute_tolerances(model: Model, atol: Any, rtol: float, start: np.ndarray)
         for name, value in atol.items():
             if name not in names:
                 raise UsageError(
-                    f"atol contains {name!r}, which is not a state of model '{model.name}'",
+                    f"`atol` contains {name!r}, which is not a state of model '{model.name}'",
                     remedy=nearest(str(name), names, kind="states"),
                 )
-            values[names.index(name)] = number(value, f"atol of {name}")
+            values[names.index(name)] = number(value, f"`atol` of {name}")
     elif is_row(atol):
         values = numbers(atol, "atol", remedy)
     elif atol is None:
@@ -290,7 +290,7 @@ def absolute_tolerances(model: Model, atol: Any, rtol: float, start: np.ndarray)
     else:
         values[:] = number(atol, "atol", remedy)
     if values.shape != start.shape or not (np.isfinite(values).all() and (values >= 0).all()):
-        raise UsageError(f"atol cannot be {atol!r}", remedy=remedy)
+        raise cannot_be("atol", atol, remedy)
     return values
 
 
@@ -301,17 +301,17 @@ def initial_modes(system: System, z0: Any) -> np.ndarray:
         return z
     components = [a.name for a in system.declared]
     if not isinstance(z0, Mapping):
-        raise UsageError(f"z0 cannot be {z0!r}", remedy="use a dict of component names and mode names")
+        raise cannot_be("z0", z0, "use a dict of component names and mode names")
     for name, mode in z0.items():
         if name not in components:
             raise UsageError(
-                f"z0 contains {name!r}, which is not a component of model '{system.model.name}'",
+                f"`z0` contains {name!r}, which is not a component of model '{system.model.name}'",
                 remedy=nearest(str(name), components, kind="components"),
             )
         automaton = system.automata[components.index(name)]
         if mode not in automaton.modes:
             raise UsageError(
-                f"z0 of {name} is {mode!r}, which is not a mode of {name}",
+                f"`z0` of {name} is {mode!r}, which is not a mode of {name}",
                 remedy=nearest(str(mode), automaton.modes, kind="modes"),
             )
         z[components.index(name)] = automaton.modes.index(mode)
@@ -319,7 +319,7 @@ def initial_modes(system: System, z0: Any) -> np.ndarray:
 
 
 def retention_of(save: Any, system: System) -> Retention:
-    """Return the parts of the run to store, from a word or from a length of time before its end."""
+    """Return which parts of the run to store, from a word or from a length of time at its end."""
     from hybridsim.engine.record.retention import ALL, EVENTS, NOTHING, Retention
 
     retentions = {"all": ALL, "events": EVENTS, "nothing": NOTHING}
@@ -331,19 +331,19 @@ def retention_of(save: Any, system: System) -> Retention:
         length = system_period(system)
         if length is None:
             raise UsageError(
-                f"save is 'last-period', but model '{system.model.name}' has no forcing period",
+                f"`save` is 'last-period', but model '{system.model.name}' has no forcing period",
                 remedy="use a length of time: save=1.5 stores the last 1.5 units of t",
             )
         return Retention(length, length)
     remedy = "use 'all', 'events', 'last-period', 'nothing', or a length of time"
     length = number(save, "save", remedy)
     if not length > 0.0:
-        raise UsageError(f"save cannot be {save!r}", remedy=remedy)
+        raise cannot_be("save", save, remedy)
     return Retention(length, length)
 
 
 def run_limits(limits: Any) -> Limits:
-    """Return the limits of a run from a mapping."""
+    """Return the limits of the run from a dict of names and numbers."""
     from dataclasses import fields
 
     from hybridsim.engine.record.limits import UNLIMITED, Limits
@@ -352,41 +352,39 @@ def run_limits(limits: Any) -> Limits:
         return UNLIMITED
     names = [f.name for f in fields(Limits)]
     if not isinstance(limits, Mapping):
-        raise UsageError(
-            f"limits cannot be {limits!r}",
-            remedy=f"use a dict with the keys {', '.join(names)}, such as {{'events': 1000}}",
-        )
+        remedy = f"use a dict with the keys {', '.join(names)}, such as {{'events': 1000}}"
+        raise cannot_be("limits", limits, remedy)
     for name, value in limits.items():
         if name not in names:
             raise UsageError(f"Unknown limit {name!r}", remedy=nearest(str(name), names, kind="limits"))
-        if not number(value, f"limit of {name}") > 0.0:
-            raise UsageError(f"limit of {name} cannot be {value!r}", remedy="use a positive number")
+        if not number(value, f"the limit {name!r}") > 0.0:
+            raise UsageError(f"the limit {name!r} cannot be {value!r}", remedy="use a positive number")
     return Limits(**{name: float(value) for name, value in limits.items()})
 
 
 def time_grid(
     t_eval: Sequence[float] | None, span: tuple[float, float], retention: Retention, save: Any
 ) -> np.ndarray | None:
-    """Return the output times, which must lie in the stored part of the span."""
+    """Return the output times, which must lie in the stored part of the run."""
     if t_eval is None:
         return None
     if retention.segments is None:
         raise UsageError(
-            f"t_eval needs the states over time, which save={save!r} does not store",
-            remedy="remove t_eval, or use save='all'",
+            f"`t_eval` needs the states over time, which save={save!r} does not store",
+            remedy="remove `t_eval`, or use save='all'",
         )
     grid = numbers(t_eval, "t_eval", "use times from t0 to t1")
     low, high = min(span), max(span)
     if len(grid) and not (grid.min() >= low and grid.max() <= high):
         bad = float(grid[~((grid >= low) & (grid <= high))][0])
         raise UsageError(
-            f"t_eval contains {bad:.9g}, outside t_span ({span[0]:.9g}, {span[1]:.9g})",
+            f"`t_eval` contains {bad:.9g}, outside `t_span` ({span[0]:.9g}, {span[1]:.9g})",
             remedy="use times from t0 to t1",
         )
     if retention.segments < math.inf and (np.abs(span[1] - grid) > retention.segments).any():
         raise UsageError(
-            f"t_eval contains times before the last {retention.segments:.9g} of the run, which save={save!r} "
-            "does not store",
+            f"`t_eval` contains times before the last {retention.segments:.9g} of the run, which "
+            f"save={save!r} does not store",
             remedy="use later times, or save='all'",
         )
     return grid

@@ -1,4 +1,4 @@
-"""A decorator that turns wrong arguments of public functions into `UsageError`."""
+"""This module defines a decorator that turns wrong arguments of public functions into `UsageError`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The exception classes; each message states the error, its place (file, line, caret) and the remedy."""
+"""This module defines the exceptions; each message states the error, its place and the remedy."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ class Place:
     text: str | None = None
 
     def at(self, text: str, column: int | None = None) -> Place:
-        """Return the same file and line with another piece of text."""
+        """Return a place in the same file and line, with another piece of text."""
         return replace(self, text=text, column=column)
 
     @property
     def prefix(self) -> str:
-        """The head of a message, ``file:line:`` and a space, or an empty string if neither is known."""
+        """The start of a message, ``file:line:`` and a space; an empty string if both are unknown."""
         parts = [str(part) for part in (self.file, self.line if self.file else None) if part is not None]
         if not parts and self.line is not None:
             parts = [f"line {self.line}"]
@@ -57,7 +57,7 @@ class Place:
 
 
 class HybridsimError(Exception):
-    """Base class of all errors that hybridsim raises.
+    """The base class of all errors that hybridsim raises.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ class HybridsimError(Exception):
 
 
 class ModelError(HybridsimError):
-    """A faulty model; ``errors`` holds every error found, each with its place and remedy.
+    """An error in a model; ``errors`` holds every error found, each with its place and remedy.
 
     Parameters
     ----------
@@ -141,12 +141,12 @@ class ModelError(HybridsimError):
 
     @property
     def errors(self) -> tuple[ModelError, ...]:
-        """Every single error; this error alone if it contains no others."""
+        """Every single error; a one-element tuple with this error if it contains no others."""
         return self._errors or (self,)
 
     @classmethod
     def collect(cls, errors: Iterable[ModelError], title: str) -> ModelError:
-        """Combine errors: return a single one itself, or a list of all, by line, under a title."""
+        """Combine errors: return a single error itself, or one error with a title that lists all by line."""
         # errors with equal texts are reported once
         every = {str(single): single for error in errors for single in error.errors}
         found = sorted(every.values(), key=_line)
@@ -157,7 +157,7 @@ class ModelError(HybridsimError):
 
 
 class ExpressionError(ModelError):
-    """A text that is not a valid expression, or an expression without a value.
+    """An error in an expression: a text that cannot be parsed, or an expression that has no value.
 
     Examples
     --------
@@ -171,7 +171,7 @@ class ExpressionError(ModelError):
 
 
 class UsageError(HybridsimError, ValueError):
-    """A call or a command line with a wrong or unknown argument.
+    """An error in a call or a command line: a wrong or unknown argument.
 
     Examples
     --------
@@ -187,7 +187,7 @@ class UsageError(HybridsimError, ValueError):
 
 
 class SimulationError(HybridsimError):
-    """A computation that could not be carried out.
+    """Raised if a computation could not be carried out.
 
     Notes
     -----
@@ -206,7 +206,7 @@ class SimulationError(HybridsimError):
 
 
 class RunInterrupted(KeyboardInterrupt):
-    """A run stopped by Ctrl-C, or by KeyboardInterrupt from its progress function.
+    """Raised if a run was stopped by Ctrl-C, or by KeyboardInterrupt from its progress function.
 
     Like any KeyboardInterrupt it ends the loop or the script around the run.
 
@@ -230,7 +230,7 @@ def plain(text: str) -> str:
 
 
 def near(name: str, known: Iterable[str]) -> list[str]:
-    """Return up to three similar names: equal up to case, similar letters, or this name as a part."""
+    """Return up to three known names that are similar to a name, or contain it."""
     names = sorted(set(known))
     folded = [other for other in names if other.lower() == name.lower()]
     similar = difflib.get_close_matches(name, names, n=3, cutoff=0.6)
@@ -242,7 +242,7 @@ def near(name: str, known: Iterable[str]) -> list[str]:
 
 
 def nearest(name: str, known: Iterable[str], *, kind: str = "names") -> str:
-    """Return the remedy for an unknown name: similar names, or the list of known names."""
+    """Return the remedy for an unknown name: similar names, or a list of the known names."""
     names = sorted(set(known))
     close = near(name, names)
     if close:
@@ -258,12 +258,12 @@ def _line(error: HybridsimError) -> int:
 
 
 def printable(text: str) -> str:
-    """Replace control characters of a text, which could steer the terminal, by "?" or a blank."""
+    """Replace the control characters of a text, which could change the terminal, by "?" or a blank."""
     return "".join(c if c.isprintable() or c == "\n" else " " if c.isspace() else "?" for c in text)
 
 
 def _window(text: str, column: int | None, width: int = 100) -> tuple[str, int | None]:
-    """Shorten a long line to the part around the caret."""
+    """Shorten a long line to the part around the marked column."""
     if len(text) <= width:
         return text, column
     start = max(0, min((column or 0) - width // 2, len(text) - width))

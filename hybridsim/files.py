@@ -1,4 +1,4 @@
-"""Write files atomically: after an error the previous file is unchanged."""
+"""This module writes files atomically: if writing fails, the previous file is unchanged."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _LETTERS = 100  # leading characters of the name that a temporary name copies; f
 
 @contextmanager
 def whole_file(path: str | PathLike[str]) -> Iterator[str]:
-    """Yield a temporary path; after a successful block its file replaces `path`.
+    """Yield a temporary path; if the block succeeds, the file at this path replaces `path`.
 
     The temporary file has a unique name in the same folder. If two processes write the same file, the last complete
     file remains. A replaced file keeps its mode and owner, and before the replacement only this user can read the new
@@ -78,11 +78,11 @@ def _new_file(final: str, mode: int) -> str:
         with suppress(FileExistsError):
             os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, mode))
             return path
-    raise FileExistsError(errno.EEXIST, "no name for a temporary file is free")
+    raise FileExistsError(errno.EEXIST, "the folder has no unused name for a temporary file")
 
 
 def _dress(path: str, before: os.stat_result) -> None:
-    """Flush a file to the disk, and copy owner and mode of the file that it replaces."""
+    """Flush a file to the disk, and give it the owner and the mode of the file that it replaces."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -101,7 +101,7 @@ def _dress(path: str, before: os.stat_result) -> None:
 
 @contextmanager
 def held(path: str | PathLike[str], busy: str) -> Iterator[None]:
-    """Lock a file or folder during a block; other processes and threads get an error.
+    """Lock a file or folder during a block; other processes and threads that try to lock it get an error.
 
     The operating system releases the lock when the process ends. On systems without such locks nothing is locked.
 
@@ -163,7 +163,7 @@ def path_text(path: object) -> str:
     except TypeError:
         found = path
     if not isinstance(found, str) or "\0" in found or not found:
-        raise UsageError(f"The path cannot be {path!r}", remedy="use the path of a file as a string")
+        raise UsageError(f"A path cannot be {path!r}", remedy="use the path of a file as a string")
     return found
 
 

@@ -1,4 +1,4 @@
-"""Locks that are released in a forked child, even if another thread of the parent held them."""
+"""This module defines locks that a forked child process finds released, even if a thread held them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from weakref import WeakSet
 
 
 class SharedLock:
-    """A lock for short critical sections, which a forked child finds released."""
+    """A lock for short critical sections that is free in a newly forked child process."""
 
     __slots__ = ("__weakref__", "_lock")
 
@@ -29,7 +29,7 @@ class SharedLock:
         self._lock.release()
 
     def renew(self) -> None:
-        """Release the lock, regardless of its holder."""
+        """Replace the lock by a new one, whoever holds the old one."""
         self._lock = Lock()
 
 
@@ -37,7 +37,7 @@ _locks: WeakSet[SharedLock] = WeakSet()
 
 
 def _renew_all() -> None:
-    """Release all locks in a newly forked child."""
+    """Replace all locks in a newly forked child process."""
     for lock in list(_locks):
         lock.renew()
     if sys.version_info < (3, 12):  # older versions keep one lock per cached property in the class

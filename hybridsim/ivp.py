@@ -1,4 +1,4 @@
-"""One mode of a model as an initial value problem for other solvers."""
+"""This module gives one mode of a model as an initial value problem for other solvers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Function = Callable[[float, np.ndarray], Any]
 
 
 class Ivp(NamedTuple):
-    """The result of `to_ivp`, named like the arguments of `scipy.integrate.solve_ivp`."""
+    """The result of `to_ivp`, with fields named like the arguments of `scipy.integrate.solve_ivp`."""
 
     fun: Function
     events: tuple[Function, ...]
@@ -91,7 +91,7 @@ def to_ivp(
     flows: dict[bytes, Flow] = {}
 
     def at(t: float, x: np.ndarray) -> tuple[Flow, float]:
-        """Return the flow at (t, x) and its local time, with the active pieces of inputs and tables."""
+        """Return the `Flow` at (t, x) and its local time, with the active pieces of inputs and tables."""
         vector, s = (
             (system.vector(Instant(float(t)), discrete), 0.0) if system.signals else (from_zero, float(t))
         )
@@ -138,11 +138,11 @@ def _modes(system: Any, declared: Mapping[str, str] | None) -> np.ndarray:
     names = [a.name for a in system.automata]
     z: object = {} if declared is None else declared
     if not isinstance(z, Mapping):
-        raise UsageError(f"z cannot be {z!r}", remedy="use a dict of component names and mode names")
+        raise UsageError(f"`z` cannot be {z!r}", remedy="use a dict of component names and mode names")
     for name in z:
         if name not in names:
             raise UsageError(
-                f"z contains {name!r}, which is not a component of model '{system.model.name}'",
+                f"`z` contains {name!r}, which is not a component of model '{system.model.name}'",
                 remedy=nearest(str(name), names, kind="components"),
             )
     modes = []
@@ -150,12 +150,12 @@ def _modes(system: Any, declared: Mapping[str, str] | None) -> np.ndarray:
         mode = z.get(automaton.name)
         if mode is None and automaton.initial < 0:
             raise UsageError(
-                f"z needs a mode of {automaton.name}, which has no initial mode",
+                f"`z` needs a mode of {automaton.name}, which has no initial mode",
                 remedy=f"use one of {', '.join(automaton.modes)}",
             )
         if mode is not None and mode not in automaton.modes:
             raise UsageError(
-                f"z of {automaton.name} is {mode!r}, which is not a mode of {automaton.name}",
+                f"`z` of {automaton.name} is {mode!r}, which is not a mode of {automaton.name}",
                 remedy=nearest(str(mode), automaton.modes, kind="modes"),
             )
         modes.append(automaton.initial if mode is None else automaton.modes.index(mode))

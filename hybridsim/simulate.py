@@ -1,4 +1,4 @@
-"""The public function `simulate`, which runs a model with an integrator."""
+"""This module defines the public function `simulate`, which runs a model with an integrator."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""This package answers questions beyond one run: comparisons, steady states, sensitivities and parameter sweeps."""
+"""This package analyses models by many runs: comparisons, steady states, sensitivities and sweeps."""
 
 from hybridsim.analysis.advise import Advice, advise
 from hybridsim.analysis.compare.compare import compare

@@ -14,7 +14,7 @@ _OF_AUTO = ("exact", "dop853", "taylor", "rodas5p", "cvode-bdf", "scipy-dop853",
 
 
 def refuse_unknown(calls: Iterable[Callable[..., Any]], options: Mapping[str, Any]) -> None:
-    """Check options for several functions; the last function passes unknown options to an integrator.
+    """Reject options that none of several functions accepts; the last one passes some to an integrator.
 
     Raises
     ------
@@ -27,12 +27,16 @@ def refuse_unknown(calls: Iterable[Callable[..., Any]], options: Mapping[str, An
     name = integrator_name(options.get("integrator", "auto"))
     classes = [integrator_class(one) for one in (_OF_AUTO if name == "auto" else (name,))]
     known = own | {option for one in classes for option in option_names(one)}
-    whose = "simulate or of the integrators that auto takes" if name == "auto" else f"simulate or of {name}"
+    whose = (
+        "simulate or of the integrators that 'auto' selects from"
+        if name == "auto"
+        else f"simulate or of {name}"
+    )
     _refuse(options, known, whose)
 
 
 def refuse_what_it_does_not_take(function: Callable[..., Any], options: Mapping[str, Any]) -> None:
-    """Check options for a user's measure against its signature."""
+    """Reject options that do not fit the signature of a user's measure."""
     try:
         parameters = inspect.signature(function).parameters.values()
     except (TypeError, ValueError):  # a builtin has no signature

@@ -9,7 +9,7 @@ Progress = Callable[[int, int, str], None]
 
 
 class Steps:
-    """A counter of `total` steps; each call reports the name of a step and the count as progress."""
+    """A progress counter of `total` steps; each call reports the step that begins and the steps done."""
 
     def __init__(self, total: int, progress: Progress | None) -> None:
         self._total, self._done, self._progress = total, 0, progress
@@ -20,6 +20,6 @@ class Steps:
         self._done += 1
 
     def finish(self) -> None:
-        """Report that everything is done, even if some steps were skipped."""
+        """Report that all steps are done, even if some were skipped."""
         if self._progress is not None:
             self._progress(self._total, self._total, "done")

@@ -1,4 +1,4 @@
-"""This module describes the origin of a result: versions, machine, and a hash of the model."""
+"""This module records where a result comes from: versions, machine, and a hash of the model."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _PACKAGES = ("numpy", "scipy", "numba", "scikit-sundae", "sympy", "mpmath")
 
 
 def provenance(model: Model) -> dict[str, Any]:
-    """Return the versions, the machine and the model of a result, ready for JSON.
+    """Return the versions, the machine and the model of a result as plain values for JSON.
 
     The hash covers the model as text with the parameters and initial values of this run. It is None for a
     model of Python functions, which has no text.

@@ -1,4 +1,4 @@
-"""This module limits the time of a computation through its progress callback; compiling does not count."""
+"""This module stops a computation after a time limit, through its progress callback."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from hybridsim.engine.native.kernels import seconds_compiling
 
 
 class OutOfTime(Exception):
-    """The time limit of a computation has passed; the text says how long it was."""
+    """Raised when a computation has passed its time limit; the text states the limit."""
 
 
 class Stopwatch:
-    """A stopwatch that starts when made and excludes the time this thread spends compiling."""
+    """A stopwatch that excludes the time that this thread spends compiling."""
 
     def __init__(self) -> None:
         self._began, self._compiled = time.perf_counter(), seconds_compiling()
 
     @property
     def seconds(self) -> float:
-        """The elapsed seconds."""
+        """The elapsed seconds, without compiling."""
         return time.perf_counter() - self._began - (seconds_compiling() - self._compiled)
 
 

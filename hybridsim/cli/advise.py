@@ -28,7 +28,7 @@ examples:
 
 
 def add_to(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command `advise` to the parser."""
     parser = commands.add_parser(
         "advise",
         help="find the simplest model and the cheapest integrator that are accurate enough",
@@ -118,7 +118,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 
 def _ranges(model: Model, pairs: list[tuple[str, str]]) -> dict[str, tuple[float, float]]:
-    """Return the range of each uncertain parameter; its limits may be expressions."""
+    """Return the range of each uncertain parameter; the limits of a range may be expressions."""
     from hybridsim.cli.sweep import number_of
 
     found = {}
@@ -126,7 +126,7 @@ def _ranges(model: Model, pairs: list[tuple[str, str]]) -> dict[str, tuple[float
         low, colon, high = text.partition(":")
         if not colon:
             raise UsageError(
-                f"--uncertain: cannot read '{name}={text}'", remedy=f"write {name}=LOW:HIGH with two numbers"
+                f"--uncertain: cannot read '{name}={text}'", remedy=f"use {name}=LOW:HIGH with two numbers"
             )
         with values.blaming_the_command_line():
             found[name] = (number_of(model, name, low), number_of(model, name, high))

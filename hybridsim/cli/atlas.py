@@ -22,7 +22,7 @@ _MATRIX_DPI = 130.0  # the labels are small
 
 
 def add_to(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command `atlas` to the parser."""
     parser = commands.add_parser(
         "atlas",
         help="run all integrators on the benchmark scenes and report failures",
@@ -57,11 +57,9 @@ def add_to(commands: Any) -> None:
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """Run the scenes, print the counts and write the results."""
+    """Run the scenes, print a table of counts and write the results."""
     if args.scenes and args.trouble:
-        raise UsageError(
-            "Scene names and --class cannot be combined", remedy="use either the scene names or --class"
-        )
+        raise UsageError("Names of scenes and --class cannot be combined", remedy="use only one of them")
     from hybridsim.testing.atlas import atlas, described, listing, scenes_named
 
     scenes = scenes_named(args.scenes, args.trouble)
@@ -103,7 +101,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 
 def _write(result: Atlas, folder: Path, session: Session, progress: Progress) -> None:
-    """Write data, matrix, pages and pictures; after an interruption only the data."""
+    """Write data, matrix, pages and pictures; write only the data if the run was interrupted."""
     from hybridsim.plot.atlas import matrix, save_small
     from hybridsim.testing.atlas import pages
 
@@ -121,7 +119,7 @@ def _write(result: Atlas, folder: Path, session: Session, progress: Progress) ->
 
 
 def _pictures(result: Atlas, folder: Path, progress: Progress) -> set[str]:
-    """Draw the scenes into the folders of their classes, and return the names of the drawn ones."""
+    """Draw each scene into the folder of its class, and return the names of the drawn scenes."""
     from hybridsim.plot.atlas import save_small
     from hybridsim.plot.atlas import scene as picture
     from hybridsim.testing.atlas import example

@@ -1,4 +1,4 @@
-"""Describe a model as text: quantities, hybrid automaton, events and compiled code."""
+"""This module describes a model as text: quantities, hybrid automaton, events and compiled code."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def lines_of(
     model: Model, report: Report, primitives: Iterable[Primitive], facts: Iterable[str]
 ) -> Iterator[str]:
-    """Yield the whole description, line by line."""
+    """Yield the description of a model, line by line."""
     yield f"{model.name}: {model.title}" if model.title else model.name
     for label in ("source", "look"):
         if text := getattr(model, label):
@@ -46,7 +46,7 @@ def lines_of(
 
 
 def _primitive(primitive: Primitive) -> str:
-    """Return a line that says how a non-smooth expression is treated."""
+    """Return a line that says how hybridsim treats a non-smooth expression."""
     text, remark = primitive.text, primitive.remark
     became = {
         COMPONENT: "two modes, continuous at the change of mode"
@@ -61,7 +61,7 @@ def _primitive(primitive: Primitive) -> str:
 
 
 def _flat(expression: Expression) -> str:
-    """Return the text of an expression on one line, without the line breaks of its file."""
+    """Return the text of an expression on one line, even if the model file has line breaks in it."""
     return " ".join(expression.text.split())
 
 
@@ -116,7 +116,7 @@ def _component(component: Component, report: Report) -> Iterator[str]:
         )
         yield (
             f"{surface.above} for {_flat(surface.function)} > 0, {beyond}; "
-            f"in {surface.hold} the unknown {surface.unknown} keeps it at 0"
+            f"in mode {surface.hold} the unknown {surface.unknown} keeps the function at 0"
             + (f" ({held} from the constraint)" if held else "")
             + (f" ({', '.join(projected)} projected onto the surface)" if projected else "")
             + (

@@ -10,7 +10,7 @@ from hybridsim.cli.session import Session
 
 
 def add_to(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command `cache` to the parser."""
     parser = commands.add_parser(
         "cache",
         help="show, clear or fill the cache of compiled code",
@@ -26,7 +26,7 @@ def add_to(commands: Any) -> None:
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """Carry out the requested action."""
+    """Run the chosen action: path, clear or warm."""
     from hybridsim.engine.native.cache import cache_root, clear, kernel_folder
 
     root = cache_root()
@@ -38,14 +38,14 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         freed, others = clear()
         complain(f"deleted {freed / 1e6:.1f} MB in {root}")
         for other in others:
-            complain(f"{other} is left alone, because hybridsim did not create it")
+            complain(f"{other} was not deleted, because hybridsim did not create it")
     else:
         _warm()
     return 0
 
 
 def _warm() -> None:
-    """Compile all kernels by a short run of the reference model with every integrator."""
+    """Compile all kernels by a short run of the reference model with each integrator."""
     import hybridsim
     from hybridsim.engine.system.period import forcing_period
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 def add_to(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command `check` to the parser."""
     parser = commands.add_parser(
         "check",
         help="check a model and print its automaton",
@@ -34,7 +34,7 @@ def add_to(commands: Any) -> None:
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """Print the automaton and the warnings; loading has already rejected a faulty model."""
+    """Print the automaton and the warnings of a model; a faulty model was rejected when it was loaded."""
     from hybridsim.engine.run.report import describe
     from hybridsim.model.checks.doubtful import warnings_of
     from hybridsim.model.checks.starting_facts import starting_facts

@@ -19,7 +19,7 @@ _SUITE_FOLDER = Path("compare-suite")
 
 
 def add_to(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command `compare` to the parser."""
     parser = commands.add_parser(
         "compare",
         help="compare error and run time of integrators on a model or on a suite",
@@ -89,7 +89,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         return _suite(args, folder or _SUITE_FOLDER, session)
     if args.model is None:
         raise UsageError(
-            "compare needs a model or --suite", remedy="name a model (see: hybridsim models) or add --suite"
+            "compare needs a model or --suite", remedy="add a model (see: hybridsim models) or --suite"
         )
     if args.scenes:
         raise UsageError("--scenes requires --suite", remedy="add --suite or remove --scenes")
@@ -161,7 +161,7 @@ def _write(
     draw: Any,
     session: Session,
 ) -> None:
-    """Write the files and print the result; printing may fail if the reader of the pipe has gone."""
+    """Write the files, then print the result, because printing may fail if the output is a closed pipe."""
     from hybridsim.plot import save
 
     try:

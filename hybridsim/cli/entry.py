@@ -1,4 +1,4 @@
-"""Run a command line and return its exit code; user errors never end in a traceback.
+"""This module runs a command line and returns its exit code; user errors never end in a traceback.
 
 Exit codes: 0 success, 1 the simulation failed, 2 wrong usage, 3 faulty model, 130 interrupted (Ctrl-C), 143
 terminated (SIGTERM), 141 the reader of the pipe closed it. Data goes to stdout, everything else to stderr.
@@ -63,7 +63,7 @@ _DISK_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS}
 
 
 def build_parser() -> Parser:
-    """Return the parser of the whole command line, to which every command adds its part."""
+    """Return the parser of the whole command line, with all commands."""
     parser = Parser(
         prog="hybridsim",
         description="Simulate piecewise-smooth systems (dry friction, impacts, switching) and compare integrators.",
@@ -77,7 +77,7 @@ def build_parser() -> Parser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run one command line (default: `sys.argv`) and return its exit code."""
+    """Run one command line (default: `sys.argv`) and return the exit code."""
     if argv is None:
         # imports create half a million permanent objects; scanning them would cost a tenth of a short run
         gc.set_threshold(100_000, 50, 50)
@@ -125,7 +125,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def command() -> NoReturn:
-    """Run the command line of the process, then end the process without freeing its memory.
+    """Run the command line of this process, then end the process without freeing its memory.
 
     The interpreter would otherwise free all objects and the compiled code, which takes a second or more. The exit
     handlers run and the streams are flushed; the operating system frees the memory.

@@ -15,19 +15,21 @@ if TYPE_CHECKING:
 
 
 def add_to(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command `integrators` to the parser."""
     parser = commands.add_parser(
         "integrators",
         help="list the integrators and their uses",
         description="List the integrators, their uses and their limitations, or describe one with its options.",
     )
-    parser.add_argument("name", metavar="NAME", nargs="?", help="describe only this one, with its options")
+    parser.add_argument(
+        "name", metavar="NAME", nargs="?", help="describe only this integrator, with its options"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.set_defaults(execute=execute)
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """List all integrators, including those of other packages, or describe one with its options."""
+    """List all integrators, including those from plug-ins, or describe one of them with its options."""
     from hybridsim.integrators import integrator_class, list_integrators
     from hybridsim.integrators.contract import CAPABILITIES
     from hybridsim.integrators.options import options_of
@@ -49,7 +51,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
             ]
         )
         return 0
-    _paragraph(f"Capabilities that a model may need: {', '.join(CAPABILITIES)}.", indent="")
+    _paragraph(f"Capabilities that a model may require: {', '.join(CAPABILITIES)}.", indent="")
     say()
     lacking = [[c for c in CAPABILITIES if c in each.lacks] for each in found]
     print_table(

@@ -10,7 +10,7 @@ from hybridsim.cli.session import Session
 
 
 def add_to(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command `models` to the parser."""
     parser = commands.add_parser(
         "models",
         help="list the models that come with hybridsim",
@@ -22,7 +22,7 @@ def add_to(commands: Any) -> None:
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """List name and title of every model, or name, title and parameters of every friction law."""
+    """List the packaged models, or the packaged friction laws with their parameters."""
     import hybridsim
 
     if args.laws:

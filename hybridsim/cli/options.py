@@ -1,4 +1,4 @@
-"""Options shared by several commands, each declared once."""
+"""This module declares the options that several commands share."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ def add_integrator(parser: argparse.ArgumentParser) -> None:
 
 
 def add_rtol(parser: argparse.ArgumentParser, default: str) -> None:
-    """Add the option for the relative tolerance; `default` describes its default in the help text."""
+    """Add the option for the relative tolerance; `default` is the text of the default in the help."""
     parser.add_argument(
         "--rtol", metavar="TOL", type=values.positive, help=f"relative tolerance (default: {default})"
     )
 
 
 def add_workers(parser: argparse.ArgumentParser, of: str = "") -> None:
-    """Add the option for the number of threads; `of` completes the help text."""
+    """Add the option for the number of threads; `of` is appended to its help text."""
     parser.add_argument(
         "--workers",
         metavar="N",
@@ -60,7 +60,7 @@ def add_out(parser: argparse.ArgumentParser, default: str) -> None:
 
 
 def add_plot(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add the option that writes a picture; `what` names its content in the help text."""
+    """Add the option that writes a picture; `what` says in the help text what is plotted."""
     parser.add_argument(
         "--plot",
         metavar="FILE",
@@ -72,7 +72,7 @@ def add_plot(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def check_plot(args: argparse.Namespace) -> None:
-    """Set the default file name of the picture, and reject a file that cannot be written."""
+    """Fill in the default file name of the picture, and reject a file that cannot be written."""
     if args.plot == _UNNAMED:
         args.plot = Path(Path(getattr(args, "model", None) or args.solution).with_suffix(".png").name)
     if args.plot:
@@ -80,5 +80,5 @@ def check_plot(args: argparse.Namespace) -> None:
 
 
 def add_json(parser: argparse.ArgumentParser, what: str, instead: str = "the table") -> None:
-    """Add the option that prints JSON; `what` and `instead` complete the help text."""
+    """Add the option that prints JSON; its help says that `what` is printed instead of `instead`."""
     parser.add_argument("--json", action="store_true", help=f"print {what} as JSON instead of {instead}")

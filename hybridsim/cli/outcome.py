@@ -1,4 +1,4 @@
-"""Output of a solution on the command line: summary or JSON, files and exit code."""
+"""This module delivers a solution on the command line: summary or JSON, files and exit code."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options for the outputs and the limits of a run."""
+    """Add the options for output files and for limits of a run."""
     parser.add_argument(
         "--limit",
         metavar="NAME=VALUE",
@@ -58,7 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def check_arguments(args: argparse.Namespace) -> None:
-    """Reject output files that cannot be written, before the run starts."""
+    """Reject output files that cannot be written before the run starts."""
     options.check_plot(args)
     if args.csv:
         require_writable(args.csv, "--csv")
@@ -78,7 +78,7 @@ def check_arguments(args: argparse.Namespace) -> None:
             require_apart(path, f"--{option}", others)
             others |= {f"the output file of --{option}": path}
     if args.points is not None and not (args.csv or args.npz):
-        raise UsageError("--points requires --csv or --npz", remedy="add --csv FILE or --npz FILE")
+        raise UsageError("--points needs --csv or --npz", remedy="add --csv FILE or --npz FILE")
     if args.points == 1:
         raise UsageError("--points cannot be 1", remedy="use at least 2 (the start and the end)")
     if args.points is not None:
@@ -89,17 +89,17 @@ def check_arguments(args: argparse.Namespace) -> None:
 
 
 def limits(args: argparse.Namespace) -> dict[str, Any]:
-    """Return the limits of the run by name."""
+    """Return the limits of a run from the command line, by name."""
     found: dict[str, Any] = {}
     for name, text in args.limit:
         if name in found:
-            raise UsageError(f"--limit {name} occurs twice", remedy=f"set {name} once")
+            raise UsageError(f"--limit {name} occurs twice", remedy=f"use --limit {name}=... only once")
         found[name] = values.option_value(text)
     return found
 
 
 def as_far_as_it_came(run: Callable[[], Solution]) -> Solution:
-    """Return the solution of a run; after Ctrl-C it contains the part computed so far."""
+    """Run a simulation and return its solution; after Ctrl-C, the solution is the part computed so far."""
     try:
         return run()
     except RunInterrupted as stopped:
@@ -110,7 +110,7 @@ def as_far_as_it_came(run: Callable[[], Solution]) -> Solution:
 def deliver(
     solution: Solution, args: argparse.Namespace, session: Session, already_reported: Container[str] = ()
 ) -> int:
-    """Write the files, print the summary and return the exit code. Warnings in `already_reported` are not repeated."""
+    """Write the files, print the summary and return the exit code, without repeating reported warnings."""
     explanations, unexplained = _explanations(solution, args.explain)
     try:  # write files first: printing fails if the reader of the pipe, such as `head`, has gone
         if solution.t.size:  # a run that stopped before its first step has nothing to write
@@ -145,7 +145,7 @@ def deliver(
 
 
 def _explanations(solution: Solution, numbers: Sequence[int]) -> tuple[list[Explanation], UsageError | None]:
-    """Return the explanations of events, and the first error, raised only after the output is written."""
+    """Return the explanations of events, and the first error, which is raised after the output is written."""
     found, fault = [], None
     for number in numbers:
         try:
@@ -170,12 +170,12 @@ def _write(solution: Solution, args: argparse.Namespace, session: Session) -> No
 
 
 def _has_events(solution: Solution) -> bool:
-    """Return whether the events and modes of the run are stored."""
+    """Return whether `save` keeps the events and modes of the run."""
     return solution._run.save != "nothing"
 
 
 def _shares(solution: Solution) -> dict[str, dict[str, float]]:
-    """Return the fraction of time that each component spent in each of its modes."""
+    """Return the fraction of time that each component spent in each mode."""
     shares: dict[str, dict[str, float]] = {}
     for component, intervals in solution.modes.items():
         spent: dict[str, float] = {}
@@ -187,7 +187,7 @@ def _shares(solution: Solution) -> dict[str, dict[str, float]]:
 
 
 def _final(solution: Solution) -> list[tuple[str, float]]:
-    """Return name and value of every state at the end of the run, or nothing if the run never started.
+    """Return name and value of every state at the end of the run; empty if the run did not start.
 
     Those of discrete states follow, where something of the run is kept.
     """

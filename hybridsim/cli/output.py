@@ -1,4 +1,4 @@
-"""Output of the program: messages to stderr, data to stdout, and checks that files are writable."""
+"""This module writes messages to stderr and data to stdout, and checks that files can be written."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TRIAL = ".hybridsim-"  # prefix of the temporary folder that tests whether a fol
 
 
 class _Data:
-    """The stream for data while stdout is redirected to stderr; if it is None, data go to `sys.stdout`."""
+    """The stream for data while stdout is redirected to stderr, or None if data go to `sys.stdout`."""
 
     stream: TextIO | None = None
 
@@ -63,7 +63,7 @@ def complain(message: str) -> None:
 
 
 def say(text: str = "") -> None:
-    """Print data for people; control characters of titles, units and names are removed."""
+    """Print text to stdout without the control characters that titles, units and names may contain."""
     print(printable(text), file=_Data.stream)
 
 
@@ -73,13 +73,13 @@ def print_json(value: Any) -> None:
 
 
 def print_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print rows under a header, with columns aligned to the left."""
+    """Print rows under a header, in left-aligned columns."""
     for line in aligned([header, *rows]):
         say(line)
 
 
 def require_writable(path: Path, option: str, suffixes: Sequence[str] = ()) -> None:
-    """Reject, before the work starts, a file that cannot be written."""
+    """Raise an error if a file cannot be written, before the work starts."""
     if suffixes and path.suffix.lower() not in suffixes:
         fault = f"unsupported file type '{path.suffix}'" if path.suffix else f"'{path}' has no file type"
         raise UsageError(f"{option}: {fault}", remedy=f"use {' or '.join(suffixes)}")
@@ -88,7 +88,9 @@ def require_writable(path: Path, option: str, suffixes: Sequence[str] = ()) -> N
     except OSError as error:  # an invalid file name
         raise UsageError(f"{option}: {path}: {error.strerror}", remedy="use another file name") from None
     if is_folder:
-        raise UsageError(f"{option}: {path} is a folder", remedy=f"name a file, such as {path / 'result'}")
+        raise UsageError(
+            f"{option}: {path} is a folder", remedy=f"use the name of a file, such as {path / 'result'}"
+        )
     folder = path.parent
     if not folder.is_dir():
         raise UsageError(
@@ -101,14 +103,14 @@ def require_writable(path: Path, option: str, suffixes: Sequence[str] = ()) -> N
 
 
 def require_apart(path: Path, option: str, others: Mapping[str, Path]) -> None:
-    """Reject an output file that the command reads, or that another option writes."""
+    """Raise an error if an output file is also an input file, or the file of another option."""
     for what, other in others.items():
         if path.resolve() == other.resolve() or (path.exists() and other.exists() and path.samefile(other)):
             raise UsageError(f"{option}: {path} is also {what}", remedy="use another file name")
 
 
 def _takes_files(folder: Path) -> bool:
-    """Return whether files can be created in a folder; access rights alone are not reliable."""
+    """Return whether files can be created in a folder, by trying it, because access rights can mislead."""
     try:
         with tempfile.TemporaryDirectory(dir=folder, prefix=TRIAL):
             return True
@@ -117,7 +119,7 @@ def _takes_files(folder: Path) -> bool:
 
 
 def require_folder(path: Path, option: str) -> None:
-    """Reject a results folder that neither exists nor can be created."""
+    """Raise an error if a folder for results neither exists nor can be created."""
     nearest = path
     try:
         while not nearest.exists() and nearest != nearest.parent:

@@ -1,4 +1,4 @@
-"""An argparse parser that raises `UsageError` and suggests the nearest option or command."""
+"""This module defines an argparse parser that raises `UsageError` and suggests similar names."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from hybridsim.errors import UsageError, nearest
 
 
 class Parser(argparse.ArgumentParser):
-    """Argument parser that raises instead of exiting, and accepts no abbreviated options."""
+    """An argument parser that raises errors instead of exiting, and rejects abbreviated options."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter, **settings)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Parse the line, and report unknown options here, where the similar names are known."""
+        """Parse the line; unknown options are reported by this parser, which knows similar names."""
         line = sys.argv[1:] if args is None else list(args)
         known, unknown = super().parse_known_args(_join_negative_values(line), namespace)
         if unknown:
@@ -33,12 +33,12 @@ class Parser(argparse.ArgumentParser):
         self.error(f"Unknown option {first!r}", nearest(first.split("=")[0], options, kind="options"))
 
     def error(self, message: str, remedy: str | None = None) -> NoReturn:
-        """Raise a `UsageError` with the remedy, by default a pointer to the help of the command."""
+        """Raise a `UsageError`; the default remedy is to read the help of the command."""
         raise UsageError(message, remedy=remedy or f"see: {self.prog} --help")
 
 
 def _join_negative_values(line: Sequence[str]) -> list[str]:
-    """Write `--t-end -5T` as `--t-end=-5T`, because argparse would read `-5T` as an option."""
+    """Write `--t-end -5T` as `--t-end=-5T`; otherwise argparse reads `-5T` as an option."""
     joined: list[str] = []
     for word in line:
         if re.match(r"-\.?\d", word) and joined and re.fullmatch(r"--[a-z][a-z0-9-]*", joined[-1]):

@@ -1,4 +1,4 @@
-"""A progress line on a terminal, which is erased when the work is finished."""
+"""This module shows progress on one line of a terminal, and erases the line at the end."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _PAUSE = 0.1  # seconds between updates
 
 
 class Progress:
-    """Show the finished fraction and the current item; print nothing if stderr is not a terminal."""
+    """Shows the finished fraction and the current step, if stderr is a terminal."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -31,7 +31,7 @@ class Progress:
             self._next = time.monotonic() + _PAUSE
 
     def of_steps(self, done: int, total: int, what: str) -> None:
-        """Show progress as a number of finished steps out of a total."""
+        """Show progress as the number of finished steps out of a total."""
         self(done / total, what)
 
     def __enter__(self) -> Self:

@@ -18,7 +18,7 @@ examples:
 
 
 def add_to(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command `resume` to the parser."""
     parser = commands.add_parser(
         "resume",
         help="continue a saved run",

@@ -22,7 +22,7 @@ examples:
 
 
 def add_to(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command `run` to the parser."""
     parser = commands.add_parser(
         "run",
         help="simulate a model",
@@ -39,7 +39,7 @@ def add_to(commands: Any) -> None:
         type=values.positive,
         help="absolute tolerance of every state (default: rtol * 1e-3 * the state's nominal size)",
     )
-    parser.add_argument("--max-step", metavar="TIME", type=values.positive, help="longest step allowed")
+    parser.add_argument("--max-step", metavar="TIME", type=values.positive, help="longest step")
     parser.add_argument(
         "--option",
         metavar="NAME=VALUE",
@@ -100,7 +100,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 
 def _settings(args: argparse.Namespace) -> dict[str, Any]:
-    """Return the keyword arguments for `simulate`; omitted options keep their defaults."""
+    """Return the keyword arguments for `simulate` from the command line, without those that were omitted."""
     settings: dict[str, Any] = {
         name: getattr(args, name) for name in ("rtol", "atol", "max_step") if getattr(args, name) is not None
     }
@@ -108,13 +108,13 @@ def _settings(args: argparse.Namespace) -> dict[str, Any]:
         settings["save"] = _save_setting(args)
     for name, text in args.option:
         if name in settings:
-            raise UsageError(f"--option {name} occurs twice", remedy=f"set {name} once")
+            raise UsageError(f"--option {name} occurs twice", remedy=f"use --option {name}=... only once")
         settings[name] = values.option_value(text)
     return settings
 
 
 def _save_setting(args: argparse.Namespace) -> str | float:
-    """Return the value of `save` for the run, and reject outputs that it cannot serve."""
+    """Return the argument `save` for the run, and reject outputs that need more than it stores."""
     if args.keep in ("events", "nothing"):
         for option in ("plot", "csv", "npz"):
             if getattr(args, option):

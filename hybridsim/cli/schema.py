@@ -12,7 +12,7 @@ from hybridsim.cli.session import Session
 
 
 def add_to(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command `schema` to the parser."""
     parser = commands.add_parser(
         "schema",
         help="print the JSON Schema of model files",
@@ -23,7 +23,7 @@ def add_to(commands: Any) -> None:
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """Print the schema that the package contains."""
+    """Print the schema file of the package."""
     schema = files("hybridsim.model.toml").joinpath("model.schema.json").read_text(encoding="utf-8")
     print_json(json.loads(schema))
     return 0

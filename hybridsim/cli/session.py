@@ -1,4 +1,4 @@
-"""State of one run of the program: the files written so far, and requests to stop."""
+"""This module holds the state of one run of the program: written files, and requests to stop."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SOON = 0.05  # seconds until a lost interruption is repeated
 
 
 class Session:
-    """Keep the state that a command shares with the program that runs it."""
+    """The state that a command shares with the function that runs the command."""
 
     def __init__(self) -> None:
         self.written: list[Path] = []
@@ -32,12 +32,12 @@ class Session:
         complain(f"wrote {path}")
 
     def summary_of_written(self) -> str:
-        """Describe in words the files written before an interruption."""
+        """Return a text that lists the files written before an interruption."""
         return "kept " + ", ".join(map(str, self.written)) if self.written else "nothing was written"
 
     @contextmanager
     def listening(self) -> Iterator[None]:
-        """Handle Ctrl-C and SIGTERM, unless the parent process set them to be ignored (as a shell does for `&`)."""
+        """Handle Ctrl-C and SIGTERM during a block, but not signals that the parent process ignores."""
         usual: dict[signal.Signals, Any] = {
             signal.SIGINT: signal.default_int_handler,
             signal.SIGTERM: signal.SIG_DFL,
@@ -74,7 +74,7 @@ class Session:
 
     @contextmanager
     def stopping_gently(self) -> Iterator[None]:
-        """Delay Ctrl-C until `stop_if_asked`, so that it never interrupts compiled code.
+        """Delay Ctrl-C until the next `stop_if_asked`, so that it does not interrupt compiled code.
 
         An exception raised inside a compiled call or inside the compiler would surface as an unrelated error. A second
         Ctrl-C interrupts immediately.
@@ -86,7 +86,7 @@ class Session:
             self._gently = False
 
     def stop_if_asked(self) -> None:
-        """Raise KeyboardInterrupt if a signal is pending or was swallowed as another exception."""
+        """Raise KeyboardInterrupt if a signal was received, even if another exception replaced it."""
         if self.interrupted:
             raise KeyboardInterrupt
 

@@ -24,7 +24,7 @@ examples:
 
 
 def add_to(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command `steady` to the parser."""
     parser = commands.add_parser(
         "steady",
         help="find the steady motion of a model and measure it",

@@ -1,4 +1,4 @@
-"""`hybridsim study NAME`: reproduce a published study, with a verdict on every claim, pictures and a page."""
+"""`hybridsim study NAME`: reproduce a published study with verdicts on its claims, pictures and a page."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _WIDTH = 100
 
 
 def add_to(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command `study` to the parser."""
     parser = commands.add_parser(
         "study",
         help="reproduce a published study",
@@ -87,5 +87,5 @@ def _write(study: Study, name: str, folder: Path, images: Path, session: Session
 
 
 def _link(title: str, name: str, folder: Path, images: Path) -> str:
-    """Return the path of a picture relative to the folder of the page."""
+    """Return the path of a picture relative to the page that shows it."""
     return Path(os.path.relpath(images / f"{name}-{title}.png", folder)).as_posix()

@@ -33,7 +33,7 @@ _MOST_DRAWN = 2  # largest number of swept parameters in a picture
 
 
 def add_to(commands: Any) -> None:
-    """Add the command to the parser."""
+    """Add the command `sweep` to the parser."""
     parser = commands.add_parser(
         "sweep",
         help="measure a model at many parameter values",
@@ -87,14 +87,14 @@ def add_to(commands: Any) -> None:
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
-    """Run the sweep, print the table and write the results; the exit code is 1 if every point failed."""
+    """Run the sweep, print a table and write the results; the exit code is 1 if all points failed."""
     model = values.changed_model(args)
     folder: Path = args.out or Path(f"sweep-{model.name}")
     require_folder(folder, "--out")
     axes = values_by_name(model, args.axes)
     if args.over is not None and args.over not in axes:
         raise UsageError(
-            f"--over: parameter '{args.over}' is not swept", remedy=f"swept parameters: {', '.join(axes)}"
+            f"--over: the sweep does not vary '{args.over}'", remedy=f"swept parameters: {', '.join(axes)}"
         )
     if len(axes) > _MOST_DRAWN and not args.list:
         complain("no picture is drawn, because more than two parameters are swept")
@@ -185,7 +185,7 @@ def _write(result: Sweep, over: str | None, folder: Path, session: Session) -> N
 
 
 def _end_of_all(model: Model, text: str | None, axes: dict[str, list[Any]]) -> float:
-    """Return the common end time of all runs; reject one that depends on a swept parameter."""
+    """Return the common end time of all runs; reject an end time that depends on a swept parameter."""
     end = values.end_time(model, text)
     for name, row in axes.items():
         ends = {end}
@@ -202,18 +202,18 @@ def _end_of_all(model: Model, text: str | None, axes: dict[str, list[Any]]) -> f
 
 
 def values_by_name(model: Model, pairs: list[tuple[str, str]]) -> dict[str, list[Any]]:
-    """Return the values of each parameter, written FROM:TO:COUNT or A,B,C on the command line."""
+    """Return the values of each parameter from arguments such as NAME=FROM:TO:COUNT or NAME=A,B,C."""
     axes: dict[str, list[Any]] = {}
     for name, text in pairs:
         if name in axes:
-            raise UsageError(f"{name} is swept twice", remedy=f"write all values of {name} in one argument")
+            raise UsageError(f"{name} is swept twice", remedy=f"put all values of {name} into one argument")
         with values.blaming_the_command_line():
             axes[name] = _row(model, name, text)
     return axes
 
 
 def _row(model: Model, name: str, text: str) -> list[Any]:
-    """Return the values of one parameter: a list of expressions, or a range."""
+    """Return the values of one parameter as a list of expressions or a range."""
     if ":" not in text:
         from hybridsim.expr import parse
 
@@ -223,7 +223,7 @@ def _row(model: Model, name: str, text: str) -> list[Any]:
     if not (len(parts) == 3 or is_log) or not parts[2].isdecimal() or not parts[2].strip("0"):
         raise UsageError(
             f"Cannot read the values '{name}={text}'",
-            remedy="write FROM:TO:COUNT, FROM:TO:COUNT:log, or values separated by commas",
+            remedy="use FROM:TO:COUNT, FROM:TO:COUNT:log, or values separated by commas",
         )
     from hybridsim.analysis.sweep.axes import MOST_POINTS
 
@@ -258,7 +258,7 @@ def _parts(text: str) -> list[str]:
 
 
 def number_of(model: Model, name: str, text: str) -> float:
-    """Return the value of an expression of the model's parameters."""
+    """Return the value of an expression in the model's parameters."""
     from hybridsim.expr import evaluate, parse, require_names
 
     known = model.parameter_values()

@@ -1,4 +1,4 @@
-"""Read values of the command line: models with changed parameters, time spans, integrator options."""
+"""This module reads values from the command line: models, parameters, time spans and options."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def assignment(text: str) -> tuple[str, str]:
     """Split NAME=VALUE into name and value."""
     name, equals, value = text.partition("=")
     if not equals or not name.strip() or not value.strip():
-        raise argparse.ArgumentTypeError(f"cannot read {text!r}; write NAME=VALUE")
+        raise argparse.ArgumentTypeError(f"cannot read {text!r}; use NAME=VALUE")
     return name.strip(), value.strip()
 
 
@@ -51,7 +51,7 @@ def positives(text: str) -> tuple[float, ...]:
 
 
 def folder(text: str) -> Path:
-    """Read the name of a folder; an empty name, which would mean the current folder, is rejected."""
+    """Read the name of a folder, and reject an empty name, which would mean the current folder."""
     if not text.strip():
         raise argparse.ArgumentTypeError("the folder name is empty; use '.' for the current folder")
     return Path(text)
@@ -83,12 +83,12 @@ def names(text: str) -> tuple[str, ...]:
     """Read names, separated by commas."""
     found = tuple(part.strip() for part in text.split(","))
     if not all(found):
-        raise argparse.ArgumentTypeError(f"{text!r} contains an empty name; write A,B")
+        raise argparse.ArgumentTypeError(f"{text!r} contains an empty name; use A,B")
     return found
 
 
 def add_model_arguments(parser: argparse.ArgumentParser, optional: bool = False) -> None:
-    """Add the arguments that select a model, its parameters and its initial values."""
+    """Add the arguments for a model, its parameters and its initial values."""
     parser.add_argument(
         "model",
         metavar="MODEL",
@@ -126,7 +126,7 @@ def add_span_argument(parser: argparse.ArgumentParser, periods: int = DEFAULT_PE
 
 
 def changed_model(args: argparse.Namespace) -> Model:
-    """Return the selected model with changed parameters and initial values."""
+    """Return the model with the parameters and initial values of the command line."""
     import hybridsim
 
     model: Model = hybridsim.load(args.model)
@@ -140,7 +140,7 @@ def changed_model(args: argparse.Namespace) -> Model:
 
 @contextmanager
 def blaming_the_command_line() -> Iterator[None]:
-    """Convert a model error into a usage error, because the model was valid before the change."""
+    """Convert an error of the model into a usage error, because a change by the command line caused it."""
     try:
         yield
     except ModelError as error:
@@ -153,13 +153,13 @@ def _expressions(pairs: Iterable[tuple[str, str]], option: str) -> dict[str, Exp
     found: dict[str, Expression] = {}
     for name, text in pairs:
         if name in found:
-            raise UsageError(f"{option} {name} occurs twice", remedy=f"set {name} once")
+            raise UsageError(f"{option} {name} occurs twice", remedy=f"set {name} only once")
         found[name] = parse(text, Place(file=f"{option} {name}", text=text))
     return found
 
 
 def end_time(model: Model, text: str | None, default_periods: int = DEFAULT_PERIODS) -> float:
-    """Return the end time of the run in the time unit of the model.
+    """Return the end time of a run in the model's time unit.
 
     Raises `UsageError` if the text cannot be read as a time, if the time is not above zero, or if it is a number of
     periods and the model has no forcing period.
@@ -189,7 +189,7 @@ def end_time(model: Model, text: str | None, default_periods: int = DEFAULT_PERI
 
 
 def _record_end(model: Model) -> float:
-    """Return the time at which the longest table or chirp ends, or 0 if there is none."""
+    """Return the time at which the longest table or chirp ends, or 0 if the model has neither."""
     from hybridsim.expr import evaluate
 
     values = model.parameter_values()
@@ -214,7 +214,7 @@ def _time(model: Model, text: str) -> float:
 
 
 def option_value(text: str) -> bool | int | float | str:
-    """Read the value of an integrator option: an integer, a number, true, false or a word."""
+    """Read the value of an integrator option as an integer, a number, true, false or a word."""
     lowered = text.lower()
     if lowered in ("true", "false"):
         return lowered == "true"

@@ -1,1 +1,1 @@
-"""This folder presents results: tables, readable text, colours, and HTML for notebooks."""
+"""This package presents results: tables, readable text, colours, and HTML for notebooks."""

@@ -1,4 +1,4 @@
-"""HTML summary of a run for notebooks: outcome, a strip of modes for each component, events."""
+"""This module shows a run in notebooks as HTML: outcome, a strip of modes for each component, events."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _CELL = "padding:0 .8em 0 0;text-align:left;border:none"
 
 
 class Interval(Protocol):
-    """A time interval in one mode."""
+    """A time interval that a component spends in one mode."""
 
     @property
     def mode(self) -> str: ...
@@ -39,7 +39,7 @@ def run_html(
     events: Sequence[Any],
     warnings: Sequence[str],
 ) -> str:
-    """Return HTML of limited size without scripts or style sheets, for light and dark pages; text is escaped.
+    """Return the HTML summary of a run, of limited size and without scripts or style sheets.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def _dimmed(text: str) -> str:
 def _mode_bars(
     colours: Mapping[str, str], modes: Mapping[str, Sequence[Interval]], t0: float, t1: float
 ) -> Iterator[str]:
-    """Yield one strip per component, the times at its ends, and a legend."""
+    """Yield one strip of modes per component, the times at both ends, and a legend."""
     shown = dict(list(modes.items())[:_MAX_BARS])
     most = _RECTANGLES // len(shown)
     yield '<table style="width:100%;border-collapse:collapse;background:none;margin:.5em 0 0 0">'
@@ -109,14 +109,14 @@ def _mode_bars(
 
 
 def _fill(colour: str) -> str:
-    """Return the fill colour; ink becomes the text colour of the page, which is visible on dark pages."""
+    """Return the fill colour; black becomes the text colour of the page, which is visible on dark pages."""
     return "currentColor" if colour == INK else colour
 
 
 def _rectangles(
     intervals: Sequence[Interval], colours: Mapping[str, str], t0: float, t1: float, most: int
 ) -> Iterator[str]:
-    """Yield a rectangle per interval, or for many intervals columns with the fraction of each mode."""
+    """Yield a rectangle for each interval, or columns with the fraction of each mode if there are many."""
     scale = _WIDTH / (t1 - t0)
     if len(intervals) <= most:
         for interval in intervals:
@@ -146,7 +146,7 @@ def _rectangles(
 def _shares(
     intervals: Sequence[Interval], names: Sequence[str], t0: float, t1: float, columns: int
 ) -> list[list[float]]:
-    """Return the fraction of each mode in equal columns of time."""
+    """Return the fraction of each mode in columns of equal duration."""
     number = {mode: i for i, mode in enumerate(names)}
     shares = [[0.0] * len(names) for _ in range(columns)]
     for interval in intervals:
@@ -167,7 +167,7 @@ def _rectangle(x: float, y: float, width: float, height: float, colour: str, tit
 
 
 def _event_table(events: Sequence[Any]) -> Iterator[str]:
-    """Yield the collapsible table of events; a long table shows its first and last rows."""
+    """Yield a collapsible table of the events; of a long table only the first and the last rows."""
     many = len(events) > _FIRST + _LAST
     yield f"<details><summary>{len(events)} event{'s' if len(events) > 1 else ''}</summary>"
     yield '<table style="border-collapse:collapse;background:none;margin:0"><tr style="background:none">'

@@ -1,4 +1,4 @@
-"""Show results as text: `Readable` gives a notebook the same text that `print` shows."""
+"""This module defines results that show the same text in a notebook as in `print`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from html import escape
 
 
 class Readable:
-    """A result whose `repr` is a text of several lines; notebooks show it with its columns aligned."""
+    """A result whose `repr` is a text of several lines, which notebooks show with aligned columns."""
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(repr(self))}</pre>"
@@ -24,5 +24,5 @@ def aligned(rows: Iterable[Sequence[str]], indent: str = "") -> list[str]:
 
 
 def in_numbers(values: Iterable[complex]) -> str:
-    """Return real or complex numbers as text with six digits."""
+    """Return real or complex numbers as text with six digits each."""
     return "[" + ", ".join(f"{value:.6g}" for value in values) + "]"

@@ -1,4 +1,4 @@
-"""A run as a table, with export to CSV, NPZ, pandas and xarray."""
+"""This module defines a run as a table, and exports it to CSV, NPZ, pandas and xarray."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Table:
-    """Quantities and modes at given times.
+    """The quantities and modes of a run at given times.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ class Table:
     about: Mapping[str, str]
 
     def mode_names(self, component: str) -> np.ndarray:
-        """Return the mode names (k,) of a component."""
+        """Return the names of a component's modes (k,)."""
         names, numbers = self.modes[component]
         return np.array(names, dtype=np.str_)[numbers]
 
@@ -57,7 +57,7 @@ class Table:
                 writer.writerow(row + [column[k] for column in texts])
 
     def to_npz(self, path: str | PathLike[str], events: Mapping[str, np.ndarray]) -> None:
-        """Write an NPZ file: an array per quantity, ``mode(c)``, ``events/...`` and ``about.json``."""
+        """Write an NPZ file with an array per quantity, ``mode(c)``, ``events/...`` and ``about.json``."""
         arrays = {"t": self.t, **self.columns}
         arrays |= {mode_title(component): self.mode_names(component) for component in self.modes}
         arrays |= {f"events/{name}": values for name, values in events.items()}
@@ -80,7 +80,7 @@ class Table:
         return frame
 
     def to_xarray(self) -> xr.Dataset:
-        """Return a data set over t, with units, and a coordinate for the mode of each component."""
+        """Return a data set over t with units, and with a coordinate for the mode of each component."""
         xarray = library("xarray")
         variables = {
             name: ("t", values, {"units": self.units[name]} if name in self.units else {})
@@ -93,12 +93,12 @@ class Table:
 
 
 def mode_title(component: str) -> str:
-    """Return the column name of a component's modes, which no quantity can have."""
+    """Return the column name for the modes of a component; no quantity can have this name."""
     return f"mode({component})"
 
 
 def event_columns(events: Sequence[Any], states: Sequence[str]) -> dict[str, np.ndarray]:
-    """Return the events as columns of equal length: t, kind, ..., and ``x-`` and ``x+`` for each state."""
+    """Return the events as columns of equal length: t, kind, ..., and ``x-`` and ``x+`` of each state x."""
     columns = {"t": np.array([e.t for e in events], dtype=float)}
     for name in ("kind", "component", "guard", "source", "target"):
         columns[name] = np.array([getattr(e, name) for e in events], dtype=np.str_)
@@ -115,7 +115,7 @@ def event_frame(events: Sequence[Any], states: Sequence[str]) -> pd.DataFrame:
 
 
 def library(name: str) -> Any:
-    """Import pandas or xarray, or raise an error if it is not installed."""
+    """Import pandas or xarray; raise an error if it is not installed."""
     try:
         return import_module(name)
     except ImportError:

@@ -1,4 +1,4 @@
-"""This module converts the segments of a run to plain arrays for a file, and back."""
+"""This module converts the segments of a run to plain arrays for a file, and restores them."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ _SEGMENT_FORMS: dict[str, Form] = _ROW_FORMS | {
 
 
 def taken_apart(blocks: Iterable[Any]) -> Iterator[tuple[str, Arrays]]:
-    """Yield kind and arrays of each block; closed-form segments share tables, which are yielded first."""
+    """Yield the kind and the arrays of each block; tables of closed-form segments are yielded first."""
     tables: list[Any] = []
     for block in blocks:
         if isinstance(block, ClosedFormBlock):
@@ -109,7 +109,7 @@ def taken_apart(blocks: Iterable[Any]) -> Iterator[tuple[str, Arrays]]:
 
 
 def put_together(system: System, stored: Iterable[tuple[str, Arrays]]) -> list[Any]:
-    """Return the blocks of segments that `taken_apart` converted to arrays.
+    """Restore the blocks of segments from the arrays that `taken_apart` yielded.
 
     Raises
     ------
@@ -120,7 +120,7 @@ def put_together(system: System, stored: Iterable[tuple[str, Arrays]]) -> list[A
     tables: list[Any] = []
     blocks: list[Any] = []
     for kind, arrays in stored:
-        title = f"a block of kind '{kind}'"
+        title = f"block of kind '{kind}'"
         if kind == "tables":
             tables.append(_checked_tables(title, arrays, sizes))
         elif kind == "closed-form":
@@ -144,7 +144,7 @@ def put_together(system: System, stored: Iterable[tuple[str, Arrays]]) -> list[A
 
 
 def _check_rows(title: str, system: System, arrays: Arrays) -> None:
-    """Check the arrays that every kind of block has for each segment: times and modes."""
+    """Check the arrays that blocks of every kind have: times and modes of each segment."""
     if not len(arrays["modes"]):
         raise ValueError(f"{title} is empty")
     check_finite(f"{title}: a time", arrays["origins"])
@@ -152,7 +152,7 @@ def _check_rows(title: str, system: System, arrays: Arrays) -> None:
 
 
 def _check_series(title: str, system: System, arrays: Arrays, sizes: dict[str, int], columns: int) -> None:
-    """Check a block of step series; `columns` is the required number of coefficients, 0 for any."""
+    """Check a block of Taylor series; `columns` is the number of coefficients per step, or 0 for any."""
     known = check_forms(title, arrays, _SERIES_FORMS, sizes)
     _check_rows(title, system, arrays)
     ends, steps = arrays["ends"], arrays["steps"]
@@ -165,12 +165,12 @@ def _check_series(title: str, system: System, arrays: Arrays, sizes: dict[str, i
 
 
 def _not_near_a_start(count: int, unknowns: int) -> Arrays:
-    """Return the arrays that files of earlier versions lack, so that modal coordinates are used instead."""
+    """Return arrays that files of earlier versions lack, with which modal coordinates are used instead."""
     return {"flows": np.zeros((count, unknowns, unknowns)), "near": np.zeros(count)}
 
 
 def _checked_tables(title: str, arrays: Arrays, sizes: dict[str, int]) -> LinearTables:
-    """Return the tables of a closed-form motion; entries that evaluation does not need are empty."""
+    """Return the tables of a closed-form motion after checking them; unneeded tables may be empty."""
     if "near" not in arrays and "counts" in arrays and "factors" in arrays:
         arrays = arrays | _not_near_a_start(len(arrays["counts"]), sizes["n"] + len(arrays["factors"]))
     known = check_forms(title, arrays, _TABLE_FORMS, sizes)
@@ -233,7 +233,7 @@ def _check_segments(title: str, system: System, arrays: Arrays, sizes: dict[str,
 
 
 def _of_segments(segments: list[Segment]) -> Arrays:
-    """Return arrays of N segments: all knots, states and series in order, and the knots per segment."""
+    """Return arrays of N segments: all knots, states and coefficients in order, and the knots per segment."""
     series = []
     for segment in segments:
         sizes = np.abs(segment.x).max(axis=0)

@@ -1,4 +1,4 @@
-"""This module defines a dictionary by component whose error for an unknown name lists the known names."""
+"""This module defines a dictionary by component name that suggests similar names for a wrong key."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ T = TypeVar("T")
 
 
 class ByName(dict[str, T]):
-    """A dict whose error for an unknown key suggests the known keys."""
+    """A dict that suggests similar keys in the error for an unknown key."""
 
     def __missing__(self, name: object) -> Never:
         raise UsageError(

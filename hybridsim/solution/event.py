@@ -9,7 +9,7 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Event:
-    """An event: something that happened at one instant of a run.
+    """An event of a run: a change of mode, an impact, a monitor or anything else recorded at one instant.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Event:
     x_plus: np.ndarray
 
     def __eq__(self, other: object) -> bool:
-        """Return whether all fields are equal; NaN states count as equal."""
+        """Return whether all fields of two events are equal; NaN states count as equal."""
         if not isinstance(other, Event):
             return NotImplemented
         states = ((self.x_minus, other.x_minus), (self.x_plus, other.x_plus))
@@ -57,7 +57,7 @@ class Event:
 
     @property
     def _what(self) -> tuple[float | str, ...]:
-        """All fields except the states, for comparisons and hashes."""
+        """All fields except the states, which are compared separately and are not hashed."""
         return self.t, self.kind, self.component, self.guard, self.source, self.target, self.direction
 
     def __repr__(self) -> str:

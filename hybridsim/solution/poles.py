@@ -1,4 +1,4 @@
-"""This module ends a run at a pole of its rates, because the results after it would have no meaning.
+"""This module ends a run at a pole of its rates, because results beyond a pole have no meaning.
 
 A zero of a denominator is not a pole if the rates are continuous there, as in sin(x)/x; the run then
 continues.
@@ -29,11 +29,11 @@ _HALVINGS = 60
 # thresholds lie half way between.
 _NEAR, _PART, _ULPS = 1e-2, 1e-2, 4.0
 _ROUNDING = 1e-9  # of the rates: a smaller relative change is rounding
-_REMEDY = "end the run earlier by a monitor, or write the rate so that its denominator stays away from zero"
+_REMEDY = "end the run earlier by a monitor, or change the rate so that its denominator stays away from zero"
 
 
 class _Way:
-    """The states that a run passed through, with the signs of its denominators."""
+    """The states along a run, and the signs of the denominators in its rates."""
 
     def __init__(self, system: System, segments: list[Segment]) -> None:
         model = system.model
@@ -41,13 +41,13 @@ class _Way:
         self._names, self._parameters = [s.name for s in model.states], model.parameter_values()
 
     def sign(self, divisor: Denominator, number: int, s: float, x: np.ndarray) -> int:
-        """Return the sign of a denominator at a local time of a segment."""
+        """Return the sign of a denominator at a local time of one segment."""
         t = float(self.segments[number].origin.plus(s))
         states = dict(zip(self._names, x.tolist(), strict=True))
         return divisor.sign({**self._parameters, "t": t, **states})
 
     def passage(self, divisor: Denominator) -> tuple[int, float, float] | None:
-        """Return the first crossing of zero at a pole: number of the segment, local time, and step length."""
+        """Return where a denominator first crosses zero at a pole: segment, local time and step length."""
         stride = max(sum(len(segment.s) for segment in self.segments) // _LOOKS, 1)
         for number, segment in enumerate(self.segments):
             last = len(segment.s) - 1
@@ -61,7 +61,7 @@ class _Way:
         return None
 
     def _zero(self, divisor: Denominator, number: int, first: int, last: int) -> tuple[float, float]:
-        """Return the last time before the sign changes between two knots, and the step length there."""
+        """Return the last time before the sign changes between two knots, and the step length at it."""
         segment = self.segments[number]
         sign = self.sign(divisor, number, float(segment.s[first]), segment.x[first])
         while last - first > 1:
@@ -77,7 +77,7 @@ class _Way:
         return before, step
 
     def _is_pole(self, segment: Segment, s: float, step: float) -> bool:
-        """Return whether the rates or their derivatives jump or grow without bound at a local time."""
+        """Return whether the rates or their derivatives are discontinuous or unbounded at a local time."""
         flow, low, high = Flow(self.system, segment.p, segment.z, Counters()), *sorted(segment.s[[0, -1]])
         nearest = max(_NEAR * _PART * abs(step), _ULPS * math.ulp(s))
         near = max(_NEAR * abs(step), 10.0 * nearest)
@@ -97,7 +97,7 @@ class _Way:
 
 
 def end_at_pole(system: System, trajectory: Trajectory) -> None:
-    """End a run at the zero of a denominator if the rates are not continuous there."""
+    """End a run where a denominator passes zero, if the rates are not continuous at this point."""
     every = denominators(system.model)
     if not every or not trajectory.segments or system.n == 0:
         return
@@ -132,7 +132,7 @@ def end_at_pole(system: System, trajectory: Trajectory) -> None:
 
 
 def passed_unseen(system: System, trajectory: Trajectory, x0: np.ndarray, t0: float) -> list[str]:
-    """Return a warning for each denominator whose sign changed in a run whose states were not saved."""
+    """Return warnings for denominators that changed sign in a run whose states were not saved."""
     every = denominators(system.model)
     if not every or not trajectory.segments or system.n == 0:
         return []

@@ -33,17 +33,17 @@ def resumed(
     end = task.t1 if t_end is None else arguments.number(t_end, "t_end")
     if not math.isfinite(end):
         raise UsageError(
-            f"t_end cannot be {t_end!r}", remedy="give a finite time; a monitor can end a run early"
+            f"`t_end` cannot be {t_end!r}", remedy="use a finite time; a monitor can end a run early"
         )
     sign = 1.0 if task.t1 >= task.t0 else -1.0
     if t_end is None and solution.status == "finished":
         raise UsageError(
             f"the run of {run.model.name} already reached its end, t = {task.t1!r}",
-            remedy="pass a later end, t_end=...",
+            remedy="pass a later `t_end`",
         )
     if not sign * (end - solution.t_end) >= 0.0:
         raise UsageError(
-            f"t_end is {t_end!r}, and the run is already at {solution.t_end!r}", remedy="give a later time"
+            f"`t_end` is {t_end!r}, and the run is already at {solution.t_end!r}", remedy="use a later time"
         )
     record = trajectory.up_to_checkpoint(run.system)
     task = replace(task, t1=end, limits=arguments.run_limits(limits), record=record)

@@ -1,4 +1,4 @@
-"""This module holds one prepared run: the model, the method, the task, and the form of its solution."""
+"""This module defines a prepared run: the model, the integrator, the task and the form of the solution."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Run:
-    """The prepared run that `hybridsim.simulate` makes from its arguments.
+    """A prepared run, which `hybridsim.simulate` makes from its arguments.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class Run:
     def carried_out(
         self, progress: Callable[[float], None] | None, compile_time: float = 0.0, before: float = 0.0
     ) -> Solution:
-        """Carry out the run and return its solution; `before` is the time in seconds of an earlier part."""
+        """Carry out the run and return its solution; the two times are those spent on an earlier part."""
         began, compiled = time.perf_counter(), seconds_compiling()
         trajectory = self.method.run(self.system, self.task, progress)
         within = seconds_compiling() - compiled  # compile time of kernels that were first needed in this run
@@ -76,7 +76,7 @@ class Run:
         return solution
 
     def _close(self, trajectory: Trajectory) -> None:
-        """Add the warnings of the run, and drop the data that is not to be kept."""
+        """Add the warnings of the run, and drop data that `save` excludes."""
         if isinstance(self.system.code, PythonCode):
             self.system.code.report(trajectory)
         for caution in jumps_of(self.model):
@@ -85,5 +85,5 @@ class Run:
         for sentence in passed_unseen(self.system, trajectory, self.task.x0, self.task.t0):
             trajectory.warn(sentence)
         if self.task.t0 == self.task.t1:
-            trajectory.warn(f"t_span begins and ends at {self.task.t0!r}: nothing was integrated")
+            trajectory.warn(f"`t_span` begins and ends at {self.task.t0!r}, so nothing was integrated")
         trajectory.close(self.task.retention)

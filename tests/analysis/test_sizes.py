@@ -52,14 +52,14 @@ def test_values_without_end(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("end", [math.inf, -math.inf, math.nan])
 def test_a_resume_without_end(end: float) -> None:
     sol = hs.simulate(DECAY, (0, 1), integrator="dop853")
-    refused(lambda: sol.resume(end), "t_end cannot be ")
+    refused(lambda: sol.resume(end), "`t_end` cannot be ")
 
 
 @pytest.mark.parametrize("points", [10**10, 10**400])
 def test_a_table_of_too_many_points(points: int, tmp_path: object) -> None:
     sol = hs.simulate(DECAY, (0, 1), integrator="dop853")
-    refused(lambda: sol.table(points), "points cannot be 1000")
-    refused(lambda: sol.to_csv(f"{tmp_path}/r.csv", points), "points cannot be 1000")
+    refused(lambda: sol.table(points), "`points` cannot be 1000")
+    refused(lambda: sol.to_csv(f"{tmp_path}/r.csv", points), "`points` cannot be 1000")
 
 
 @pytest.mark.parametrize(
@@ -102,7 +102,7 @@ def test_the_command_line(
 def test_counts_that_no_time_suffices_for(name: str, ask: Callable[[int], object], count: int) -> None:
     refused(
         lambda: ask(count),
-        f"{name} cannot be 1000.*\n.*give a whole number above zero, 1000000(000)? at most",
+        f"`{name}` cannot be 1000.*\n.*use a whole number from 1 to 1000000(000)?",
     )
 
 

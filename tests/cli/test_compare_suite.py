@@ -43,7 +43,7 @@ def test_regularised_forms(hybridsim: Callable, tmp_path: Path) -> None:
         (["compare", "--suite", "--scenes", "P1,P9"], "no scene 'P9'"),
         (["compare", "dfcs", "--scenes", "P1"], "--scenes requires --suite"),
         (["compare", "--suite", "--budget", "0"], "--budget"),
-        (["compare", "dfcs", "--v0", "1e-3"], "v0 is given without regularized"),
+        (["compare", "dfcs", "--v0", "1e-3"], "`v0` requires `regularized`"),
         (["compare", "dfcs", "--regularized", "tan"], "no regularisation 'tan'"),
     ],
 )

@@ -83,7 +83,7 @@ def test_a_point_that_fails_is_told_and_only_all_of_them_are_a_failure(hybridsim
         (["F0=1:q:3"], "q"),
         (["F0=1,,2"], "F0"),
         (["F0=1", "F0=2"], "twice"),
-        (["F0=1", "--over", "N"], "--over: parameter 'N' is not swept"),
+        (["F0=1", "--over", "N"], "--over: the sweep does not vary 'N'"),
         (["F0=1", "--t-end", "3"], "--t-end requires --measure final"),
         (["F0=1", "--measure", "amplitude.y"], "amplitude.x"),
         (["F0=1,2", "N=1", "--list", *FINAL], "different lengths"),

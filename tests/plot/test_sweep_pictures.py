@@ -110,7 +110,7 @@ def test_texts_as_values_of_a_parameter() -> None:
         (lambda: swept(omega=OMEGA).plot("s"), "s is text"),
         (lambda: swept(omega=OMEGA).plot("b"), "no 'b'"),
         (lambda: swept(omega=OMEGA, N=N).plot("all"), "all is an array"),
-        (lambda: swept(omega=OMEGA).plot(over="N"), "over cannot be 'N'"),
+        (lambda: swept(omega=OMEGA).plot(over="N"), "`over` cannot be 'N'"),
         (lambda: swept(omega=OMEGA, N=N, F0=[1]).plot(), "3 parameters"),
         (lambda: sweep_map(swept(omega=OMEGA)), "a grid of two"),
         (lambda: hs.sweep("dfcs", {"N": [1]}, lambda m: "s").plot(), "no reading that can be drawn"),

@@ -101,7 +101,7 @@ def test_on_the_grid_of_the_run_and_backward() -> None:
 
 @pytest.mark.parametrize("points", [1, 0, -3])
 def test_too_few_points(points: int, rubbing: hs.Solution) -> None:
-    with pytest.raises(UsageError, match=f"points cannot be {points}"):
+    with pytest.raises(UsageError, match=f"`points` cannot be {points}"):
         rubbing.table(points)
 
 

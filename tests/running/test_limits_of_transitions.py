@@ -87,11 +87,14 @@ def test_tanks_and_rocking_blocks_go_on_behind_their_limits(integrator: str) -> 
 def test_the_event_is_explained_by_the_series_before_it() -> None:
     sol = hs.simulate(TANKS, (0, 5), integrator="exact")
     said = str(sol.explain(len(sol.events) - 1))
-    assert "each shorter by the factor 0.5; they add up to t = 4.0, and off is entered there" in said
+    assert (
+        "each shorter by the factor 0.5; the event times converge to t = 4.0, and mode off begins there"
+        in said
+    )
     twisting = hs.simulate("twisting-controller", (0, 7), integrator="exact")
     said = str(twisting.explain(len(twisting.events) - 1))
     assert "every 4 of them shorter by the factor" in said
-    assert "sliding is entered there" in said
+    assert "mode sliding begins there" in said
 
 
 def test_a_run_that_is_stopped_in_the_series_goes_on_to_the_same_limit() -> None:

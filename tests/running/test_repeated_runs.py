@@ -229,7 +229,7 @@ def test_what_equals_a_number_and_is_none_is_refused_every_time(model: hs.Model)
     for wrong in ({"max_step": True}, {"save": True}):
         with pytest.raises(hs.UsageError, match="cannot be True"):
             hs.simulate(model, (0.0, 1.0), integrator="exact", **{"max_step": 1.0, "save": 1.0} | wrong)
-    with pytest.raises(hs.UsageError, match="a value of t_span cannot be True"):
+    with pytest.raises(hs.UsageError, match="a value of `t_span` cannot be True"):
         hs.simulate(model, (0.0, True), integrator="exact", max_step=1.0, save=1.0)
 
 

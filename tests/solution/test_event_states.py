@@ -42,7 +42,7 @@ def test_they_are_those_of_the_objects(name: str, end: float, options: dict[str,
 def test_what_is_not_there() -> None:
     sol = hs.simulate("dfcs", (0.0, 1e-4))
     assert sol.event_states("f", "monitor").shape == (0, 2)
-    with pytest.raises(hs.UsageError, match="side cannot be 'x'"):
+    with pytest.raises(hs.UsageError, match="`side` cannot be 'x'"):
         sol.event_states("f", side="x")
     with pytest.raises(hs.UsageError, match="no component"):
         sol.event_states("g")

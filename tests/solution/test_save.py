@@ -64,7 +64,7 @@ def test_the_last_stretch(whole: hs.Solution, save: str | float) -> None:
     for name, intervals in sol.modes.items():
         assert intervals[0].t0 == sol.t_start
         assert [i.mode for i in intervals] == [i.mode for i in whole.modes[name][-len(intervals) :]]
-    with pytest.raises(UsageError, match="outside of what save="):
+    with pytest.raises(UsageError, match="outside the part of the run that save="):
         sol(0.5 * sol.t_start)
 
 
@@ -153,12 +153,12 @@ def test_modes_out_of_events_with_transitions_at_both_ends() -> None:
 @pytest.mark.parametrize(
     ("save", "said"),
     [
-        ("some", "save cannot be 'some'"),
-        (-1.0, "save cannot be -1.0"),
-        (0, "save cannot be 0"),
-        (math.nan, "save cannot be nan"),
-        (None, "save cannot be None"),
-        (True, "save cannot be True"),
+        ("some", "`save` cannot be 'some'"),
+        (-1.0, "`save` cannot be -1.0"),
+        (0, "`save` cannot be 0"),
+        (math.nan, "`save` cannot be nan"),
+        (None, "`save` cannot be None"),
+        (True, "`save` cannot be True"),
     ],
 )
 def test_what_save_cannot_be(save: object, said: str) -> None:

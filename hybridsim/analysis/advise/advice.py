@@ -1,4 +1,4 @@
-"""This module defines the result of `advise`: the ladder, the simplest adequate rung, the best setting."""
+"""This module defines the result of `advise`: compared models, and the simplest adequate one."""
 
 from __future__ import annotations
 
@@ -76,12 +76,12 @@ class Advice(Readable):
 
     @property
     def simplest(self) -> Step:
-        """The simplest adequate rung (over a region: adequate everywhere), or the full model."""
+        """The simplest model that is adequate, over a region at every point; otherwise the full model."""
         return next(step for step in self.ladder if step.is_adequate)
 
     @property
     def integrator(self) -> Setting | None:
-        """The quickest setting within the tolerance; None if none was tried or none is."""
+        """The fastest integrator setting within the tolerance, or None if no setting was found."""
         return next((s for s in self.settings if s.is_adequate), None)
 
     def __getitem__(self, name: str) -> Step:
@@ -90,13 +90,18 @@ class Advice(Readable):
             if step.name == name:
                 return step
         names = [step.name for step in self.ladder]
-        raise UsageError(f"there is no rung {name!r}", remedy=nearest(str(name), names, kind="rungs"))
+        raise UsageError(
+            f"the advice has no simpler model {name!r}", remedy=nearest(str(name), names, kind="rungs")
+        )
 
     @property
     def map(self) -> np.ndarray:
-        """Over a region, the name of the simplest adequate rung at each point."""
+        """The name of the simplest adequate model at each point of a region."""
         if self.region is None:
-            raise UsageError("the advice is for a single point", remedy="pass over={...} for a map")
+            raise UsageError(
+                "the advice has no map, because it is for a single point",
+                remedy="pass `over`, such as over={'F0': [20, 30]}, to compute a map",
+            )
         return self.region["simplest"]
 
     @property
@@ -108,7 +113,7 @@ class Advice(Readable):
         return self.table()
 
     def table(self) -> str:
-        """Return the ladder, the settings and the remarks as text."""
+        """Return the compared models, the integrator settings and the remarks as text."""
         from hybridsim.analysis.advise.table import table
 
         return table(self)
@@ -154,7 +159,7 @@ class Advice(Readable):
         return text
 
     def plot(self) -> Any:
-        """Draw the errors of the ladder, or the map of a region; see `hybridsim.plot.advice`."""
+        """Draw the errors of the compared models, or the map of a region; see `hybridsim.plot.advice`."""
         # The plot package is a layer above this one, so it is imported only on demand.
         return import_module("hybridsim.plot").advice(self)
 
@@ -164,23 +169,23 @@ def _remarks(advice: Advice) -> list[str]:
     simplest, full = advice.simplest, advice.ladder[-1]
     where = " everywhere in the region" if advice.region is not None else ""
     if all(step.verdict in (*WITHOUT_TRIAL, FULL) for step in advice.ladder):
-        found.append("no simpler model could be tried: no rung applies to this model")
+        found.append("no simpler model could be tried: none applies to this model")
     elif untried := [step.name for step in advice.ladder if step.verdict == WHERE_TRIED]:
         found.append(
             f"the map gives the simplest model at each point; whether {' or '.join(untried)} would be adequate at all "
-            f"of them was not tried: pass rungs=[{untried[-1]!r}] to find out"
+            f"of them was not tried; pass rungs=[{untried[-1]!r}] to try it"
         )
     elif simplest.verdict == FULL and len(advice.ladder) > 1:
         found.append(f"no simpler model gives {advice.quantity} within {advice.tol:g}{where}")
     elif simplest.seconds > full.seconds:
         found.append(
-            f"{simplest.name} is simpler but not quicker: {duration(simplest.seconds)} against "
-            f"{duration(full.seconds)} of the full model"
+            f"{simplest.name} is simpler but not faster: it takes {duration(simplest.seconds)}, "
+            f"the full model {duration(full.seconds)}"
         )
     spread = advice.spread
     if spread is not None and spread.relative > advice.tol:
         found.append(
-            f"the ranges of the parameters alone change {advice.quantity} by {100.0 * spread.relative:.3g} %, more "
+            f"uncertain parameters alone change {advice.quantity} by {100.0 * spread.relative:.3g} %, more "
             f"than the tolerance {advice.tol:g}: a more detailed model does not help"
         )
         enough = next(s for s in advice.ladder if s.error <= spread.relative or s.verdict == FULL)

@@ -124,7 +124,7 @@ def advise(
     over = None if over is None else mapping(over, "over")
     tol = positive(tol, "tol")
     if not tol < 1.0:
-        raise UsageError(f"tol cannot be {tol!r}", remedy="give a relative tolerance below 1, such as 0.01")
+        raise UsageError(f"`tol` cannot be {tol!r}", remedy="use a relative tolerance below 1, such as 0.01")
     accuracy = min(max(_FINER * tol, _ACCURACY[0]), _ACCURACY[1])
     span = None if t_span is None else arguments.time_span(t_span)
     question = question_of(model, quantity, span, accuracy)
@@ -135,7 +135,8 @@ def advise(
     if over is not None:
         if ranges is not None:
             raise UsageError(
-                "over and uncertain are both given", remedy="pass only one: uncertain is for a single point"
+                "`over` and `uncertain` cannot be combined",
+                remedy="remove one of them; `uncertain` is for a single point",
             )
         options = {"mode": mode, "workers": workers, "progress": progress}
         limits = Limits(spending, _LEAST_AT_A_POINT, repeat=False)
@@ -155,11 +156,11 @@ def advise(
     try:
         full = limits.warm(partial(question.ask, seen), limits.time_budget())
     except NoAnswer as reason:
-        raise SimulationError(f"the full model gives no {question.text}: {reason}") from reason
+        raise SimulationError(f"the full model has no value of {question.text}: {reason}") from reason
     except OutOfTime as fault:
         raise SimulationError(
-            f"the full model gives no {question.text} within the budget: {fault}",
-            remedy="give a larger budget",
+            f"the full model gave no {question.text} within the budget: {fault}",
+            remedy="pass a larger `budget`",
         ) from fault
     scene = scene_of(seen, full.motion, width)
     steps = []
@@ -176,7 +177,7 @@ def advise(
         try:
             known = _spread(seen, question, full.value, ranges, limits)
         except OutOfTime:
-            left_out = f"{limits.spent}: the effect of the parameter ranges was not computed"
+            left_out = f"{limits.spent}, so the effect of the parameter ranges was not computed"
     return Advice(
         model,
         question.text,
@@ -201,9 +202,7 @@ def _spread(model: Model, question: Question, full: Any, ranges: Any, limits: Li
     try:
         return spread(model, question, full, ranges, limits.time_budget())
     except NoAnswer as reason:
-        raise SimulationError(
-            f"at an end of the given ranges there is no {question.text}: {reason}"
-        ) from reason
+        raise SimulationError(f"{question.text} has no value at one end of the ranges: {reason}") from reason
 
 
 def _chosen(names: Sequence[str] | None) -> tuple[LadderStep, ...]:
@@ -213,12 +212,15 @@ def _chosen(names: Sequence[str] | None) -> tuple[LadderStep, ...]:
     asked_for = checked_names(names, "rungs")
     for name in asked_for:
         if name not in known:
-            raise UsageError(f"there is no rung {name!r}", remedy=nearest(name, known, kind="rungs"))
+            raise UsageError(
+                f"`rungs` contains {name!r}, which is not a simpler model",
+                remedy=nearest(name, known, kind="rungs"),
+            )
     return tuple(rung for rung in LADDER if rung.name in asked_for)
 
 
 class _ProgressReport:
-    """Reports progress: the next item, and repeated signs of life."""
+    """Report progress: the item that begins, repeated while the item takes long."""
 
     def __init__(self, progress: Progress | None, total: int) -> None:
         self._progress, self._total, self._done = arguments.callback(progress), total, -1
@@ -229,7 +231,7 @@ class _ProgressReport:
         self.again()
 
     def again(self) -> None:
-        """Repeat the last report, at most once per pause."""
+        """Repeat the last report, unless it was made less than a pause ago."""
         if self._progress is not None and time.monotonic() >= self._next:
             self._next = time.monotonic() + _PAUSE
             self._progress(self._done, self._total, self._what)

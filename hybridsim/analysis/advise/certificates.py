@@ -1,4 +1,4 @@
-"""This module derives statements about a model without a run: nothing moves, it is linear, it never stops."""
+"""This module proves without a run that a model stays at rest, is linear, or never sticks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _UNIT_BOUND = 1.0  # upper bound of a unit wave, whatever its shape
 
 @dataclass(frozen=True)
 class Certificate:
-    """A statement about a model that needs no run.
+    """A property of a model that follows from theory, without a run.
 
     rung : the rung that it makes exact; "" if it concerns the full model. motion : the closed form, if there is one.
     steady_only : whether it concerns the steady motion only.
@@ -32,13 +32,11 @@ class Certificate:
 
 
 def certificates(model: Model) -> tuple[Certificate, ...]:
-    """Return all statements that theory makes about a model, the strongest first."""
+    """Return all properties of a model that follow from theory, the strongest first."""
     found = []
     if bound := _nothing_moves(model):
         load, limit = (f"{value:.6g}" for value in bound)
-        text = (
-            f"at rest, nothing moves: the load of at most {load} never exceeds the {limit} that stick holds"
-        )
+        text = f"the model stays at rest: the load is at most {load}, and the stick limit is {limit}"
         found.append(Certificate(text, AtRest.name, AtRest().apply(Scene(model))))
     elif _is_linear(model):
         found.append(Certificate("the model is linear and has no modes: there is nothing to simplify"))
@@ -57,7 +55,8 @@ def _never_stops(model: Model) -> list[Certificate]:
         return []
     s = form.found.system
     text = (
-        f"inside the no-stop boundary (mu N/F0 = {s.slip_force / s.force:.4g}): the steady motion is Den Hartog's, "
+        f"inside the no-stop boundary (mu N/F0 = {s.slip_force / s.force:.4g}): Den Hartog's formula is "
+        "the steady motion, "
         "and no other is"
     )
     return [Certificate(text, NoStop.name, motion, steady_only=True)]
@@ -87,7 +86,7 @@ def _is_linear(model: Model) -> bool:
 
 
 def _nothing_moves(model: Model) -> tuple[float, float] | None:
-    """Return (largest load, stick limit) if a single contact holds everything at rest for all time."""
+    """Return (largest load, stick limit) if a single contact holds the whole model at rest for all time."""
     plain = not (
         model.surfaces or model.impacts or model.components or model.discrete or model.schedules or model.flow
     )

@@ -1,4 +1,4 @@
-"""This module runs the ladder of one scene: each rung with its value, error, cost and verdict."""
+"""This module evaluates the simplified models of one scene: value, error, cost and verdict of each."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _DEARER = 10.0  # times the full model's cost; a simpler model that takes longer
 
 @dataclass(frozen=True)
 class Step:
-    """One rung of the ladder with its result.
+    """One simplified model with its result.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class Step:
 
     @property
     def is_adequate(self) -> bool:
-        """Whether the value of the rung is within the tolerance."""
+        """Whether the value of the simplified model is within the tolerance."""
         return self.verdict in (ADEQUATE, FULL)
 
 
@@ -86,23 +86,23 @@ class Limits:
     report: Callable[[], None] | None = None
 
     def time_budget(self, full: Answer | None = None) -> TimeBudget:
-        """Return the time budget of one part, from the cost of the full model (if known) and the remaining budget."""
+        """Return the time budget of one computation: a multiple of the full model's cost, or what is left."""
         own = math.inf if full is None else max(_DEARER * full.seconds, self.least)
         return TimeBudget(min(own, self.budget.left), self.report)
 
     def reason(self, fault: OutOfTime, full: Answer) -> str:
-        """Return the reason why a part was stopped."""
+        """Return why a computation was stopped for taking too long."""
         if not self.budget.left:
             return self.spent
-        return f"slower than the full model: {fault}, and that takes {duration(full.seconds)}"
+        return f"slower than the full model: {fault}, but the full model takes {duration(full.seconds)}"
 
     @property
     def spent(self) -> str:
-        """The reason why a part was not started, or was ended."""
+        """The reason that is reported for a computation for which no time is left."""
         return f"the budget of {self.budget.seconds:.3g} s is spent"
 
     def warm(self, ask: Callable[[Watch | None], Answer], watch: Watch) -> Answer:
-        """Return the answer; quick runs are repeated, so that their cost excludes one-time set-up."""
+        """Return the answer; a fast computation is repeated, so that its cost excludes one-time set-up."""
         first = ask(watch)
         if not self.repeat or first.seconds > _AGAIN_BELOW:
             return first
@@ -116,7 +116,7 @@ def duration(seconds: float) -> str:
 
 
 def scene_of(model: Model, motion: Any, v0: float | None) -> Scene:
-    """Return the scene for the rungs: the model and the sliding speeds of the full motion."""
+    """Return the data that simplified models need: the full model, and its sliding speeds."""
     if isinstance(motion, Measures):
         means, peak = speeds(model, motion)
         return Scene(model, means, peak or None, v0)
@@ -131,7 +131,7 @@ def climb(
     tol: float,
     limits: Limits,
 ) -> Iterator[Step]:
-    """Yield the steps one by one, from the simplest rung up."""
+    """Yield the result of each simplified model, from the simplest one up."""
     for rung in ladder_steps:
         if limits.budget.left:
             yield _step(rung, scene, question, full, tol, limits)
@@ -159,8 +159,8 @@ def _step(
     except NoAnswer as reason:
         why = str(reason).partition("\n")[0]
         if isinstance(reason.__cause__, ModelError):  # the simpler model cannot be run at all
-            return _without(rung, NOT_APPLICABLE, f"its model cannot be run: {why}")
-        return _without(rung, NOT_ADEQUATE, f"it gives no {question.text}: {why}", model)
+            return _without(rung, NOT_APPLICABLE, f"the simpler model cannot be run: {why}")
+        return _without(rung, NOT_ADEQUATE, f"the simpler model has no {question.text}: {why}", model)
     except OutOfTime as fault:
         return _without(rung, STOPPED, limits.reason(fault, full), model)
     error = relative_error(answer.value, full.value)
@@ -180,26 +180,26 @@ def _step(
 
 
 def _formula(rung: LadderStep, scene: Scene, question: Question, _: Watch | None = None) -> Answer:
-    """Return the answer of a rung that is a formula; its cost is the time to evaluate the formula."""
+    """Return the value of a closed form; its cost is the time to evaluate the formula."""
     watch = Stopwatch()
     motion = rung.apply(scene)
     return Answer(question.read(motion), watch.seconds, motion)
 
 
 def _without(rung: LadderStep, verdict: str, why: str, model: Model | None = None) -> Step:
-    """Return a step without a value."""
+    """Return the result of a simplified model that has no value."""
     return Step(rung.name, rung.title, rung.drops, None, math.inf, math.nan, verdict, why, model)
 
 
 def _why(error: float, tol: float, full: Number) -> str:
     if math.isinf(error):
-        return "the full model's value is zero, this one is not"
+        return "the full model's value is zero, but this value is not"
     sign = "<=" if error <= tol else ">"
-    return f"error {error:.2g} {sign} {tol:g}" if full != 0 else "zero, as the full model's value"
+    return f"error {error:.2g} {sign} {tol:g}" if full != 0 else "zero, like the full model's value"
 
 
 def by_theory(certificates: Sequence[Certificate], question: Question) -> Answer | None:
-    """Return the full model's answer without a run, if a certificate gives it."""
+    """Return the full model's answer without a run, if a known property determines it."""
     for certificate in certificates:
         if certificate.motion is None or (certificate.steady_only and question.t_span is not None):
             continue

@@ -38,11 +38,11 @@ Number = float | complex
 
 
 class NoAnswer(Exception):
-    """A model lacks the quantity, or the steady motion that defines the quantity; the text says why."""
+    """Raised if a motion has no value of the requested quantity; the text gives the reason."""
 
 
 class OverRun(Measures):
-    """The measures of a steady state, taken over a run instead of a period."""
+    """Measures like those of a steady state, but taken over a whole run instead of a period."""
 
     period = math.nan
 
@@ -50,7 +50,7 @@ class OverRun(Measures):
         self.solution = solution
 
     def _extreme(self, name: str, side: int) -> float:
-        """Return the least or greatest value of one quantity, since a search on all of them is slow."""
+        """Return the least or greatest value of one quantity, without searching all other quantities."""
         if name not in self._alone:
             orbit = self._orbit
             q = slice(orbit.column(name), orbit.column(name) + 1)
@@ -65,7 +65,7 @@ class OverRun(Measures):
 
 @dataclass(frozen=True)
 class Answer:
-    """A value, the time needed to find the motion, and the motion from which it was read."""
+    """The value of the quantity, the seconds it took to find the motion, and the motion."""
 
     value: Number
     seconds: float
@@ -74,7 +74,7 @@ class Answer:
 
 @dataclass(frozen=True)
 class Question:
-    """A quantity given by name, or by a function of the motion.
+    """The quantity to compute, given by name or as a function of the motion.
 
     Parameters
     ----------
@@ -91,22 +91,22 @@ class Question:
 
     @property
     def head(self) -> str:
-        """The kind of quantity, such as "amplitude"."""
+        """The kind of the quantity, such as "amplitude"."""
         return self.text.partition(".")[0]
 
     @property
     def name(self) -> str:
-        """The name of the state, output or contact in question."""
+        """The state, output or contact to which the quantity refers."""
         return self.text.split(".")[1] if "." in self.text else ""
 
     @property
     def number(self) -> int:
-        """The number of the harmonic or event; 1 by default."""
+        """The number of the harmonic or of the event; 1 by default."""
         parts = self.text.split(".")
         return int(parts[2]) if len(parts) > 2 else 1
 
     def ask(self, model: Model, progress: Callable[[float], None] | None = None) -> Answer:
-        """Return the value from a steady state or a run, with its cost without compiling.
+        """Compute the quantity from a steady state or a run, and measure the cost without compiling.
 
         Raises
         ------
@@ -177,20 +177,20 @@ class Question:
     def _call(self, motion: Any) -> Number:
         assert self.function is not None
         if not isinstance(motion, Measures):
-            raise NoAnswer("a closed form has no trajectory to pass to a function")
+            raise NoAnswer("the result is a closed form, so there is no trajectory to pass to the function")
         argument = motion if self.t_span is None else motion.solution
         value = self.function(argument)
         try:
             found = complex(value) if isinstance(value, complex) else float(value)
         except (TypeError, ValueError, OverflowError):
-            raise NoAnswer(f"the function returned {value!r}, which is not a number") from None
+            raise NoAnswer(f"`quantity` returned {value!r}, which is not a number") from None
         if not math.isfinite(abs(found)):
-            raise NoAnswer(f"the function returned {value!r}")
+            raise NoAnswer(f"`quantity` returned {value!r}")
         return found
 
     def _event_time(self, motion: Any) -> float:
         if not isinstance(motion, Measures):
-            raise NoAnswer("a closed form has no events")
+            raise NoAnswer("the result is a closed form, which has no events")
         system = motion.solution.model
         known = {c.name for c in system.all_components()} | {m.name for m in system.monitors}
         times = motion.solution.event_times(self.name).tolist() if self.name in known else []
@@ -200,7 +200,7 @@ class Question:
 
 
 def _require_limit_cycle(model: Model, steady: SteadyState) -> None:
-    """Refuse a vibration of an undamped free system, because its amplitude depends on the start."""
+    """Reject the vibration of an undamped free system, because its amplitude depends on the initial state."""
     from hybridsim.engine.system.period import system_period
     from hybridsim.engine.system.system_cache import system_of
 
@@ -211,14 +211,14 @@ def _require_limit_cycle(model: Model, steady: SteadyState) -> None:
 
 
 def stuck(solution: Solution, contact: str) -> float:
-    """Return the fraction of a run that a contact spends in stick; 0 for a contact without that mode."""
+    """Return the fraction of a run that a contact spends in stick, or 0 if the contact has no stick mode."""
     spent = sum(i.t1 - i.t0 for i in solution.modes.get(contact, ()) if i.mode == _STICK)
     return float(spent / (solution.t_end - solution.t_start))
 
 
 def _of(values: Any, name: str, head: str) -> float:
     if name not in values:
-        raise NoAnswer(f"it has no value of {head}.{name}")
+        raise NoAnswer(f"the motion has no value of {head}.{name}")
     return float(values[name])
 
 
@@ -239,7 +239,7 @@ def _speed(contact: str) -> str:
 
 
 def with_contact_outputs(model: Model) -> Model:
-    """Return the model with velocity, speed and power of each contact as outputs; all rungs keep these."""
+    """Return the model with velocity, speed and power of each contact as additional outputs."""
     known = {output.name for output in model.outputs}
     more = []
     for contact in model.contacts:
@@ -273,7 +273,7 @@ def speeds(model: Model, motion: Measures) -> tuple[dict[str, float], float]:
 
 
 def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None, accuracy: float) -> Question:
-    """Return the question, checked against the model.
+    """Return the question after checking that the model has the quantity.
 
     Raises
     ------
@@ -284,33 +284,35 @@ def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None,
         return Question(getattr(quantity, "__name__", "a function"), quantity, t_span, accuracy)
     if not isinstance(quantity, str):
         raise UsageError(
-            f"quantity cannot be {quantity!r}", remedy=f"give a name such as {'amplitude.x'!r}, or a function"
+            f"quantity cannot be {quantity!r}", remedy=f"use a name such as {'amplitude.x'!r}, or a function"
         )
     head, *rest = quantity.split(".")
     if head not in HEADS:
         meant = [".".join((other, *rest)) for other in near(head, HEADS)]
         named = nearest(quantity, meant) if meant else nearest(head, HEADS, kind="quantities")
-        raise UsageError(f"there is no quantity {quantity!r}", remedy=named)
+        raise UsageError(f"`quantity` is unknown: {quantity!r}", remedy=named)
     if head in OF_RUN and t_span is None:
-        raise UsageError(f"{quantity} is read from a run and needs t_span", remedy="give t_span=(0, ...)")
+        raise UsageError(
+            f"{quantity} is read from a run and needs t_span", remedy="pass `t_span`, such as t_span=(0, 10)"
+        )
     if head in OF_MOTION:
         if t_span is not None or rest:
             raise UsageError(
                 f"quantity cannot be {quantity!r}",
-                remedy="write 'period' without a name, and leave t_span out",
+                remedy="use 'period' alone, without `.` and a name, and without `t_span`",
             )
         return Question(quantity, None, None, accuracy)
     names = _names(model, head)
     if not rest or rest[0] not in names:
         remedy = nearest(rest[0] if rest else "", names, kind=head)
-        raise UsageError(f"there is no quantity {quantity!r}", remedy=remedy)
+        raise UsageError(f"`quantity` is unknown: {quantity!r}", remedy=remedy)
     numbered = head in ("harmonic", "event_time")
     if len(rest) > 2 or (len(rest) == 2 and not (numbered and rest[1].isdecimal())):
         raise UsageError(
             f"quantity cannot be {quantity!r}", remedy=f"write {head}.{rest[0]}" + (".1" if numbered else "")
         )
     if head == "event_time" and len(rest) == 2 and int(rest[1]) < 1:
-        raise UsageError(f"quantity cannot be {quantity!r}", remedy="events are counted from 1")
+        raise UsageError(f"quantity cannot be {quantity!r}", remedy="use an event number from 1 on")
     return Question(quantity, None, t_span, accuracy)
 
 

@@ -1,4 +1,4 @@
-"""This module gives advice over a region of parameters: the simplest adequate rung at each point."""
+"""This module finds the simplest adequate model at each point of a region of parameters."""
 
 from __future__ import annotations
 
@@ -88,15 +88,17 @@ def over_region(
     limits: Limits,
     options: Mapping[str, Any],
 ) -> tuple[Sweep, tuple[Step, ...]]:
-    """Return the map, and a ladder that combines the results of all points."""
+    """Return the map of a region, and a table that combines the results of all points."""
     found = sweep(model, over, _Point(tuple(ladder_steps), question, tol, v0, limits), **options)
     if found.failed.all():
-        raise SimulationError(f"no point of the region has an answer: {next(found.problems())[0]}")
+        raise SimulationError(
+            f"the quantity has no value at any point of the region: {next(found.problems())[0]}"
+        )
     return found, tuple(_steps(found, ladder_steps, tol))
 
 
 def _steps(found: Sweep, ladder_steps: Sequence[LadderStep], tol: float) -> list[Step]:
-    """Return, for each rung, its largest error and the number of points at which it is adequate."""
+    """Return the largest error of each simplified model, and the number of points at which it is adequate."""
     done = ~found.failed
     total = int(done.sum())
     errors, simplest = found["errors"][done], found["simplest"][done]
@@ -114,7 +116,7 @@ def _steps(found: Sweep, ladder_steps: Sequence[LadderStep], tol: float) -> list
             verdict = NOT_APPLICABLE
         why = f"adequate at {serves} of {total} points, the simplest at {first}"
         if tried < total:
-            why = f"adequate at {serves} of the {tried} points where nothing simpler is"
+            why = f"adequate at {serves} of the {tried} points without a simpler adequate model"
         if stopped_at := int(found["stopped"][done][:, k].sum()):
             why += f", slower than the full model at {stopped_at} and stopped there"
         steps.append(
@@ -131,6 +133,15 @@ def _steps(found: Sweep, ladder_steps: Sequence[LadderStep], tol: float) -> list
         )
     alone = int((simplest == FULL).sum())
     steps.append(
-        Step(FULL, FULL, "nothing", None, 0.0, math.nan, FULL, f"needed at {alone} of {total} points")
+        Step(
+            FULL,
+            FULL,
+            "nothing",
+            None,
+            0.0,
+            math.nan,
+            FULL,
+            f"the only adequate model at {alone} of {total} points",
+        )
     )
     return steps

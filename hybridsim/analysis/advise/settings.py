@@ -1,4 +1,4 @@
-"""This module runs integrator settings to find the quickest that answers a question within the tolerance."""
+"""This module finds the fastest integrator setting that computes a quantity within the tolerance."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _RUN_STEPS = 10  # periods assumed in a run with t_span, to choose fixed steps
 
 @dataclass(frozen=True)
 class Setting:
-    """One way to run the full model.
+    """One integrator setting for the full model, with its result.
 
     Parameters
     ----------
@@ -69,18 +69,18 @@ class Setting:
 
     @property
     def is_adequate(self) -> bool:
-        """Whether the value of the setting is within the tolerance."""
+        """Whether the setting computes the value within the tolerance."""
         return self.verdict == ADEQUATE
 
     @property
     def title(self) -> str:
-        """The integrator and its options in one line."""
+        """The integrator and its options as one line of text."""
         return " ".join([self.integrator, *(f"{name}={value:g}" for name, value in self.options.items())])
 
 
 @dataclass(frozen=True)
 class _Settling:
-    """The length of a run up to its steady motion, and the interval at its end that is measured."""
+    """A run that is long enough to become steady, and the interval at its end that is measured."""
 
     question: Question
     span: tuple[float, float]
@@ -88,7 +88,7 @@ class _Settling:
     step_base: float
 
     def options(self, option: str, value: float) -> dict[str, float]:
-        """Return the options for `simulate`; a number of steps counts per period."""
+        """Return the options for `simulate`; a number of steps means steps per period."""
         if not option:
             return {}
         return {"step": self.step_base / value} if option == "steps" else {option: value}
@@ -117,7 +117,7 @@ def settings(
     limits: Limits,
     report: Callable[[str], None],
 ) -> tuple[Setting, ...]:
-    """Try every family from its loosest setting until one is adequate; return all, sorted by `rank`."""
+    """Try each integrator from its loosest setting to an adequate one; return all, sorted by `rank`."""
     found = []
     if question.t_span is None:
         loose = Question(question.text, question.function, None, max(_SHARE * tol, question.accuracy))
@@ -145,16 +145,18 @@ def settings(
 
 
 def rank(setting: Setting) -> tuple[bool, bool, float]:
-    """Return the sort key: adequate settings first, then quick ones; a fixed step must be clearly quicker."""
+    """Return the sort key: adequate settings first, then fast ones; a fixed step must be clearly faster."""
     worth = _UNCONTROLLED if "step" in setting.options else 1.0
     return not setting.is_adequate, math.isnan(setting.seconds), worth * setting.seconds
 
 
 def confirmed(one: Setting, finer: Setting, tol: float) -> Setting:
-    """Return a fixed-step setting, marked not adequate if a shorter step is not: its small error was chance."""
+    """Return a fixed-step setting; it counts as not adequate if a shorter step is not adequate."""
     if finer.is_adequate or finer.value is None:
         return one
-    why = f"{finer.title} is off by {finer.error:.2g}, beyond {tol:g}: the error does not fall with the step"
+    why = (
+        f"{finer.title} has the error {finer.error:.2g}, above {tol:g}: the error does not fall with the step"
+    )
     return replace(one, verdict=NOT_ADEQUATE, why=why)
 
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def table(advice: Advice) -> str:
-    """Return the heading, certificates, ladder, settings and remarks as text."""
+    """Return heading, known properties, simplified models, settings and remarks as text."""
     lines = [f"{advice.quantity} of {advice.model.name} within {advice.tol:g}: {_conclusion(advice)}"]
     lines += [f"  by theory: {text}" for text in advice.certificates]
     lines += ["", *aligned(_ladder(advice))]

@@ -1,4 +1,4 @@
-"""This module finds how much a quantity varies when parameters are known only within ranges."""
+"""This module computes how much a quantity varies if parameters are only known within ranges."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _MAX_RANGES = 6  # ranges; 2**6 corners need as many runs
 
 @dataclass(frozen=True)
 class Spread:
-    """The variation of a quantity over the corners of a box of parameters.
+    """The variation of a quantity over a box of parameter ranges.
 
     low, high : least and greatest value. relative : half of their difference, relative to the full model's value.
     """
@@ -32,29 +32,32 @@ def ranges_of(model: Model, declared_ranges: Any) -> dict[str, tuple[float, floa
     """Return the checked ranges by parameter; each must contain the model's own value."""
     if not isinstance(declared_ranges, Mapping) or not declared_ranges:
         raise UsageError(
-            f"uncertain cannot be {declared_ranges!r}",
-            remedy="give ranges by parameter: {'mu': (0.28, 0.32)}",
+            f"`uncertain` cannot be {declared_ranges!r}",
+            remedy="use a dict of parameter names and ranges, such as {'mu': (0.28, 0.32)}",
         )
     if len(declared_ranges) > _MAX_RANGES:
-        raise UsageError(f"uncertain has {len(declared_ranges)} ranges", remedy=f"give at most {_MAX_RANGES}")
+        raise UsageError(
+            f"`uncertain` has {len(declared_ranges)} ranges", remedy=f"use at most {_MAX_RANGES} ranges"
+        )
     found, known = {}, model.parameter_values()
     for name, ends in declared_ranges.items():
         if not is_row(ends) or len(ends) != 2:
-            raise UsageError(f"the range of {name} cannot be {ends!r}", remedy="give (low, high)")
+            raise UsageError(f"the range of {name} cannot be {ends!r}", remedy="use (low, high)")
         low, high = (number(end, f"an end of the range of {name}") for end in ends)
         if not low < high:
             raise UsageError(
-                f"the range of {name} cannot be {ends!r}", remedy="give (low, high) with low < high"
+                f"the range of {name} cannot be {ends!r}", remedy="use (low, high) with low < high"
             )
         if name not in known:
             raise UsageError(
-                f"uncertain has {name!r}, but model {model.name} has no parameter of that name",
+                f"`uncertain` contains {name!r}, which is not a parameter of model {model.name}",
                 remedy=model.remedy_for_parameter(str(name)),
             )
         if not low <= known[name] <= high:
             raise UsageError(
                 f"the range [{low:g}, {high:g}] of {name} does not contain the model's value {known[name]:g}",
-                remedy="give a range that contains the model's value, or set another value with params",
+                remedy="use a range that contains the model's value, or change the model's value with "
+                "`params`",
             )
         found[str(name)] = (low, high)
     return found
@@ -67,7 +70,7 @@ def spread(
     ranges: Mapping[str, tuple[float, float]],
     watch: Callable[[float], None] | None = None,
 ) -> Spread:
-    """Evaluate the quantity at the corners of the ranges, and at both ends of each range alone."""
+    """Evaluate the quantity at all corners of the ranges, and at both ends of one range at a time."""
     values = [abs(full) if isinstance(full, complex) else full]
     for point in _points(ranges):
         value = question.ask(model.with_(**point), watch).value

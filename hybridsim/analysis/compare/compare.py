@@ -1,4 +1,4 @@
-"""This module compares integrators on a model: error and cost of each at several settings."""
+"""This module compares the errors and costs of integrators on one model, at several settings each."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def compare(
         series = regularised_series(model, kinds, v0, names, rtols)
     elif v0 is not None:
         raise UsageError(
-            "v0 is given without regularized", remedy="name the forms, such as regularized=['tanh']"
+            "`v0` requires `regularized`", remedy="add the names of the laws, such as regularized=['tanh']"
         )
     else:
         series = choose_series(integrators, rtols, steps, None if period else span[1] - span[0])
@@ -130,5 +130,8 @@ def _span(
         return 0.0, PERIODS * period if period else TIME
     t0, t1 = time_span(t_span)
     if not t1 > t0:
-        raise UsageError(f"t_span = ({t0:g}, {t1:g})", remedy="comparisons run forward: give t1 > t0")
+        raise UsageError(
+            f"`t_span` cannot be ({t0:g}, {t1:g})",
+            remedy="use t1 > t0, because comparisons run forward in time",
+        )
     return t0, t1

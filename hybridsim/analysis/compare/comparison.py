@@ -1,4 +1,4 @@
-"""This module defines the result of a comparison: one row per run, as a table, CSV and JSON."""
+"""This module defines the result of a comparison: one row per run, as text, CSV or JSON."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from hybridsim.presentation.readable import Readable
 
 @dataclass(frozen=True)
 class Comparison(Readable):
-    """The errors and costs of integrators on one model, each at several settings, against one reference.
+    """The errors and costs of integrators on one model, each at several settings.
 
     Parameters
     ----------
@@ -69,12 +69,12 @@ class Comparison(Readable):
         return self.table()
 
     def reading(self, row: Row, quantity: str) -> Reading | None:
-        """Return one kind of error of a row (see `QUANTITIES`), or None if it was not measured.
+        """Return one kind of error of a row (see `QUANTITIES`), or None if this error was not measured.
 
         Event times are in periods if the model has a period, else in the model's unit of time.
         """
         if not isinstance(row, Row):
-            raise UsageError(f"row cannot be {row!r}", remedy="give one of the comparison's rows")
+            raise UsageError(f"`row` cannot be {row!r}", remedy="use a row from `comparison.rows`")
         value, floor = self.scaled(row.errors, quantity), self.floor(quantity)
         if value is None:
             return None
@@ -82,7 +82,7 @@ class Comparison(Readable):
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """The kinds of error that were measured in any row; the error of the states is always included."""
+        """The kinds of error that at least one row contains; the error of the states is always included."""
         return tuple(
             name
             for name in QUANTITIES
@@ -90,14 +90,14 @@ class Comparison(Readable):
         )
 
     def floor(self, quantity: str) -> float:
-        """Return the reference's own uncertainty in the units of `reading`; 0 if unknown."""
+        """Return the uncertainty of the reference in the units of `reading`; 0 if it is unknown."""
         return self.scaled(self.uncertainty, quantity) or 0.0
 
     def scaled(self, errors: Errors | None, quantity: str) -> float | None:
         """Return an error in the units of `reading`."""
         known_name(quantity, QUANTITIES, "a comparison has no quantity", "quantities")
         if errors is not None and not isinstance(errors, Errors):
-            raise UsageError(f"errors cannot be {errors!r}", remedy="give the errors of a row, row.errors")
+            raise UsageError(f"`errors` cannot be {errors!r}", remedy="use the errors of a row: `row.errors`")
         value: float | None = getattr(errors, quantity, None)
         return (
             value / self.period if value is not None and quantity == "event_time" and self.period else value
@@ -105,7 +105,7 @@ class Comparison(Readable):
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """The names of the lines, in order."""
+        """The names of the compared lines, in order; a line is an integrator or a regularised law."""
         return tuple(dict.fromkeys(row.label for row in self.rows))
 
     def table(self) -> str:

@@ -1,4 +1,4 @@
-"""This module measures the errors of a run against a reference: in states, event times and modes."""
+"""This module measures the errors of a run in states, event times and modes against a reference."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ class Errors:
 
     @property
     def wrong_modes(self) -> bool:
-        """Whether the run has modes and their sequence is wrong."""
+        """Whether the run has modes, but in the wrong sequence."""
         return self.sequence is not None and not self.sequence.right
 
 
 class Yardstick:
-    """A reference that is sampled once and then compared with any number of runs.
+    """A reference that is sampled once, with which any number of runs are then compared.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class Yardstick:
         return CompletedGraph(trajectory, jumps, self.period or t1 - t0, self.amplitude)
 
     def measure(self, run: Trajectory) -> Errors:
-        """Return the errors of a run with the same start, up to the end of the shorter motion."""
+        """Return the errors of a run that starts like the reference, up to the shorter of their ends."""
         matched = match_events(self.trajectory, run)
         end = min(self.trajectory.t_span[1], run.t_span[1])
         shared = self.times <= end
@@ -103,7 +103,7 @@ class Yardstick:
     def _matched_times(
         self, matched: MatchedEvents, t_span: tuple[float, float]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return the times at which to evaluate the run, and whether the state before an event is needed."""
+        """Return the times at which to evaluate the run, and a mask of those just before an event."""
         jumps = [(a.t, b.t) for a, b in matched.pairs if a in self.resets]
         if not jumps:
             return self.times, self.before

@@ -1,4 +1,4 @@
-"""This module computes the distance between two motions with jumps, as that of their completed graphs."""
+"""This module computes the distance of two motions with jumps, as the distance of their completed graphs."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class CompletedGraph:
         return self._refined(times, states, self._bound(times, states, end), end)
 
     def _bound(self, times: Array, states: Array, end: float) -> Array:
-        """Return an upper bound of each distance, from the state at the same time and the nearest jumps."""
+        """Return an upper bound of each distance, from the graph at the same time and at nearby jumps."""
         inside = np.clip(times, self.trajectory.t_span[0], end)
         late = np.abs(times - inside) / self.time
         far = np.min([np.abs(self.at(inside, side) - states).max(axis=1) for side in "-+"], axis=0)
@@ -82,7 +82,7 @@ class CompletedGraph:
         return bound
 
     def _refined(self, times: Array, states: Array, bound: Array, end: float) -> Array:
-        """Return the distances, from a window of the graph that contains the nearest point."""
+        """Return the distances, by searching the part of the graph that contains the nearest points."""
         for _ in range(_ROUNDS):
             width = bound[:, None] * self.time
             knots = np.clip(times[:, None] + width * _WINDOW, self.trajectory.t_span[0], end)
@@ -103,7 +103,7 @@ class CompletedGraph:
         return bound
 
     def _to_segments(self, t: Array, x: Array, ta: Array, xa: Array, tb: Array, xb: Array) -> Array:
-        """Return the distance, in the largest coordinate, of points (t, x) from the segments (ta, xa) to (tb, xb)."""
+        """Return the distance of points (t, x) from segments (ta, xa)-(tb, xb) in the maximum norm."""
         start = np.concatenate([((ta - t) / self.time)[..., None], xa - x], axis=-1)
         along = np.concatenate([((tb - ta) / self.time)[..., None], xb - xa], axis=-1)
         least = np.minimum(np.abs(start).max(axis=-1), np.abs(start + along).max(axis=-1))
@@ -136,7 +136,7 @@ def graph_distance(first: CompletedGraph, second: CompletedGraph) -> float:
 
 
 def _farthest(one: CompletedGraph, other: CompletedGraph, end: float) -> float:
-    """Return the largest distance of a point of one graph from the other; the worst candidates are tried first."""
+    """Return the largest distance of a point of one graph from the other graph."""
     times, states = one.points(other, end)
     bound = other._bound(times, states, end)
     order = np.argsort(-bound)
@@ -151,7 +151,7 @@ def _farthest(one: CompletedGraph, other: CompletedGraph, end: float) -> float:
 
 
 def _nearest_gap(times: Array, others: Array) -> Array:
-    """Return the distance of each of `times` from the nearest of `others`; 0 if `others` is empty."""
+    """Return the distance of each of `times` from the nearest time in `others`, or 0 if there is none."""
     if not len(others):
         return np.zeros(len(times))
     after = np.clip(np.searchsorted(others, times), 0, len(others) - 1)

@@ -1,4 +1,4 @@
-"""This module chooses the runs of a comparison: a line per integrator, and a run for each of its settings."""
+"""This module chooses the runs of a comparison: each line is an integrator with several settings."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _PERIODS = 10  # periods assumed for a run without a period, if the step is a fr
 
 @dataclass(frozen=True)
 class Series:
-    """One line of a comparison.
+    """One line of a comparison: an integrator with one varied option.
 
     Parameters
     ----------
@@ -41,12 +41,13 @@ class Series:
     def __post_init__(self) -> None:
         if not self.values:
             raise UsageError(
-                f"the line of {self.integrator} has no {self.varied}", remedy="give at least one"
+                f"the line of {self.integrator} has no values of {self.varied}",
+                remedy="use at least one value",
             )
         if (self.varied == "v0") != bool(self.regularized):
             raise UsageError(
                 f"a line with regularized = {self.regularized!r} cannot vary {self.varied!r}",
-                remedy="vary v0 if the line has a regularised form, and only then",
+                remedy="vary `v0` if and only if `regularized` is set",
             )
         if not self.label:
             shown = {name: value for name, value in self.options.items() if name != "period"}
@@ -55,7 +56,7 @@ class Series:
             object.__setattr__(self, "label", f"{name} ({details})" if details else name)
 
     def options_at(self, value: float) -> dict[str, Any]:
-        """Return the options of the run at a value of the varied option."""
+        """Return the options of the run for one value of the varied option."""
         others = {name: item(value) if callable(item) else item for name, item in self.options.items()}
         return others if self.regularized else {self.varied: value, **others}
 
@@ -98,7 +99,9 @@ def choose_series(
     labels = [series.label for series in chosen]
     repeated = [label for label in labels if labels.count(label) > 1]
     if repeated:
-        raise UsageError(f"two lines have the label {repeated[0]!r}", remedy="give each line its own label")
+        raise UsageError(
+            f"two lines have the label {repeated[0]!r}", remedy="use a different label for each line"
+        )
     return tuple(chosen)
 
 
@@ -122,7 +125,7 @@ def _line(
 
 
 def _shown_unasked(name: str) -> list[tuple[Mapping[str, Any], str]]:
-    """Return options and labels of an integrator's default lines; several if an option sets its accuracy."""
+    """Return options and label of each line that an integrator has by default."""
     if name in _ALSO_NATIVE:
         return [({}, ""), ({"events": "native"}, f"{name}, native events")]
     if name != "rk4-dichotomy":

@@ -1,4 +1,4 @@
-"""This module matches the events of a run with those of a reference in order, and compares the mode sequences."""
+"""This module matches the events of a run with those of a reference, and compares the two mode sequences."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _MISSED, _MATCHED, _SPURIOUS = 0, 1, 2
 
 @dataclass(frozen=True)
 class SequenceVerdict:
-    """The difference of a mode sequence from the reference's, as counts."""
+    """The counted differences between the mode sequence of a run and that of the reference."""
 
     missed: int = 0
     spurious: int = 0
@@ -36,7 +36,7 @@ class SequenceVerdict:
 
 @dataclass(frozen=True)
 class MatchedEvents:
-    """Pairs of events (reference's, run's), and the verdict on the modes; None if the run has no modes."""
+    """Matched events of a reference and a run, and the verdict on the mode sequence of the run."""
 
     pairs: tuple[tuple[EventLike, EventLike], ...]
     verdict: SequenceVerdict | None
@@ -44,7 +44,7 @@ class MatchedEvents:
 
 @dataclass(frozen=True)
 class _Entry:
-    """One step of a sequence; the first mode comes at the start and has no event."""
+    """One element of a sequence: an event with its new mode, or the first mode, which has no event."""
 
     t: float
     label: str
@@ -95,7 +95,7 @@ def _left_over(entries: Sequence[_Entry], matched: set[int]) -> list[float]:
 
 
 def _sequences(trajectory: Trajectory) -> dict[tuple[str, str], list[_Entry]]:
-    """Return the events by channel; a channel of mode changes starts with the first mode."""
+    """Return a sequence of entries for each component, monitor and schedule."""
     t0 = trajectory.t_span[0]
     sequences = {
         ("transition", component): [_Entry(t0, mode, None)]
@@ -116,7 +116,7 @@ def _sequences(trajectory: Trajectory) -> dict[tuple[str, str], list[_Entry]]:
 
 
 def _without_instants(entries: Sequence[_Entry]) -> list[_Entry]:
-    """Return a sequence of modes without the modes of zero duration."""
+    """Return a sequence of modes without those of zero duration."""
     lasting: list[_Entry] = []
     for _, group in itertools.groupby(entries, key=lambda entry: entry.t):
         *passing, last = group
@@ -128,7 +128,7 @@ def _without_instants(entries: Sequence[_Entry]) -> list[_Entry]:
 
 
 def _align(expected: Sequence[_Entry], found: Sequence[_Entry], window: float) -> list[tuple[int, int]]:
-    """Return the index pairs of the cheapest ordered alignment, with matches only within the window.
+    """Return the index pairs of the cheapest alignment in order; only entries within the time window match.
 
     This is the edit distance, row by row over the expected entries and, in each row, over the found entries
     within the window only. The work therefore grows linearly with the number of events.

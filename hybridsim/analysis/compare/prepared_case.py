@@ -1,4 +1,4 @@
-"""This module prepares one model over one span for the runs of a comparison and for its reference."""
+"""This module prepares one model for the runs of a comparison and for the run of its reference."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ if TYPE_CHECKING:
 
 
 class _OutOfTime(Exception):
-    """A run has passed its time limit."""
+    """Raised when a run has passed its time limit."""
 
 
 @dataclass(frozen=True)
 class PreparedCase:
-    """Runs of one model over one span.
+    """One model with its time span and initial values, ready for many runs.
 
     Parameters
     ----------
@@ -42,18 +42,18 @@ class PreparedCase:
     _forms: dict[tuple[str, float], Model] = field(default_factory=dict, repr=False, compare=False)
 
     def simulate(self, integrator: str, *, model: Model | None = None, **options: Any) -> Solution:
-        """Run the model, or a modified form of the model, with an integrator."""
+        """Run the model, or its regularised form, with an integrator."""
         from hybridsim.simulate import simulate
 
         return simulate(model or self.model, self.t_span, integrator=integrator, **options)
 
     def call(self, line: Series, value: float) -> Callable[[], Solution]:
-        """Return a function that makes the run of a line at a value, for timing."""
+        """Return a function, for timing, that makes one run of a line at one setting."""
         model, options = self._form(line, value), line.options_at(value)
         return lambda: self.simulate(line.integrator, model=model, **options)
 
     def first_run(self, line: Series, value: float, reference: Reference, limit: float = math.inf) -> Row:
-        """Make the run that warms up; its errors and counts go into the row.
+        """Make the untimed first run, and return a row with its errors and counts.
 
         Parameters
         ----------
@@ -107,7 +107,7 @@ class PreparedCase:
         )
 
     def _form(self, line: Series, value: float) -> Model | None:
-        """Return the regularised model of a line, or None for a line without one."""
+        """Return the regularised model of a line, or None if the line uses the model itself."""
         if not line.regularized:
             return None
         key = (line.regularized, value)

@@ -1,4 +1,4 @@
-"""This module finds the reference of a comparison, and its uncertainty."""
+"""This module computes the reference of a comparison, and the uncertainty of the reference."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class _TooLong(SimulationError):
-    """A run of a reference has passed its time limit."""
+    """Raised when the run of a reference has passed its time limit."""
 
 
 Run = Callable[..., "Solution"]
@@ -42,7 +42,7 @@ DIGITS = 32
 
 @dataclass(frozen=True)
 class Reference:
-    """The reference of a comparison.
+    """The trajectory with which the runs of a comparison are compared, and its uncertainty.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def find_reference(
         except OutOfTime as late:
             raise _TooLong(
                 f"the run with {_describe((integrator, options))} was {late}",
-                remedy="shorten the span, give a larger budget, or give a reference",
+                remedy="shorten the span, pass a larger `budget` or a `reference`",
             ) from None
 
     if requested is None:
@@ -111,7 +111,7 @@ def find_reference(
     for kind in kinds:
         if kind not in KINDS:
             raise UsageError(
-                f"reference {kind!r} is unknown", remedy=f"use one of {', '.join(map(repr, KINDS))}"
+                f"`reference` cannot be {kind!r}", remedy=f"use one of {', '.join(map(repr, KINDS))}"
             )
         try:
             if kind == CLOSED_FORM:
@@ -148,7 +148,7 @@ def _multiple_precision(
 
 
 def _checked(reference: Reference, run: Run) -> Reference:
-    """Return the reference after a comparison with the most accurate integrator."""
+    """Return the reference with its uncertainty, estimated from a run of the most accurate integrator."""
     difference, warnings = _held_against(reference.yardstick, run, _BEST)
     return replace(
         reference,
@@ -168,7 +168,7 @@ def _two_runs(run: Run, yardstick: Callable[[Trajectory], Yardstick]) -> Referen
     if not first.success:
         raise SimulationError(
             f"the reference run with {_describe(chosen)} ended as {first.status}: {first.message}",
-            remedy="shorten the span, or give a reference",
+            remedy="shorten the span, or pass a `reference`",
         )
     best = yardstick(trajectory_of(first))
     difference, warnings = _held_against(best, run, other)

@@ -39,7 +39,7 @@ def regularised_series(
     integrators: Sequence[str] | None = None,
     rtols: Sequence[float] | None = None,
 ) -> tuple[Series, ...]:
-    """Return lines for each integrator and tolerance: the set-valued law, and each regularised form over v0.
+    """Return lines over v0 for each regularised law and integrator, and lines with the set-valued law.
 
     Parameters
     ----------
@@ -48,12 +48,12 @@ def regularised_series(
     """
     if not model.contacts:
         raise UsageError(
-            f"model {model.name} has no contact to regularise", remedy="choose one with dry friction"
+            f"model {model.name} has no contact to regularise", remedy="choose a model with dry friction"
         )
     for kind in kinds:
         if kind not in KINDS:
             raise UsageError(
-                f"there is no regularisation {kind!r}", remedy=nearest(kind, KINDS, kind="forms")
+                f"`regularized` cannot contain {kind!r}", remedy=nearest(kind, KINDS, kind="forms")
             )
     widths = tuple(v0) if v0 else tuple(fraction * _velocity_size(model) for fraction in FRACTIONS)
     chosen = [(name, float(rtol)) for name in integrators or INTEGRATORS for rtol in rtols or RTOLS]
@@ -72,7 +72,7 @@ def regularised_series(
 
 
 def _velocity_size(model: Model) -> float:
-    """Return the nominal size of the relative velocities, the smallest of all contacts."""
+    """Return the smallest nominal relative velocity of all contacts."""
     nominal = {state.name: state.nominal or 1.0 for state in model.states}
     sizes = [
         [nominal[name] for name in contact.velocity.names if name in nominal] for contact in model.contacts
@@ -81,7 +81,7 @@ def _velocity_size(model: Model) -> float:
 
 
 def as_set_valued(run: Trajectory, contacts: Collection[str]) -> Trajectory:
-    """Return a run of a regularised form with mode names of the set-valued law; smooth modes are dropped."""
+    """Return a run of a regularised model, with its modes renamed like those of the set-valued law."""
     modes = {
         name: _BREAKING.get(mode, mode) if name in contacts else mode
         for name, mode in run.initial_modes.items()
@@ -99,7 +99,7 @@ def as_set_valued(run: Trajectory, contacts: Collection[str]) -> Trajectory:
 
 
 def exponents(comparison: Comparison) -> Mapping[str, tuple[float | None, float | None]]:
-    """Return, for each line over v0, the exponents p of error ~ v0^p and work ~ v0^p; None if unknown.
+    """Return the exponents p of error ~ v0^p and work ~ v0^p of each line over v0; None if unknown.
 
     They are fitted by least squares of the logarithms over the three smallest v0 that ran. For the error only
     those count whose error is at least three times that of the same integrator on the set-valued law at the
@@ -130,7 +130,7 @@ def exponents(comparison: Comparison) -> Mapping[str, tuple[float | None, float 
 
 
 def exponent_text(power: float | None) -> str:
-    """Return an exponent with two decimals."""
+    """Return an exponent as text with two decimals."""
     return "?" if power is None else f"{round(power, 2) + 0.0:.2f}"  # so that -0.001 becomes 0.00
 
 

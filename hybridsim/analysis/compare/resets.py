@@ -11,7 +11,7 @@ from hybridsim.reference.trajectory import EventLike
 
 @dataclass(frozen=True)
 class Resets:
-    """The events with a declared reset of a state; test with ``event in resets``.
+    """The set of events whose guard, monitor or schedule resets a state; test with ``event in resets``.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ class Resets:
 
 
 def resets_of(model: Model) -> Resets:
-    """Return the events that reset a state according to the model."""
+    """Return the events that reset a state, as the model declares them."""
     states = {state.name for state in model.states}
     transitions = frozenset(
         (component.name, mode.name, choice.to)

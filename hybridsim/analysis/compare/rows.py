@@ -36,7 +36,7 @@ class Cost:
 
     @property
     def work(self) -> int:
-        """The count of evaluations and steps, which is the same on every machine."""
+        """The number of evaluations and steps, which is equal on every machine."""
         return max(self.rhs_evaluations + self.guard_evaluations, self.steps, 1)
 
     @property
@@ -47,7 +47,7 @@ class Cost:
 
 @dataclass(frozen=True)
 class Row:
-    """One integrator at one setting.
+    """The run of one integrator at one setting.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Row:
     form: str = ""
 
     def timed(self, wall_times: tuple[float, ...]) -> Row:
-        """Return the row with the wall times of its repetitions; unchanged if there are none."""
+        """Return the row with the measured wall times; the row is unchanged if there are none."""
         if self.cost is None or not wall_times:
             return self
         return replace(self, cost=replace(self.cost, wall_times=wall_times, repetitions=len(wall_times)))
@@ -77,7 +77,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Reading:
-    """An error as far as the reference determines it: a value, or a bound given by the reference's uncertainty."""
+    """An error as a value, or only as a bound if it is below the uncertainty of the reference."""
 
     value: float
     is_bound: bool

@@ -55,7 +55,7 @@ def milliseconds(seconds: float) -> str:
 
 
 def versions(facts: Mapping[str, Any]) -> str:
-    """Return versions and machine of a result in one line."""
+    """Return the versions and the machine of a result as one line of text."""
     packages = ", ".join(f"{name} {facts[name]}" for name in _VERSIONS if facts.get(name))
     machine = f"{facts.get('system')} {facts.get('processor')}, {facts.get('cpus')} CPUs"
     return f"hybridsim {facts.get('hybridsim')}, {facts.get('python')}, {packages}; {machine}"
@@ -104,7 +104,7 @@ def _heading(comparison: Comparison) -> list[str]:
 
 
 def differences(comparison: Comparison, errors: Errors | None = None) -> str:
-    """Return errors as text in the units of the table; by default the errors of the second reference."""
+    """Return errors as text in the units of the table; by default the difference of the second reference."""
     readings = {name: comparison.scaled(errors or comparison.difference, name) for name in QUANTITIES}
     return ", ".join(f"{_NAMES[name]} {value:.1e}" for name, value in readings.items() if value) or "nothing"
 
@@ -112,7 +112,7 @@ def differences(comparison: Comparison, errors: Errors | None = None) -> str:
 def _graph_notes(comparison: Comparison) -> list[str]:
     if "graph" not in comparison.quantities:
         return []
-    unit = "periods" if comparison.period else "lengths of the run"
+    unit = "periods" if comparison.period else "run lengths"
     return [f"Graph: Hausdorff distance of the completed graphs, in {unit} and amplitudes, to 1 %."]
 
 
@@ -147,7 +147,7 @@ def _notes(comparison: Comparison) -> list[str]:
         *_graph_notes(comparison),
         *_form_notes(comparison),
         *(["T is a tenth of the run: the model has no period."] if counted and not comparison.period else []),
-        f"Wall time of a call: {turns(comparison.repeat)} of all rows, of several calls if they are short,",
+        f"Wall time of one run: {turns(comparison.repeat)} of all rows, of several calls if they are short,",
         f"after a warm-up; fewer turns of a run that takes more than {ENOUGH / comparison.repeat:.2g} s.",
         versions(facts),
         f"model {facts.get('model')}, {_hash(facts)}",

@@ -23,7 +23,7 @@ _PATIENCE = 2
 
 
 class Budget:
-    """A time budget in seconds from now on; compiling does not count."""
+    """A time limit in seconds that starts when the object is made; compiling does not count."""
 
     def __init__(self, seconds: float) -> None:
         self.seconds, self._watch = seconds, Stopwatch()
@@ -41,7 +41,7 @@ class Budget:
 
 @dataclass(frozen=True)
 class Entry:
-    """A scene, its reference, and the lines to run on it."""
+    """A scene, its reference, and the lines to run on the scene."""
 
     case: PreparedCase
     reference: Reference
@@ -82,7 +82,7 @@ def timed_rows(
         here = [run for run in runs if run.level == level]
         predicted = {run: _predicted(entries, rows, run) for run in here}
         too_long = {
-            run: f"it would take about {seconds:.2g} s, more than its share of the budget of {budget.seconds:.3g} s"
+            run: f"the run would take {seconds:.2g} s, more than its share of the budget of {budget.seconds:.3g} s"
             if math.isfinite(seconds)
             else "a looser setting took too long"
             for run, seconds in predicted.items()
@@ -113,7 +113,7 @@ def timed_rows(
 
 
 def _predicted(entries: Sequence[Entry], rows: dict[_Run, Row], run: _Run) -> float:
-    """Return the predicted seconds of a run from the two previous settings of its line; 0 if unknown."""
+    """Return the predicted seconds of a run, from two looser settings of its line; 0 if unknown."""
     before = [rows[replace(run, level=level)] for level in range(run.level)]
     done = [(row.setting[1], row.cost) for row in before if row.cost is not None]
     if any(row.status == STOPPED for row in before):
@@ -127,7 +127,7 @@ def _predicted(entries: Sequence[Entry], rows: dict[_Run, Row], run: _Run) -> fl
 
 
 def _not_fitting(predicted: dict[_Run, float], seconds: float) -> list[_Run]:
-    """Return the longest runs to leave out so that the remaining runs fit into the budget."""
+    """Return the runs to skip, the longest first, so that the other runs fit into the budget."""
     gone = []
     total = sum(predicted.values())
     for run in sorted(predicted, key=lambda run: -predicted[run]):

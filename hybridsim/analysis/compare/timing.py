@@ -1,4 +1,4 @@
-"""This module measures comparable wall times: runs are repeated in turns, so that disturbances affect all alike."""
+"""This module measures wall times of runs in rotation, so that disturbances affect all runs alike."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def timed_in_turns(
     expected: Sequence[float] | None = None,
     until: float = math.inf,
 ) -> list[tuple[float, ...]]:
-    """Return the seconds of each call of each run, one call in each of `repeat` rounds, fewer for long runs.
+    """Return the seconds of each run in each of `repeat` rounds; long runs are repeated less often.
 
     Each run must have been called once; short ones are called several more times before the first round.
     Garbage collection is off, as in `timeit`, because it would disturb random runs. Objects alive at the
@@ -81,7 +81,7 @@ def _warmed_up(run: Callable[[], object], expected: float, until: float) -> floa
 
 
 def _fitting(expected: Sequence[float], seconds: float) -> list[int]:
-    """Return the indices of the runs, cheapest first, that fit into the remaining seconds."""
+    """Return the indices of the runs that fit into the remaining seconds, chosen from the shortest."""
     chosen, left = [], seconds
     for i in sorted(range(len(expected)), key=lambda i: expected[i]):
         if expected[i] > left:

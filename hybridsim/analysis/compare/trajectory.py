@@ -1,4 +1,4 @@
-"""This module defines the data that a comparison needs of a run, an exact motion or a user's reference."""
+"""This module converts runs, closed forms and user references to trajectories for a comparison."""
 
 from __future__ import annotations
 
@@ -32,6 +32,6 @@ def as_trajectory(value: Any, t_span: tuple[float, float]) -> Trajectory:
     if callable(value):
         return Trajectory(lambda t, side: np.asarray(value(t), dtype=float), t_span)
     raise UsageError(
-        f"reference is a {type(value).__name__}",
-        remedy="give a Solution, a Trajectory, a function t -> states, 'closed form' or 'runs'",
+        f"`reference` cannot be a {type(value).__name__}",
+        remedy="use a Solution, a Trajectory, a function t -> states, 'closed form' or 'runs'",
     )

@@ -47,7 +47,7 @@ class BranchPoint:
 
     @cached_property
     def steady(self) -> SteadyState:
-        """The steady state of the orbit: amplitude, energy, stick fraction and so on, as from `steady_state`."""
+        """This orbit as a steady state with amplitudes, energies and so on; see `steady_state`."""
         message = f"orbit of a branch; residual {self.orbit.residual:.1e}"
         return SteadyState(self.motion, "periodic", self.orbit, self.is_free, 0, 0, message)
 
@@ -138,7 +138,7 @@ def specials(points: tuple[BranchPoint, ...]) -> tuple[Special, ...]:
 
 
 def _branchings(points: tuple[BranchPoint, ...], found: list[Special]) -> list[Special]:
-    """Return the points where a multiplier passes +1 without a fold, so that another branch begins.
+    """Return the points at which a multiplier passes +1 without a fold, where another branch begins.
 
     They are sign changes of the product of 1 - m over all multipliers; each fold explains the sign change
     next to it.
@@ -162,7 +162,7 @@ def _branchings(points: tuple[BranchPoint, ...], found: list[Special]) -> list[S
 
 
 def _stability_changes(a: BranchPoint, b: BranchPoint, i: int) -> list[Special]:
-    """Return the points where a multiplier passes -1, or a pair passes the unit circle."""
+    """Return the points at which a multiplier passes -1, or a complex pair passes the unit circle."""
     if a.word != b.word or len(a.multipliers) != len(b.multipliers):
         return []
     found = []

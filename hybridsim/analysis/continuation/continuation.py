@@ -43,7 +43,7 @@ _DIFFERENCE = 1e-6  # of the parameter, to differentiate the forcing's period
 
 @dataclass(frozen=True)
 class _Closing:
-    """The data of Newton's method for one orbit: its change over a period, with derivatives."""
+    """The data of Newton's method for one orbit: the change x(T) - x(0), with its derivatives."""
 
     point: BranchPoint
     change: np.ndarray
@@ -64,7 +64,7 @@ def continuation(
     progress: Callable[[float], None] | None = None,
     **options: Any,
 ) -> Branch:
-    """Follow the periodic orbit of a model over a parameter in both directions, to the bounds or its end.
+    """Follow a periodic orbit over a parameter, in both directions, to the bounds or the branch's end.
 
     This is pseudo-arclength continuation (H. B. Keller, in Applications of Bifurcation Theory, ed. P. H.
     Rabinowitz, Academic Press 1977, 359) of the shooting equations. The derivatives come from the variational
@@ -115,27 +115,28 @@ def continuation(
             f"model {model.name} has no parameter {parameter!r}",
             remedy=model.remedy_for_parameter(str(parameter)),
         )
-    low, high = arguments.two_numbers(bounds, "bounds", "give two numbers, (low, high)")
+    low, high = arguments.two_numbers(bounds, "bounds", "use two numbers, (low, high)")
     progress = arguments.callback(progress)
     value = model.parameter_values()[parameter]
     if not low <= value <= high or low == high:
         raise UsageError(
-            f"bounds {bounds!r} do not contain the model's value {parameter} = {value:g}",
-            remedy=f"give bounds that contain it, or another start with params={{{parameter!r}: ...}}",
+            f"`bounds` {bounds!r} do not contain the model's value {parameter} = {value:g}",
+            remedy="use bounds that contain it, or change the model's value with "
+            f"params={{{parameter!r}: ...}}",
         )
     method = {"integrator": integrator, "rtol": rtol, **options}
     start = steady_state(model, x0=x0, **method)
     if start.kind != "periodic" or start._closed is None:
         raise UsageError(
             f"model {model.name} does not settle on a periodic orbit at {parameter} = {value:g}: {start.message}",
-            remedy="start from other parameters or another x0",
+            remedy="use other `params` or another `x0`",
         )
     follower = _Follower(model, parameter, (low, high), method, start._closed, start._is_free, most)
     first = follower.close(start._closed, value)
     if first is None:
         raise UsageError(
             f"the orbit at {parameter} = {value:g} cannot be followed: {follower.fault or start.message}",
-            remedy="sweep it with hs.bifurcation",
+            remedy="vary the parameter with hs.bifurcation",
         )
     sides = []
     for number, sign in enumerate((-1.0, 1.0)):
@@ -237,7 +238,7 @@ class _Follower:
         return int(np.argmax(rates / self.unit[: len(rates)])) if len(rates) else 0
 
     def _at_bound(self, inside: BranchPoint, outside: BranchPoint) -> list[BranchPoint]:
-        """Return the orbit at the bound between two points, if Newton's method finds it."""
+        """Return the orbit at the bound that lies between two points, or None if Newton's method fails."""
         bound = self.bounds[0] if outside.parameter < self.bounds[0] else self.bounds[1]
         share = (bound - inside.parameter) / (outside.parameter - inside.parameter)
         a, b = self._unknowns(inside), self._unknowns(outside)
@@ -283,7 +284,7 @@ class _Follower:
         return None, _CORRECTIONS
 
     def close(self, orbit: Orbit, value: float) -> _Closing | None:
-        """Return the data of Newton's method for an orbit that is already periodic."""
+        """Return the data of Newton's method for an orbit that needs no correction."""
         motion = Motion(self.model.with_(**{self.parameter: value}), self.method)
         point = BranchPoint(value, orbit, motion, np.zeros(0), (), self.is_free)
         return self._closing(point, self._unknowns(point))
@@ -331,14 +332,14 @@ class _Follower:
 
     @staticmethod
     def _rates(solution: Solution, k: int, count: int) -> np.ndarray:
-        """Return the rates (count,) of all unknowns at the start (k = 0) or the end (-1) of a run."""
+        """Return the rates (count,) of all unknowns at the start (k = 0) or at the end (k = -1) of a run."""
         segment, found = solution._segments[k], np.zeros(count)
         states = rates_of(solution._system, float(segment.s[k]), segment.x[k], segment.p, segment.z)
         found[: len(states)] = states
         return found
 
     def _forced(self, value: float) -> tuple[float, float]:
-        """Return the period of the forcing, and its derivative by the parameter."""
+        """Return the forcing period and its derivative with respect to the parameter."""
         from hybridsim.engine.system.period import common_period
         from hybridsim.engine.system.system_cache import system_of
 
@@ -354,6 +355,6 @@ class _Follower:
 
 
 def _word(solution: Solution) -> tuple[str, ...]:
-    """Return the modes of the orbit in order, in the rotation that is first in alphabetical order."""
+    """Return the mode sequence of the orbit, cyclically shifted to be first in alphabetical order."""
     word = word_of(solution)
     return min((word[i:] + word[:i] for i in range(len(word))), default=word)

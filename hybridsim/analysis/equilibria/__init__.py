@@ -1,4 +1,4 @@
-"""This package finds the equilibria and the steady sliding of a model, and its linearisation there."""
+"""This package finds equilibria and steady sliding motions of a model, and linearises about them."""
 
 from hybridsim.analysis.equilibria.equilibria import Equilibrium, equilibria
 from hybridsim.analysis.equilibria.linearize import Linearization, linearize

@@ -1,4 +1,4 @@
-"""This module finds all equilibria and steady sliding of a model, with the ranges in which bodies can stick."""
+"""This module finds all equilibria and steady sliding motions of a model, including sets of equilibria."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _SETTLED = 1e-14
 
 @dataclass(frozen=True)
 class Equilibrium(Readable):
-    """An equilibrium in one combination of modes: a point, or a set of points if bodies stick.
+    """An equilibrium in one combination of modes: a single point, or a set of points if bodies stick.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class Equilibrium(Readable):
 def equilibria(
     model: Model | str | PathLike[str], *, params: Mapping[str, Any] | None = None
 ) -> tuple[Equilibrium, ...]:
-    """Find the equilibria and the steady sliding of an unforced model, in each combination of modes that can hold.
+    """Find equilibria and steady sliding of an unforced model, in each combination of modes that can hold.
 
     In each combination of modes Newton's method finds a point with zero rates; points that violate a guard
     are left out. If contacts stick, the points form a set. Linear programs then give the least and greatest
@@ -108,7 +108,8 @@ def equilibria(
     system = system_of(model)
     if model.schedules:
         raise UsageError(
-            f"model {model.name} has {model.schedules[0].name}, which changes it over time: there is no equilibrium",
+            f"model {model.name} has {model.schedules[0].name}, which changes the model over time: there "
+            "is no equilibrium",
             remedy="use hs.steady_state",
         )
     if is_driven(system):
@@ -120,7 +121,7 @@ def equilibria(
     if count > _MAX_COMBINATIONS:
         raise UsageError(
             f"model {model.name} has {count} combinations of modes; at most {_MAX_COMBINATIONS} are tried",
-            remedy="choose modes and use hs.linearize(model, mode)",
+            remedy="choose the modes yourself with hs.linearize(model, mode)",
         )
     found: list[Equilibrium] = []
     for numbers in product(*(range(len(a.modes)) for a in system.automata)):
@@ -172,7 +173,7 @@ def _in_modes(field: Field) -> Equilibrium | None:
 
 
 def _scaled(A: np.ndarray) -> np.ndarray:
-    """Scale rows and columns to about unit size, so that the rank is meaningful."""
+    """Scale rows and columns of a matrix to about unit size, so that its numerical rank is meaningful."""
     rows = np.abs(A).max(axis=1, initial=0.0)
     A = A / np.where(rows > 0.0, rows, 1.0)[:, None]
     columns = np.abs(A).max(axis=0, initial=0.0)
@@ -180,7 +181,7 @@ def _scaled(A: np.ndarray) -> np.ndarray:
 
 
 def _extent(field: Field, x: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the range of each state over the equilibria around x; None if the guards allow none."""
+    """Return the range of each state over the equilibria around x; None if the guards admit no point."""
     n = len(x)
     low, high = np.empty(n), np.empty(n)
     for i in range(n):
@@ -193,7 +194,7 @@ def _extent(field: Field, x: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None
 
 
 def _farthest(field: Field, x: np.ndarray, i: int, side: float) -> float | None:
-    """Return the least (side 1) or greatest (side -1) value of state i, by repeated linear programs."""
+    """Return the least (side 1) or greatest (side -1) value of state i, by a sequence of linear programs."""
     at = x
     for _ in range(_ROUNDS):
         solved = _program(field, at, i, side)
@@ -239,7 +240,7 @@ def _program(field: Field, at: np.ndarray, i: int, side: float) -> tuple[str, np
 
 
 def _nearest_inside(field: Field, middle: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return an equilibrium near the middle of the set."""
+    """Return an equilibrium near the middle of the set of equilibria."""
     try:
         return equilibrium_near(field, middle)
     except SimulationError:

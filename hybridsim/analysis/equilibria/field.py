@@ -30,7 +30,7 @@ class Field:
         if not system.has_tape:
             raise UsageError(
                 f"model {system.model.name} consists of Python functions, whose derivatives are unknown",
-                remedy="write it in expressions",
+                remedy="write the model in expressions",
             )
         self.system, self.z, self.t, self.by_state = system, z, t, by_state
         self.p = system.vector(Instant(t), system.discrete_start)
@@ -47,14 +47,14 @@ class Field:
         return found.values[0, :n], found.slopes[0, :n], found.values[0, n:], found.slopes[0, n:]
 
     def at_sides(self, x: np.ndarray) -> Field:
-        """Return the field in the modes that follow from x: sides of corners and jumps, pieces of tables."""
+        """Return the field in the modes that x determines: sides of corners and jumps, pieces of tables."""
         if not self.by_state:
             return self
         z = modes_by_state(self.system, self.by_state, 0.0, x, self.p, self.z)
         return self if (z == self.z).all() else Field(self.system, z, self.t, self.by_state)
 
     def borders(self, x: np.ndarray) -> list[tuple[int, int]]:
-        """Return the components with a guard at zero within rounding, each with the mode beyond the guard."""
+        """Return the components with a guard that is zero within rounding, and the mode beyond that guard."""
         _, _, g, G = self(x)
         rounding = dict(zip(self.guards.tolist(), INSIDE * (np.abs(G) @ self.sizes(x)), strict=True))
         value = dict(zip(self.guards.tolist(), g.tolist(), strict=True))
@@ -68,7 +68,7 @@ class Field:
         return found
 
     def sizes(self, x: np.ndarray) -> np.ndarray:
-        """Return the scale of each state at x: its value or its nominal size, or 1 if both are zero."""
+        """Return the scale of each state at x: its absolute value or nominal size, or 1 if both are zero."""
         found = np.maximum(np.abs(x), [state.nominal or 0.0 for state in self.system.model.states])
         return np.where(found > 0.0, found, 1.0)
 
@@ -83,13 +83,13 @@ def is_driven(system: System) -> bool:
     if tape is None:
         raise UsageError(
             f"model {system.model.name} consists of Python functions, whose derivatives are unknown",
-            remedy="write it in expressions",
+            remedy="write the model in expressions",
         )
     return tape["time"] >= 0 or bool(system.model.inputs)
 
 
 def modes_of(system: System, mode: Mapping[str, str] | str | None) -> tuple[np.ndarray, tuple[int, ...]]:
-    """Return the mode numbers from names by component, and the components whose modes follow from the state.
+    """Return mode numbers from a dict by component, and the components whose modes the state determines.
 
     A string is the mode of the only component. The state determines the modes of corners, tables and jumps of
     a rate, which are not declared as components, unless their mode is given.
@@ -99,18 +99,18 @@ def modes_of(system: System, mode: Mapping[str, str] | str | None) -> tuple[np.n
     if isinstance(mode, str):
         if len(declared) != 1:
             raise UsageError(
-                f"mode is {mode!r}, but model {system.model.name} has {len(declared)} components",
-                remedy="give a mapping from components to modes",
+                f"`mode` is {mode!r}, but model {system.model.name} has {len(declared)} components",
+                remedy="use a dict of component names and modes",
             )
         mode = {declared[0].name: mode}
     if not (mode is None or isinstance(mode, Mapping)):
-        raise UsageError(f"mode cannot be {mode!r}", remedy="give a mapping from components to modes")
+        raise UsageError(f"`mode` cannot be {mode!r}", remedy="use a dict of component names and modes")
     mode_names: dict[str, Any] = dict(mode or {})
     names = [a.name for a in system.declared]
     for name in mode_names:
         if name not in names:
             raise UsageError(
-                f"mode contains {name!r}, which is not a component of model {system.model.name}",
+                f"`mode` contains {name!r}, which is not a component of model {system.model.name}",
                 remedy=nearest(str(name), names, kind="components"),
             )
     numbers, by_state = [], []
@@ -120,11 +120,11 @@ def modes_of(system: System, mode: Mapping[str, str] | str | None) -> tuple[np.n
             by_state.append(c)
         elif chosen is None and automaton.initial < 0:
             raise UsageError(
-                f"mode has no entry for {automaton.name}", remedy=f"give one of {', '.join(automaton.modes)}"
+                f"`mode` has no entry for {automaton.name}", remedy=f"use one of {', '.join(automaton.modes)}"
             )
         if chosen is not None and chosen not in automaton.modes:
             raise UsageError(
-                f"mode of {automaton.name} cannot be {chosen!r}",
+                f"`mode` of {automaton.name} cannot be {chosen!r}",
                 remedy=nearest(str(chosen), automaton.modes, kind="modes"),
             )
         numbers.append(max(automaton.initial, 0) if chosen is None else automaton.modes.index(chosen))

@@ -1,4 +1,4 @@
-"""This module linearises one mode of a model about a point and computes the complex eigenvalues."""
+"""This module linearises a model about a point in one combination of modes, and computes the eigenvalues."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Linearization(Readable):
 
     def __repr__(self) -> str:
         remarks = [] if self.is_equilibrium else ["not an equilibrium"]
-        remarks += [] if self.admissible else ["the modes do not last there"]
+        remarks += [] if self.admissible else ["the modes do not last at this point"]
         return "\n".join(
             [
                 ", ".join([f"Linearization: {'stable' if self.stable else 'not stable'}", *remarks]),
@@ -76,7 +76,7 @@ class Linearization(Readable):
 
     @property
     def eigenvalues(self) -> np.ndarray:
-        """Complex eigenvalues (m,), the fastest growing first."""
+        """Complex eigenvalues (m,), in order of falling real part."""
         return self._modes[0]
 
     @property
@@ -101,7 +101,7 @@ class Linearization(Readable):
 
     @property
     def damping_ratios(self) -> np.ndarray:
-        """Damping ratio ``-Re/|lambda|`` of each of these pairs; negative for growing motions."""
+        """Damping ratio ``-Re/|lambda|`` of each oscillating pair; negative for growing motions."""
         pairs = self.eigenvalues[self.eigenvalues.imag > 0.0]
         return -pairs.real / np.abs(pairs)
 
@@ -115,7 +115,7 @@ def linearize(
     at: Mapping[str, float] | Sequence[float] | None = None,
     t: float = 0.0,
 ) -> Linearization:
-    """Linearise one combination of modes about a point: compute its Jacobian and complex eigenvalues.
+    """Linearise a model about a point in one combination of modes, and compute the eigenvalues.
 
     The Jacobian is exact to rounding, because the expressions are differentiated. At corners (`abs`, `min`,
     `max`, conditionals, pieces of a table) and jumps of a rate, the side on which the point lies is used. A
@@ -180,7 +180,7 @@ def linearize(
 
 
 def _refuse_borders(field: Field, x: np.ndarray, A: np.ndarray) -> None:
-    """Refuse a point on a corner or a jump whose sides differ in their rates or in their Jacobians."""
+    """Reject a point on a corner or a jump at which the rates or the Jacobians of the two sides differ."""
     system = field.system
     rates = field(x)[0]
     scale = field.sizes(x)
@@ -197,12 +197,12 @@ def _refuse_borders(field: Field, x: np.ndarray, A: np.ndarray) -> None:
         raise UsageError(
             f"the point lies on the corner {system.automata[c].name}: the linearizations on its two sides "
             "differ",
-            remedy="give a point on one side of the corner with at=",
+            remedy="pass a point on one side of the corner as `at`",
         )
 
 
 def equilibrium_near(field: Field, x: np.ndarray) -> np.ndarray:
-    """Return an equilibrium found by Newton's method from x; in a continuum of equilibria, a nearby one."""
+    """Return an equilibrium near x by Newton's method; the equilibria may form a continuum."""
     x = field.projected(x)
     field = field.at_sides(x)
     f, A, *_ = field(x)
@@ -227,17 +227,17 @@ def equilibrium_near(field: Field, x: np.ndarray) -> np.ndarray:
         return x
     modes = ", ".join(f"{c}: {m}" for c, m in field.system.mode_names(field.z).items())
     raise SimulationError(
-        f"no equilibrium of model {field.system.model.name} was found from its start"
+        f"no equilibrium of model {field.system.model.name} was found from its initial state"
         + (f", in the modes {modes}" if modes else ""),
-        remedy="start the model closer to one, declare nominal values of its states, or pass a point "
-        "to linearise about with at=",
+        remedy="use initial values closer to an equilibrium, declare nominal values, or pass a point "
+        "to linearise about as `at`",
     )
 
 
 def _without_dust(
     field: Field, x: np.ndarray, f: np.ndarray, A: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Set states that are rounding errors of zero to zero, if the rates do not get worse."""
+    """Set states that are zero within rounding to zero, unless that makes the rates worse."""
     scale = np.abs(A).max(axis=1, initial=0.0)
     scale[scale == 0.0] = 1.0
     for j in field.free:
@@ -251,5 +251,5 @@ def _without_dust(
 
 
 def _terms(A: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Return the sizes of the terms of each rate."""
+    """Return the sum of the absolute values of the terms of each rate."""
     return np.abs(A) @ sizes + np.finfo(float).tiny

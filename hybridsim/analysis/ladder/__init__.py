@@ -1,4 +1,4 @@
-"""This package holds the simpler models of `advise`; each rung states what it drops and when it does not apply."""
+"""This package holds the simplified models of `advise`, and states what each of them leaves out."""
 
 from __future__ import annotations
 

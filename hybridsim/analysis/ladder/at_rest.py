@@ -1,4 +1,4 @@
-"""This module defines the simplest rung: nothing moves."""
+"""This module defines the simplest simplified model, in which nothing moves."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ class Rest:
 
 
 class AtRest(LadderStep):
-    """The rung in which every state keeps its start value."""
+    """The simplified model in which every state keeps its initial value."""
 
     name = "at-rest"
     title = "nothing moves"
     drops = "all motion: contacts hold, every state stays where it starts"
 
     def apply(self, scene: Scene) -> Rest:
-        """Return the trivial motion."""
+        """Return the motion in which nothing moves."""
         need_contacts(scene.model)
         start = scene.model.start_values()
         if scene.model.discrete:

@@ -1,4 +1,4 @@
-"""This module defines the rungs with a constant friction coefficient instead of a speed-dependent law."""
+"""This module defines simplified models with a friction coefficient that does not depend on the speed."""
 
 from __future__ import annotations
 
@@ -16,34 +16,36 @@ _MEAN = "mean_speed"
 def _need_velocity_law(model: Model) -> None:
     need_stick(model)
     if any(contact.law.tables or contact.law.slip_backward is not None for contact in model.contacts):
-        raise DoesNotApply("the law of a contact is a table, or differs between forward and backward sliding")
+        raise DoesNotApply(
+            "the friction law of a contact is a table, or differs between the two sliding directions"
+        )
     if not any(SPEED in contact.law.slip.names for contact in model.contacts):
-        raise NothingToDrop("mu is constant already: no friction force depends on the speed")
+        raise NothingToDrop("no friction force depends on the speed, so mu is already constant")
 
 
 class ConstantAtRest(LadderStep):
-    """The rung with slip := stick := slip(0)."""
+    """The simplified model with slip := stick := slip(0)."""
 
     name = "constant-mu-at-rest"
-    title = "constant mu, of the force at rest"
-    drops = "how friction changes with speed: the force is the law's at v = 0"
+    title = "constant mu from the friction force at rest"
+    drops = "how friction changes with speed: the law's force at v = 0 is used"
 
     def apply(self, scene: Scene) -> Model:
-        """Return the model with Coulomb's law at the force of slow sliding."""
+        """Return the model with Coulomb friction whose force is that of slow sliding."""
         model = scene.model
         _need_velocity_law(model)
         return with_contacts(model, lambda c: _constant(c, "0"), "constant mu (at rest)")
 
 
 class ConstantAtMeanSpeed(LadderStep):
-    """The rung with slip := stick := slip(mean sliding speed of the full motion)."""
+    """The simplified model with slip := stick := slip(mean sliding speed of the full motion)."""
 
     name = "constant-mu-mean"
-    title = "constant mu, of the force at the mean sliding speed"
-    drops = "how friction changes with speed: the force is the law's at the mean speed of sliding"
+    title = "constant mu from the friction force at the mean sliding speed"
+    drops = "how friction changes with speed: the law's force at the mean sliding speed is used"
 
     def apply(self, scene: Scene) -> Model:
-        """Return the model with Coulomb's law at the force of the mean speed, a parameter for each contact."""
+        """Return the model with Coulomb friction that has the force at each contact's mean sliding speed."""
         model = scene.model
         _need_velocity_law(model)
         if any(not scene.speed.get(contact.name) for contact in model.contacts):

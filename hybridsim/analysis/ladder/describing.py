@@ -1,4 +1,4 @@
-"""This module computes the first harmonic of a contact's friction force for a cosine velocity."""
+"""This module computes the first harmonic of the friction force of a contact with sinusoidal velocity."""
 
 from __future__ import annotations
 
@@ -23,7 +23,9 @@ class FirstHarmonic:
         if contact.normal.names - model.constant_names():
             raise DoesNotApply(f"the normal load of contact {contact.name} varies")
         if contact.law.slip_backward is not None or contact.law.stick_backward is not None:
-            raise DoesNotApply(f"the friction of contact {contact.name} differs between forward and backward")
+            raise DoesNotApply(
+                f"the friction of contact {contact.name} differs between the two sliding directions"
+            )
         self._values = model.parameter_values()
         self._speed = _unused(set(self._values), "speed")
         self._slip = inlined(model, contact.slip_force(parse(self._speed)))

@@ -1,4 +1,4 @@
-"""This module defines the rung of equivalent viscous damping, by one-term harmonic balance."""
+"""This module defines the simplified model with equivalent viscous damping, by one-term harmonic balance."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _NOTHING = "the harmonic balance has no moving solution: it predicts that fricti
 
 
 class EquivalentViscous(LadderStep):
-    """The rung f = c_eq v, c_eq = F1(V)/V, with F1 the first harmonic of friction for a cosine of amplitude V.
+    """The simplified model f = c_eq v, c_eq = F1(V)/V; F1 is the first harmonic of friction at v = V cos(a).
 
     For Coulomb friction c_eq = 4 mu N/(pi V), a damper that does the same work per cycle. V is the first
     harmonic of the relative velocity in the steady motion of the model with these dampers, at the forcing's
@@ -39,7 +39,7 @@ class EquivalentViscous(LadderStep):
     drops = "stick and all harmonics of friction: a damper takes the same work per cycle at the forcing's frequency"
 
     def apply(self, scene: Scene) -> Model:
-        """Return the model with each contact replaced by a damper."""
+        """Return the model with a viscous damper in place of each contact."""
         model = scene.model
         need_stick(model)
         period = _period(model)
@@ -68,12 +68,14 @@ def _period(model: Model) -> float:
 
     period = system_period(system_of(model))
     if period is None:
-        raise DoesNotApply("the model has no single forcing period for a harmonic balance")
+        raise DoesNotApply(
+            "the harmonic balance needs a single forcing period, which the model does not have"
+        )
     return period
 
 
 def _by_runs(viscous: Model, scene: Scene, names: list[str]) -> Response:
-    """Return the response of a nonlinear model, from its steady state."""
+    """Return the response of a model that is not linear, from its steady state."""
     from hybridsim.analysis.steady import steady_state
 
     velocities = {f"{n}_v": c.velocity for n, c in zip(names, scene.model.contacts, strict=True)}
@@ -99,7 +101,7 @@ def _by_runs(viscous: Model, scene: Scene, names: list[str]) -> Response:
 
 
 def _solve(response: Response, forces: list[FirstHarmonic], most: int) -> np.ndarray:
-    """Return the dampers (contacts,) that are consistent with the motion they cause.
+    """Return the damping coefficients (contacts,) that agree with the motion they cause.
 
     The search starts at small dampers, so that it finds the solution with the largest motion. A single damper
     is found by bisection of log(F1(V(c))/(c V(c))), several by rounds of c <- F1(V(c))/V(c) with half steps
@@ -125,7 +127,8 @@ def _solve_one(balanced: Callable[[float], float], start: float) -> np.ndarray:
     low = start / _BELOW
     if balanced(low) < low:
         raise DoesNotApply(
-            "the harmonic balance has no solution above 1/1000 of the damping of the free motion"
+            "the harmonic balance has no solution above 1/1000 of the damping that the frictionless "
+            "motion suggests"
         )
     high = 2.0 * low
     while balanced(high) > high:
@@ -144,11 +147,13 @@ def _balanced(response: Response, forces: list[FirstHarmonic], c: np.ndarray) ->
 
 
 def _first(response: Response, forces: list[FirstHarmonic]) -> np.ndarray:
-    """Return the dampers for the frictionless motion, or with very small damping if it is unbounded."""
+    """Return a first estimate from the frictionless motion, or with small damping if that is unbounded."""
     try:
         found = _balanced(response, forces, np.zeros(len(forces)))
     except (np.linalg.LinAlgError, DoesNotApply):
         found = _balanced(response, forces, np.full(len(forces), 1e-6))
     if not (found > 0.0).all():
-        raise DoesNotApply("a contact without load has no friction that a damper could replace")
+        raise DoesNotApply(
+            "a contact has no normal load, so there is no friction that a damper could replace"
+        )
     return found

@@ -1,4 +1,4 @@
-"""This module rewrites a model for rungs: forces instead of contacts, other laws, more parameters."""
+"""This module rewrites models: forces in place of contacts, other friction laws, more parameters."""
 
 from __future__ import annotations
 
@@ -44,24 +44,24 @@ def with_forces(model: Model, forces: Mapping[str, Expression], mode: str, title
 
 
 def _is_copy(contact: Contact, part: Component) -> bool:
-    """Return whether an automaton belongs to one of several copies of a law, whose forces are added."""
+    """Return whether an automaton is one of several instances of a law whose forces add up."""
     number = part.name.removeprefix(f"{contact.name}_")
     return contact.law.copies is not None and number != part.name and number.isdecimal()
 
 
 def with_contacts(model: Model, change: Callable[[Contact], Contact], title: str) -> Model:
-    """Return the model with each contact changed, and a title that states the change."""
+    """Return the model with each contact changed; the changed model's title states the change."""
     contacts = tuple(change(contact) for contact in model.contacts)
     return replace(model, contacts=contacts, title=f"{model.title or model.name}, {title}")
 
 
 def at_speed(slip: Expression, speed: str) -> Expression:
-    """Return the slip force at a speed, which is a number or the name of a parameter of the law."""
+    """Return the slip force at a given speed, which is a number or a parameter name of the law."""
     return substitute(slip, {SPEED: parse(speed)})
 
 
 def with_law(contact: Contact, law: FrictionLaw) -> Contact:
-    """Return the contact with another law, without the parameters that this law does not use."""
+    """Return the contact with another law, without the parameters that the new law does not use."""
     used = {name for _, expression in law.expressions() for name in expression.names}
     while more := {n for u in used if (e := law.parameters.get(u)) is not None for n in e.names} - used:
         used |= more
@@ -71,7 +71,7 @@ def with_law(contact: Contact, law: FrictionLaw) -> Contact:
 
 
 def with_parameters(model: Model, wishes: Mapping[str, float]) -> tuple[Model, dict[str, str]]:
-    """Return the model with additional parameters, and the unused name chosen for each requested name."""
+    """Return the model with additional parameters, and the unused name chosen for each of them."""
     taken, names = names_of_model(model), {}
     for wish in wishes:
         names[wish] = free_name(taken, wish)
@@ -81,7 +81,7 @@ def with_parameters(model: Model, wishes: Mapping[str, float]) -> tuple[Model, d
 
 
 def inlined(model: Model, expression: Expression) -> Expression:
-    """Return an expression with the model's definitions inserted."""
+    """Return an expression in which the model's definitions are replaced by their formulas."""
     definitions = dict(model.definitions)
     while used := expression.names & definitions.keys():
         expression = substitute(expression, {name: definitions[name] for name in used})

@@ -1,4 +1,4 @@
-"""This module defines a rung: a simplified model, with a statement of what it drops and when it does not apply."""
+"""This module defines a simplified model: what it leaves out, and when it does not apply."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ if TYPE_CHECKING:
 
 
 class DoesNotApply(Exception):
-    """A rung cannot replace a model; the text says why."""
+    """Raised if a simplified model cannot replace a model; the text gives the reason."""
 
 
 class NothingToDrop(DoesNotApply):
-    """A model lacks the feature that a rung would drop, so the rung changes nothing; the text says why."""
+    """Raised if the model lacks the feature that the simplified model would leave out; the text names it."""
 
 
 @dataclass(frozen=True)
 class Scene:
-    """The full model and the numbers of its motion that rungs need.
+    """The full model, and the sliding speeds of its motion.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class Scene:
 
 
 class LadderStep(ABC):
-    """A simpler model: a transformation Model -> Model, or a closed form instead of a model.
+    """A simplification of a model: a function Model -> Model, or a closed form of the motion.
 
     name : one word for options and maps.
     title, drops : its title, and the feature of the full model that it lacks.
@@ -52,7 +52,7 @@ class LadderStep(ABC):
 
     @abstractmethod
     def apply(self, scene: Scene) -> Model | Any:
-        """Return the simpler model. A step with a closed form returns its motion as a steady state.
+        """Return the simpler model, or a motion in closed form with the measures of a steady state.
 
         Raises
         ------
@@ -65,13 +65,13 @@ class LadderStep(ABC):
 
 
 def need_contacts(model: Model) -> None:
-    """Refuse a model without contacts, because rungs change friction only."""
+    """Reject a model without contacts, because the simplification changes friction only."""
     if not model.contacts:
         raise DoesNotApply("the model has no contact")
 
 
 def need_stick(model: Model) -> None:
-    """Refuse a model with a law without stick, for rungs that change the modes of a law."""
+    """Reject a model with a friction law without stick, because the simplification changes stick."""
     need_contacts(model)
     if not all(contact.law.is_set_valued for contact in model.contacts):
-        raise DoesNotApply("the law of a contact gives its force directly, without stick")
+        raise DoesNotApply("the friction law of a contact gives the force directly, without a stick mode")

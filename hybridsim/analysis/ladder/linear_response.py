@@ -19,11 +19,11 @@ _SAME = 1e-9  # relative; closer frequencies are equal, because parameters carry
 
 
 class NotLinear(Exception):
-    """The rates or relative velocities are not linear forms in the states."""
+    """Raised if the rates or relative velocities are not linear in the states."""
 
 
 class LinearResponse:
-    """First harmonics of the relative velocities of a model, as functions of the damper coefficients."""
+    """Relative velocities of a forced linear model as functions of the contacts' damping coefficients."""
 
     def __init__(self, model: Model, frequency: float) -> None:
         automata = model.surfaces or model.impacts or model.components
@@ -47,7 +47,7 @@ class LinearResponse:
         self._b, self._u = (np.array([_wave(a, frequency, inputs) for a in rows]) for rows in (rates, slides))
 
     def __call__(self, dampers: np.ndarray) -> np.ndarray:
-        """Return the complex amplitudes V of the relative velocities for coefficients c, both (contacts,)."""
+        """Return complex amplitudes (contacts,) of the relative velocities, for damping coefficients c."""
         B = self._B * dampers
         resistance = 1j * self._frequency * np.eye(len(self._A)) - self._A - B @ self._W
         x = np.linalg.solve(resistance, self._b + B @ self._u)
@@ -67,13 +67,13 @@ def _matrix(rows: list[Affine], names: list[str]) -> np.ndarray:
 
 
 def _wave(row: Affine, frequency: float, inputs: Mapping[str, complex]) -> complex:
-    """Return the complex amplitude of exp(iwt) in a row's constant waves and inputs."""
+    """Return the complex amplitude of the forcing in one row: of its harmonic constants and inputs."""
     own = sum(-1j * p for w, p in row.waves.items() if abs(w - frequency) <= _SAME * frequency)
     return complex(own + sum(row.linear.get(name, 0.0) * wave for name, wave in inputs.items()))
 
 
 def _mean(row: Affine, inputs: Iterable[Input], values: Mapping[str, float]) -> float:
-    """Return the mean over a period of a row's constant and inputs, without its states."""
+    """Return the mean over a period of the forcing in one row, without the states."""
     total = row.constant
     for declared in inputs:
         number = {name: float(evaluate(e, values)) for name, e in declared.expressions.items()}
@@ -83,7 +83,7 @@ def _mean(row: Affine, inputs: Iterable[Input], values: Mapping[str, float]) -> 
 
 
 def first_harmonic(declared: Input, frequency: float, values: Mapping[str, float]) -> complex:
-    """Return the complex amplitude of a periodic input at a frequency; 0 for any other frequency."""
+    """Return the complex amplitude of a periodic input at a frequency, or 0 if the frequencies differ."""
     if declared.kind != "wave" or declared.period is None:
         raise NotLinear(f"the input {declared.name} is not periodic")
     number = {name: float(evaluate(e, values)) for name, e in declared.expressions.items()}

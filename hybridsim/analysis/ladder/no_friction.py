@@ -1,4 +1,4 @@
-"""This module defines the rung without friction: every contact force is zero."""
+"""This module defines the simplified model without friction: every contact force is zero."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hybridsim.model import Model
 
 
 class NoFriction(LadderStep):
-    """The rung with f = 0."""
+    """The simplified model with f = 0 in every contact."""
 
     name = "no-friction"
     title = "no friction"

@@ -1,4 +1,4 @@
-"""This module defines the rung of Den Hartog's closed form, for an oscillator that never stops."""
+"""This module defines Den Hartog's closed form for an oscillator that never stops, as a simplified model."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _DENSE = 2001  # points of the search for the largest velocity, before Newton's 
 
 
 class NoStopMotion:
-    """Den Hartog's motion with the measures of a steady state; the second half period mirrors the first."""
+    """Den Hartog's motion with the measures of a steady state; its two half periods mirror each other."""
 
     def __init__(self, found: Recognised, contact: str, amplitude: float, angle: float) -> None:
         s = found.system
@@ -77,13 +77,13 @@ class NoStopMotion:
         return complex(4.0 / self.period * (self._w @ (self._swing(name) * wave)))
 
     def _swing(self, name: str) -> np.ndarray:
-        """Return the deviation from the mean over the half period after the upper turning point."""
+        """Return the deviation from the mean during the half period after the upper turning point."""
         if name == self._contact:
             return np.full(len(self._s), -self._system.slip_force)
         return self._phase.derivative(0 if name == self._x else 1, self._s) - self.mean[name]
 
     def _fastest(self) -> float:
-        """Return the largest speed, by Newton's method on the acceleration from the fastest of many points."""
+        """Return the largest speed, by Newton's method from the fastest of many sampled points."""
         s = np.linspace(0.0, 0.5 * self.period, _DENSE)
         at = float(s[int(np.argmax(np.abs(self._phase.derivative(1, s))))])
         for _ in range(4):
@@ -93,7 +93,7 @@ class NoStopMotion:
 
 @dataclass(frozen=True)
 class _Held:
-    """The solution of the closed form: amplitude, forcing angle at the turning point, and uniqueness."""
+    """The solution of the closed form: amplitude, forcing angle at the turning point, uniqueness."""
 
     found: Recognised
     amplitude: float
@@ -158,7 +158,7 @@ def _angle_at_top(system: ForcedCoulombOscillator, amplitude: float) -> float:
 
 
 class NoStop(LadderStep):
-    """The rung of the closed form of J. P. Den Hartog, Trans. ASME 53 (1931) 107."""
+    """The closed form without stops by J. P. Den Hartog, Trans. ASME 53 (1931) 107."""
 
     name = "no-stop"
     title = "Den Hartog's closed form without stops"

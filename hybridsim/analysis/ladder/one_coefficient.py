@@ -1,4 +1,4 @@
-"""This module defines the rung with equal static and kinetic friction, mu_s := mu_k."""
+"""This module defines the simplified model with equal static and kinetic friction, mu_s := mu_k."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ _TRIALS = 4  # points at which a jump at rest is looked for; more than one exclu
 
 
 class OneCoefficient(LadderStep):
-    """The rung with stick := slip(0), for every contact whose static friction exceeds its kinetic friction."""
+    """The simplified model with stick := slip(0), for contacts with mu_s > mu_k."""
 
     name = "mu_s=mu_k"
     title = "mu_s := mu_k"
-    drops = "static friction above kinetic: a body breaks loose at the force with which it slides"
+    drops = "the excess of static over kinetic friction: a body breaks loose at the sliding force"
 
     def apply(self, scene: Scene) -> Model:
-        """Return the model with the stick limit lowered to the force of slow sliding."""
+        """Return the model in which the stick limit equals the force of slow sliding."""
         model = scene.model
         need_stick(model)
         if any(contact.law.tables for contact in model.contacts):
-            raise DoesNotApply("the law of a contact is a table")
+            raise DoesNotApply("the friction law of a contact is a table")
         jumps = [_jumps(model, contact) for contact in model.contacts]
         if not any(jumps):
             raise NothingToDrop("static and kinetic friction are already equal at v = 0")

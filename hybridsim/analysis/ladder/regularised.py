@@ -1,4 +1,4 @@
-"""This module defines the rungs with a single-valued friction force: tanh, arctan, and Karnopp's dead band."""
+"""This module defines simplified models with a single-valued friction force, such as tanh."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ SHARE = 0.01  # of the largest sliding speed; makes the regularised region narro
 
 
 class _Regularised(LadderStep):
-    """A rung that regularises the force within a width v0 around zero velocity; see `Model.regularized`."""
+    """A simplified model whose friction force is smooth for |v| < v0; see `Model.regularized`."""
 
     def apply(self, scene: Scene) -> Model:
         """Return the model with every contact regularised."""
@@ -19,7 +19,7 @@ class _Regularised(LadderStep):
         if v0 is None:
             if not scene.peak:
                 raise DoesNotApply(
-                    "nothing slides in the full motion, so that no v0 is small compared with its speed"
+                    "nothing slides in the full motion, so there is no sliding speed to choose `v0` from"
                 )
             v0 = SHARE * scene.peak
         try:
@@ -29,7 +29,7 @@ class _Regularised(LadderStep):
 
 
 class Tanh(_Regularised):
-    """The rung with f = slip(|v|) tanh(v/v0)."""
+    """The simplified model with f = slip(|v|) tanh(v/v0)."""
 
     name = "tanh"
     title = "regularised, tanh(v/v0)"
@@ -37,15 +37,15 @@ class Tanh(_Regularised):
 
 
 class Arctan(_Regularised):
-    """The rung with f = slip(|v|) (2/pi) atan(v/v0)."""
+    """The simplified model with f = slip(|v|) (2/pi) atan(v/v0)."""
 
     name = "arctan"
     title = "regularised, (2/pi) atan(v/v0)"
-    drops = "stick, and the full force at all speeds: it is reached only slowly"
+    drops = "stick, and the full friction force, which is only approached at high speed"
 
 
 class Karnopp(_Regularised):
-    """The rung in which the body is stopped for |v| < v0."""
+    """The simplified model in which a body with |v| < v0 is stopped."""
 
     name = "karnopp"
     title = "Karnopp's dead band |v| < v0"

@@ -1,4 +1,4 @@
-"""This package finds steady motions, by following a run and by Newton's method, and measures one period of them."""
+"""This package finds the steady motion of a model and measures it over one period."""
 
 from hybridsim.analysis.steady.result import SteadyState
 from hybridsim.analysis.steady.steady_state import steady_state

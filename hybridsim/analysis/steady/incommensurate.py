@@ -1,4 +1,4 @@
-"""This module follows a model whose forcing and clocks have no common period, and a small change of its start."""
+"""This module follows motions with incommensurate forcing periods until an initial change has decayed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _NO_PERIOD = "the periods of forcing and clocks have no common multiple"
 
 
 class Followed(NamedTuple):
-    """The result of `follow`: an orbit at rest if found, and whether a change of the start decays."""
+    """The result of `follow`: an equilibrium if one was found, and whether an initial change decays."""
 
     rests: Orbit | None
     dies_out: bool
@@ -29,7 +29,7 @@ class Followed(NamedTuple):
 
 
 def follow(motion: Motion, longest: float, settle: int, max_periods: int) -> Followed:
-    """Follow a motion for more and more periods of its slowest forcing, until its start no longer matters.
+    """Follow a motion over more and more periods of its slowest forcing, until an initial change has decayed.
 
     If every small change of the start decays, the motion follows the forcing alone, with its frequencies and
     their sums: it is quasi-periodic. Otherwise it has further frequencies, or is chaotic.
@@ -42,7 +42,7 @@ def follow(motion: Motion, longest: float, settle: int, max_periods: int) -> Fol
         if (high - low <= RESTS * largest).all() and not solution._system.layout.discrete:
             rest = Orbit(point_at_end(solution), longest, 1, 0.0)
             message = (
-                f"equilibrium: nothing moves in the later half of {count} periods of the slowest forcing"
+                f"equilibrium: nothing moves in the second half of {count} periods of the slowest forcing"
             )
             return Followed(rest, True, count, f"{message}; {_NO_PERIOD}")
         motion.carry(solution)
@@ -53,7 +53,7 @@ def follow(motion: Motion, longest: float, settle: int, max_periods: int) -> Fol
         unit = np.where(largest > 0.0, largest, 1.0)
         unit = np.concatenate([unit, np.ones(len(matrix) - len(unit))])
         left = float(np.abs(matrix * unit[None, :] / unit[:, None]).max(initial=0.0))
-        growth = f"a change of the start is {left:.1e} times as large after {count} slowest periods"
+        growth = f"an initial change is {left:.1e} times as large after {count} slowest periods"
         if left <= _DIES_OUT:
             return Followed(None, True, count, f"quasi-periodic: {_NO_PERIOD}, and {growth}")
         if count * _LONGER > min(max_periods, _MAX_SLOW_PERIODS):

@@ -1,4 +1,4 @@
-"""This module computes the largest Lyapunov exponent of a motion with events: the growth of a small change.
+"""This module computes the largest Lyapunov exponent of a motion with events.
 
 It uses Benettin's method (G. Benettin, L. Galgani, A. Giorgilli, J.-M. Strelcyn, Meccanica 15 (1980) 9,
 doi:10.1007/BF02128236), with the saltation matrices of P. C. Mueller, Chaos, Solitons and Fractals 5 (1995)
@@ -22,9 +22,10 @@ _SMALLEST = 1e-280  # a smaller change has been reduced to nothing by stick
 
 
 def largest_exponents(motion: Motion, start: Point, period: float) -> tuple[float, float]:
-    """Return the mean growth rates of a change over the first and second 150 periods; -inf for zero change.
+    """Return the mean growth rates of an initial change, over 150 periods and over the next 150 periods.
 
-    Exponential growth has the same rate in both halves. Growth like a power of time has not.
+    Exponential growth has the same rate in both halves, unlike growth by a power of time. The rates are -inf if
+    stick reduces the change to zero.
     """
     n, d = len(start.x), len(start.discrete)
     change = np.ones(n + d) / math.sqrt(n + d)

@@ -1,4 +1,4 @@
-"""This module measures a periodic orbit: amplitudes, means, energies, harmonics, work of friction, time in stick."""
+"""This module measures a periodic orbit: amplitudes, energies, harmonics, friction work, stick fractions."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _ROUNDING = 1e-10  # relative to a guard's largest value; a smaller value is rou
 
 
 class Grazing(NamedTuple):
-    """The smallest value that a guard reaches without an event, absolute and relative to its maximum on the orbit."""
+    """The smallest value of a guard that does not reach zero, and its ratio to the guard's maximum."""
 
     guard: str
     t: float
@@ -37,11 +37,11 @@ class Grazing(NamedTuple):
 
 
 class UnknownName(UsageError, KeyError):
-    """A measure was requested for a name that does not exist."""
+    """Raised if a measure is requested by an unknown name."""
 
 
 class ByName(Mapping[str, float]):
-    """A measure of each quantity, computed on demand.
+    """A mapping from names to one measure, whose values are computed on demand.
 
     Quantities that cannot be read (`unreadable`) are not items of it; accessing them raises an error with the
     reason.
@@ -86,7 +86,7 @@ class Measures:
 
     @property
     def _phase(self) -> float:
-        """The time at which the orbit begins, in the time of the forcing."""
+        """The time at which the orbit begins, on the time axis of the forcing."""
         return 0.0
 
     @cached_property
@@ -103,7 +103,7 @@ class Measures:
 
     @property
     def too_fast(self) -> tuple[str, ...]:
-        """Quantities that vary too fast, or jump too often, to be measured."""
+        """Names of the quantities that vary too fast, or jump too often, to be measured."""
         return tuple(name for name in self._names if name in self._orbit.too_fast)
 
     def _extreme(self, name: str, side: int) -> float:
@@ -147,7 +147,8 @@ class Measures:
         known_name(name, self._names, "the steady state has no quantity", "quantities")
         if not isinstance(k, int) or not 0 <= k <= MOST_HARMONICS:
             raise UsageError(
-                f"k cannot be {k!r}", remedy="give 0 for the mean, 1 for the fundamental, 2, 3, ..."
+                f"`k` cannot be {k!r}",
+                remedy="use 0 for the mean, 1 for the fundamental, or 2, 3, ... for higher harmonics",
             )
         frequency = 2.0 * math.pi * k / self._orbit.duration
         found = self._orbit.harmonic(name, frequency)
@@ -166,7 +167,7 @@ class Measures:
         )
 
     def _velocity(self, contact: str) -> np.ndarray:
-        """Return the relative velocity of a contact at the orbit's points."""
+        """Return the relative velocity of a contact at the Gauss points of the orbit."""
         orbit, model = self._orbit, self.solution.model
         if f"velocity of {contact}" in orbit.names:
             return orbit.of(f"velocity of {contact}")
@@ -193,7 +194,7 @@ class Measures:
         return spent / (self.solution.t_end - self.solution.t_start)
 
     def held_mode(self, contact: str) -> str:
-        """Return the mode that counts as stick: ``stick`` for a contact, the sliding mode for a switching surface."""
+        """Return the mode that counts as stick: ``stick``, or the sliding mode of a switching surface."""
         automata = {a.name: a for a in self.solution._system.automata if a.has_surface}
         automaton = automata[
             known_name(contact, list(automata), "the steady state has no contact", "contacts")
@@ -206,7 +207,7 @@ class Measures:
         return ByName(self._contacts, self._stops, "contact")
 
     def _stops(self, contact: str) -> float:
-        """Count the intervals of stick; one across the end of the period counts once, permanent stick counts zero."""
+        """Count the stick intervals; an interval across the end counts once, permanent stick as zero."""
         hold, intervals = (
             self.held_mode(contact),
             [i.mode for i in self.solution.modes[contact] if i.t1 > i.t0],
@@ -216,12 +217,12 @@ class Measures:
 
     @cached_property
     def word(self) -> tuple[str, ...]:
-        """The modes in the order of the period; the modes of several components are separated by commas."""
+        """The mode sequence over the period; modes of several components are separated by commas."""
         return word_of(self.solution)
 
     @cached_property
     def grazing(self) -> Grazing | None:
-        """The guard that comes closest to zero and turns back, if any; a small value is close to a grazing.
+        """The guard that comes closest to zero without reaching it, or None; near grazing it is small.
 
         A guard at an event that makes it zero is left out there. So is a guard that varies too fast for its
         minima to be found.
@@ -244,7 +245,7 @@ class Measures:
 
 
 def word_of(solution: Solution) -> tuple[str, ...]:
-    """Return the modes of a run in order; equal first and last modes are merged."""
+    """Return the mode sequence of a run; the last mode is dropped if it equals the first."""
     names = [a.modes for a in solution._system.declared]
     found: list[str] = []
     for z, (first, last) in zip(solution._segments.modes(), solution._segments.spans(), strict=True):

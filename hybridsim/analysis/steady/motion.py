@@ -1,4 +1,4 @@
-"""This module defines the state at a section and the runs from one passage of the section to later ones."""
+"""This module defines states at a section, and runs from one passage of the section to later passages."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Point:
-    """The start of a run: states, discrete states, and modes of the components without a surface.
+    """The start of a run: time, states, discrete states and modes.
 
     x (n,), discrete (d,); numbers: the modes of all components, which determine the held states. Events
     exactly at the section have not happened yet. at: the time from which the forcing's phase is counted.
@@ -50,7 +50,7 @@ class Point:
 
 
 class CostsMore(Exception):
-    """A run has reached its first cost limit; `reached` is its duration so far."""
+    """Raised when a run has reached its first cost limit; `reached` is the duration so far."""
 
     def __init__(self, reached: float) -> None:
         super().__init__(reached)
@@ -58,20 +58,22 @@ class CostsMore(Exception):
 
 
 class GrowsWithoutBound(SimulationError):
-    """A run ended because a state grew beyond all bounds."""
+    """Raised if a run ended because a state grew without bound."""
 
     def __init__(self, name: str) -> None:
         super().__init__(f"the motion grows without bound: {name} has passed {_WITHOUT_BOUND:g}")
 
 
 class CostsTooMuch(SimulationError):
-    """A search has reached its work limit."""
+    """Raised when a search has reached its cost limit."""
 
     def __init__(self) -> None:
         super().__init__(
-            "no steady motion was found within the work limit; declare the `duration` of some periods of the motion, "
-            "pass period=, a smaller settle, a larger tol or a stiff integrator (rodas5p), or raise max_periods, which "
-            "also raises the limit"
+            "no steady motion was found within the work limit; declare a `duration` of several periods "
+            "in the model, "
+            "pass `period`, a smaller `settle`, a larger `tol` or a stiff integrator such as rodas5p, "
+            "or raise "
+            "`max_periods`, which also raises the limit"
         )
 
 
@@ -86,7 +88,7 @@ _WITHOUT_BOUND = 1e100  # in any unit; squares and products of such values overf
 
 
 class Motion:
-    """Runs of one model with one method.
+    """Runs of one model with the same options.
 
     Parameters
     ----------
@@ -130,13 +132,13 @@ class Motion:
         return coupled_sizes(system, point.x, system.vector(Instant(point.at), point.discrete), point.numbers)
 
     def stands_still(self, point: Point) -> bool:
-        """Return whether all rates at a point are rounding errors."""
+        """Return whether all rates at a point are zero within rounding errors."""
         system = system_of(self.model)
         p = system.vector(Instant(point.at), point.discrete)
         return stands_still(system, point.x, p, point.numbers, self.rtol)
 
     def _tolerances(self, start: Point, rtol: float) -> dict[str, Any]:
-        """Return the absolute tolerances of a run; a state near zero gets that of the motion's size."""
+        """Return the absolute tolerances of a run; a state near zero gets one from the size of the motion."""
         if "atol" in self.options or all(state.nominal for state in self.model.states):
             return {}
         found = np.maximum(self.coupled_sizes(start), self.sizes)
@@ -150,7 +152,7 @@ class Motion:
         return replace(point, x=x)
 
     def run(self, start: Point | None, duration: float, is_carried: bool = False, **options: Any) -> Solution:
-        """Run from the time of a point on; None starts at time 0 from the model's start.
+        """Run from a point for a duration; without a point, from the model's initial state at time 0.
 
         is_carried: derivatives will be carried along the run, so that their cost counts too.
         """
@@ -185,7 +187,7 @@ class Motion:
         return solution
 
     def _longer(self, solution: Solution, duration: float, is_carried: bool) -> Solution:
-        """Continue a run that has reached its limits for as many steps again, within the cost limit."""
+        """Continue a run that has reached its limits, for as many steps as so far, within the cost limit."""
         spent, reached = _cost_of(solution), solution.t_end - solution.t_start
         spent += _cost_of_carrying(solution) if is_carried else 0.0
         if (
@@ -199,7 +201,7 @@ class Motion:
         )
 
     def carry(self, solution: Solution) -> None:
-        """Add the cost of carrying derivatives along a run."""
+        """Add the cost of carrying derivatives along a run to the cost so far."""
         self._spend(_cost_of_carrying(solution))
 
     def _spend(self, seconds: float, ahead: float = 0.0) -> None:
@@ -208,7 +210,7 @@ class Motion:
             raise CostsTooMuch
 
     def _refuse_growth(self, solution: Solution) -> None:
-        """Raise `GrowsWithoutBound` for a run that failed because of the size of a state."""
+        """Raise `GrowsWithoutBound` if a run failed because a state became too large."""
         last = np.abs(solution._segments[-1].x[-1]) if solution._segments else np.zeros(0)
         last = np.where(np.isfinite(last), last, np.inf)
         if last.max(initial=0.0) >= _WITHOUT_BOUND:

@@ -1,4 +1,4 @@
-"""This module represents part of a run as polynomials on small pieces with Gauss points, none across an event.
+"""This module represents part of a run by polynomials on short intervals, none of them across an event.
 
 Integrals are sums over the points, and extrema are zeros of polynomials, so that no time grid is needed.
 """
@@ -53,19 +53,19 @@ class Orbit:
 
     @property
     def duration(self) -> float:
-        """Length of the part of the run."""
+        """Duration of this part of the run."""
         return float(self.lengths.sum())
 
     @property
     def times(self) -> np.ndarray:
-        """Times of the points (K, POINTS), from the beginning of the run."""
+        """Times of the Gauss points (K, POINTS), from the start of the run."""
         return self.starts[:, None] + 0.5 * self.lengths[:, None] * (1.0 + NODES)
 
     def column(self, name: str) -> int:
-        """Return the number of a readable quantity."""
+        """Return the column of a quantity in `values`."""
         if name in self.too_fast:
             raise SimulationError(
-                f"{name} varies too fast, or jumps too often, to be resolved on an orbit: it has no readings",
+                f"{name} varies too fast, or jumps too often, to be measured over a period",
                 remedy="sample this quantity from steady.solution, and remove it from the outputs to read all other "
                 "quantities at once",
             )
@@ -80,11 +80,11 @@ class Orbit:
         return self.of(name) @ TO_COEFFICIENTS.T
 
     def integral(self, values: np.ndarray) -> float:
-        """Return the integral over the run of values at the Gauss points (K, POINTS)."""
+        """Return the integral over this part of the run, from values at the Gauss points (K, POINTS)."""
         return float((values @ WEIGHTS) @ (0.5 * self.lengths))
 
     def harmonic(self, name: str, frequency: float) -> complex:
-        """Return the amplitude c of q = Re(c exp(i w t)), an integral over the orbit; the mean for w = 0."""
+        """Return the amplitude c of q = Re(c exp(i w t)) by an integral over the orbit; the mean if w = 0."""
         total = 0.0 + 0.0j
         parts = max(1, int(np.ceil(frequency * self.lengths.max() / POINTS * 2.0)))
         coefficients = self._series(name)
@@ -112,7 +112,7 @@ class Orbit:
 
     @cached_property
     def turns(self) -> Turns:
-        """The points inside pieces at which the slope of a quantity changes its sign."""
+        """The extrema inside the pieces: points at which the slope of a quantity changes its sign."""
         found = [self._turns_of(*block) for block in self._blocks()]
         return Turns(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
@@ -132,7 +132,7 @@ class Orbit:
         return Turns(q, k, times, turned, before < 0.0)
 
     def _blocks(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-        """Yield batches of pieces: number, Legendre coefficients (k * Q, POINTS), and validity (k, Q)."""
+        """Yield batches of pieces: numbers, Legendre coefficients (k * Q, POINTS), validity masks (k, Q)."""
         block = max(1, _SLOPES_PER_BATCH // (_DENSE * len(self.names)))
         for first in range(0, max(len(self.values), 1), block):
             chosen = slice(first, first + block)
@@ -140,7 +140,7 @@ class Orbit:
             yield first, rows @ TO_COEFFICIENTS.T, self.is_smooth[chosen]
 
     def passes(self, name: str, level: float, upward: bool = True) -> np.ndarray:
-        """Return the times, from the start of the run, at which a quantity rises (or falls) through a level."""
+        """Return the times, from the start of the run, at which a quantity passes a level in a direction."""
         series = self._series(name)
         series[:, 0] -= level
         series *= 1.0 if upward else -1.0
@@ -156,7 +156,7 @@ class Orbit:
 def _zeros(
     series: np.ndarray, low: np.ndarray, high: np.ndarray, at_low: np.ndarray, at_high: np.ndarray
 ) -> np.ndarray:
-    """Return zeros (m,) of Legendre series (m, degree + 1), each between two points with the given values."""
+    """Return the zeros (m,) of Legendre series (m, degree + 1), each between two points with known values."""
     slope = series @ legendre.legder(np.eye(series.shape[1])).T
     at = low + (high - low) * at_low / (at_low - at_high)
     for _ in range(_STEPS):
@@ -169,7 +169,7 @@ def _zeros(
 
 
 class Turns(NamedTuple):
-    """Local extrema inside pieces: number of the quantity and of the piece, time, value, whether it is a minimum."""
+    """Local extrema inside the pieces of an orbit, with the time and value of each."""
 
     quantity: np.ndarray
     piece: np.ndarray

@@ -1,4 +1,4 @@
-"""This module finds instants of a motion without events; a period that begins there contains each event once."""
+"""This module finds a start of the period at which no event happens, so that no event is counted twice."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ def event_times(solution: Solution) -> np.ndarray:
 
 
 def is_event_near(solution: Solution, times: np.ndarray, t: float, period: float) -> bool:
-    """Return whether an event other than a near-grazing or a corner is next to time t, given all `event_times`."""
+    """Return whether one of the `event_times` other than a near-grazing or a corner is close to time t."""
     first, end = np.searchsorted(times, [t - _NEAR * period, t + _NEAR * period])
     occurrences = solution._of_model.record.occurrences
     return any(occurrences[k].kind not in _WITHOUT_EFFECT for k in range(int(first), int(end)))
 
 
 def quiet_offset(solution: Solution, period: float) -> float:
-    """Return the time from the section at the end of a run to an instant without events, modulo the period.
+    """Return the time from the end of a run to an instant without events, modulo the period.
 
     It is 0 if no event is at the section, else it leads to the middle of the longest event-free interval.
     """
@@ -43,14 +43,14 @@ def quiet_offset(solution: Solution, period: float) -> float:
 
 
 def middle_of_longest(times: np.ndarray, period: float) -> float:
-    """Return the middle of the longest gap between times (K,) in [0, period), repeated periodically; K > 0."""
+    """Return the middle of the longest gap between times (K,) that repeat with the period; K > 0."""
     gaps = np.diff(np.append(times, times[0] + period))
     k = int(np.argmax(gaps))
     return float((times[k] + 0.5 * gaps[k]) % period)
 
 
 def between_events(times: np.ndarray, t: float, low: float, high: float) -> float:
-    """Return a time in (low, high) in the middle between the events before and after t; t if there are no events."""
+    """Return a time in (low, high) midway between the events before and after t; t if there are no events."""
     if not len(times):
         return t
     k = int(np.searchsorted(times, t))

@@ -1,4 +1,4 @@
-"""This module converts a run to an `Orbit`: steps are halved until a polynomial is accurate on each interval."""
+"""This module converts a run to an `Orbit`, with intervals short enough for accurate polynomials."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ _ROUNDINGS = 4.0  # multiple of the measured rounding
 
 
 def _misfits() -> tuple[np.ndarray, np.ndarray]:
-    """Return the sample points of an interval (Gauss points and two near its ends) and misfit weights (rows).
+    """Return the sample points of an interval, and the weights that measure misfits of a polynomial.
 
     Misfits are the last coefficients, and the errors of the polynomial near the ends. Only the latter show a
     feature that begins behind the last Gauss point.
@@ -56,7 +56,7 @@ _SAMPLE_POINTS, _MISFITS = _misfits()
 
 
 class Sampler:
-    """Values of states and other quantities inside the segments of a run.
+    """Samples states and other quantities inside the segments of a run.
 
     The other quantities are outputs, discrete states, surfaces of contacts ("velocity of f") and all guards
     by number ("guard 3").
@@ -80,7 +80,7 @@ class Sampler:
         self.names = (*system.names, *(() if states_only else others))
 
     def __call__(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """Return values (k, Q) in the segments with these numbers (k,), at local times (k,)."""
+        """Return values (k, Q) at local times (k,) in the segments with the given numbers (k,)."""
         x = self.segments.states(index, s)
         if self.states_only:
             return x
@@ -106,7 +106,7 @@ class Sampler:
 
 
 class _Intervals(NamedTuple):
-    """Parts of segments (k,), from one local time to another."""
+    """Time intervals (k,), each inside one segment."""
 
     segments: np.ndarray
     begins: np.ndarray
@@ -116,7 +116,7 @@ class _Intervals(NamedTuple):
         return _Intervals(*(part[chosen] for part in self))
 
     def part(self, share: float, length: float) -> _Intervals:
-        """Return a part of each interval; its start and length are fractions of the interval."""
+        """Return one part of each interval; start and length of the part are fractions of the interval."""
         whole = self.ends - self.begins
         begins = self.begins + share * whole
         return _Intervals(self.segments, begins, begins + length * whole)
@@ -128,7 +128,7 @@ class _Intervals(NamedTuple):
 
 
 class _Finished(NamedTuple):
-    """Pieces with values (k, POINTS, Q), and a mask (k, Q) of non-constant polynomials."""
+    """Finished intervals with values (k, POINTS, Q), and a mask (k, Q) of the varying quantities."""
 
     intervals: _Intervals
     values: np.ndarray
@@ -136,7 +136,7 @@ class _Finished(NamedTuple):
 
 
 def orbit_of(solution: Solution, *, states_only: bool = False) -> Orbit:
-    """Return a forward run, or its saved part, as polynomials on intervals."""
+    """Return a forward run, or the saved part of it, as an `Orbit`."""
     sample = Sampler(solution, states_only)
     index, s, _ = solution._segments.knots()
     same = (index[1:] == index[:-1]) & (s[1:] > s[:-1])
@@ -169,7 +169,7 @@ def orbit_of(solution: Solution, *, states_only: bool = False) -> Orbit:
 def _resolved(
     sample: Sampler, intervals: _Intervals, rounding: np.ndarray, required: np.ndarray
 ) -> tuple[list[_Finished], np.ndarray]:
-    """Return intervals that resolve the required quantities (Q,), or a mask of those that need too many."""
+    """Return intervals that resolve the required quantities (Q,), or a mask of the unresolved quantities."""
     count = len(sample.names)
     most = max(
         min(_MAX_INTERVALS, _MAX_VALUES // (POINTS * count)), int(_MAX_PER_STEP * len(intervals.begins))
@@ -218,7 +218,7 @@ def _sampled(sample: Sampler, intervals: _Intervals) -> tuple[np.ndarray, np.nda
 
 
 def _rounding(sample: Sampler, steps: _Intervals) -> np.ndarray:
-    """Return the misfit (Q,) of rounding alone, measured on intervals so short that nothing else remains.
+    """Return the misfit (Q,) that rounding causes, measured on very short intervals.
 
     For a difference of large terms, such as an energy balance, the misfit may consist of rounding on every
     interval.

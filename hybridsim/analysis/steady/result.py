@@ -27,7 +27,7 @@ _MOST_LISTED = 10_000  # harmonics per quantity in a record
 
 
 class SteadyState(Readable, Measures):
-    """The motion that a model settles on.
+    """The motion that a model reaches after its transient has decayed, with its measures.
 
     Attributes
     ----------
@@ -84,23 +84,23 @@ class SteadyState(Readable, Measures):
 
     @property
     def success(self) -> bool:
-        """Whether the motion is periodic or an equilibrium."""
+        """Whether the steady motion is periodic or an equilibrium."""
         return self.kind in ("periodic", "equilibrium")
 
     @property
     def status(self) -> str:
-        """The kind of motion."""
+        """The kind of motion, such as "periodic" or "equilibrium"."""
         return self.kind
 
     @cached_property
     def solution(self) -> Solution:  # type: ignore[override]  # computed on demand
-        """The run over one period, or over part of a motion without a period.
+        """The run over one period; if the motion has no period, a run over part of it.
 
         With forcing it begins at t = 0, or between two events if an event is there, so that it contains each
         event once.
         """
         if self._closed is None:
-            raise UsageError(f"there is no trajectory of this motion: {self.message}")
+            raise UsageError(f"no trajectory of this motion is stored: {self.message}")
         return self._motion.run(self._closed.start, self._closed.period)
 
     @property
@@ -114,30 +114,31 @@ class SteadyState(Readable, Measures):
         if not self.success:
             raise UsageError(
                 f"the motion is {self.kind}: no single period represents it ({self.message})",
-                remedy="run hs.simulate, or sample it with a section",
+                remedy="use hs.simulate, or hs.bifurcation to sample the motion",
             )
         return orbit_of(self.solution)
 
     @cached_property
     def multipliers(self) -> np.ndarray:
-        """Floquet multipliers, largest first; without forcing the trivial one, which is 1, is left out.
+        """Floquet multipliers, largest first; of an unforced orbit without the trivial multiplier 1.
 
         Each stick phase of a contact reduces the rank by one, and makes one multiplier exactly zero.
         """
         if not self.success:
             raise UsageError(
-                f"the motion is {self.kind}: it has no multipliers", remedy="read lyapunov instead"
+                f"the motion is {self.kind}: a motion without a period has no multipliers",
+                remedy="use `lyapunov` instead",
             )
         rates = rates_at_end(self.solution) if self._is_free else None
         return multipliers(derivatives(self.solution, ()).by_start, rates)
 
     @property
     def stable(self) -> bool:
-        """Whether all multipliers are inside the unit circle, or on the circle within 100 rtol."""
+        """Whether all multipliers are inside the unit circle, or on it within 100 rtol."""
         return bool((np.abs(self.multipliers) <= 1.0 + max(_NEUTRAL, 100.0 * self._motion.rtol)).all())
 
     def to_dict(self, harmonics: int = 5) -> dict[str, Any]:
-        """Return all results as plain values; harmonics up to the given number, with their phases in radians.
+        """Return all results as plain values, with harmonics up to a given order and their phases in radians.
 
         If the motion has no multipliers, ``multipliers`` and ``stable`` are None, and ``no_multipliers`` gives the
         reason.

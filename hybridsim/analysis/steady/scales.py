@@ -1,4 +1,4 @@
-"""This module estimates the sizes of states near zero, and the size of a motion that is only rounding."""
+"""This module estimates the sizes of states near zero, and detects motion that consists of rounding only."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _LOOSEST = 1e-10  # largest tolerance used here, because a looser one hides slow
 
 
 def coupled_sizes(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Return the sizes (n,) of the states at x; a state near zero takes its size from the coupled states.
+    """Return the sizes (n,) of the states at x; a state near zero gets its size from states coupled to it.
 
     A velocity at rest next to a spring of length x has the size sqrt(k/m) x, because a rounding error of the
     spring force changes it by that size times rounding. For two states that act on each other, the ratio of
@@ -39,12 +39,12 @@ def coupled_sizes(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -
 
 
 def rounding_of(sizes: np.ndarray, rtol: float) -> np.ndarray:
-    """Return the largest changes (n,) from rounding alone, for states of these sizes and this tolerance."""
+    """Return the largest changes (n,) that rounding alone can cause, for given sizes of the states."""
     return _ROUNDINGS * min(rtol, _LOOSEST) * sizes
 
 
 def stands_still(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, rtol: float) -> bool:
-    """Return whether errors of the states within a run's tolerance explain all rates at x."""
+    """Return whether all rates at x can be explained by errors of the states within the tolerance."""
     if not system.has_tape or not system.n:
         return True
     f, A = _rates(system, x, p, z)

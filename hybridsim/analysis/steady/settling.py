@@ -1,4 +1,4 @@
-"""This module follows a motion until it repeats, by periods of the forcing or by passages of a section."""
+"""This module follows a motion until it repeats after some forcing periods or section passages."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ LONGEST_WORD = 12  # largest number of periods after which a motion may repeat
 
 @dataclass(frozen=True)
 class Passings:
-    """A motion at consecutive passages of a section.
+    """The states of a motion at consecutive passages of a section.
 
     Parameters
     ----------
@@ -61,12 +61,12 @@ class Passings:
         return relative(self.values[-1] - self.values[-1 - multiple], self.scale)
 
     def repeats_after(self, tolerance: float) -> int | None:
-        """Return the least number of passages after which the motion repeats, if it has converged to its limit."""
+        """Return after how many passages the motion repeats, or None if the motion has not converged yet."""
         found = (m for m in range(1, min(LONGEST_WORD, len(self.values) - 1) + 1))
         return next((m for m in found if self._error(m, CLOSER * tolerance) <= tolerance), None)
 
     def _error(self, multiple: int, rounding: float) -> float:
-        """Return the distance of the last passage from the limit, from the change and its rate of decrease."""
+        """Return the estimated distance of the last passage from the limit, by extrapolating the changes."""
         residual = self.residual(multiple)
         back = (len(self.values) - 1) // (2 * multiple)
         if back == 0:
@@ -77,7 +77,7 @@ class Passings:
         return float(residual / (1.0 - (residual / earlier) ** (1.0 / back)))
 
     def more(self, multiple: int, tolerance: float) -> float:
-        """Return how many more passages the motion needs to settle to the tolerance, at its present pace."""
+        """Estimate how many more passages the motion needs to settle to the tolerance."""
         residual, back = self.residual(multiple), (len(self.values) - 1) // (2 * multiple)
         if back == 0:
             return float("inf")
@@ -89,13 +89,13 @@ class Passings:
         return multiple * left / rate
 
     def _change(self, back: int, multiple: int) -> float:
-        """Return the change over `multiple` passages, up to `back * multiple` passages before the last."""
+        """Return the change over `multiple` passages, `back * multiple` passages before the last one."""
         return relative(
             self.values[-1 - back * multiple] - self.values[-1 - (back + 1) * multiple], self.scale
         )
 
     def drifting(self) -> int | None:
-        """Return the number of a state that moves by the same amount in each quarter of the passages, or None."""
+        """Return the number of a state that drifts by equal amounts per quarter of the passages, or None."""
         quarter = (len(self.values) - 1) // 4
         if quarter < 2:
             return None
@@ -104,7 +104,7 @@ class Passings:
         return i if np.ptp(moves[:, i]) <= _STEADY * abs(moves[0, i]) else None
 
     def nearest(self) -> int:
-        """Return the least number of passages after which the motion comes close to repeating."""
+        """Return after how many passages the motion comes close to repeating."""
         most = min(LONGEST_WORD, (len(self.values) - 1) // 2)
         residuals = [self.residual(m) for m in range(1, max(most, 1) + 1)]
         return 1 + next(i for i, r in enumerate(residuals) if r <= _ABOUT * min(residuals))
@@ -116,13 +116,13 @@ _ABOUT = 10.0
 
 
 def relative(change: np.ndarray, scale: np.ndarray) -> float:
-    """Return the largest entry of a change relative to its scale; entries without a scale do not count."""
+    """Return the largest entry of a change relative to its scale, without entries that have no scale."""
     parts = np.abs(change)[scale > 0.0] / scale[scale > 0.0]
     return float(parts.max(initial=0.0))
 
 
 def scale_of(solution: Solution, since: float) -> np.ndarray:
-    """Return the scale of a change of each state and discrete state (n + d,): half of its range late in a run.
+    """Return the scale (n + d,) for changes of each state: half the range of the state late in the run.
 
     It is at least a thousandth of the largest size, because a state far from zero that hardly moves has fewer digits.
     """
@@ -138,7 +138,7 @@ _DIGITS = 1e-3
 
 
 def forced_passings(motion: Motion, start: Point | None, period: float, count: int, phase: float) -> Passings:
-    """Return the passages at consecutive periods of the forcing, at the given phase of each.
+    """Return the states at one phase of consecutive forcing periods.
 
     If an event is at this phase, the section moves to an event-free phase, and the motion is followed as long again.
     """
@@ -164,7 +164,7 @@ def forced_passings(motion: Motion, start: Point | None, period: float, count: i
 def free_passings(
     motion: Motion, start: Point | None, duration: float, largest: np.ndarray, **limits: Any
 ) -> Passings:
-    """Return the passages of the most mobile state through the middle of its range, in the later half of a run.
+    """Return the passages of the most mobile state through the middle of its range, late in a run.
 
     A state that only grows, such as the angle of a shaft, passes there once; it is used if there is no other.
     largest (n,): the largest scale of each state so far, updated here. A motion that has decayed relative to
@@ -206,7 +206,7 @@ def free_passings(
 def _without_events(
     late: Solution, orbit: Orbit, times: np.ndarray, j: int, may_be_passed: np.ndarray
 ) -> tuple[np.ndarray, int]:
-    """Return times (K,) at which the flow passes an event-free section, and the state that defines it.
+    """Return the times (K,) at which the flow passes a section without events, and the state of the section.
 
     times, j: a first section, which is kept if no event is there. Otherwise the section moves to the middle
     of the longest event-free interval of a period. It becomes a level of the state that moves fastest there,
@@ -238,14 +238,14 @@ _LAST_PASSAGES = 3  # last passages that are checked for events
 
 
 def _drifts_steadily(solution: Solution, moves: np.ndarray, steady: float) -> np.ndarray:
-    """Return which states (n,) with the given ranges move by the same amount in each quarter of a run."""
+    """Return a mask (n,) of states that drift by equal amounts in each quarter of a run."""
     steps = np.diff(solution(np.linspace(solution.t_start, solution.t_end, 5)), axis=1)
     is_steady = np.ptp(steps, axis=1) <= steady * np.abs(steps[:, 0])
     return np.asarray(is_steady & (np.abs(steps.sum(axis=1)) >= (1.0 - _STEADY) * moves) & (moves > 0.0))
 
 
 def died_out(low: np.ndarray, high: np.ndarray, largest: np.ndarray) -> bool:
-    """Return whether a motion whose states (n,) stay between low and high has decayed to nothing."""
+    """Return whether the states (n,), between low and high, vary so little that the motion has decayed."""
     return bool((high - low <= _DIED_OUT * largest).all())
 
 

@@ -50,7 +50,7 @@ class Orbit:
 def shoot(
     motion: Motion, start: Orbit, scale: np.ndarray, section: int | None, tol: float, steps: int = _STEPS
 ) -> Orbit:
-    """Close an orbit by Newton's method.
+    """Find a periodic orbit near a given start by Newton's method.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def shoot(
 
 
 def followed_closely(motion: Motion, start: Orbit, scale: np.ndarray, is_free: bool) -> Orbit:
-    """Return an orbit with its residual at the tightest tolerance, and with a corrected period if it is free.
+    """Return an orbit recomputed at the tightest tolerance, with its period corrected if it is unknown.
 
     Orbits in a continuum, as in a system that conserves energy, change only by the numerical loss of a run.
     """
@@ -112,7 +112,7 @@ def followed_closely(motion: Motion, start: Orbit, scale: np.ndarray, is_free: b
 def _newton(
     matrix: np.ndarray, change: np.ndarray, scale: np.ndarray, section: int | None, rates: np.ndarray | None
 ) -> tuple[np.ndarray, float]:
-    """Return the step of start and period for which the linearised change vanishes."""
+    """Return the Newton step of start and period."""
     count = len(change)
     unit = np.where(scale > 0.0, scale, 1.0)
     A = np.eye(count) - matrix * unit[None, :] / unit[:, None]
@@ -138,7 +138,7 @@ def rates_at_end(solution: Solution) -> np.ndarray:
 
 
 def multipliers(matrix: np.ndarray, rates: np.ndarray | None) -> np.ndarray:
-    """Return the Floquet multipliers, largest first; without forcing the trivial one, which is 1, is left out.
+    """Return the Floquet multipliers, largest first; of an unforced orbit without the trivial multiplier 1.
 
     rates (n,): dx/dt at the end of the orbit, for a motion without forcing. If another multiplier is about 1
     as well, as on closed orbits of a conservative system, both are accurate only to the square root of
@@ -156,7 +156,7 @@ def multipliers(matrix: np.ndarray, rates: np.ndarray | None) -> np.ndarray:
 
 
 def _beside(matrix: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """Return a matrix restricted to the subspace orthogonal to the rates."""
+    """Return the restriction of a matrix to the subspace orthogonal to the rates."""
     direction = np.zeros((len(matrix), 1))
     direction[: len(rates), 0] = rates
     across = np.linalg.qr(direction, mode="complete")[0][:, 1:]

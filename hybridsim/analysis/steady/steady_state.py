@@ -1,4 +1,4 @@
-"""This module finds and measures the motion that a model settles on."""
+"""This module finds and measures the steady motion of a model."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def steady_state(
     progress: Callable[[float], None] | None = None,
     **options: Any,
 ) -> SteadyState:
-    """Find the motion that a model settles on from its start, over one period, with its measures.
+    """Find the steady motion that a model reaches from its initial state, and measure one period of it.
 
     A run is followed until it repeats; then Newton's method on the period map (single shooting) replaces
     waiting, with a matrix from the variational flow through the events (`hs.sensitivities`). If the sequence
@@ -149,7 +149,7 @@ def steady_state(
     tol = arguments.number(tol, "tol")
     if not 0.0 < tol < 1.0:
         raise UsageError(
-            f"tol cannot be {tol!r}", remedy="give a relative tolerance between 0 and 1, such as 1e-10"
+            f"`tol` cannot be {tol!r}", remedy="use a relative tolerance between 0 and 1, such as 1e-10"
         )
     system = system_of(model)
     _refuse_what_ends(system, period is not None)
@@ -185,7 +185,7 @@ def steady_state(
 
 
 class _Search:
-    """Follows a motion until its kind is known."""
+    """Follow a motion until its kind is known."""
 
     def __init__(
         self,
@@ -227,7 +227,7 @@ class _Search:
             passings = self._follow(passings)
 
     def _not_below_rounding(self, passings: Passings) -> Passings:
-        """Return the passages with lower bounds of the scales, below which a change is rounding.
+        """Return the passages with scales of at least the size of rounding errors.
 
         A state that has decayed relative to its former size has no scale of its own. A discrete state that
         settles on zero gets its size from the other states: from the effect over one period of a change of
@@ -244,7 +244,7 @@ class _Search:
         return replace(passings, scale=scale)
 
     def _over_a_period(self, start: Point) -> np.ndarray:
-        """Return the effect of changes of the start over one forcing period (n + d, n + d); zeros if unknown."""
+        """Return d(end of one forcing period)/d(its start), (n + d, n + d), or zeros if it is unknown."""
         try:
             return derivatives(self.motion.run(start, self.period or 0.0), ()).by_start
         except UsageError:
@@ -252,11 +252,11 @@ class _Search:
 
     @property
     def share(self) -> float:
-        """The finished fraction of the largest number of periods."""
+        """The number of periods so far as a fraction of the largest allowed number."""
         return min(self.periods / self.max_periods, 1.0)
 
     def _follow(self, last: Passings | None) -> Passings:
-        """Follow the motion from its present point for as long again as so far."""
+        """Continue the motion from its present point, for as long as it has run so far."""
         start = None if last is None else last.last
         if self.period is not None:
             count = self.expected or min(max(self.settle, self.periods), _MAX_PERIODS_PER_RUN)
@@ -280,7 +280,7 @@ class _Search:
         return passings
 
     def _passed(self, start: Point | None) -> Passings:
-        """Return the motion over the duration, or at first over the length of a run of limited cost."""
+        """Return the motion over a duration; the first call chooses the duration by its cost."""
         is_free_to_choose = start is None and self.least > 0.0 and "limits" not in self.motion.options
         if is_free_to_choose and self.duration == self.least:
             try:
@@ -290,12 +290,12 @@ class _Search:
         return free_passings(self.motion, start, self.duration, self.largest)
 
     def _closed(self, passings: Passings) -> Orbit | None:
-        """Return the periodic orbit of the motion, or the one found by Newton's method, or None."""
+        """Return the periodic orbit of the motion, directly or by Newton's method, or None."""
         orbit = self._repeated(passings)
         return None if orbit is None or self._has_died_out(orbit) else orbit
 
     def _has_died_out(self, orbit: Orbit) -> bool:
-        """Return whether a closed orbit without forcing is an equilibrium with rounding around it."""
+        """Return whether a closed orbit of an unforced model is an equilibrium disturbed by rounding only."""
         if self.period is not None:
             return False
         low, high = ranges(self.motion.run(orbit.start, orbit.period), 0.0)
@@ -352,7 +352,7 @@ class _Search:
         )
 
     def _rests(self, orbit: Orbit) -> bool:
-        """Return whether all motion along an orbit is rounding."""
+        """Return whether all motion along an orbit is within rounding errors."""
         solution = self.motion.run(orbit.start, orbit.period)
         held = [segment.p[solution._system.layout.discrete_slice] for segment in solution._segments]
         if any((values != held[0]).any() for values in held):
@@ -362,7 +362,7 @@ class _Search:
         return bool((high - low <= rounding).all())
 
     def _shortest(self, orbit: Orbit) -> Orbit:
-        """Return the orbit with its least period, which may be a divisor of the one found."""
+        """Return the orbit with its shortest period, of which the period found is a multiple."""
         for divisor in range(1, orbit.multiple):
             if orbit.multiple % divisor:
                 continue
@@ -407,7 +407,7 @@ class _Search:
         return found
 
     def _without_return(self, passings: Passings) -> SteadyState:
-        """Return the result for a motion that does not return to its earlier states."""
+        """Return the result for a motion that does not come back to earlier states."""
         name = self.motion.names[passings.state]
         orbit = Orbit(passings.last, self.duration, 1, math.inf)
         message = (
@@ -417,7 +417,7 @@ class _Search:
         return _found(self.motion, UNSETTLED, orbit, periods=self.periods, message=message)
 
     def _leaving(self, passings: Passings) -> str:
-        """Return the name of a state that never returns, or an empty string."""
+        """Return the name of a state that does not come back to earlier values, or an empty string."""
         names = [*self.motion.names, *self.motion.discrete]
         drifting = passings.drifting()
         if drifting is not None:
@@ -446,44 +446,44 @@ def _found(
 
 def _check_period(model: Model, period: float, own: float | None) -> None:
     if not (period > 0.0 and math.isfinite(period)):
-        raise UsageError(f"period cannot be {period!r}", remedy="give a time above zero")
+        raise UsageError(f"`period` cannot be {period!r}", remedy="use a time above zero")
     if own is not None and abs(period / own - max(round(period / own), 1)) > _COMMENSURATE * period / own:
         raise UsageError(
-            f"period is {period!r}, but model {model.name} is forced with the period {own!r}",
-            remedy="leave period out, or give a whole multiple of it",
+            f"`period` is {period!r}, but model {model.name} is forced with the period {own!r}",
+            remedy="remove `period`, or use a whole multiple of the forcing period",
         )
 
 
 def _refuse_what_ends(system: System, has_period: bool) -> None:
-    """Refuse impacts, and events or inputs that change the model permanently."""
+    """Reject models with impacts, and with events or inputs that change the model permanently."""
     model = system.model
     if system.is_unilateral.any():
         raise UsageError(
-            f"model {model.name} has impacts, through which derivatives are not carried: steady states are not found",
-            remedy="write impacts as a guard and a reset, or simulate until the motion repeats",
+            f"model {model.name} has impacts, for which steady states are not supported",
+            remedy="write impacts as a guard and a reset, or use hs.simulate until the motion repeats",
         )
     for declared in model.inputs:
         if declared.period is None:
             raise UsageError(
                 f"model {model.name} is driven by {declared.subject}, a {declared.kind}: there is no steady state",
-                remedy="give a periodic input",
+                remedy="use a periodic input",
             )
     for clock in model.schedules:
         if clock.period is None or clock.count is not None:
             raise UsageError(
                 f"schedule {clock.name} of model {model.name} ends, so there is no steady state before",
-                remedy="leave the schedule out, or declare a clock without count",
+                remedy="remove the schedule, or remove its `count`",
             )
         start = evaluate(clock.start, system.values) if clock.start is not None else 0.0
         if start >= evaluate(clock.period, system.values):
             raise UsageError(
                 f"clock {clock.name} of model {model.name} begins after its first period",
-                remedy="choose a start below the period of the clock",
+                remedy="use a `start` below the period of the clock",
             )
     tape = system.code.data["tape"]
     plain = tape is not None and any(source == system.layout.origin_at for _, source in tape["parameters"])
     if plain and not has_period:
         raise UsageError(
             f"model {model.name} contains t outside of sines and cosines: its period is unknown",
-            remedy="if the motion is periodic, pass period=",
+            remedy="if the motion is periodic, pass `period`",
         )

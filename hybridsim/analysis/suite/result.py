@@ -1,4 +1,4 @@
-"""This module defines the result of the comparison suite: a comparison per scene, and conclusions from all."""
+"""This module defines the result of the comparison suite: one comparison per scene, and overall verdicts."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ ACCURACIES = (1e-3, 1e-6, 1e-9, 1e-11)
 
 @dataclass(frozen=True)
 class SceneResult:
-    """A scene and the comparison of the integrators on it."""
+    """One scene of the suite, and the comparison of the integrators on this scene."""
 
     scene: Scene
     comparison: Comparison
 
     def cheapest(self, accuracy: float) -> Row | None:
-        """Return the fastest row with correct modes and an error of the states within an accuracy."""
+        """Return the fastest row with correct modes whose error of the states is within an accuracy."""
         good = [row for row in self.comparison.rows if self._reaches(row, accuracy)]
         # other rows include the time of warming up
         timed = [row for row in good if row.cost and row.cost.repetitions]
@@ -90,7 +90,7 @@ class SuiteComparison(Readable):
         }
 
     def cheapest(self, accuracies: Sequence[float] = ACCURACIES) -> dict[str, dict[float, Row | None]]:
-        """Return scene -> accuracy -> the cheapest row that reaches it, or None."""
+        """Return scene -> accuracy -> cheapest row within the accuracy, or None."""
         accuracies = positives(accuracies, "accuracies") or ()
         return {
             result.scene.name: {accuracy: result.cheapest(accuracy) for accuracy in accuracies}
@@ -99,14 +99,14 @@ class SuiteComparison(Readable):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Notes on runs that were left out or timed less often, and on doubtful references."""
+        """Notes on runs that were skipped or timed less often, and on uncertain references."""
         left_out: dict[str, dict[str, list[str]]] = {}
         for result in self.results:
             for row in result.comparison.rows:
                 if row.status in (NOT_STARTED, STOPPED):
                     left_out.setdefault(row.label, {}).setdefault(result.scene.name, []).append(setting(row))
         notes = [
-            f"{label}, left out because of the time it takes: "
+            f"{label}, skipped because of its run time: "
             + "; ".join(f"{scene} at {', '.join(settings)}" for scene, settings in scenes.items())
             for label, scenes in left_out.items()
         ]
@@ -125,7 +125,7 @@ class SuiteComparison(Readable):
 
     @property
     def provenance(self) -> Mapping[str, Any]:
-        """Versions and machine; the hashes of the models are in the comparisons."""
+        """Versions and machine; the comparisons contain the hashes of the models."""
         facts = self.results[0].comparison.provenance
         return {name: value for name, value in facts.items() if not name.startswith("model")}
 

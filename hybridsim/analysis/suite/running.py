@@ -36,7 +36,7 @@ _RUNNING = 0.95  # the rest of the budget is for writing and drawing
 
 
 class _TooSlow(Exception):
-    """A reference has passed its time limit."""
+    """Raised when a reference has passed its time limit."""
 
 
 @refusing
@@ -113,7 +113,7 @@ def _chosen(names: Sequence[str] | None) -> tuple[Scene, ...]:
                 f"the suite has no scene {name!r}", remedy=nearest(name, scene_names(), kind="scenes")
             )
     if not names:
-        raise UsageError("no scenes to run", remedy=f"name some of {', '.join(scene_names())}")
+        raise UsageError("no scenes to run", remedy=f"use some of {', '.join(scene_names())}")
     return tuple(scene for scene in SCENES if scene.name in names)
 
 
@@ -125,7 +125,7 @@ def _prepared_case(scene: Scene) -> PreparedCase:
 
 
 def _reference(case: PreparedCase, seconds: float, step: Callable[[str], None]) -> Reference:
-    """Find a reference that is independent of the engine; if that takes too long, use two runs and add a warning."""
+    """Return a reference that is independent of the engine, or if that is too slow one from two runs."""
     limit = Budget(seconds)
 
     def watch(_: float) -> None:
@@ -139,7 +139,8 @@ def _reference(case: PreparedCase, seconds: float, step: Callable[[str], None]) 
         return find((CLOSED_FORM, MULTIPLE_PRECISION, RUNS))
     except _TooSlow:
         warning = (
-            f"a reference in multiple precision was not ready after {seconds:.2g} s: two runs replace it"
+            f"a reference in multiple precision was not finished after {seconds:.2g} s: the "
+            "reference is a run instead"
         )
         found = find((RUNS,))
         return replace(found, warnings=(*found.warnings, warning))

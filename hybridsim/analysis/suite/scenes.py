@@ -1,4 +1,4 @@
-"""This module lists the scenes of the comparison suite, with the kind of error that each one shows."""
+"""This module lists the scenes of the comparison suite, and the kind of error that each scene shows."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class Scene:
-    """A model in one setting.
+    """A model with parameters and a time span, and the kind of error that it shows.
 
     Parameters
     ----------

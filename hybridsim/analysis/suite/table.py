@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def table(suite: SuiteComparison) -> str:
-    """Return the whole text."""
+    """Return the results of the suite as text."""
     blocks = [_who_is_right(suite), _cheapest(suite), _references(suite), _notes(suite)]
     return printable("\n\n".join("\n".join(block) for block in blocks))
 
@@ -65,7 +65,8 @@ def _notes(suite: SuiteComparison) -> list[str]:
     return [
         "State errors: the largest error of all states over the run, relative to the state's amplitude.",
         "Event times are in periods of the forcing if the model has one, else in the model's unit of time.",
-        f"Wall times: {turns(suite.repeat)} of all runs of all scenes, of several calls if they are short.",
+        f"Wall times: {turns(suite.repeat)} of all runs of all scenes; short runs are repeated within "
+        "one measurement.",
         f"The suite took {suite.seconds:.0f} s of its budget of {suite.budget:g} s.",
         versions(suite.provenance),
         *(["Differences from the request:", *(f"  {note}" for note in suite.notes)] if suite.notes else []),

@@ -17,7 +17,7 @@ USELESS = 0.1
 
 
 class Verdict(Enum):
-    """The verdict on a run."""
+    """Whether the run of an integrator on a scene is right, and why not."""
 
     RIGHT = "right"
     OFF = "off"
@@ -32,7 +32,7 @@ class Verdict(Enum):
 
 
 def verdict(scene: Scene, rows: Sequence[Row]) -> Verdict:
-    """Return the verdict on a line, at the setting nearest to the common one.
+    """Return the verdict on a line, for the setting closest to the common one.
 
     "off": the modes are right, but a state is wrong by more than a tenth of its amplitude. "lacks": the modes
     are wrong, and the integrator declares that it lacks a capability that the scene needs.

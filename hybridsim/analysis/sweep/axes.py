@@ -23,7 +23,7 @@ MOST_POINTS = 1 << 25  # each needs about a hundred bytes
 
 @dataclass(frozen=True)
 class Axis:
-    """A parameter or an initial value, and its values in the sweep.
+    """One axis of a sweep: a parameter or an initial value, with its values.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class Axis:
 
 @dataclass(frozen=True)
 class Points:
-    """All points of a sweep, numbered in C order of the axes, so that the last one varies fastest.
+    """All points of a sweep, numbered in C order: the last axis varies fastest.
 
     Parameters
     ----------
@@ -62,11 +62,11 @@ class Points:
 
     @property
     def dimensions(self) -> tuple[str, ...]:
-        """Name of each dimension of that shape."""
+        """Name of each axis of `shape`."""
         return tuple(axis.name for axis in self.axes) if self.mode == "grid" else (POINT,)
 
     def settings(self, numbers: range) -> list[tuple[float | Expression, ...]]:
-        """Return the settings of the axes at some points."""
+        """Return the values of all axes at some points."""
         if self.mode == "list":
             return [tuple(axis.settings[k] for axis in self.axes) for k in numbers]
         indices = np.unravel_index(np.asarray(numbers), self.shape)
@@ -77,12 +77,12 @@ class Points:
 
     @cached_property
     def _parsed(self) -> list[list[Expression]]:
-        """The settings of a grid as expressions, parsed only once because each is used many times."""
+        """The values of a grid as expressions, each parsed once and used for many points."""
         return [[parse(setting) for setting in axis.settings] for axis in self.axes]
 
 
 def points_of(model: Model, values: Any, mode: Any) -> Points:
-    """Return the points of a request.
+    """Return the points that the arguments of a sweep describe.
 
     Raises
     ------
@@ -90,11 +90,11 @@ def points_of(model: Model, values: Any, mode: Any) -> Points:
         For unknown names, invalid values, or lists of different lengths.
     """
     if not isinstance(mode, str) or mode not in MODES:
-        raise UsageError(f"mode cannot be {mode!r}", remedy="give 'grid' for all combinations, or 'list'")
+        raise UsageError(f"`mode` cannot be {mode!r}", remedy="use 'grid' for all combinations, or 'list'")
     if not isinstance(values, Mapping) or not values:
         raise UsageError(
-            f"values cannot be {values!r}",
-            remedy="give a mapping from names of parameters to values, {'F0': [20, 30, 40]}",
+            f"`values` cannot be {values!r}",
+            remedy="use a dict of parameter names and values, such as {'F0': [20, 30, 40]}",
         )
     units = {p.name: p.unit for p in model.parameters}
     starts = {s.name: s.unit for s in model.states} | {d.name: d.unit for d in model.discrete}
@@ -112,7 +112,7 @@ def points_of(model: Model, values: Any, mode: Any) -> Points:
         counted = ", ".join(f"{name} {length}" for name, length in lengths.items())
         raise UsageError(
             f"the lists of the sweep have different lengths: {counted}",
-            remedy="give lists of equal length, or mode='grid'",
+            remedy="use lists of equal length, or mode='grid'",
         )
     axes = tuple(
         Axis(
@@ -128,7 +128,7 @@ def points_of(model: Model, values: Any, mode: Any) -> Points:
 
 
 def _length(row: Any) -> int:
-    """Return the number of values in a row, or 1 if it has no length."""
+    """Return the number of values in a row, or 1 if the row has no length."""
     try:
         return len(row)
     except TypeError:  # not a row, or an iterator
@@ -138,7 +138,7 @@ def _length(row: Any) -> int:
 
 
 def _refuse_too_many(lengths: Mapping[str, int], mode: str) -> None:
-    """Refuse a sweep with more points than fit into memory, before any of them is built."""
+    """Reject a sweep with too many points for the memory, before any point is built."""
     total = math.prod(lengths.values()) if mode == "grid" else max(lengths.values())
     if total > MOST_POINTS:
         counted = ", ".join(
@@ -147,16 +147,16 @@ def _refuse_too_many(lengths: Mapping[str, int], mode: str) -> None:
         )
         raise UsageError(
             f"the sweep has more than {MOST_POINTS} points ({counted})",
-            remedy="give fewer values, or sweep in parts",
+            remedy="use fewer values, or sweep in parts",
         )
 
 
 def _settings(name: str, row: Any) -> tuple[float | Expression, ...]:
     if not is_row(row):
-        raise UsageError(f"the values of {name} are {row!r}", remedy="give a list of numbers or expressions")
+        raise UsageError(f"the values of {name} are {row!r}", remedy="use a list of numbers or expressions")
     found = tuple(_setting(name, value) for value in islice(row, MOST_POINTS + 1))
     if not found:
-        raise UsageError(f"{name} has no values", remedy="give at least one value")
+        raise UsageError(f"{name} has no values", remedy="use at least one value")
     return found
 
 
@@ -165,14 +165,14 @@ def _setting(name: str, value: Any) -> float | Expression:
         return value
     if isinstance(value, str):
         return parse(value)
-    found = number(value, f"a value of {name}", "give a number or an expression")
+    found = number(value, f"a value of {name}", "use a number or an expression")
     if not math.isfinite(found):
-        raise UsageError(f"a value of {name} cannot be {value!r}", remedy="give finite numbers")
+        raise UsageError(f"a value of {name} cannot be {value!r}", remedy="use finite numbers")
     return found
 
 
 def _values(model: Model, name: str, row: Sequence[float | Expression], swept: frozenset[str]) -> np.ndarray:
-    """Return the numbers of the settings, or their texts if a number would depend on another axis."""
+    """Return the values as numbers, or as text if one of them depends on another axis."""
     declared = {p.name: p.value for p in model.parameters}
     dependencies = {}
     for setting in row:
@@ -198,7 +198,7 @@ def _dependencies(declared: Mapping[str, Expression], name: str) -> dict[str, Ex
 
 
 def _number(name: str, dependencies: Mapping[str, Expression]) -> float:
-    """Return the value of a parameter; a NaN, for a missing value, is an error of this point only."""
+    """Return the value of a parameter, or NaN for a missing value, which is an error of this point only."""
     try:
         return resolve(dependencies)[name]
     except ExpressionError:

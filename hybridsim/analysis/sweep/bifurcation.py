@@ -1,4 +1,4 @@
-"""This module makes bifurcation diagrams by brute force: settled samples over a parameter, upward and downward."""
+"""This module computes bifurcation diagrams by brute force: settled motions over a parameter, up and down."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ DIRECTION = "direction"
 
 
 class _Branches:
-    """The values of one parameter in rising and in falling order, as two chains."""
+    """The values of one parameter in rising and in falling order, as two branches."""
 
     def __init__(self, points: Points, count: int) -> None:
         rows = points.settings(range(count))
@@ -39,11 +39,11 @@ class _Branches:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Steps along a branch, number of branches."""
+        """Number of steps along a branch, and number of branches."""
         return len(self._rising), 2
 
     def settings(self, numbers: range) -> list[Settings]:
-        """Return the settings; even numbers belong to the rising chain, odd ones to the falling one."""
+        """Return the settings; even numbers belong to the rising branch, odd ones to the falling branch."""
         return [self._rising[-1 - k // 2 if k % 2 else k // 2] for k in numbers]
 
 
@@ -65,7 +65,7 @@ def bifurcation(
     progress: Progress | None = None,
     **options: Any,
 ) -> Sweep:
-    """Sample the settled motion at a section over a parameter, followed upward and downward.
+    """Sample the settled motion at a section, while a parameter is raised and lowered in steps.
 
     Each value starts at the end of its neighbour's run, so that coexisting stable motions can be found from
     below and from above. Branches that differ show hysteresis. Unstable motions are not found.
@@ -145,5 +145,5 @@ def bifurcation(
 
 
 def _turned(array: np.ndarray) -> np.ndarray:
-    """Rearrange (step, branch, ...) to (branch, value, ...), with both branches in rising order."""
+    """Reorder (step, branch, ...) to (branch, value, ...), so that both branches are in rising order."""
     return np.stack([array[:, 0], array[::-1, 1]])

@@ -1,4 +1,4 @@
-"""This module collects the results of a sweep, in any order, in arrays."""
+"""This module collects the results of a sweep in arrays; the results may arrive in any order."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hybridsim.analysis.sweep.work.job import NOT_RUN, Outcome
 
 
 class Collected:
-    """Arrays of readings and statuses, independent of the order in which the points arrive.
+    """Arrays of readings and statuses, which are independent of the order of arrival.
 
     A reading that a point does not have is NaN, or an empty text. The end of an array that is shorter than
     another point's is filled in the same way.
@@ -26,7 +26,7 @@ class Collected:
         ] = {}  # for each name: the first point that has it, and the position there
 
     def put(self, numbers: Sequence[int], outcomes: Sequence[Outcome]) -> None:
-        """Store the outcomes of some points; if there are fewer outcomes than numbers, the rest was not run."""
+        """Store the outcomes of some points; points without an outcome were not run."""
         for number, (status, found) in zip(numbers, outcomes):
             self.status[number] = status
             for place, (name, value) in enumerate((found or {}).items()):
@@ -44,7 +44,7 @@ class Collected:
     def values(
         self, shape: tuple[int, ...], nothing: Mapping[str, float | str] | None = None
     ) -> dict[str, np.ndarray]:
-        """Return the arrays by name in the order of the first points; missing ones are filled from `nothing`."""
+        """Return the arrays by name; the entries of points without a result come from `nothing`."""
         for name, value in (nothing or {}).items():
             if name not in self._arrays:
                 self._arrays[name] = np.full(len(self.status), value, dtype=_kind(value))
@@ -52,7 +52,7 @@ class Collected:
         return {name: self._arrays[name].reshape(*shape, *self._arrays[name].shape[1:]) for name in names}
 
     def _enlarged(self, old: np.ndarray | None, value: Reading) -> np.ndarray:
-        """Return an array for such values with the content of the old one."""
+        """Return an array that is large enough for some values, with the content of the old array."""
         total, kind = len(self.status), _kind(value)
         long = np.ndim(value) == 1
         length = np.size(value) if long else None

@@ -26,7 +26,7 @@ def frequency_response(
     params: Mapping[str, Any] | None = None,
     **options: Any,
 ) -> Sweep:
-    """Measure the steady amplitude, and the stick fraction and stops of each contact, over the forcing frequency.
+    """Measure amplitude, stick fraction and stops of the steady motion over the forcing frequency.
 
     Parameters
     ----------
@@ -60,11 +60,11 @@ def frequency_response(
     model = chosen_model(model, params)
     others, frequency = mapping(levels, "levels"), text(frequency, "frequency")
     if len(others) > 1 or frequency in others:
-        raise UsageError(f"levels cannot be {levels!r}", remedy="give one parameter other than the frequency")
-    if not model.states:
         raise UsageError(
-            f"model {model.name} has no states", remedy="give a model with a state that responds"
+            f"`levels` cannot be {levels!r}", remedy="use one parameter other than the frequency"
         )
+    if not model.states:
+        raise UsageError(f"model {model.name} has no states", remedy="use a model with at least one state")
     readings = [f"amplitude.{model.states[0].name if quantity is None else text(quantity, 'quantity')}"]
     for contact in model.contacts:
         readings += [f"stick_fraction.{contact.name}", f"stops_per_period.{contact.name}"]

@@ -1,4 +1,4 @@
-"""This module computes a text that identifies a value: for a function its code and data, for an array its bytes.
+"""This module computes a text that identifies a value, such as a function by its code and its data.
 
 The journal of an interrupted sweep may only serve the same sweep. The name of a function does not identify
 it, because an edited measure, another lambda or another closure may have the same name. An object is
@@ -53,7 +53,7 @@ def identity(value: Any) -> str:
 
 
 class _Describer:
-    """Identifies values that may contain one another."""
+    """Computes the texts, also of values that contain one another."""
 
     def __init__(self) -> None:
         self._around: list[int] = []  # the values in progress: a value may contain itself
@@ -114,7 +114,7 @@ class _Describer:
         return f"{self.of(type(value))}({self._state(value)})"
 
     def _class(self, value: type) -> str:
-        """Return the identity of a class: all definitions of the class and its bases."""
+        """Return the identity of a class, from all definitions of the class and its bases."""
         defined = {name: part for name, part in vars(value).items() if name not in _NOT_READ}
         parts = (value.__qualname__, type(value), value.__bases__, defined)
         return f"class({', '.join(map(self.of, parts))})"
@@ -141,7 +141,8 @@ class _Describer:
             raise UsageError(
                 f"the measure uses an object of {type(value).__qualname__}, which a journal cannot identify: "
                 f"{error}",
-                remedy="sweep without a journal, or give its class a method __getstate__ that returns its content",
+                remedy="sweep without a journal, or add a method __getstate__ to the class that returns "
+                "the content",
             ) from error
         if isinstance(state, str):
             return f"{_of_module(_module(value))}.{state}"
@@ -166,7 +167,7 @@ def _is_library(name: str) -> bool:
 
 
 def _of_module(name: str) -> str:
-    """Return the identity of a module: its version for a library, a hash of its file otherwise."""
+    """Return the identity of a module: the version of a library, or a hash of another module's file."""
     module = sys.modules.get(name)
     if _is_library(name) or not (file := getattr(module, "__file__", None)) or not Path(file).is_file():
         return f"{name} {getattr(sys.modules.get(name.partition('.')[0]), '__version__', '')}"
@@ -174,7 +175,7 @@ def _of_module(name: str) -> str:
 
 
 def _read_by(function: FunctionType) -> list[Any]:
-    """Return the values that a function depends on in addition to its arguments."""
+    """Return the values other than its arguments that a function depends on."""
     code = function.__code__
     cells = [cell.cell_contents for cell in function.__closure__ or () if cell != _EMPTY]
     found = {n: function.__globals__[n] for n in sorted(_names(code)) if n in function.__globals__}
@@ -182,6 +183,6 @@ def _read_by(function: FunctionType) -> list[Any]:
 
 
 def _names(code: CodeType) -> set[str]:
-    """Return the names that a code object and the code within it look up."""
+    """Return the names that a code object looks up, including those in nested code."""
     inner = (part for part in code.co_consts if isinstance(part, CodeType))
     return set(code.co_names).union(*map(_names, inner))

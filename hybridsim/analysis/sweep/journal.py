@@ -1,4 +1,4 @@
-"""This module writes the results of a sweep to a file as they arrive, so that an interrupted sweep can continue.
+"""This module records the results of a sweep in a file as they arrive, so that the sweep can be resumed.
 
 Each piece of work is one line of JSON; an incomplete last line, cut off by a kill, is ignored. Numbers are
 written with all digits, so that a sweep in parts equals a sweep in one bit for bit.
@@ -36,7 +36,7 @@ def fingerprint(*parts: object) -> str:
 
 
 class Journal:
-    """The file of one sweep, open for further results.
+    """The journal file of one sweep, open for more results.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ class Journal:
             try:
                 is_other = os.path.exists(self.path) and not stat.S_ISREG(os.stat(self.path).st_mode)
                 if is_other:
-                    raise OSError(errno.EINVAL, "it is not a regular file")
+                    raise OSError(errno.EINVAL, "the path is not a regular file")
                 file = open(self.path, "a+b")  # noqa: SIM115  # it stays open as long as the journal
             except OSError as error:
                 raise cannot_write(self.path, error) from error
@@ -84,7 +84,7 @@ class Journal:
             file.close()
 
     def _read(self, sweep: str) -> None:
-        """Read the existing content; an incomplete last line is cut off."""
+        """Read the existing results, and cut off an incomplete last line."""
         head = {"format": _FORMAT, "sweep": sweep}
         self._file.seek(0)
         end, line = 0, self._file.readline(_MOST_BYTES)
@@ -116,16 +116,16 @@ class Journal:
             found = None
         if not isinstance(found, dict) or found.get("format") != _FORMAT:
             raise UsageError(
-                f"{self.path} is not a journal of a sweep", remedy="give another path, or delete the file"
+                f"{self.path} is not a journal of a sweep", remedy="use another path, or delete the file"
             )
         if found.get("sweep") != head["sweep"]:
             raise UsageError(
-                f"{self.path} belongs to another sweep: model, values, options or measure differ",
-                remedy="finish that sweep, delete the file, or give another path",
+                f"{self.path} belongs to another sweep: its model, values, options or measure differ",
+                remedy="finish the other sweep, delete the file, or use another path",
             )
 
     def note(self, numbers: range, outcomes: Sequence[Outcome]) -> None:
-        """Add the outcomes of some points; they are safe if the process is killed later."""
+        """Append the outcomes of some points and flush the file, so that they survive a crash."""
         rows = [[o.status, {n: _written(v) for n, v in (o.found or {}).items()}] for o in outcomes]
         if rows:
             self._write([list(numbers[: len(rows)]), rows])
@@ -155,7 +155,7 @@ def _as_line(content: Any) -> bytes:
 
 
 def _piece(line: Any) -> tuple[list[int], list[Outcome]]:
-    """Return the indices of the points in a line, and their outcomes.
+    """Read one line: the indices of its points, and their outcomes.
 
     Raises
     ------
@@ -166,7 +166,7 @@ def _piece(line: Any) -> tuple[list[int], list[Outcome]]:
         raise ValueError("the line is not a pair of points and results")
     numbers, rows = line
     if not all(type(number) is int for number in numbers):
-        raise ValueError("its points are not numbers")
+        raise ValueError("the points of the line are not numbers")
     return numbers, [_outcome(row) for row in rows]
 
 
@@ -178,7 +178,7 @@ def _outcome(row: Any) -> Outcome:
 
 
 def _written(value: Reading) -> Any:
-    """Return a reading for JSON: numbers and texts are unchanged, other values are stored with their kind."""
+    """Convert a reading to JSON: numbers and texts stay as they are, other values get a type tag."""
     if isinstance(value, np.ndarray):
         parts = [value.real.tolist(), value.imag.tolist()] if value.dtype.kind == "c" else [value.tolist()]
         return {"array": parts}

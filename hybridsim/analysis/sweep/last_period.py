@@ -1,4 +1,4 @@
-"""This module measures the last of many periods of the forcing, whether or not the motion repeats by then."""
+"""This module measures the last forcing period of a run, even if the motion does not repeat."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ _SMALLEST = 1e-3  # relative to a state's size; the least range used to scale it
 
 @dataclass(frozen=True)
 class MeasuredPeriod(Measures):
-    """The last period of a run, with the measures of a steady state."""
+    """The last forcing period of a run, with the measures of a steady state."""
 
     solution: Solution
     period: float
 
     @property
     def residual(self) -> float:
-        """The largest change of a state over the period, relative to half of its range."""
+        """The largest change of a state over the period, relative to half of the state's range."""
         low, high = self._orbit.extremes
         ends = self.solution.y[:, [0, -1]]
         n = len(ends)
@@ -43,7 +43,7 @@ class MeasuredPeriod(Measures):
 
 @dataclass(frozen=True)
 class LastPeriod:
-    """Readings of the period that ends `after` forcing periods from the start."""
+    """A measure that reads the forcing period after the first `after` periods."""
 
     reading_names: tuple[str, ...]
     after: int
@@ -51,11 +51,11 @@ class LastPeriod:
     read_one: Callable[[Any, str], Any]
 
     def nothing(self) -> dict[str, float | str]:
-        """Return the readings of a point without a result."""
+        """Return the readings of a point that has no result."""
         return {word: "" if word == "word" else math.nan for word in self.reading_names}
 
     def run(self, model: Model, previous: Any) -> MeasuredPeriod:
-        """Make one run."""
+        """Run the model up to the end of the measured period."""
         from hybridsim.simulate import simulate
 
         period = period_of(model)
@@ -75,7 +75,7 @@ class LastPeriod:
         alone: Callable[[Settings], Outcome],
         watch: Watch,
     ) -> list[Outcome] | None:
-        """Run all points in compiled code, except those left to `alone`; return None if no point can run so.
+        """Run all points in compiled code, except those for `alone`; return None if no point can run so.
 
         If the watch requests a stop, the outcomes are those of the first points, as far as they were run.
         """
@@ -110,12 +110,12 @@ class LastPeriod:
 
 
 def period_of(model: Model) -> float:
-    """Return the common period of all forcing of a model.
+    """Return the common forcing period of a model.
 
     Raises
     ------
-    If it has none.
-        Where it has none.
+    UsageError
+        If the model has no periodic forcing.
     """
     from hybridsim.engine.system.period import common_period
     from hybridsim.engine.system.system_cache import system_of
@@ -124,7 +124,7 @@ def period_of(model: Model) -> float:
     if period is None:
         raise UsageError(
             f"model {model.name} has no periodic forcing: there is no last period",
-            remedy="leave out after; hs.steady_state finds the motion of an unforced model",
+            remedy="remove `after`, or use hs.steady_state, which also finds unforced motions",
         )
     return period
 
@@ -135,7 +135,7 @@ def _outcome(found: dict[str, Any]) -> Outcome:
 
 
 def _reader(word: str, system: Any) -> Callable[[LastPeriods], np.ndarray] | None:
-    """Return a function that reads a word from the sums over the last periods (m,), or None."""
+    """Return a function that computes a reading from sums over the last periods (m,), or None."""
     head, _, rest = word.partition(".")
     if head == "period":
         return lambda last: last.periods
@@ -174,7 +174,7 @@ def _residuals(last: LastPeriods) -> np.ndarray:
 
 
 def _residual(low: np.ndarray, high: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Return the largest change of a state relative to half of its range, over the last axis."""
+    """Return the largest change of a state relative to half of the state's range, along the last axis."""
     scale = np.maximum(0.5 * (high - low), _SMALLEST * np.maximum(abs(low), abs(high)))
     change = np.abs(after - before)
     return np.divide(change, scale, out=np.zeros_like(change), where=scale > 0.0).max(axis=-1, initial=0.0)

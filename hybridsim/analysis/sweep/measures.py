@@ -1,4 +1,4 @@
-"""This module provides the measures of a sweep: a function of the user's, or a built-in measure."""
+"""This module chooses the measure of a sweep: a user's function, or a built-in measure."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from hybridsim.model import Model
 
 @dataclass(frozen=True)
 class UserFunction:
-    """A function of the user's, of the model and, in a chain, of the neighbour's result."""
+    """A measure defined by a user's function of the model and, in a chain, of the previous point's result."""
 
     function: Callable[..., Any]
     options: Mapping[str, Any]
     chained: bool
 
     def run(self, model: Model, previous: Any) -> Any:
-        """Return the result of the function."""
+        """Call the user's function at one point."""
         if self.chained:
             return self.function(model, previous, **self.options)
         return self.function(model, **self.options)
 
     def read(self, result: Any) -> Any:
-        """Return the whole result."""
+        """Return the result as it is."""
         return result
 
 
 def measure_of(measure: Any, model: Model, chained: bool, options: Mapping[str, Any]) -> Measure:
-    """Return the measure for the argument of `sweep`."""
+    """Return the measure that the argument `measure` of `sweep` describes."""
     if callable(measure):
         refuse_what_it_does_not_take(measure, options)
         return UserFunction(measure, options, chained)
@@ -44,6 +44,6 @@ def measure_of(measure: Any, model: Model, chained: bool, options: Mapping[str, 
     if names and all(isinstance(word, str) for word in names):
         return named_measure(names, model, options)
     raise UsageError(
-        f"measure cannot be {measure!r}",
-        remedy="give a function of the model, or the name of a built-in measure",
+        f"`measure` cannot be {measure!r}",
+        remedy="use a function of the model, or the name of a built-in measure",
     )

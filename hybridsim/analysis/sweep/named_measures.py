@@ -1,4 +1,4 @@
-"""This module defines the built-in measures: properties of the steady state, and states at the end of a run."""
+"""This module defines the built-in measures: properties of the steady state, and final states."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _PLAIN = ("amplitude", "energy")  # the default measures of each quantity
 
 @dataclass(frozen=True)
 class Steady:
-    """Readings of `steady_state`: ``amplitude.x``, ``harmonic.x.3``, ``stick_fraction.f``, ``period``, ``kind``, ...
+    """A measure that reads `steady_state`: ``amplitude.x``, ``harmonic.x.3``, ``period``, ``kind``, ...
 
     A motion that does not repeat has no such measures; its status names its kind.
     """
@@ -39,11 +39,11 @@ class Steady:
     options: Mapping[str, Any]
 
     def nothing(self) -> dict[str, float | str]:
-        """Return the readings of a point without a result."""
+        """Return the readings of a point that has no result."""
         return {word: "" if word in _TEXTS else math.nan for word in self.reading_names}
 
     def run(self, model: Model, previous: SteadyState | None) -> SteadyState:
-        """Return the steady state, searched from that of the neighbour if there is one."""
+        """Find the steady state, from that of the previous point if the points form a chain."""
         from hybridsim.analysis.steady import steady_state
 
         start = {} if previous is None else _start_of(previous)
@@ -59,23 +59,23 @@ class Steady:
         return {word: _reading(result, word) for word in self.reading_names}
 
     def blank(self, result: SteadyState) -> tuple[str, ...]:
-        """Return the readings that do not exist for a result: an equilibrium has no period."""
+        """Return the readings that a result does not have, such as the period of an equilibrium."""
         return ("period",) if result.kind == "equilibrium" else ()
 
 
 @dataclass(frozen=True)
 class Final:
-    """States at the end of a run of `simulate`."""
+    """A measure that reads the states at the end of a run of `simulate`."""
 
     names: tuple[str, ...]
     options: Mapping[str, Any]
 
     def nothing(self) -> dict[str, float | str]:
-        """Return the readings of a point without a result."""
+        """Return the readings of a point that has no result."""
         return {f"{FINAL}.{name}": math.nan for name in self.names}
 
     def run(self, model: Model, previous: Any) -> dict[str, float]:
-        """Return the states by name, from a run that starts at the neighbour's end if there is one."""
+        """Return the final states by name; in a chain the run starts from the previous point's end."""
         from hybridsim.simulate import simulate
 
         arguments = {"save": "nothing", **self.options}
@@ -109,13 +109,15 @@ def named_measure(
     heads = {word.partition(".")[0] for word in asked}
     if heads == {FINAL}:
         if "t_span" not in options:
-            raise UsageError(f"measure is {reading_names!r} without t_span", remedy="give t_span=(0, ...)")
+            raise UsageError(
+                f"`measure` {reading_names!r} needs `t_span`", remedy="pass `t_span`, such as t_span=(0, 10)"
+            )
         refuse_unknown([simulate], options)
         names = states if asked == (FINAL,) else [_of(word, states, "states") for word in asked]
         return Final(tuple(names), options)
     if FINAL in heads:
         raise UsageError(
-            f"measure cannot be {reading_names!r}",
+            f"`measure` cannot be {reading_names!r}",
             remedy="use two sweeps: one for readings of steady states, and one for ends of runs",
         )
     if AFTER in options:
@@ -135,8 +137,9 @@ def named_measure(
         is_harmonic = word.startswith("harmonic.") and last.isdecimal()
         if AFTER in options and word in _OF_MOTION and word not in OF_MOTION:
             raise UsageError(
-                f"{word} belongs to a steady state, but after= reads one period of an ordinary run",
-                remedy=f"leave {word} or after out; residual measures how far a run is from repeating",
+                f"{word} belongs to a steady state, but `after` measures one period of an ordinary run",
+                remedy=f"remove {word} or `after`; the reading 'residual' measures how far a run is from "
+                "repeating",
             )
         if (f"{stem}.1" if is_harmonic else word) not in known:
             raise UsageError(
@@ -152,15 +155,13 @@ def _last_period(reading_names: tuple[str, ...], model: Model, options: dict[str
     after = whole(options.pop(AFTER), AFTER)
     for name in ("t_span", "save", "t_eval"):
         if name in options:
-            raise UsageError(
-                f"{name} and after cannot be combined", remedy=f"leave {name} out: the last period is kept"
-            )
+            raise UsageError(f"`{name}` and `after` cannot be combined", remedy=f"remove `{name}`")
     period_of(model)  # an unforced model is refused here, once for all points
     return LastPeriod(reading_names, after, options, _reading)
 
 
 def units_of_readings(reading_names: Iterable[str], model: Model) -> dict[str, str]:
-    """Return the units of named readings, as far as the model declares them."""
+    """Return the units of named readings that are declared in the model."""
     known, time = units_of(model), time_unit(model)
     units = {}
     for word in reading_names:
@@ -175,7 +176,7 @@ def units_of_readings(reading_names: Iterable[str], model: Model) -> dict[str, s
 
 
 def _known(model: Model, of_motion: Sequence[str]) -> list[str]:
-    """Return every reading of a steady state, with the first harmonic of each quantity."""
+    """Return the names of all readings of a steady state, with the first harmonic of each quantity."""
     discrete = {d.name for d in model.discrete}
     quantities = [name for name in units_of(model) if name not in discrete]
     contacts = [contact.name for contact in model.contacts]
@@ -203,7 +204,7 @@ def _reading(steady: SteadyState | MeasuredPeriod, word: str) -> Any:
 
 
 def _start_of(steady: SteadyState) -> dict[str, Any]:
-    """Return the state and the modes at the start of a steady motion."""
+    """Return the states and the modes at which a steady motion starts."""
     run = steady.solution
     x0 = dict(zip(run.names, run.y[:, 0].tolist(), strict=True))
     x0 |= {d.name: float(run.output(d.name, run.t_start)) for d in run.model.discrete}

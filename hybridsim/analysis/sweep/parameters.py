@@ -1,4 +1,4 @@
-"""This module computes parameters and initial states at many points of a sweep as arrays, without models."""
+"""This module computes parameters and initial states of many sweep points as arrays."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hybridsim.model.checks.values import checked_names
 
 
 class Setter:
-    """Sets some parameters and initial values of a model.
+    """Computes parameters and initial values for the points of a sweep.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class Setter:
         return np.array(sound, dtype=np.int64)
 
     def _number(self, setting: float | Expression) -> float:
-        """Return the value of a setting; NaN if the setting depends on other settings."""
+        """Return the value of a setting, or NaN if it depends on other settings."""
         if not isinstance(setting, Expression):
             return setting
         if setting not in self._known:

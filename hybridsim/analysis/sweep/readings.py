@@ -1,4 +1,4 @@
-"""This module converts the result of a measure to readings: numbers, texts and arrays by name."""
+"""This module converts the result of a measure to named readings: numbers, texts and arrays."""
 
 from __future__ import annotations
 
@@ -58,5 +58,5 @@ def _reading(name: str, value: Any) -> Reading:
             pass
     raise UsageError(
         f"the measure returned {type(value).__name__} as {name}",
-        remedy="return a number, a one-dimensional array, or a dict of these by name",
+        remedy="let the measure return a number, a one-dimensional array, or a dict of names and such values",
     )

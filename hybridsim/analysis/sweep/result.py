@@ -1,4 +1,4 @@
-"""This module defines the result of a sweep: labelled arrays, and a status for every point."""
+"""This module defines the result of a sweep: arrays over its axes, and a status for every point."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class Sweep(Readable):
 
     @property
     def failed(self) -> np.ndarray:
-        """A mask of the points without a result, in the shape of `status`."""
+        """A mask, in the shape of `status`, of the points that have no result."""
         return self.status != DONE
 
     def __getitem__(self, name: str) -> np.ndarray:
@@ -94,7 +94,7 @@ class Sweep(Readable):
         return "\n".join([heading(self), *statuses(self)])
 
     def table(self) -> str:
-        """Return the least and greatest value of each reading, and the counts of statuses, as text."""
+        """Return the extremes of each reading, and the counts of statuses, as text."""
         return table(self)
 
     def columns(self) -> dict[str, np.ndarray]:
@@ -113,7 +113,7 @@ class Sweep(Readable):
         return found | {"status": self.status.ravel()}
 
     def to_csv(self, path: str | Path) -> None:
-        """Write one line per point, with all digits."""
+        """Write one line per point, with numbers in full precision."""
         columns = self.columns()
         with whole_file(path) as partly, open(partly, "w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
@@ -146,7 +146,7 @@ class Sweep(Readable):
         return text
 
     def to_xarray(self) -> xr.Dataset:
-        """Return a data set over the axes, with a variable and unit for each reading, and the status."""
+        """Return an xarray data set over the axes, with the readings, their units and the status."""
         xarray = library("xarray")
         where = self.dimensions
         variables = {
@@ -162,7 +162,7 @@ class Sweep(Readable):
         )
 
     def plot(self, *names: str, over: str | None = None) -> Any:
-        """Draw readings: lines over one parameter, maps over two; see `hybridsim.plot.sweep`.
+        """Draw readings as lines over one parameter or as maps over two; see `hybridsim.plot.sweep`.
 
         Returns the axes; ``hybridsim.plot.save`` writes them to a file.
         """
@@ -177,7 +177,7 @@ class Sweep(Readable):
         return {"units": self.units[name]} if self.units.get(name) else {}
 
     def problems(self) -> Iterator[tuple[str, int]]:
-        """Yield the errors with the number of points of each, most frequent first."""
+        """Yield each error with its number of points, the most frequent error first."""
         counted = Counter(text for text in self.status.ravel().tolist() if text not in (DONE, NOT_RUN))
         yield from counted.most_common()
 

@@ -1,4 +1,4 @@
-"""This module samples a settled motion at a Poincare section: per forcing period, or at a level."""
+"""This module samples a settled motion at a Poincare section: once per forcing period, or at a level."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _EMPTY_FREE = 5  # intervals without any passage after which the search ends, wi
 
 
 class Passings(NamedTuple):
-    """States (k, n) at the section, the largest size (n,) of each along the motion, and the end of the run."""
+    """States (k, n) at the section, the largest size (n,) of each state, and the end of the run."""
 
     states: np.ndarray
     sizes: np.ndarray
@@ -39,7 +39,7 @@ class Passings(NamedTuple):
 
 @dataclass(frozen=True)
 class Section:
-    """Samples of a settled motion at a section.
+    """A measure that samples the settled motion at a section.
 
     Parameters
     ----------
@@ -58,13 +58,13 @@ class Section:
     options: Mapping[str, Any]
 
     def run(self, model: Model, previous: Passings | None) -> Passings:
-        """Return the samples at a point, starting at the end of the neighbour's run."""
+        """Return the samples at one point; in a chain the run starts from the previous point's end."""
         motion = Motion(model, dict(self.options), dict(self.first))
         start = None if previous is None else previous.end
         return self._passed(motion, start) if self.level else self._strobed(motion, start)
 
     def read(self, result: Passings) -> dict[str, Any]:
-        """Return each state's samples in order of time, and the number after which they repeat (0: never)."""
+        """Return the samples of each state, and their least period in samples (0 if they do not repeat)."""
         columns = {f"state {k}": column for k, column in enumerate(result.states.T)}
         return {**columns, REPEATS: repeats_after(result.states, self.tol * result.sizes)}
 
@@ -73,7 +73,7 @@ class Section:
         if period is None:
             raise UsageError(
                 f"model {motion.model.name} has no forcing of one period",
-                remedy="give section an expression that passes zero upward, such as section='v'",
+                remedy="set `section` to an expression that passes zero upward, such as 'v'",
             )
         times = period * np.arange(self.settle + 1, self.settle + self.samples + 1)
         run = motion.run(start, float(times[-1]), save=self.samples * period)
@@ -101,7 +101,7 @@ class Section:
 
 
 def with_section(model: Model, section: str | None) -> tuple[Model, str]:
-    """Return the model with a monitor at a section, and the monitor's name; "" for the period of the forcing.
+    """Return the model with a monitor at the section, and the monitor's name, or "" for the forcing period.
 
     Raises
     ------
@@ -114,7 +114,7 @@ def with_section(model: Model, section: str | None) -> tuple[Model, str]:
         return model, ""
     if not isinstance(section, str):
         raise UsageError(
-            f"section cannot be {section!r}", remedy="give an expression, or the name of a monitor"
+            f"`section` cannot be {section!r}", remedy="use an expression, or the name of a monitor"
         )
     if section in {monitor.name for monitor in model.monitors}:
         return model, section
@@ -124,7 +124,7 @@ def with_section(model: Model, section: str | None) -> tuple[Model, str]:
 
 
 def repeats_after(states: np.ndarray, tols: np.ndarray) -> int:
-    """Return the least period of samples (k, n) within the tolerances, as a number of samples; 0 if none."""
+    """Return the least period of samples (k, n) within the tolerances, as a number of samples, or 0."""
     for n in range(1, len(states) // 2 + 1):
         if (np.abs(states[n:] - states[:-n]) <= tols).all():
             return n

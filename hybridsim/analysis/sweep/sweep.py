@@ -1,4 +1,4 @@
-"""This module runs a measure over grids and lists of parameter values, on threads or any executor."""
+"""This module measures a model over grids and lists of parameter values, on threads or any executor."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def sweep(
     progress: Progress | None = None,
     **options: Any,
 ) -> Sweep:
-    """Measure a model at many values of its parameters.
+    """Measure a model at many values of its parameters and initial values.
 
     A point that fails, or gives NaN, has a status with the reason, and never ends the sweep. The result is
     bit for bit the same for every executor, number of workers and order of completion.
@@ -124,8 +124,9 @@ def sweep(
     if after is not None:
         if warm_start:
             raise UsageError(
-                "warm_start and after cannot be combined: the periods are counted from the start of each point",
-                remedy="leave warm_start or after out",
+                "`warm_start` and `after` cannot be combined, because `after` counts periods from the "
+                "model's own start",
+                remedy="remove `warm_start` or `after`",
             )
         options["after"] = after
     count = None if workers is None else whole(workers, "workers")

@@ -30,7 +30,7 @@ def statuses(sweep: Sweep) -> list[str]:
 
 
 def table(sweep: Sweep) -> str:
-    """Return the least and greatest value of each reading with their points; for texts, the count of each."""
+    """Return the extremes of each reading and the points at which they occur; for texts, the counts."""
     rows: list[tuple[str, ...]] = []
     for name, values in sweep.values.items():
         unit = sweep.units.get(name, "")
@@ -51,7 +51,7 @@ def table(sweep: Sweep) -> str:
 
 
 def _where(sweep: Sweep, k: int, shape: tuple[int, ...]) -> str:
-    """Return the parameters of the point that holds the k-th number of a reading."""
+    """Return the parameters of the point that contains the k-th number of a reading."""
     place = np.unravel_index(k, shape)
     if sweep.mode == "list":
         return ", ".join(_set(name, settings[place[0]]) for name, settings in sweep.axes.items())

@@ -1,4 +1,4 @@
-"""This package computes derivatives of a run with respect to its start and parameters, through all events."""
+"""This package computes derivatives of a run by its initial state and parameters, through all events."""
 
 from hybridsim.analysis.variations.sensitivities import Sensitivities, sensitivities
 

@@ -1,4 +1,4 @@
-"""This module carries derivatives along a run: the variational flow on segments, saltation matrices at events.
+"""This module carries derivatives along a run, by saltation matrices at events.
 
 At an event whose time changes by dt, a change dx of the state before it becomes
 
@@ -63,7 +63,7 @@ _SAME = 1e-9  # of its size: a state that changes by less at an event does not j
 
 
 class Carrier:
-    """Carries derivatives along one run."""
+    """Computes derivatives along one run."""
 
     def __init__(self, solution: Solution) -> None:
         self.solution = solution
@@ -71,11 +71,11 @@ class Carrier:
         if not self.system.has_tape:
             raise UsageError(
                 f"model {solution.model.name} consists of Python functions, whose derivatives are unknown",
-                remedy="write it in expressions",
+                remedy="write the model in expressions",
             )
         if self.system.is_unilateral.any():
             raise UsageError(
-                f"model {solution.model.name} has impacts, through which derivatives are not carried",
+                f"model {solution.model.name} has impacts, for which derivatives are not supported",
                 remedy="write impacts as a guard and a reset, or compare runs with different parameters",
             )
         module: Any = self.system.code.module
@@ -85,7 +85,7 @@ class Carrier:
         self._scale = np.where(largest > 0.0, largest, 1.0)
 
     def carry(self, directions: Directions, *, sided: bool = False) -> Carried:
-        """Carry directions from the first segment to the end of the last.
+        """Carry M directions of change from the start of the run to its end.
 
         sided : whether a direction that moves a function off zero is followed on its side, not on that of the run.
         """
@@ -125,19 +125,19 @@ class Carrier:
         return Carried(Y, Yd, times, self._off, self._lost)
 
     def _is_end(self, segment: Segment) -> bool:
-        """Return whether a segment begins at the end of the run, to rounding."""
+        """Return whether a segment begins at the end of the run, within rounding."""
         end = self.solution._segments[-1].end
         return bool(segment.start.minus(end) >= -time_rounding(self.solution))
 
     def _moves(self, shift: np.ndarray) -> np.ndarray:
-        """Return a mask (M,) of the directions that move a time, given its derivatives."""
+        """Return a mask (M,) of the directions that shift a time, given the derivatives of the time."""
         length = self.solution.t_end - self.solution.t_start
         return np.asarray(np.abs(shift) * self._changes.own > _ROUNDING * length)
 
     def _at_end(
         self, last: Last, behind: Segment, Y: np.ndarray, Yd: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Handle an event exactly at the end, which a change may move beyond the end."""
+        """Return the derivatives at an event exactly at the end, which a change may shift beyond the end."""
         before, system = last.segment, self.system
         moves = self._moves(last.shift)
         jumps = bool(
@@ -155,7 +155,7 @@ class Carrier:
         return np.where(is_later, last.Y, Y), np.where(is_later, last.Yd, Yd)
 
     def _note(self, off: list[OffZero]) -> np.ndarray | float:
-        """Store the functions at zero; return the addition to the states' derivatives."""
+        """Record functions that are exactly zero; return their addition to the derivatives of the states."""
         self._off += off
         if not self._sided:
             return 0.0
@@ -164,12 +164,12 @@ class Carrier:
         return more
 
     def sizes(self) -> np.ndarray:
-        """Return the sizes of the states and discrete states (n + d, 1), all positive."""
+        """Return the sizes (n + d, 1) of the states and discrete states; all sizes are positive."""
         discrete = np.abs(self.system.discrete_start)
         return np.concatenate([self._scale, np.where(discrete > 0.0, discrete, 1.0)])[:, None]
 
     def own_sizes(self, directions: Directions) -> np.ndarray:
-        """Return the step along each direction (M,) with the size of the first quantity that changes."""
+        """Return the steps (M,) along the directions that first change a quantity by its own size."""
         system = self.system
         constants = np.abs(np.concatenate([system.discrete_start, list(system.values.values())]))
         scale = np.concatenate([self._scale, np.where(constants > 0.0, constants, 1.0)])
@@ -180,12 +180,13 @@ class Carrier:
     def _started(
         self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, event_times: EventTimes
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the derivatives after the events of the first instant."""
+        """Return the derivatives after the events at the start of the run."""
         happened = at_start(self.solution)
         for one in happened:
             if one.kind == "scheduled" and any(shift.any() for shift in event_times.scheduled(one)):
                 raise UsageError(
-                    f"{one.component} happens at the start of the run, at a time that depends on the varied quantities",
+                    f"{one.component} has an event at the start of the run, at a time that depends on "
+                    "the varied quantities",
                     remedy="begin the run a little earlier or later",
                 )
         z = segment.z.copy()
@@ -228,7 +229,7 @@ class Carrier:
     def _over(
         self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, begin: float, end: float
     ) -> np.ndarray:
-        """Carry derivatives over a segment from one local time to another."""
+        """Carry the derivatives over a segment from one local time to another."""
         if end <= begin or not self.system.n:
             return Y
         tape, directions = (
@@ -309,7 +310,7 @@ class Carrier:
         return rates_of(self.system, float(segment.s[0]), segment.x[0], segment.p, segment.z)
 
     def _settled(self, rounds: Rounds, following: Segment, x: np.ndarray, before: np.ndarray) -> np.ndarray:
-        """Return the derivatives of the states after an instant, and note the functions at zero.
+        """Return the derivatives of the states just after an instant; record functions at zero.
 
         x, before : states and rates (n,) before the instant.
         """
@@ -337,7 +338,7 @@ class Carrier:
 
 
 def _place(rounds: Rounds, following: Segment) -> Place:
-    """Return the place just after an instant."""
+    """Return the `Place` just after an instant."""
     return Place(
         float(following.s[0]), float(following.origin), following.x[0], following.p, following.z,
         rounds.Y, rounds.Yd, rounds.shift, rounds.large,

@@ -24,7 +24,7 @@ _TANGENTIAL = (
 
 @dataclass(frozen=True)
 class Place:
-    """A place on the run with derivatives: local time, its origin, states, run-time vector, modes.
+    """A point of the run with derivatives: local time, its origin, states, run-time vector, modes.
 
     Y, Yd : derivatives of the states (n, M) and discrete states (d, M); shift : of the time (M,).
     large : sizes (n, M) of the terms of the sums Y.
@@ -43,7 +43,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Changed:
-    """One guard, monitor or surface: its value, its derivatives (M,), and the sizes of their terms (M,).
+    """The value of a guard, monitor or surface, its derivatives (M,), and the sizes (M,) of the summed terms.
 
     row (n,), by_time : its derivatives by the states and by time.
     """
@@ -62,13 +62,13 @@ class Changed:
         return np.asarray(np.abs(self.by) > _ALIKE * self.sizes)
 
     def along(self, rates: np.ndarray) -> float:
-        """Return the rate of the function for these rates (n,) of the states; 0 if the terms cancel."""
+        """Return the rate of the function for rates (n,) of the states, or 0 if the terms cancel."""
         terms = np.append(self.row * rates, self.by_time)
         return float(terms.sum()) if abs(terms.sum()) > _TANGENTIAL * np.abs(terms).sum() else 0.0
 
 
 class Changes:
-    """Derivatives of guards, monitors and surfaces in M directions.
+    """Computes derivatives of guards, monitors and surfaces in M directions.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ class Changes:
         self._scale, self.own = scale, own
 
     def flow(self, at: Place) -> tuple[np.ndarray, np.ndarray]:
-        """Return the rates (n,) of the states, and their derivatives by each input of the formulas."""
+        """Return the rates (n,) of the states, and their derivatives by all inputs of the formulas."""
         found = TangentTape(self.system, at.z)(
             np.array([at.s]), at.x[None, :], at.p, seeds(self.system, at.origin, self.rates)
         )
@@ -98,7 +98,7 @@ class Changes:
         monitors: tuple[int, ...] = (),
         surfaces: tuple[int, ...] = (),
     ) -> list[Changed]:
-        """Return the changes of the guards, then monitors, then surfaces with these numbers."""
+        """Return values and derivatives of the guards, monitors and surfaces with these numbers."""
         system, n = self.system, self.system.n
         tape = TangentTape(system, at.z, guards, monitors, surfaces)
         found = tape(np.array([at.s]), at.x[None, :], at.p, seeds(system, at.origin, self.rates))

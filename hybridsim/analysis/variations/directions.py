@@ -1,4 +1,4 @@
-"""This module defines the directions of change at the start of a run, and their derivatives at its end."""
+"""This module defines directions of change at the start of a run, and derivatives along them at the end."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ class Directions:
     parameters: np.ndarray
 
     def both_ways(self, chosen: np.ndarray) -> Directions:
-        """Return some of the directions, followed by their negatives."""
+        """Return some of the directions, and after them the same directions with opposite sign."""
         rows = self.x[:, chosen], self.discrete[:, chosen], self.parameters[:, chosen]
         return Directions(*(np.concatenate([row, -row], axis=1) for row in rows))
 
 
 @dataclass(frozen=True)
 class Carried:
-    """Derivatives at the end of a run, and of the time of each event before it.
+    """Derivatives at the end of a run, and derivatives of the times of its events.
 
     x (n, M), discrete (d, M); times: each instant with an event, and its derivatives (M,);
     off: functions exactly at zero that some directions move off zero;

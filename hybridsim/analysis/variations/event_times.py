@@ -1,4 +1,4 @@
-"""This module computes derivatives of event times: zeros of guards and monitors, and schedules."""
+"""This module computes derivatives of event times."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ _ALIKE = 1e-7  # relative; events at one instant are one event if the derivative
 
 @dataclass(frozen=True)
 class Shift:
-    """Derivatives (M,) of a time, and the size (M,) of the terms of each sum."""
+    """Derivatives (M,) of a time, and the sizes (M,) of the terms that were summed."""
 
     values: np.ndarray
     sizes: np.ndarray
 
 
 class EventTimes:
-    """Derivatives of event times in M directions."""
+    """Computes derivatives of event times in M directions."""
 
     def __init__(self, changes: Changes) -> None:
         self.system, self._changes = changes.system, changes
@@ -65,8 +65,8 @@ class EventTimes:
         if not shifts:
             raise UsageError(
                 f"the cause of the change of {happened[0].component} at t = {float(happened[0].instant):.9g} is "
-                "unknown, and so are the derivatives of its time",
-                remedy="use other parameters, or a run that ends before",
+                "unknown, so its time has no derivatives",
+                remedy="use other parameters, or a run that ends before this time",
             )
         first = shifts[0]
         if any(
@@ -74,16 +74,17 @@ class EventTimes:
             for shift in shifts
         ):
             raise UsageError(
-                f"several events at t = {float(happened[0].instant):.9g} separate when the run is changed "
-                f"({', '.join(sorted({o.component for o in happened}))}): there is no derivative",
-                remedy="use other parameters, or a run that ends before",
+                f"several events at t = {float(happened[0].instant):.9g} happen at different times after "
+                "a small change of the run "
+                f"({', '.join(sorted({o.component for o in happened}))}), so there is no derivative",
+                remedy="use other parameters, or a run that ends before this time",
             )
         return first.values
 
     def recorded(
         self, segment: Segment, one: Occurrence, s: float, x: np.ndarray, Y: np.ndarray, Yd: np.ndarray
     ) -> np.ndarray:
-        """Return the derivatives of a recording monitor's time (M,); NaN if the monitor only touches zero."""
+        """Return the derivatives (M,) of a recorded monitor time; NaN if the monitor only touches zero."""
         shift = self._located(segment, one, s, x, Y, Yd, is_first=False)
         return np.full(self._changes.G.shape[1], np.nan) if shift is None else shift.values
 
@@ -97,7 +98,7 @@ class EventTimes:
         Yd: np.ndarray,
         is_first: bool,
     ) -> Shift | None:
-        """Return the shift of an event at a zero of a guard or monitor; None if another event caused it."""
+        """Return the derivatives of the time of an event; None if another event caused it."""
         system = self.system
         is_monitor = one.kind == "monitor"
         if is_monitor:
@@ -118,13 +119,13 @@ class EventTimes:
                 return None
             raise UsageError(
                 f"{one.component} has an event at t = {float(one.instant):.9g} at which its guard does "
-                "not fall: the time of such an event has no derivatives",
-                remedy="use other parameters, or a run that ends before",
+                "not decrease, so the time of the event has no derivatives",
+                remedy="use other parameters, or a run that ends before this time",
             )
         return Shift(-found.by / rate, found.sizes / abs(rate))
 
     def scheduled(self, one: Occurrence) -> list[np.ndarray]:
-        """Return the derivatives (M,) of a scheduled time, one array for each entry that it may be."""
+        """Return the derivatives (M,) of a scheduled time, one array per possible schedule entry."""
         width = self._changes.G.shape[1]
         declared = next((c for c in self.system.model.schedules if c.name == one.component), None)
         if declared is None:

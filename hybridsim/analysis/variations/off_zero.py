@@ -1,4 +1,4 @@
-"""This module handles states exactly on a guard or surface, where a change leads to the other side.
+"""This module handles runs exactly on a guard or surface, where a small change leads to the other side.
 
 A change to the side of the run leaves the run as it is. A change to the other side is followed for the time
 tau until it returns, which is of first order. The rates differ there, so that the states change by (f_there -
@@ -24,7 +24,7 @@ _SAME = 1e-9  # of their size: rates on two sides of a guard that differ by less
 
 
 class OffZero(NamedTuple):
-    """A function exactly at zero at time t, and its effect on the derivatives in M directions.
+    """A function that is exactly zero at time t, and its effect on the derivatives in M directions.
 
     moves : mask (M,) of these directions. lost : mask (M,) of those from whose side the run does not return.
     more : addition to the derivatives (n, M) of the states on the other side; zero elsewhere.
@@ -38,7 +38,7 @@ class OffZero(NamedTuple):
 
 
 def rates_of(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Return dx/dt (n,) of the states; held states follow their constraints."""
+    """Return the rates dx/dt (n,), with held states moving along their constraints."""
     rates = system.flow(s, x, p, z)
     if not system.holds(z):
         return rates
@@ -49,25 +49,25 @@ def rates_of(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarr
 
 
 def differ(one: np.ndarray, other: np.ndarray) -> bool:
-    """Return whether rates (n,) differ."""
+    """Return whether two arrays of rates (n,) differ by more than rounding."""
     return bool((np.abs(one - other) > _SAME * (np.abs(one) + np.abs(other))).any())
 
 
 def off_zero(changes: Changes, at: Place) -> tuple[np.ndarray, list[OffZero]]:
-    """Return derivatives (n, M) of the states after holding is restored, and the functions left at zero."""
+    """Return derivatives (n, M) after held states have returned to their surfaces; list functions at zero."""
     sides = _Sides(changes, at)
     off = sides.surfaces()
     return sides.at.Y, off + sides.guards()
 
 
 def limits_reached(changes: Changes, at: Place, components: Sequence[int]) -> list[OffZero]:
-    """Return the limits that a component reaches exactly when it begins to hold or passes a surface."""
+    """Return force limits that are reached exactly when a component begins to hold or passes its surface."""
     sides = _Sides(changes, at)
     return [one for c in components for one in sides.limits(c)]
 
 
 def monitors_reached(changes: Changes, at: Place, later: Place) -> list[OffZero]:
-    """Return monitors at zero at the start of a run that would fire soon after a start on one side.
+    """Return monitors at zero at the start of a run that would fire if the run started on one side of zero.
 
     later : a later place; it gives the side if the rate at the start is zero.
     """
@@ -87,7 +87,7 @@ def monitors_reached(changes: Changes, at: Place, later: Place) -> list[OffZero]
 
 
 class _Sides:
-    """Both sides of the functions at zero at one place."""
+    """Computes the effects of both sides of the functions at zero, at one place."""
 
     def __init__(self, changes: Changes, at: Place) -> None:
         self.changes, self.system, self.at, self.before = changes, changes.system, at, at
@@ -97,7 +97,7 @@ class _Sides:
         self.here = self._rates(at.z)
 
     def guards(self) -> list[OffZero]:
-        """Return the guards at zero that do not fire, and would fire with an effect on one side only."""
+        """Return the guards at zero that do not fire here, but would fire on one side with an effect."""
         guards_here = [
             (c, i, g)
             for c, automaton in enumerate(self.system.automata)
@@ -119,7 +119,7 @@ class _Sides:
         return off
 
     def surfaces(self) -> list[OffZero]:
-        """Return the surfaces whose sides differ.
+        """Return the surfaces on whose two sides the rates differ.
 
         A change off a held surface returns at once, by an impulse of the force that holds it.
         """
@@ -185,7 +185,7 @@ class _Sides:
         return off
 
     def _passed(self, c: int, both: list[Changed], above: np.ndarray, below: np.ndarray) -> list[OffZero]:
-        """Describe a surface at zero that the run leaves, before and after impulses of holding components.
+        """Describe a surface that the run leaves, before and after the impulses of held components.
 
         On the other side, directions with impulses do not return by themselves.
         """
@@ -207,7 +207,7 @@ class _Sides:
         return off
 
     def _freed(self, c: int, one: Changed, other: int) -> list[OffZero]:
-        """Return a component that would no longer hold, because the impulse of another one exceeds its limit."""
+        """Return a component that would not hold any longer, because of the impulse of component c."""
         automaton, off = self.system.automata[c], []
         numbers = self.system.automata[other].guards[self.system.automata[other].hold]
         for mode, mask in ((automaton.above, one.by > 0.0), (automaton.below, one.by < 0.0)):
@@ -241,7 +241,7 @@ class _Sides:
         return [self.off(name, one, other, there, 0.0)]
 
     def limits(self, c: int) -> list[OffZero]:
-        """Return the exactly reached limits of a component that holds, or would hold."""
+        """Return the force limits that a component reaches exactly, if it holds or is about to hold."""
         automaton, off = self.system.automata[c], []
         z = self._with(c, automaton.hold)
         numbers = automaton.guards[automaton.hold]
@@ -261,7 +261,7 @@ class _Sides:
         return off
 
     def off(self, name: str, one: Changed, other: np.ndarray, there: np.ndarray, speed: float) -> OffZero:
-        """Describe a function at zero by its rate on the other side; with rate 0 it does not return."""
+        """Describe a function at zero by its rate on the other side; if the rate is 0, it does not return."""
         other = other & one.moves
         t = self.at.origin + self.at.s
         if speed == 0.0:
@@ -282,7 +282,7 @@ class _Sides:
         return z
 
     def _is_smooth(self, z: np.ndarray) -> bool:
-        """Return whether rates and their derivatives are equal in modes z, as at the smooth corner of x abs(x)."""
+        """Return whether the rates and their derivatives are equal in modes z and in the run's modes."""
         one, other = (self.changes.flow(replace(self.at, z=modes)) for modes in (z, self.at.z))
         return not any(differ(a, b) for a, b in zip(one, other, strict=True))
 
@@ -293,7 +293,7 @@ def _are_opposite(one: np.ndarray, other: np.ndarray) -> bool:
 
 
 def beyond(off: Sequence[OffZero], width: int) -> tuple[np.ndarray, np.ndarray | float]:
-    """Return the mask (M,) of lost directions at one place, and the addition to the derivatives of the states.
+    """Return the mask (M,) of lost directions at one place, and the addition to the states' derivatives.
 
     A direction to the other side of several functions at once is lost, because the order of return matters.
     """

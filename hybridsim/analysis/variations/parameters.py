@@ -1,4 +1,4 @@
-"""This module computes derivatives of parameter and initial values with respect to some parameters."""
+"""This module computes derivatives of parameter values and initial values by some parameters."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def value_slopes(model: Model, chosen: Sequence[str]) -> np.ndarray:
-    """Return derivatives (P, C) of all parameters by the chosen ones, including dependent parameters."""
+    """Return derivatives (P, C) of all parameters by the C chosen parameters."""
     names = [p.name for p in model.parameters]
     slopes = {name: np.zeros(len(chosen)) for name in names}
     values = model.parameter_values()
@@ -38,7 +38,7 @@ def value_slopes(model: Model, chosen: Sequence[str]) -> np.ndarray:
 
 
 def start_slopes(expressions: Sequence[Expression], model: Model, by_parameter: np.ndarray) -> np.ndarray:
-    """Return d(initial values)/d(chosen parameters), (len(expressions), C)."""
+    """Return derivatives of initial values by the chosen parameters, (number of expressions, C)."""
     slopes = {p.name: row for p, row in zip(model.parameters, by_parameter, strict=True)}
     values = model.parameter_values()
     rows = [expression_slope(e, values, slopes, by_parameter.shape[1]) for e in expressions]
@@ -48,7 +48,7 @@ def start_slopes(expressions: Sequence[Expression], model: Model, by_parameter: 
 def expression_slope(
     expression: Expression, values: Mapping[str, float], slopes: Mapping[str, np.ndarray], width: int
 ) -> np.ndarray:
-    """Return d(expression of parameters)/d(chosen parameters), (width,), by the chain rule."""
+    """Return derivatives (width,) of an expression by the chosen parameters, by the chain rule."""
     total = np.zeros(width)
     for name in sorted(expression.names):
         if slopes[name].any():

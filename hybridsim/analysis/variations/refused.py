@@ -1,4 +1,4 @@
-"""This module refuses accumulations and inputs through which derivatives are not carried."""
+"""This module rejects runs and parameters for which derivatives are not computed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _ROUNDINGS = 4096.0
 
 
 def refuse_limits(solution: Solution) -> None:
-    """Refuse a run with an accumulation of events that was not followed down to rounding."""
+    """Reject a run in which events accumulate before the accumulation is resolved to rounding."""
     components = {component.name: component for component in solution.components}
     before = solution.t_start
     for event in solution.events:
@@ -30,23 +30,25 @@ def refuse_limits(solution: Solution) -> None:
         names = [guard.name for guard in component.mode(event.source).guards]
         if event.guard == LIMIT and LIMIT in names and component.limit:
             raise UsageError(
-                f"the guard {LIMIT} of {event.component} has the reserved name of changes at an accumulation, as at "
-                f"t = {event.t!r}, so that the two cannot be distinguished",
-                remedy="give the guard another name",
+                f"the guard {LIMIT} of {event.component} has a name that is reserved for accumulations "
+                "of events; one ends at "
+                f"t = {event.t:.9g}, so that the two cannot be distinguished",
+                remedy="rename the guard",
             )
         if event.guard == LIMIT and LIMIT not in names:
             if event.t - before > _ROUNDINGS * math.ulp(event.t):
                 raise UsageError(
-                    f"events accumulate at t = {event.t:.9g} and were not followed to rounding: derivatives are "
-                    "not carried through them",
-                    remedy="use finite differences of runs",
+                    f"events accumulate at t = {event.t:.9g} and were not resolved to rounding, so the "
+                    "run has "
+                    "no derivatives",
+                    remedy="use finite differences between runs",
                 )
         elif event.t > before:
             before = event.t
 
 
 def refuse_inputs(model: Model, G: np.ndarray) -> None:
-    """Refuse parameters that change the shape of an input, since such derivatives are unknown."""
+    """Reject parameters on which the shape of an input depends, because its derivatives are unknown."""
     moving = {p.name for p, row in zip(model.parameters, G, strict=True) if row.any()}
     starts = {part.name: part.start.names for part in model.discrete}
     for declared in model.inputs:
@@ -55,7 +57,7 @@ def refuse_inputs(model: Model, G: np.ndarray) -> None:
         if used:
             raise UsageError(
                 f"{declared.subject} depends on {used[0]}, but its derivative by {used[0]} is not known",
-                remedy=f"leave {used[0]} out, or write the input as an expression of t"
+                remedy=f"do not request derivatives by {used[0]}, or write the input as an expression of t"
                 if declared.kind != "step"
-                else f"leave {used[0]} out, or let a schedule at that time reset a discrete state",
+                else f"do not request derivatives by {used[0]}, or let a schedule reset a discrete state instead",
             )

@@ -1,4 +1,4 @@
-"""This module applies the resets of one instant with their derivatives, in successive rounds."""
+"""This module applies the resets of one instant to the states and their derivatives, round by round."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _ALIKE = 1e-7  # relative; guards fire together if their delays agree
 
 
 def is_knot(system: System, instant: Instant) -> bool:
-    """Return whether an input has a knot at an instant, to rounding."""
+    """Return whether an input has a knot at an instant, within rounding."""
     slack = 4.0 * math.ulp(float(instant))
     for signal in system.signals:
         knot = signal.next_knot(instant.plus(-slack), True)
@@ -34,7 +34,7 @@ def is_knot(system: System, instant: Instant) -> bool:
 
 
 def batches(happened: Sequence[Occurrence]) -> list[list[Occurrence]]:
-    """Return the events of one instant, split where the state was recorded in between."""
+    """Group the events of one instant; a new group begins where the state was recorded again."""
     found: list[list[Occurrence]] = []
     for one in happened:
         if (
@@ -49,7 +49,7 @@ def batches(happened: Sequence[Occurrence]) -> list[list[Occurrence]]:
 
 
 class Rounds:
-    """States, discrete states and modes at one instant, with derivatives in M directions.
+    """States, discrete states and modes at one instant, with their derivatives in M directions.
 
     Parameters
     ----------
@@ -90,11 +90,11 @@ class Rounds:
         self._names = [*system.names, *(v.name for v in system.model.discrete)]
 
     def at_end(self, segment: Segment, happened: Sequence[Occurrence]) -> None:
-        """Apply the events that were found along a segment."""
+        """Apply the resets of events that were located along a segment."""
         self._run(happened, segment.p, float(segment.s[-1]), float(segment.origin))
 
     def at_appointment(self, instant: Instant, happened: Sequence[Occurrence]) -> None:
-        """Apply the events that were due at an instant, with inputs on their next pieces."""
+        """Apply the resets of events that were due at an instant, with inputs on their next pieces."""
         self._run(happened, self.system.vector(instant, self.d), 0.0, float(instant))
 
     def _run(self, happened: Sequence[Occurrence], p: np.ndarray, s: float, origin: float) -> None:
@@ -113,7 +113,7 @@ class Rounds:
             pending = [one for one in pending if not any(one is other for other in fired)]
 
     def _has_fired(self, one: Occurrence, p: np.ndarray, s: float, origin: float) -> bool:
-        """Return whether a guard or monitor is at or below zero, so that no other reset caused its event."""
+        """Return whether a guard or monitor is at or below zero, so that it fired itself."""
         system = self.system
         if one.kind == "monitor":
             chosen: tuple[tuple[int, ...], tuple[int, ...]] = (
@@ -147,7 +147,7 @@ class Rounds:
         return has_fired
 
     def _delay(self, p: np.ndarray, s: float, origin: float, fired: Sequence[Occurrence]) -> None:
-        """Move to the time when the guards of a round fire, if a change of the start shifts that time.
+        """Shift the state to the time at which the guards of a round fire after a small change of the start.
 
         They must fire together, and no other event may happen before that.
         """
@@ -168,7 +168,7 @@ class Rounds:
         self.shift = self.shift + later
 
     def _reading(self) -> np.ndarray:
-        """Return the modes in which states are evaluated freely, not from later constraints."""
+        """Return the modes in which the states are evaluated without constraints that begin later."""
         z = self.z.copy()
         for c, mode in self._loose:
             z[c] = mode
@@ -212,7 +212,7 @@ class Rounds:
         self.z = modes
 
     def _lifted(self, p: np.ndarray, origin: float) -> tuple[list[Dual], list[Any]]:
-        """Return states and run-time vector as dual numbers."""
+        """Return the states and the run-time vector as dual numbers."""
         layout = self.system.layout
         return with_slopes(self.x, self.Y), lifted_vector(
             layout, p, self._G, self._by_rates * origin, self.d, self.Yd
@@ -248,7 +248,7 @@ def lifted_vector(
 
 
 def is_recorded(system: System, one: Occurrence) -> bool:
-    """Return whether an event is a monitor that changes nothing."""
+    """Return whether an event is a monitor without a reset, which changes nothing."""
     if one.kind != "monitor":
         return False
     key = "monitor", system.monitor_names.index(one.component)
@@ -256,13 +256,13 @@ def is_recorded(system: System, one: Occurrence) -> bool:
 
 
 def component_of(system: System, one: Occurrence) -> tuple[int, Any]:
-    """Return the component of a transition, as number and automaton."""
+    """Return number and automaton of the component of a transition."""
     c = [a.name for a in system.automata].index(one.component)
     return c, system.automata[c]
 
 
 def guard_number(system: System, one: Occurrence) -> int:
-    """Return the number of the guard of a transition; -1 if no guard of its mode caused it."""
+    """Return the number of the guard that caused a transition, or -1 if no guard of its mode did."""
     _, automaton = component_of(system, one)
     m = automaton.modes.index(one.source)
     names = automaton.guard_names[m]

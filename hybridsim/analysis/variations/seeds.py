@@ -1,4 +1,4 @@
-"""This module builds derivative directions of all inputs of formulas: states, time, discrete states, parameters."""
+"""This module builds derivative matrices of all inputs of the formulas: states, time, parameters."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def rate_slopes(system: System, at: Instant) -> np.ndarray:
-    """Return d(angular rates of the forcing)/d(parameters), (R, P)."""
+    """Return the derivatives (R, P) of the angular rates of the forcing by the parameters."""
     layout, module = system.layout, system.code.module
     P = layout.parameters
     p: list[Any] = list(system.vector(at, np.zeros(layout.discrete)))
@@ -25,7 +25,7 @@ def rate_slopes(system: System, at: Instant) -> np.ndarray:
 
 
 def seeds(system: System, origin: float, rates: np.ndarray) -> np.ndarray:
-    """Return the seeds of states, local time, discrete states and parameters, (n + 1 + layout.size, n + 1 + d + P).
+    """Return the derivatives of all inputs of the formulas by states, local time and parameters.
 
     rates: the result of `rate_slopes`.
     """

@@ -1,4 +1,4 @@
-"""This module divides a run into segments with the events between them, for carrying derivatives."""
+"""This module lists the segments of a run with the events between them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SegmentEvents:
-    """A segment, the monitors recorded along it, and the events between its end and the next segment."""
+    """A segment, the monitor events recorded inside it, and the events at its end."""
 
     segment: Segment
     recorded: tuple[Occurrence, ...]
@@ -26,7 +26,7 @@ class SegmentEvents:
 
 
 class Last(NamedTuple):
-    """The events exactly at the end of a run: segment and derivatives before them, and derivatives of the time."""
+    """Events exactly at the end of a run, with the last segment and the derivatives before and after them."""
 
     segment: Segment
     Y: np.ndarray
@@ -56,14 +56,14 @@ def segment_events_of(solution: Solution) -> Iterator[SegmentEvents]:
 
 
 def time_rounding(solution: Solution) -> float:
-    """Return a bound of the rounding error of event times from the sum of the steps; see `add_steps`."""
+    """Return a bound of the rounding error of event times, which grow as sums of steps; see `add_steps`."""
     steps, length = solution.stats["steps"], abs(solution.t_end - solution.t_start)
     rounding = UNIT * (16.0 * steps + solution._run.method.rounding) * length
     return rounding + 4.0 * math.ulp(max(abs(solution.t_end), abs(solution.t_start)))
 
 
 def at_start(solution: Solution) -> list[Occurrence]:
-    """Return the events of the first instant of a run."""
+    """Return the events at the start of a run."""
     first = solution._segments[0].start
     found = []
     for one in solution._of_model.record.occurrences:

@@ -1,4 +1,4 @@
-"""This module computes derivatives of a run's end and event times with respect to start and parameters."""
+"""This module computes derivatives of a run's end and event times by its initial state and parameters."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Sensitivities(Readable):
-    """The derivatives of a run's end and event times with respect to its start and parameters.
+    """The derivatives of a run's end and event times by its initial state and parameters.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class Sensitivities(Readable):
 def sensitivities(
     solution: Solution, parameters: Sequence[str] | None = None, *, starts_follow: bool = True
 ) -> Sensitivities:
-    """Differentiate the end and event times of a run with respect to its start and parameters.
+    """Differentiate a run's end and event times with respect to its initial state and parameters.
 
     The variational equations Y' = f_x Y + f_p are integrated along the dense output and carried through each event by
     its saltation matrix (`hybridsim.analysis.variations.carried`), including a contact's loss of rank in stick. The
@@ -121,7 +121,7 @@ def sensitivities(
 def derivatives(
     solution: Solution, parameters: Sequence[str] | None = None, *, starts_follow: bool = True
 ) -> Sensitivities:
-    """Return the derivatives of a run, on its own side of a guard, surface or end on which it lies exactly."""
+    """Return the derivatives of a run; on a guard or surface, those on the run's own side of it."""
     return _found(solution, parameters, starts_follow, _own_side)
 
 
@@ -142,7 +142,7 @@ def _found(
     ],
 ) -> Sensitivities:
     if not hasattr(solution, "_segments"):
-        raise UsageError(f"solution cannot be {solution!r}", remedy="give the result of hs.simulate")
+        raise UsageError(f"`solution` cannot be {solution!r}", remedy="use the result of hs.simulate")
     model, system = solution.model, solution._system
     names = [p.name for p in model.parameters]
     starts_follow = flag(starts_follow, "starts_follow")
@@ -180,8 +180,9 @@ def _found(
         shifts[:, : n + d],
         shifts[:, n + d :],
         tuple(
-            f"{name}, and a change of {' or '.join(np.array(changed)[mask])} moves it off: derivatives are NaN if "
-            "those on the two sides differ"
+            f"{name}, but a change of {' or '.join(np.array(changed)[mask])} moves it off zero: "
+            "derivatives that "
+            "differ on the two sides are NaN"
             for name, mask in parted
         ),
     )
@@ -194,5 +195,5 @@ def _refuse(solution: Solution) -> None:
             remedy="run it with save='all'",
         )
     if solution.t_end <= solution.t_start:
-        raise UsageError("the run does not go forward in time", remedy="give a run with t1 > t0")
+        raise UsageError("`solution` does not run forward in time", remedy="use a run with t1 > t0")
     refuse_limits(solution)

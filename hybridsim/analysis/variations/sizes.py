@@ -1,4 +1,4 @@
-"""This module measures how large each state becomes along a run."""
+"""This module measures the largest values of the states along a run."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def sizes(solution: Solution) -> np.ndarray:
 
 
 def ranges(solution: Solution, since: float = -np.inf) -> tuple[np.ndarray, np.ndarray]:
-    """Return the least and greatest value (n,) of each state along a run, or its part after a time."""
+    """Return the least and greatest value (n,) of each state over a run, or over its part after a time."""
     begin = max(since, solution.t_start)
     sampled = solution(np.linspace(begin, solution.t_end, _POINTS)).T
     index, s, x = solution._segments.knots()

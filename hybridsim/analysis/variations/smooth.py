@@ -1,4 +1,4 @@
-"""This module integrates the variational flow Y' = A(t) Y + B(t) over one segment by Gauss collocation.
+"""This module integrates the derivatives Y' = A(t) Y + B(t) over one segment by Gauss collocation.
 
 It runs along the dense output. Eight Gauss points per piece have order 16 (E. Hairer, S. P. Norsett, G.
 Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, section II.7). The equation is linear, so
@@ -37,7 +37,7 @@ _MAX_RADIANS = 2**17  # additional radians that are followed; more take minutes
 
 
 class Collocation(NamedTuple):
-    """Nodes c_i on (0, 1), a_ij: integral from 0 to c_i of the j-th Lagrange polynomial, b_j: from 0 to 1.
+    """A collocation rule: nodes c_i on (0, 1), weights b_j, and integrals a_ij of the Lagrange polynomials.
 
     coefficients : maps values at the nodes to Legendre coefficients.
     """
@@ -49,7 +49,7 @@ class Collocation(NamedTuple):
 
     @classmethod
     def at(cls, x: np.ndarray) -> Collocation:
-        """Return the collocation with nodes x on [-1, 1]."""
+        """Return the collocation rule with nodes x on [-1, 1]."""
         coefficients = np.linalg.inv(legendre.legvander(x, len(x) - 1))
         integrals = [legendre.legint(column, lbnd=-1.0) for column in coefficients.T]
         A = np.array([0.5 * legendre.legval(x, c) for c in integrals]).T
@@ -67,7 +67,7 @@ Slopes = Callable[[np.ndarray], np.ndarray]
 
 
 def transition(slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: np.ndarray) -> np.ndarray:
-    """Return d(states at the last knot)/d(states at the first knot, constants), (n, n + q).
+    """Return d(states at the last knot)/d(states at the first knot, constants) as an array (n, n + q).
 
     knots: ascending local times, between which the flow is smooth. scale (n,), constants (q,): sizes of the
     states and of the constants, all positive.
@@ -79,7 +79,7 @@ def transition(slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: 
     if turns > _FADES * len(begins) + _MAX_RADIANS:
         raise UsageError(
             f"derivatives between t = {knots[0]:.9g} and {knots[-1]:.9g} (since the last event) oscillate over about "
-            f"{turns:.1g} radians: following that takes minutes or longer",
+            f"{turns:.1g} radians: the computation takes minutes or longer",
             remedy="simulate a shorter time, or choose parameters for which the motion is slower",
         )
     found_parts: list[tuple[np.ndarray, np.ndarray]] = []
@@ -109,7 +109,7 @@ def transition(slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: 
 
 
 def _work(slopes: Slopes, begins: np.ndarray, ends: np.ndarray) -> tuple[float, float]:
-    """Return the number of e-folds by which the fastest change decays, and the radians or e-folds of all changes."""
+    """Return the e-folds by which the fastest change decays, and the radians or e-folds of all changes."""
     middle, lengths = 0.5 * (begins + ends), ends - begins
     found = slopes(middle)
     A = found[:, :, : found.shape[1]]
@@ -125,7 +125,7 @@ def _work(slopes: Slopes, begins: np.ndarray, ends: np.ndarray) -> tuple[float, 
 def stiff_transition(
     slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: np.ndarray
 ) -> np.ndarray:
-    """Return the transition of stiff variations with Radau's formula, which takes longer pieces.
+    """Return the derivatives of a stiff segment by Radau's formula, which allows longer pieces.
 
     The formula damps unresolved changes, so that only those that have not decayed need to be resolved.
     """
@@ -163,7 +163,7 @@ def stiff_transition(
 def _transitions(
     slopes: Slopes, begins: np.ndarray, ends: np.ndarray, scale: np.ndarray, constants: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the transition (K, n, n + q) over each piece, and the resolution of the rates on it (K,)."""
+    """Return the derivatives (K, n, n + q) over each piece, and a measure (K,) of how well it is resolved."""
     lengths = ends - begins
     rates = _rates(GAUSS, slopes, begins, lengths)
     moved = lengths[:, None, None] * np.einsum("i,kiab->kab", GAUSS.b, rates)
@@ -185,7 +185,7 @@ def _transitions(
 def _rates(
     method: Collocation, slopes: Slopes, begins: np.ndarray, lengths: np.ndarray, Y: np.ndarray | None = None
 ) -> np.ndarray:
-    """Return the rates (K, stages, n, n + q) at the nodes of each piece."""
+    """Return the derivatives of the rates (K, stages, n, n + q) at the nodes of each piece."""
     D = slopes((begins[:, None] + lengths[:, None] * method.nodes).ravel())
     stages, count, n, width = len(method.nodes), len(begins), D.shape[1], D.shape[2]
     D = D.reshape(count, stages, n, width)

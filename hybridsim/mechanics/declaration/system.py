@@ -265,9 +265,9 @@ class MechanicalSystem:
 
     def _start(self, start: Any, what: str) -> np.ndarray:
         remedy = f"give {self.n} finite numbers"
-        values = np.zeros(self.n) if start is None else real_array(start, f"{self.name}: {what}", remedy)
+        values = np.zeros(self.n) if start is None else real_array(start, f"{self.name}: `{what}`", remedy)
         if values.shape != (self.n,):
-            raise UsageError(f"{self.name}: {what} is {start!r}", remedy=remedy)
+            raise UsageError(f"{self.name}: `{what}` is {start!r}", remedy=remedy)
         return values
 
     def _check(self) -> None:

@@ -1,4 +1,4 @@
-"""This folder explains an event: it repeats the decision and records every quantity that was used.
+"""This folder explains events: it repeats a decision and records every quantity that the decision used.
 
 Start with `explanation`.
 """

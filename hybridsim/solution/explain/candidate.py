@@ -1,4 +1,4 @@
-"""This module shows the details of a decision: guards along a flow, and the combinations judged."""
+"""This module describes the combinations of modes that a decision judged, and their guards."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _OPEN = "a question of rounding"
 
 @dataclass(frozen=True)
 class GuardView:
-    """A guard along the flow of one mode, at the instant of an event.
+    """A guard at the instant of an event, with its derivatives along the flow of one mode.
 
     Parameters
     ----------
@@ -54,16 +54,16 @@ class GuardView:
 
     @property
     def is_open(self) -> bool:
-        """Whether rounding decides the sign just after: no derivative is clearly non-zero."""
+        """Whether rounding decides the sign just after the event: no derivative is clearly nonzero."""
         left = (*self.derivatives[self.decreed :], *self.bounds[self.decreed :])
         return self.side == 0 and any(left)
 
     def in_numbers(self) -> str:
-        """Return value, first two derivatives and rounding error of the guard as text."""
+        """Return the value, the first two derivatives and the rounding error of the guard as text."""
         numbers = zip(("g", "g'", "g''"), self.derivatives, self.units, strict=False)
         terms = [f"{name} = {value + 0.0:.3g} {unit}".rstrip() for name, value, unit in numbers]
         rounding = f"{self.bounds[0]:.1g} {self.units[0]}".rstrip()
-        terms[0] += f" (rounding of the states alone makes {rounding})"
+        terms[0] += f" (rounding of the states contributes {rounding})"
         return f"{self.guard} (g = {self.text}): {', '.join(terms)}"
 
     def __str__(self) -> str:
@@ -89,7 +89,7 @@ class GuardView:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A combination of modes that could hold just after an event, with its guards and the verdict."""
+    """A combination of modes that could hold just after an event, with its guards and its verdict."""
 
     modes: dict[str, str]
     verdict: str
@@ -100,7 +100,7 @@ class Candidate:
 def views(
     system: System, at: Situation, z: np.ndarray, guards: list[int], decreed: np.ndarray
 ) -> Iterable[GuardView]:
-    """Yield the guards along the flow of the modes z; values that the event makes zero count as exactly zero."""
+    """Yield guards along the flow of the modes z; values that the event sets to zero count as exact."""
     series = system.series(at.s, at.x, at.p, z, at.x_error, at.s_error, at.is_put)
     time = time_unit(system.model)
     for g in guards:
@@ -126,7 +126,7 @@ def views(
 
 
 def as_in(system: System, z: np.ndarray, expression: Expression) -> Expression:
-    """Return an expression with its corners replaced by their values on the sides of the modes z."""
+    """Return an expression in which each corner is replaced by its branch in the modes z."""
     modes = [c.modes[int(k)] for c, k in zip(system.model.all_components(), z, strict=True)]
     values = {n: e.tree for mode in modes for n, e in mode.set.items() if n.startswith((VARIABLE, SIGN))}
     tree = expression.tree
@@ -136,14 +136,14 @@ def as_in(system: System, z: np.ndarray, expression: Expression) -> Expression:
 
 
 def _readable(text: str, component: str) -> str:
-    """Return the expression of a guard in words, without the program's internal names."""
+    """Return the expression of a guard as readable text, without internal names."""
     if text.startswith(ATTRACTION):
         return f"attraction of {component}, half the sum of the rates at which its two sides approach it"
     return re.sub(rf"{SIGN}\d+", component, text)
 
 
 def candidate(system: System, decision: Decision, look: Look) -> Candidate:
-    """Return one combination that a decision judged, with its values at that moment."""
+    """Return one combination that a decision judged, with the values of its guards at that time."""
     guards = [g for c in look.components for g in system.automata[c].guards[look.z[c]]]
     shown = tuple(views(system, look.at, look.z, guards, look.decreed))
     modes = {system.automata[c].name: system.automata[c].modes[look.z[c]] for c in look.components}
@@ -151,7 +151,7 @@ def candidate(system: System, decision: Decision, look: Look) -> Candidate:
 
 
 def way(system: System, look: Look) -> str:
-    """Return the modes of a combination as text."""
+    """Return the modes of a combination as text, such as "f: stick, g: slip+"."""
     return ", ".join(
         f"{system.automata[c].name} {system.automata[c].modes[look.z[c]]}" for c in look.components
     )

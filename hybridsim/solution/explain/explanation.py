@@ -1,4 +1,4 @@
-"""This module explains an event: it repeats the decision and shows every quantity that the decision used."""
+"""This module explains an event by repeating its decision, and shows every quantity that was used."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ _SERIES = 24  # events that are used to describe an accumulation
 
 @dataclass(frozen=True)
 class Explanation(Readable):
-    """The reason why an event happened as it did; ``print`` it.
+    """The reason for an event and the quantities that decided it, as text for `print`.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def explain(solution: Solution, number: int | Event) -> Explanation:
     if isinstance(number, bool) or not isinstance(number, int) or not -len(events) <= number < len(events):
         raise UsageError(
             f"there is no event {number!r}: the run has {len(events)} events",
-            remedy=f"give a number from 0 to {len(events) - 1}, or -1 for the last" if events else None,
+            remedy=f"use a number from 0 to {len(events) - 1}, or -1 for the last" if events else None,
         )
     happened = [o for o in occurrences if o.kind != CORNER]
     found = _explained(solution, events[number], happened, number)
@@ -132,7 +132,7 @@ def explain(solution: Solution, number: int | Event) -> Explanation:
 
 
 def _explained(solution: Solution, event: Event, happened: list[Occurrence], number: int) -> Explanation:
-    """Return the explanation without remarks; `happened` holds the records behind the events, in their order."""
+    """Return the explanation without remarks; `happened` holds the records of all events, in their order."""
     if event.kind == "near-grazing":
         near = grazed(solution, happened[number])
         return Explanation(
@@ -185,7 +185,7 @@ def _explained(solution: Solution, event: Event, happened: list[Occurrence], num
 
 
 def _decision(place: Place, occurrence: Occurrence) -> Decision | None:
-    """Return the decision that made a change or followed an impact; None if a guard made the change."""
+    """Return the decision that changed a mode or followed an impact; None if a guard named the new mode."""
     resolution, change = place.stage.resolution, place.change
     system = resolution.system
     c = next(k for k, a in enumerate(system.automata) if a.name == occurrence.component)
@@ -203,13 +203,13 @@ def _decision(place: Place, occurrence: Occurrence) -> Decision | None:
 
 
 def _is_declared(solution: Solution, event: Event) -> bool:
-    """Return whether the mode that an event left declares the guard named by the event."""
+    """Return whether the guard that an event names is declared in the mode that the event left."""
     component = next(c for c in solution.components if c.name == event.component)
     return any(guard.name == event.guard for guard in component.mode(event.source).guards)
 
 
 def _of_accumulation(solution: Solution, event: Event) -> str:
-    """Explain an accumulation: an instant that is the limit of a series of events and ends no segment."""
+    """Explain an accumulation of events, an instant that ends no segment."""
     times = [e.t for e in solution.events if e.kind == "transition" and e.t < event.t]
     gaps = [b - a for a, b in pairwise(times[-_SERIES:]) if b > a]
     clear_gaps = takewhile(
@@ -222,13 +222,14 @@ def _of_accumulation(solution: Solution, event: Event) -> str:
     component = next(c for c in solution.components if c.name == event.component)
     end = ", as declared by its limit" if component.limit else ""
     return (
-        f"events accumulate: the last intervals between them are {shown}{series}; they add up to t = {event.t!r}, "
-        f"and {event.target} is entered there{end}"
+        f"events accumulate: the last intervals between them are {shown}{series}; the event times "
+        f"converge to t = {event.t!r}, "
+        f"and mode {event.target} begins there{end}"
     )
 
 
 def _without_a_segment(solution: Solution, event: Event) -> str:
-    """Explain a change of mode that no motion precedes, as at the start of a run."""
+    """Explain a change of mode without a motion before it, as at the start of a run."""
     if event.t == solution.t[0]:
         return (
             "the run starts here: the sides of corners and the admissible modes are found from the initial values, "
@@ -236,24 +237,26 @@ def _without_a_segment(solution: Solution, event: Event) -> str:
         )
     if not solution.success and event.t == solution.t[-1]:
         return f"the run ended here: {solution.message}"
-    return "it followed the earlier events of this instant immediately: nothing moved in between"
+    return "it followed the earlier events of this instant immediately: no time passed in between"
 
 
 def _without_guards(solution: Solution, event: Event, together: list[Occurrence]) -> str:
     """Explain a change of mode for which no guard was located at zero."""
     due = sorted({o.component for o in together if o.kind == "scheduled"})
     if due:
-        return f"{', '.join(due)} was due at this instant; the modes that hold were found again just after it"
+        return f"{', '.join(due)} was due at this instant; the modes just after it were determined again"
     if event.guard and any(o.kind == "monitor" for o in together):
-        return "a reset at this instant led there: no guard was located at zero"
+        return "a reset at this instant changed the mode: no guard was located at zero"
     if solution.model.inputs and solution._run.method.has_compiled_loop:
         names = ", ".join(declared.name for declared in solution.model.inputs)
-        return f"no guard reached zero: an input has a knot here (of {names}), and the modes were found again"
-    return "the integrator decided this by its own rule: no guard was located at zero"
+        return (
+            f"no guard reached zero: an input has a knot here ({names}), and the modes were determined again"
+        )
+    return "the integrator changed the mode by its own rule: no guard was located at zero"
 
 
 def _state(solution: Solution, event: Event) -> str:
-    """Return the states just before an event as text, with units."""
+    """Return the states just before an event as text with units."""
     units = units_of(solution.model)
     return ", ".join(
         f"{name} = {_with_unit(value, units.get(name, ''))}"
@@ -266,7 +269,7 @@ def _with_unit(value: float, unit: str) -> str:
 
 
 def _taken(solution: Solution, event: Event, at: Situation) -> tuple[tuple[Choice, ...], int]:
-    """Return the ordered choice of the guard that fired, and the index of the entry taken; empty without a choice."""
+    """Return the choices of the guard that fired, and the index of the chosen one; empty without choices."""
     component = next((c for c in solution.components if c.name == event.component), None)
     mode = next((m for m in component.modes if m.name == event.source), None) if component else None
     guard = next((g for g in mode.guards if g.name == event.guard), None) if mode else None
@@ -279,7 +282,7 @@ def _taken(solution: Solution, event: Event, at: Situation) -> tuple[tuple[Choic
 
 
 def _choices(solution: Solution, event: Event, at: Situation) -> tuple[str, ...]:
-    """Describe the choice of the guard that fired, if it has several entries: conditions, values, and the outcome."""
+    """Describe the choices of the guard that fired: conditions, their values, and the outcome."""
     then, taken = _taken(solution, event, at)
     if len(then) < 2:
         return ()
@@ -307,13 +310,14 @@ def _of_another_kind(solution: Solution, event: Event, occurrence: Occurrence) -
         sets = _sets(event, solution.model.schedules)
         return f"the schedule {event.component} was due; a step ended exactly there, without a search" + sets
     return (
-        f"guard {event.guard} of {event.component} came within rounding of zero and turned back: no event, "
+        f"guard {event.guard} of {event.component} came within rounding of zero and turned back: there "
+        "is no event, "
         "but a slightly different run may have one here"
     )
 
 
 def _sets(event: Event, parts: Sequence[Monitor | Schedule]) -> str:
-    """Describe the declared reset of a monitor or a schedule; it is empty for a clock without one."""
+    """Describe the reset that a monitor or a schedule declares, or return an empty text without a reset."""
     part = next((part for part in parts if part.name == event.component), None)
     resets = part.reset.items() if part else ()
     values = ", ".join(assignment(name, value) for name, value in resets)
@@ -321,7 +325,7 @@ def _sets(event: Event, parts: Sequence[Monitor | Schedule]) -> str:
 
 
 def _segment_before(solution: Solution, occurrence: Occurrence) -> Segment | None:
-    """Return the segment that an event ended, or None."""
+    """Return the segment that ends with an event, or None."""
     if solution._save != "all":
         raise UsageError(
             f"the run was made with save={solution._save!r}",
@@ -337,7 +341,7 @@ def _segment_before(solution: Solution, occurrence: Occurrence) -> Segment | Non
 
 
 def _met(system: System, at: Situation, fired: list[int]) -> list[int]:
-    """Return the guards that reached zero at the same instant as the fired ones and would go negative."""
+    """Return the guards that reached zero together with the fired guards and would become negative."""
     series = system.series(at.s, at.x, at.p, at.z, at.x_error, at.s_error)
     found = []
     for g in np.flatnonzero(system.active(at.z)):

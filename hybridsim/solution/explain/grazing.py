@@ -1,4 +1,4 @@
-"""This module describes a near-grazing: how close to zero a guard came before it turned back."""
+"""This module describes a near-grazing: a guard that came close to zero without reaching it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def grazed(solution: Solution, occurrence: Occurrence) -> tuple[GuardView, ...]:
-    """Return the grazing guard with its derivatives at its nearest point; empty if no states were kept."""
+    """Return the grazing guard with its derivatives at the nearest point, if states were saved."""
     if solution._save != "all":
         return ()
     system, x = solution._system, occurrence.x_minus

@@ -23,7 +23,7 @@ _AT_LIMIT = 1e-9  # relative distance of an impulse to its limit; a closer impul
 
 
 def restitution(model: Model, stage: Stage, c: int, impact_guard: GuardView) -> str:
-    """Describe the speed at which a gap closed, the speed at which it opens, and the restitution."""
+    """Describe the restitution of an impact, with the speeds at which the gap closed and opens."""
     resolution, outcome = stage.resolution, stage.outcome
     system, automaton = resolution.system, resolution.system.automata[c]
     declared = next(i for i in model.impacts if i.name == automaton.name).restitution
@@ -41,13 +41,13 @@ def restitution(model: Model, stage: Stage, c: int, impact_guard: GuardView) -> 
 
 
 def is_struck(system: System, change: Change) -> bool:
-    """Return whether a change belongs to a contact that an impact closes."""
+    """Return whether a change of mode belongs to a contact whose gap closes by an impact."""
     automaton = system.automata[change.component]
     return change.guard == "gap" and automaton.is_unilateral and change.source != automaton.hold
 
 
 def errors_beside(stage: Stage, c: int) -> np.ndarray:
-    """Return rounding bounds of the states that impulses of the contact change, and infinity for the others."""
+    """Return rounding bounds of the states that impulses of the contact can change; infinity for the rest."""
     system, at = stage.resolution.system, stage.before
     cluster = next(cluster for cluster in system.clusters if c in cluster)
     _, changes, _ = system.impulses(at.s, at.x, at.p, np.maximum(at.z, 0))
@@ -56,7 +56,7 @@ def errors_beside(stage: Stage, c: int) -> np.ndarray:
 
 
 def friction(stage: Stage, c: int) -> str:
-    """Describe the friction during an impact: slip at the limit, or stick; empty without friction.
+    """Describe the friction during an impact, slip or stick; return an empty text without friction.
 
     The impulses are computed from the changes of the states. The text is empty if several sets of impulses
     fit.

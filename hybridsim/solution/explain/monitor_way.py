@@ -1,4 +1,4 @@
-"""This module describes how a monitor left its side: through zero, to zero, or carried back by a reset."""
+"""This module describes how a monitor left zero or its side of zero when it fired."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def way_of_monitor(solution: Solution, event: Event, occurrence: Occurrence) -> str:
-    """Describe how a monitor passed or reached zero when it fired."""
+    """Describe how a monitor passed zero or reached zero when it fired."""
     way, side = ("rose", "below") if event.direction > 0 else ("fell", "above")
     after = _side_after(solution, occurrence) if solution._save == "all" else None
     if after is None:

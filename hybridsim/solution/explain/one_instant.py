@@ -1,4 +1,4 @@
-"""This module lists the events of one instant: guards located at zero, and the effects of resets."""
+"""This module describes events of one instant: guards located at zero, and effects of resets."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ BY_RESET = (
 def fired_guards(
     system: System, segment: Segment, together: list[Occurrence], method: Integrator
 ) -> list[int]:
-    """Return the numbers of the guards that reached zero at one instant, in the modes of the segment before.
+    """Return the numbers of the guards that reached zero at one instant, in the modes just before it.
 
     Guards that another event of this instant moved are left out: they are not at zero at the end of the
     segment.
@@ -56,7 +56,7 @@ def fired_guards(
 
 
 def resets_before(resolution: EventResolution, change: Change) -> str:
-    """Describe the resets before a change at its instant, with the values that they set; empty without any."""
+    """Describe the resets that preceded a change at the same instant, with the values that they set."""
     system = resolution.system
     resets: dict[str, None] = {}
     for one in resolution.changes:
@@ -78,7 +78,7 @@ def changes_text(
     error: np.ndarray | float = 0.0,
     texts: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
-    """Describe the states that changed by more than their error: name, old value, new value, and an optional note."""
+    """Describe each state that changed by more than its error: old value, new value, and an optional note."""
     moved = np.abs(after - before) > 2.0 * error
     return ", ".join(
         f"{name} from {a:.6g} to {b:.6g}{texts.get(name, '')}"

@@ -1,4 +1,4 @@
-"""This module explains an event in one sentence: the cause of the decision, and the rule that made it."""
+"""This module explains an event in one sentence: its cause, and the rule by which the mode was chosen."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def reason(
     has_choices: bool,
     impact_guard: GuardView | None,
 ) -> str:
-    """Return the sentence; `changed` names the changed states, and `impact_guard` is the gap as it reached zero."""
+    """Return the sentence; `changed` names changed states, `impact_guard` is the gap when it closed."""
     stage, change = place.stage, place.change
     resolution, outcome = stage.resolution, stage.outcome
     system = resolution.system
@@ -45,10 +45,10 @@ def reason(
     if how == BY_RESET:
         is_contact = any(contact.name == automaton.name for contact in model.contacts)
         gave = "gave it a velocity" if is_contact else "moved the state off its surface"
-        gave += f", to the side of {occurrence.target}: nothing is left to decide"
+        gave += f", to the side of {occurrence.target}, which determines the mode"
         return f"{led.subject or 'a reset at this instant'} {gave}"
     if how == "impact":
-        return f"{led.subject or 'an impact at this instant'} made its gap open: nothing is left to decide"
+        return f"{led.subject or 'an impact at this instant'} made its gap open, which determines the mode"
     if automaton.is_unilateral and changed and occurrence.source != automaton.modes[automaton.hold]:
         # the run knew the rate to within the rounding of its own steps
         if after != occurrence.target and change is None:
@@ -72,20 +72,20 @@ def reason(
 
 
 class _Led(NamedTuple):
-    """The causes of a change in words: earlier events as clauses, and earlier impacts or resets as nouns."""
+    """The causes of a change: earlier events at the same instant, as clauses or as nouns."""
 
     clauses: list[str]
     nouns: list[str]
 
     @property
     def subject(self) -> str:
-        """The causes as the subject of a sentence; empty without any."""
+        """The causes as the subject of a sentence, or an empty text without causes."""
         text = " and ".join([*self.clauses, *self.nouns])
         return f"{text}, which" if self.clauses else text
 
     @property
     def start(self) -> str:
-        """The causes as the start of a sentence; empty without any."""
+        """The causes as the start of a sentence, or an empty text without causes."""
         after = [f"after {' and '.join(self.nouns)}"] if self.nouns else []
         text = " and ".join([*self.clauses, *after])
         return f"{text}: " if text else ""
@@ -111,7 +111,7 @@ def _led(place: Place) -> tuple[list[str], list[str]]:
 
 
 def _transitions(system: System, changes: Sequence[Change]) -> list[str]:
-    """List the transitions of other components that do not set any state."""
+    """List the transitions of other components that set no state."""
     found = []
     for one in changes:
         automaton = system.automata[one.component]
@@ -122,23 +122,25 @@ def _transitions(system: System, changes: Sequence[Change]) -> list[str]:
 
 
 def _impacts(system: System, changes: Sequence[Change], of: Change) -> list[str]:
-    """Return the names of the struck contacts, without the one whose change is explained."""
+    """Return the names of the contacts in the impact, without the contact whose change is explained."""
     struck = [one.component for one in changes if is_struck(system, one) and one.component != of.component]
     return [system.automata[c].name for c in struck]
 
 
 def _decided(system: System, decision: Decision, c: int) -> str:
-    """Describe the rule by which a decision chose the mode of one component."""
+    """Describe the rule by which the mode of one component was chosen."""
     fine, undecided, taken = decision.fine, decision.undecided, decision.taken
     whose = _whose(system, c, int(decision.z[c]))
     if taken is not None and taken.verdict != FINE:
         shown = _open_modes(system, taken) or whose
-        better = "" if fine else "no other is better: "
+        better = "" if fine else "no other combination is better: "
         return f"{shown}: a question of rounding, and {better}a mode is kept if possible"
     if len(fine) > 1:
         return _of_several(system, decision)
     if not fine:
-        return f"{whose}: a question of rounding, and no other is better: a mode is kept if possible"
+        return (
+            f"{whose}: a question of rounding, and no other combination is better: a mode is kept if possible"
+        )
     is_joint = len(fine[0].components) > 1
     if not undecided:
         if is_joint:
@@ -150,7 +152,7 @@ def _decided(system: System, decision: Decision, c: int) -> str:
 
 
 def _of_several(system: System, decision: Decision) -> str:
-    """Describe the choice between several admissible combinations, with the rule of the choice."""
+    """Describe how one of several admissible combinations was chosen."""
     fine, taken = decision.fine, decision.taken
     ways = " and ".join(f"({way(system, look)})" for look in fine)
     first = taken or fine[0]
@@ -161,7 +163,7 @@ def _of_several(system: System, decision: Decision) -> str:
 
 
 def _open(system: System, undecided: Sequence[Look], taken: Look) -> str:
-    """Describe the combinations that rounding leaves open, and whether they differ from the chosen motion."""
+    """Describe the combinations whose admissibility rounding leaves open."""
     ways = " and ".join(f"({way(system, look)})" for look in undecided)
     are = "is a question" if len(undecided) == 1 else "are questions"
     same = ": the same motion to rounding" if all(look.is_as(taken) for look in undecided) else ""
@@ -169,7 +171,7 @@ def _open(system: System, undecided: Sequence[Look], taken: Look) -> str:
 
 
 def _open_modes(system: System, look: Look) -> str:
-    """Return the modes of a combination whose guards are undecided at rounding."""
+    """Return the modes of a combination whose guards have an undecided sign."""
     guards = [g for c in look.components for g in system.automata[c].guards[look.z[c]]]
     shown = views(system, look.at, look.z, guards, look.decreed)
     return " and ".join(dict.fromkeys(view.mode for view in shown if view.is_open))

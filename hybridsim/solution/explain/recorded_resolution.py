@@ -1,4 +1,4 @@
-"""This module repeats a resolution of modes and records its decisions and the values that each of them used."""
+"""This module repeats the choice of modes at an event, and records each decision and the values it used."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Look:
-    """One combination of modes that was judged.
+    """One combination of modes that a decision judged.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class Look:
 
 @dataclass
 class Decision:
-    """One joint decision: the combinations it judged, the modes it chose, and the changes it caused.
+    """A decision on several components: the combinations it judged, the chosen modes, and the changes.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ class Decision:
 
     @property
     def components(self) -> tuple[int, ...]:
-        """Return the components whose guards were judged."""
+        """Return the components whose guards were evaluated."""
         return self.looks[0].components if self.looks else ()
 
     def has_taken(self, look: Look) -> bool:
@@ -73,11 +73,11 @@ class Decision:
 
     @property
     def taken(self) -> Look | None:
-        """The combination whose modes were chosen."""
+        """The combination with the chosen modes."""
         return next((look for look in self.looks if self.has_taken(look)), None)
 
     def with_verdict(self, verdict: int) -> list[Look]:
-        """The combinations with this verdict."""
+        """Return the combinations with a given verdict."""
         return [look for look in self.looks if look.verdict == verdict]
 
     @property
@@ -87,12 +87,12 @@ class Decision:
 
     @property
     def undecided(self) -> list[Look]:
-        """Return the combinations that rounding leaves open."""
+        """Return the combinations that rounding leaves undecided."""
         return self.with_verdict(UNDECIDED)
 
 
 class RecordedResolution(EventResolution):
-    """Resolve an event and record the verdict on every combination of modes, also after one is chosen."""
+    """Choose the modes at an event, and record the verdict on every combination of modes."""
 
     is_thorough = True
 
@@ -128,12 +128,12 @@ class RecordedResolution(EventResolution):
         return found
 
     def decision_of(self, component: int, number: int) -> Decision | None:
-        """Return the decision that made a change of a component, by its number; None if no decision did."""
+        """Return the decision that caused the change with a given number, or None if no decision did."""
         for decision in self.decisions:
             if component in decision.components and number < decision.last:
                 return decision if decision.first <= number else None
         return None
 
     def decision_after(self, component: int, number: int) -> Decision | None:
-        """Return the first decision on a component after a change, by its number."""
+        """Return the first decision about a component after the change with a given number."""
         return next((d for d in self.decisions if component in d.components and d.first > number), None)

@@ -1,4 +1,4 @@
-"""This module adds remarks to an explanation: sides of corners, vanishing loads, simultaneous events."""
+"""This module adds remarks on corners, vanishing loads and simultaneous events to an explanation."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _FIRST_PIECE = "1"  # the name of the first mode of a table's component; its mod
 
 
 def remarks(solution: Solution, occurrence: Occurrence, everything: Sequence[Occurrence]) -> tuple[str, ...]:
-    """Return remarks that the values of the guards do not show; `everything` holds all records of the run."""
+    """Return remarks on facts that the guards do not show; `everything` holds all records of the run."""
     if solution._save != "all":
         return ()  # the modes and the motion around the event were not kept
     system = solution._system
@@ -42,16 +42,16 @@ def remarks(solution: Solution, occurrence: Occurrence, everything: Sequence[Occ
 
 
 def change_of_side(solution: Solution, occurrence: Occurrence) -> str:
-    """Say why the argument of a corner such as abs changed its sign, and what follows for the run."""
+    """Describe why the argument of a corner such as `abs` changed its sign, and the effect on the run."""
     system = solution._system
     sentence = _changed(system, occurrence, _modes_after(solution, float(occurrence.instant)))
     if next(a for a in system.automata if a.name == occurrence.component).is_step:
-        return f"{sentence}; it depends on time alone, so that rates may jump, but no mode changes"
-    return f"{sentence}; both sides agree at this instant, so that nothing jumps and no mode changes"
+        return f"{sentence}; it depends on time alone, so the rates may jump, but no mode changes"
+    return f"{sentence}; both sides agree at this instant, so nothing jumps and no mode changes"
 
 
 def _companions(occurrence: Occurrence, together: Sequence[Occurrence]) -> Iterator[str]:
-    """List several events of one instant in their order."""
+    """List the other events of the same instant in order."""
     events = [one for one in together if one.kind != CORNER]
     if len(events) < 2:
         return
@@ -64,7 +64,7 @@ def _name(one: Occurrence) -> str:
 
 
 def _changed(system: System, occurrence: Occurrence, z: np.ndarray) -> str:
-    """Describe a change of a corner's side or of a table's piece."""
+    """Describe a corner that changes its side, or a table that goes to another piece."""
     name, component = _quoted(occurrence.component), _component(system, occurrence.component)
     if component.modes[0].name == _FIRST_PIECE:
         return f"table {name} goes from piece {occurrence.source} to piece {occurrence.target} here"
@@ -79,18 +79,18 @@ def _changed(system: System, occurrence: Occurrence, z: np.ndarray) -> str:
 
 
 def _jump(system: System, occurrence: Occurrence, z: np.ndarray) -> Iterator[str]:
-    """Describe the component that represents a jump in the rates."""
+    """Describe the component that hybridsim adds for a jump in the rates."""
     for component in system.model.all_components():
         surface = component.surface if component.name == occurrence.component else None
         if surface and surface.unknown.startswith(SIGN):
             border = as_in(system, z, surface.function).text
-            yield f"{component.name} jumps in the rates where {border} = 0, and switches like a component"
+            yield f"{component.name} makes the rates jump at {border} = 0, and switches like a component"
 
 
 def _unchanged_sides(
     system: System, occurrence: Occurrence, z: np.ndarray, changed: set[str]
 ) -> Iterator[str]:
-    """Describe the sides of corners that an event depends on and that did not change."""
+    """Describe the corners and tables that an event depends on, and their present sides and pieces."""
     read = _read_by(system, occurrence)
     for component, automaton, mode in zip(system.model.all_components(), system.automata, z, strict=True):
         own = component.modes[int(mode)]
@@ -110,7 +110,7 @@ def _unchanged_sides(
 
 
 def _read_by(system: System, occurrence: Occurrence) -> set[str]:
-    """Return the names that the guards or the monitor of an event read, also through definitions and variables."""
+    """Return the names that the guards or the monitor of an event depend on, also through definitions."""
     model = system.model
     behind: dict[str, set[str]] = {name: set(names_of(expr.tree)) for name, expr in model.definitions}
     for component in model.all_components():
@@ -127,7 +127,7 @@ def _read_by(system: System, occurrence: Occurrence) -> set[str]:
 
 
 def _trees(model: Model, occurrence: Occurrence) -> Iterator[ast.expr]:
-    """Yield the expressions that decide an event: its guard, all guards of a surface's modes, or its monitor."""
+    """Yield the expressions that decide an event: its guard, guards of a surface, or its monitor."""
     yield from (monitor.expr.tree for monitor in model.monitors if monitor.name == occurrence.component)
     for component in model.all_components():
         if component.name != occurrence.component or occurrence.kind == CORNER:
@@ -140,7 +140,7 @@ def _trees(model: Model, occurrence: Occurrence) -> Iterator[ast.expr]:
 
 
 def _loads(solution: Solution, t: float) -> Iterator[str]:
-    """Describe the contacts whose normal load reaches, leaves or touches zero at an instant."""
+    """Describe contacts whose normal load reaches, leaves or touches zero at an instant."""
     times = sorted(
         {solution.t_start, solution.t_end, *(float(o.instant) for o in solution._of_model.record.occurrences)}
     )
@@ -184,7 +184,7 @@ def _modes_after(solution: Solution, t: float) -> np.ndarray:
 
 
 def _quoted(name: str) -> str:
-    """Return the name of a corner for a sentence, quoted if it contains words."""
+    """Return the name of a corner, in quotation marks if it contains words."""
     return f"'{name}'" if " if " in name else name
 
 

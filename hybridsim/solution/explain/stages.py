@@ -1,4 +1,4 @@
-"""This module repeats what was resolved at one instant, in order: located guards, monitor resets, due events."""
+"""This module repeats the decisions of one instant in order: located guards, monitor resets, due events."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Stage:
-    """One resolution of the modes at an instant.
+    """One choice of modes at an instant, and the changes that followed.
 
     Parameters
     ----------
@@ -47,13 +47,13 @@ class Stage:
 
     @property
     def changes(self) -> list[Change]:
-        """Return the changes that the run records as transitions."""
+        """Return the changes of mode that the run records as transitions."""
         return [c for c in self.resolution.changes if not self.resolution.system.is_corner[c.component]]
 
 
 @dataclass(frozen=True)
 class Place:
-    """The stage of its instant in which a recorded transition was made; `change` is None if it was not found."""
+    """The stage of an instant in which a transition was made; `change` is None if it was not found."""
 
     stage: Stage
     change: Change | None
@@ -62,7 +62,7 @@ class Place:
 def place_of(
     run: Run, segment: Segment, together: Sequence[Occurrence], fired: list[int], occurrence: Occurrence
 ) -> Place | None:
-    """Return the stage in which a transition was made, given all records of its instant; None if there is none."""
+    """Return the stage in which a transition was made; `together` holds all records of its instant."""
     instant = _Instant(run, segment, together)
     stages = list(instant.located(fired))
     found, left = _matched(run.system, instant.transitions, stages)
@@ -81,7 +81,7 @@ def place_of(
 def _matched(
     system: System, transitions: Sequence[Occurrence], stages: Sequence[Stage]
 ) -> tuple[dict[int, Place], list[Occurrence]]:
-    """Return the place of each recorded transition by number, and the transitions that were not found."""
+    """Match transitions with stages: return the place of each by index, and the unmatched transitions."""
     made = [Place(stage, change) for stage in stages for change in stage.changes]
     found, left, start = {}, [], 0
     for number, occurrence in enumerate(transitions):
@@ -102,7 +102,7 @@ def _is_of(system: System, change: Change | None, occurrence: Occurrence) -> boo
 
 
 class _Instant:
-    """An instant of a run: the segment that ended there, and the records of the instant."""
+    """An instant of a run, with the segment that ended at it and the records made at it."""
 
     def __init__(self, run: Run, segment: Segment, together: Sequence[Occurrence]) -> None:
         self.system, self.task, self.segment, self.together = run.system, run.task, segment, together
@@ -129,7 +129,7 @@ class _Instant:
         ]
 
     def located(self, fired: list[int]) -> list[Stage]:
-        """Return the stages of guards located at zero and of monitors, with inputs already on their next piece."""
+        """Return the stages of located guards and monitors, evaluated with inputs on their next pieces."""
         at = situation(self.system, self.segment, fired)
         found = self._nothing(at, {g: k for k, g in enumerate(fired)})
         if self.is_general and (self.schedules or self.knots) and (fired or self.stopping):
@@ -147,7 +147,7 @@ class _Instant:
         return Located(at, fired or {}, none, True)
 
     def crossed(self, stage: Stage) -> Stage | None:
-        """Return the stage of monitor resets that another stage triggered, or None."""
+        """Return the stage of the monitor resets that an earlier stage triggered, or None."""
         sides = stage.outcome.monitor_sides
         crossed = [k for k, way in self.monitors.items() if k not in self.stopping and sides[k] != -way]
         if not crossed:
@@ -157,7 +157,7 @@ class _Instant:
         return self._settled(self._nothing(at), crossed, ())
 
     def due(self, stage: Stage | None, first: Occurrence | None) -> list[Stage]:
-        """Return the stages of events due at the instant and of their resets; `first` is their first transition."""
+        """Return the stages of events that were due and of their resets; `first` is the first transition."""
         system, segment = self.system, self.segment
         if first is None or not (self.schedules or self.knots):
             return []
@@ -175,7 +175,7 @@ class _Instant:
     def _settled(
         self, found: Located, monitors: Sequence[int], schedules: Sequence[int], begins: bool = False
     ) -> Stage:
-        """Resolve one stage; `begins`: pieces of inputs begin with it, so the state may jump off a surface."""
+        """Choose the modes of one stage; `begins` says whether inputs begin new pieces with it."""
         system, model, at = self.system, self.system.model, found.at
         keys = [("monitor", k) for k in monitors] + [("schedule", k) for k in schedules]
         before = Situation(at.s, at.x.copy(), at.p.copy(), at.z.copy(), at.x_error.copy(), at.s_error)
@@ -197,7 +197,7 @@ class _Instant:
 
 
 def situation(system: System, segment: Segment, fired: list[int]) -> Situation:
-    """Return the state before an event, with the bounds of its rounding that the run itself uses."""
+    """Return the state before an event, with the same rounding bounds that the run uses."""
     s, x = float(segment.s[-1]), segment.x[-1].copy()
     s_error = 2.0 * math.ulp(s)
     series = system.series(s, x, segment.p, segment.z, np.zeros(system.n), 0.0)
@@ -212,7 +212,7 @@ def situation(system: System, segment: Segment, fired: list[int]) -> Situation:
 
 
 def _set_by(system: System, key: tuple[Any, ...], at: Situation) -> str:
-    """Describe the values that one reset sets, old and new."""
+    """Describe the old and new values of the states that one reset sets."""
     if key not in system.resets:
         return ""
     x, p = at.x.copy(), at.p.copy()
@@ -224,7 +224,7 @@ def _set_by(system: System, key: tuple[Any, ...], at: Situation) -> str:
 
 
 def _knots(system: System, segment: Segment, instant: Instant, forward: bool) -> list[str]:
-    """Return the names of the inputs that have a knot at an instant."""
+    """Return the names of the inputs that have a knot at this instant."""
     found = []
     for declared, signal in zip(system.model.inputs, system.signals, strict=True):
         knot = signal.next_knot(segment.start, forward)
@@ -236,7 +236,7 @@ def _knots(system: System, segment: Segment, instant: Instant, forward: bool) ->
 def _knots_text(
     system: System, names: list[str], instant: Instant, at: Situation, forward: bool
 ) -> list[str]:
-    """Describe the inputs that have a knot, and the values of inputs that jump there."""
+    """Describe the inputs with a knot at this instant, and the jumps of their values."""
     if not names:
         return []
     vectors = (system.vector(instant, system.discrete(at.p), not forward), at.p)
@@ -253,5 +253,5 @@ def _knots_text(
         for name in names
         if name in known and values[0][k := known.index(name)] != values[1][k]
     ]
-    text = f"an input has a knot here (of {', '.join(shown[name] for name in names)})"
+    text = f"an input has a knot here ({', '.join(shown[name] for name in names)})"
     return [text + (f", where {' and '.join(jumps)}" if jumps else "")]

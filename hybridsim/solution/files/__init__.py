@@ -1,4 +1,4 @@
-"""This folder keeps solutions in files: archives that are checked when they are read, and tables.
+"""This folder saves solutions to files and loads them: archives that are checked on reading, and tables.
 
 Start with `archive`.
 """

@@ -1,4 +1,4 @@
-"""This module saves solutions to files: model, settings, trajectory, and a checkpoint to resume from.
+"""This module saves solutions to archive files with model, settings, trajectory and checkpoint.
 
 The file is a zip of NumPy arrays (`numpy.savez`). One of them, the header, is JSON text. Nothing is pickled, so that
 reading a file runs no code from it.
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 FORMAT, VERSION = "hybridsim solution", 4
 _HEADER, _SEAL = "header", "digest"
-_REMEDY = "give a file written by sol.save(...)"
+_REMEDY = "use a file written by sol.save(...)"
 _FAULTS = (ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError, RecursionError)
 
 
@@ -40,19 +40,19 @@ def save(solution: Solution, path: str | PathLike[str]) -> None:
 
 
 def to_bytes(solution: Solution) -> bytes:
-    """Return the content of a solution's file, to send the solution to another process."""
+    """Return the content of a solution's archive as bytes, for another process."""
     file = io.BytesIO()
     np.savez(file, **_stored(solution))  # type: ignore[arg-type]  # as above
     return file.getvalue()
 
 
 def of_bytes(stored: bytes) -> Solution:
-    """Return the solution that `to_bytes` has packed."""
+    """Return the solution from bytes that `to_bytes` made."""
     return _read(io.BytesIO(stored), "the solution that another process sent")
 
 
 def _stored(solution: Solution) -> dict[str, np.ndarray]:
-    """Return the arrays of a solution's file, by name."""
+    """Return the arrays of a solution's archive by name."""
     from hybridsim import __version__
     from hybridsim.solution.block_arrays import taken_apart
 
@@ -114,7 +114,7 @@ def _stored(solution: Solution) -> dict[str, np.ndarray]:
 
 @refusing
 def load_solution(path: str | PathLike[str]) -> Solution:
-    """Read a solution that `Solution.save` wrote.
+    """Load a solution that `Solution.save` wrote.
 
     The events, the modes and the states at the run's own steps are bit for bit those that were saved. So are
     ``resume()`` and the dense output of the compiled integrators; the dense output of other integrators
@@ -263,7 +263,7 @@ def _checkpoint(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Checkp
 
 
 def _digest(text: str, arrays: dict[str, np.ndarray]) -> str:
-    """Return a hash of the header and the arrays; it keeps inconsistent files away from compiled code."""
+    """Return a hash of header and arrays, which is checked before compiled code uses the arrays."""
     digest = hashlib.sha256(text.encode())
     for name in sorted(arrays):
         array = np.ascontiguousarray(arrays[name])

@@ -1,4 +1,4 @@
-"""This module checks the header and the arrays of a saved solution against its model, and names what is wrong."""
+"""This module checks the header and the arrays of a saved solution against its model."""
 
 from __future__ import annotations
 
@@ -63,12 +63,12 @@ _TEXTS = ("status", "message", "reason")
 
 
 def mode_counts(system: System) -> list[int]:
-    """Return the number of modes of each component."""
+    """Return the number of modes of each component of a system."""
     return [len(a.modes) for a in system.automata]
 
 
 def sizes_of(system: System) -> dict[str, int]:
-    """Return the array lengths that depend on the system, by their symbols."""
+    """Return the sizes that array shapes refer to, by symbol, such as n for the number of states."""
     return {
         "n": system.n,
         "C": len(system.automata),
@@ -80,7 +80,7 @@ def sizes_of(system: System) -> dict[str, int]:
 
 
 def check_header(header: Header) -> None:
-    """Refuse a header with an entry of the wrong type."""
+    """Reject a header in which an entry has the wrong type."""
     for name in _TEXTS:
         if not isinstance(header[name], str):
             raise ValueError(f"its {name} cannot be {header[name]!r}")
@@ -118,7 +118,7 @@ def check_header(header: Header) -> None:
 
 
 def check_task(header: Header, arrays: Arrays, system: System) -> None:
-    """Refuse a time span, tolerances or a start that `simulate` would refuse."""
+    """Reject a time span, tolerances or a start that `simulate` would reject."""
     arguments.time_span(header["span"])
     tolerances = header["tolerances"]
     arguments.relative_tolerance(check_number("rtol", tolerances["rtol"]))
@@ -135,7 +135,7 @@ def check_task(header: Header, arrays: Arrays, system: System) -> None:
 
 
 def check_events(events: Arrays, hidden: object, system: System) -> None:
-    """Refuse events whose components or modes are not in the model."""
+    """Reject events whose components or modes the model does not have."""
     lengths: dict[str, Form] = {
         "instants": (float, ("E", 2)),
         "directions": (np.int64, ("E",)),
@@ -163,7 +163,7 @@ def check_events(events: Arrays, hidden: object, system: System) -> None:
 
 
 def check_checkpoint(header: Header, arrays: Arrays, system: System, span: tuple[float, float]) -> None:
-    """Refuse a checkpoint that no run of the system could have written."""
+    """Reject a checkpoint that a run of this system cannot have written."""
     high, low = check_instant("the checkpoint", header["instant"])
     if not min(span) <= high + low <= max(span):
         raise ValueError("the checkpoint is outside of t_span")

@@ -27,7 +27,7 @@ _FAULTS = (
 
 
 def open_regular(name: str, remedy: str) -> IO[bytes]:
-    """Open a regular file for reading; devices and pipes are refused, because they may be endless.
+    """Open a regular file for reading; devices and pipes are rejected, because they may never end.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def read_arrays(file: IO[bytes]) -> dict[str, np.ndarray]:
 
 
 def _check_members(members: list[zipfile.ZipInfo], size: int) -> None:
-    """Refuse members that `numpy.savez` would not write into a file of this size."""
+    """Reject archive members that `numpy.savez` would not write, or that do not fit into the file size."""
     names = {member.filename for member in members}
     if len(names) != len(members) or len({name.removesuffix(".npy") for name in names}) != len(names):
         raise ValueError("two of its arrays have the same name")
@@ -80,7 +80,7 @@ def _check_members(members: list[zipfile.ZipInfo], size: int) -> None:
 
 
 def _array(content: bytes, name: str) -> np.ndarray:
-    """Return one array, after checking that its shape matches the number of bytes."""
+    """Return one array after checking that its shape fits the number of its bytes."""
     from io import BytesIO
 
     head = BytesIO(content)

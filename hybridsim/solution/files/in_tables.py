@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class InTables(ABC):
-    """The base class of results with names, events and a table, which can be written in several formats."""
+    """The base class of results that have names, events and a table, with methods that export them."""
 
     @property
     @abstractmethod
@@ -31,7 +31,7 @@ class InTables(ABC):
 
     @abstractmethod
     def table(self, points: int | None = None) -> Table:
-        """Return times, states, outputs and modes as columns; all conversions below use this table.
+        """Return times, states, outputs and modes as columns; the export methods use this table.
 
         Parameters
         ----------
@@ -40,19 +40,19 @@ class InTables(ABC):
         """
 
     def to_csv(self, path: str | PathLike[str], points: int | None = None) -> None:
-        """Write the `table` as CSV."""
+        """Write the table as a CSV file."""
         self.table(points).to_csv(path)
 
     def to_npz(self, path: str | PathLike[str], points: int | None = None) -> None:
-        """Write the `table` and the events for `numpy.load`: ``["x"]``, ``["mode(f)"]``, ``["events/t"]``, ..."""
+        """Write table and events for `numpy.load`, as ``["x"]``, ``["mode(f)"]``, ``["events/t"]``, ..."""
         self.table(points).to_npz(path, event_columns(self.events, self.names))
 
     def to_pandas(self, points: int | None = None) -> pd.DataFrame:
-        """Return the `table` as a data frame over t; modes are categorical, and ``attrs`` holds the units."""
+        """Return the table as a data frame over t; modes are categorical, and ``attrs`` holds the units."""
         return self.table(points).to_pandas()
 
     def to_xarray(self, points: int | None = None) -> xr.Dataset:
-        """Return the `table` as a data set over t; modes are coordinates, and ``attrs`` holds the units."""
+        """Return the table as a data set over t; modes are coordinates, and ``attrs`` holds the units."""
         return self.table(points).to_xarray()
 
     def events_to_pandas(self) -> pd.DataFrame:

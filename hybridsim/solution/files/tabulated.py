@@ -1,4 +1,4 @@
-"""This module puts a solution into columns: times, states, outputs and modes."""
+"""This module converts a solution to columns: times, states, outputs and modes."""
 
 from __future__ import annotations
 

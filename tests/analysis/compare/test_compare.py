@@ -109,7 +109,7 @@ def test_failures_are_rows(monkeypatch) -> None:
     assert "rtol" in result.rows[0].message and "no_such_option" in result.rows[2].message
     assert result.rows[0].errors is None and result.rows[0].cost is None
     table = result.table()
-    assert "  rtol 1e-20: refused: rtol cannot be 1e-20" in table and "no_such_option" in table
+    assert "  rtol 1e-20: refused: `rtol` cannot be 1e-20" in table and "no_such_option" in table
 
 
 def test_a_third_partys_exception_costs_its_own_row_only(monkeypatch) -> None:
@@ -212,13 +212,13 @@ def test_a_long_run_is_not_repeated_for_ever(monkeypatch) -> None:
     "keywords, message",
     [
         ({"t_span": (1, 0)}, "t_span"),
-        ({"repeat": 0}, "repeat cannot be 0"),
+        ({"repeat": 0}, "`repeat` cannot be 0"),
         ({"integrators": []}, "no integrators"),
         ({"integrators": ["scipy-rk4"]}, "scipy-rk4"),
         ({"integrators": ["scipy-rk45", "scipy-rk45"]}, "two lines"),
-        ({"rtols": []}, "has no rtol"),
-        ({"reference": "guess"}, "reference 'guess'"),
-        ({"reference": 3}, "reference is a int"),
+        ({"rtols": []}, "has no values of rtol"),
+        ({"reference": "guess"}, "`reference` cannot be 'guess'"),
+        ({"reference": 3}, "`reference` cannot be a int"),
         ({"params": {"mass": 1}}, "no parameter 'mass'"),
     ],
 )

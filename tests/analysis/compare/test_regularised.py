@@ -96,10 +96,10 @@ def test_widths_unasked_are_fractions_of_the_velocity() -> None:
 @pytest.mark.parametrize(
     "model, keywords, message",
     [
-        ("dfcs", {"v0": [1e-3]}, "v0 is given without regularized"),
+        ("dfcs", {"v0": [1e-3]}, "`v0` requires `regularized`"),
         ("thermostat", {"regularized": "tanh"}, "no contact to regularise"),
-        ("dfcs", {"regularized": "tanhh"}, "no regularisation 'tanhh'"),
-        ("dfcs", {"regularized": "tanh", "integrators": [("dop853", {})]}, "integrators cannot contain"),
+        ("dfcs", {"regularized": "tanhh"}, "`regularized` cannot contain 'tanhh'"),
+        ("dfcs", {"regularized": "tanh", "integrators": [("dop853", {})]}, "`integrators` cannot contain"),
     ],
 )
 def test_bad_requests(model: str, keywords: dict[str, object], message: str) -> None:

@@ -30,7 +30,7 @@ def test_a_search_that_costs_too_much_ends(monkeypatch: pytest.MonkeyPatch) -> N
     "count", [10**400, 10**18, 10**7, 0, -1, 2.0, True], ids=["huge", "1e18", "1e7", "0", "-1", "2.0", "True"]
 )
 def test_counts_of_periods_that_would_never_end_are_refused(name: str, count: float) -> None:
-    with pytest.raises(hs.UsageError, match=f"{name} cannot be .*\n?.*from 1 to 1000000"):
+    with pytest.raises(hs.UsageError, match=f"`{name}` cannot be .*\n?.*from 1 to 1000000"):
         hs.steady_state("dfcs", **{name: count})
 
 

@@ -216,7 +216,7 @@ HELD = '[contacts.f]\nvelocity = "v"\nnormal = "1"\nlaw = { name = "coulomb", mu
             f'x = {{ start = 1, der = "-x + {FORCED_TWICE}" }}',
             "",
             "quasi-periodic",
-            "a change of the start is",
+            "an initial change is",
         ),
         (
             'x = { start = 1, der = "-x + u + w" }',
@@ -229,7 +229,7 @@ HELD = '[contacts.f]\nvelocity = "v"\nnormal = "1"\nlaw = { name = "coulomb", mu
             OSCILLATOR.format(x0=1, der="-9*x + " + FORCED_TWICE),
             "",
             "not settled",
-            "a change of the start is 1",
+            "an initial change is 1",
         ),
         (OSCILLATOR.format(x0=0, der=f"-x - f + {FORCED_TWICE}"), HELD, "equilibrium", "nothing moves"),
     ],

@@ -174,8 +174,8 @@ def test_what_was_left_out_is_said() -> None:
         suite(), results=(replace(whole, comparison=replace(whole.comparison, rows=rows)),), repeat=99
     )
     assert cut.notes == (
-        "dop853, left out because of the time it takes: P1 at rtol 1e-12",
-        "scipy-dop853 (events=native), left out because of the time it takes: P1 at rtol 1e-12",
+        "dop853, skipped because of its run time: P1 at rtol 1e-12",
+        "scipy-dop853 (events=native), skipped because of its run time: P1 at rtol 1e-12",
         "5 of 5 runs were timed fewer than 99 times, 0 runs only while they warmed up",
     )
     assert all(note in cut.table() for note in cut.notes)
@@ -185,7 +185,7 @@ def test_a_reference_that_takes_too_long_is_replaced_and_that_is_said() -> None:
     hurried = hs.compare_suite(
         scenes=["stribeck"], integrators=["dop853"], rtols=[1e-6], repeat=1, budget=2.0
     ).results[0]
-    assert "two runs replace it" in hurried.comparison.warnings[-1]
+    assert "the reference is a run instead" in hurried.comparison.warnings[-1]
     assert hurried.comparison.reference == "run with scipy-dop853 at rtol 1e-13"
 
 
@@ -194,8 +194,8 @@ def test_a_reference_that_takes_too_long_is_replaced_and_that_is_said() -> None:
     [
         ({"scenes": ["P3"]}, "no scene 'P3'"),
         ({"scenes": []}, "no scenes"),
-        ({"budget": 0.0}, "budget cannot be 0.0"),
-        ({"repeat": 0}, "repeat cannot be 0"),
+        ({"budget": 0.0}, "`budget` cannot be 0.0"),
+        ({"repeat": 0}, "`repeat` cannot be 0"),
         ({"integrators": ["cvode-bfd"]}, "cvode-bfd"),
     ],
 )

@@ -94,9 +94,9 @@ def test_a_section_that_is_never_passed_is_a_status() -> None:
     [
         ({"parameter": "x"}, "x is a state"),
         ({"parameter": "q"}, "no parameter or state 'q'"),
-        ({"samples": 0}, "samples cannot be 0"),
-        ({"tol": 0}, "tol cannot be 0"),
-        ({"section": 3}, "section cannot be 3"),
+        ({"samples": 0}, "`samples` cannot be 0"),
+        ({"tol": 0}, "`tol` cannot be 0"),
+        ({"section": 3}, "`section` cannot be 3"),
         ({"rtoll": 1e-8}, "'rtoll' is not an option of simulate"),
         ({"integrator": "dop853", "step": 1.0}, "'step' is not an option of simulate or of dop853"),
     ],

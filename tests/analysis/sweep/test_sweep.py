@@ -243,17 +243,17 @@ def test_labelled_arrays() -> None:
     "given, message",
     [
         ({"values": {"F": [1]}}, "did you mean 'F0'"),
-        ({"values": {}}, "values cannot be"),
+        ({"values": {}}, "`values` cannot be"),
         ({"values": {"F0": []}}, "F0 has no values"),
-        ({"values": {"F0": 3.0}}, "give a list of numbers"),
+        ({"values": {"F0": 3.0}}, "use a list of numbers"),
         ({"values": {"F0": [math.inf]}}, "finite"),
         ({"values": {"F0": [None]}}, "a value of F0 cannot be None"),
         ({"values": {"F0": [1, 2], "N": [1]}, "mode": "list"}, "F0 2, N 1"),
-        ({"mode": "cloud"}, "mode cannot be 'cloud'"),
-        ({"workers": 0}, "workers cannot be 0"),
+        ({"mode": "cloud"}, "`mode` cannot be 'cloud'"),
+        ({"workers": 0}, "`workers` cannot be 0"),
         ({"executor": 3}, "client.get_executor"),
-        ({"measure": 3}, "measure cannot be 3"),
-        ({"progress": 3}, "progress cannot be 3"),
+        ({"measure": 3}, "`measure` cannot be 3"),
+        ({"progress": 3}, "`progress` cannot be 3"),
     ],
 )
 def test_what_cannot_be_asked_for(given: dict[str, object], message: str) -> None:
@@ -276,7 +276,7 @@ def test_what_is_no_measurement_is_a_status() -> None:
 def test_what_cannot_be_sent_to_a_process_is_refused_with_a_remedy() -> None:
     with (
         ProcessPoolExecutor(1, multiprocessing.get_context("spawn")) as processes,
-        pytest.raises(hs.UsageError, match=r"(?s)measure of the sweep cannot be sent .*leave executor out"),
+        pytest.raises(hs.UsageError, match=r"(?s)measure of the sweep cannot be sent .*remove `executor`"),
     ):
         hs.sweep("dfcs", {"F0": [1.0]}, lambda model: 1.0, executor=processes)
 
@@ -296,7 +296,7 @@ def test_a_pool_that_breaks_loses_its_points_and_says_so() -> None:
     pool = ThreadPoolExecutor(1)
     pool.shutdown()
     found = hs.sweep("dfcs", {"F0": [1.0, 2.0]}, _load, executor=pool)
-    assert all(text.startswith("lost by the executor: RuntimeError") for text in found.status)
+    assert all(text.startswith("the executor lost the batch: RuntimeError") for text in found.status)
 
 
 # A cluster has threads and event loops of its own, whose last words at exit are no warnings of ours.

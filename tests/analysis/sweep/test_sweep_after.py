@@ -183,9 +183,9 @@ def test_points_that_fail_leave_a_status_and_all_the_others() -> None:
 def test_what_has_no_last_period_is_refused() -> None:
     with pytest.raises(UsageError, match="no periodic forcing"):
         hs.sweep("belt", {"v_belt": [0.1]}, ["amplitude.x"], after=10)
-    with pytest.raises(UsageError, match="after cannot be 0"):
+    with pytest.raises(UsageError, match="`after` cannot be 0"):
         hs.sweep("dfcs", {"F0": [30.0]}, ["amplitude.x"], after=0)
-    with pytest.raises(UsageError, match="save and after cannot be combined"):
+    with pytest.raises(UsageError, match="`save` and `after` cannot be combined"):
         hs.sweep("dfcs", {"F0": [30.0]}, ["amplitude.x"], after=3, save="all")
     with pytest.raises(UsageError, match="kind belongs to a steady state"):
         hs.sweep("dfcs", {"F0": [30.0]}, ["kind"], after=3)
@@ -262,7 +262,7 @@ def test_the_bits_do_not_depend_on_what_was_run_before() -> None:
 
 @pytest.mark.parametrize(
     ("given", "said"),
-    [({"t_span": (0, 1)}, "t_span and after cannot be combined"), ({"warm_start": True}, "warm_start")],
+    [({"t_span": (0, 1)}, "`t_span` and `after` cannot be combined"), ({"warm_start": True}, "warm_start")],
 )
 def test_what_does_not_go_with_the_last_period(given: dict, said: str) -> None:
     with pytest.raises(UsageError, match=said):

@@ -69,10 +69,10 @@ def test_the_end_of_a_run() -> None:
         ("amplitude.y", {}, "did you mean 'amplitude.x'"),
         ("harmonic.x", {}, "did you mean 'harmonic.x.1'"),
         ("stick_fraction.x", {}, "no measure 'stick_fraction.x'"),
-        ("final", {}, "without t_span"),
+        ("final", {}, "needs `t_span`"),
         ("final.y", {"t_span": (0, 1)}, "no measure 'final.y'"),
         (["final.x", "period"], {"t_span": (0, 1)}, "two sweeps"),
-        ([], {}, r"measure cannot be \[\]"),
+        ([], {}, r"`measure` cannot be \[\]"),
     ],
 )
 def test_what_does_not_exist(measure: object, options: dict[str, object], message: str) -> None:

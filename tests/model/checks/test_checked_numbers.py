@@ -33,9 +33,9 @@ def sliding(law: hs.FrictionLaw) -> hs.Model:
         (lambda: hs.Harmonic(math.nan), "Harmonic: omega is nan"),
         (lambda: hs.Harmonic(1.0, sin=math.inf), "Harmonic: sin is inf"),
         (lambda: hs.Harmonic(1.0, cos=1j), "Harmonic: cos is 1j"),
-        (lambda: hs.MechanicalSystem([1.0], None, None, q0=[1j]), "q0 cannot be"),
-        (lambda: hs.MechanicalSystem([[1, 2], [3]], None, None), "M cannot be"),
-        (lambda: hs.MechanicalSystem([10**400], None, None), "M cannot be"),
+        (lambda: hs.MechanicalSystem([1.0], None, None, q0=[1j]), "`q0` cannot be"),
+        (lambda: hs.MechanicalSystem([[1, 2], [3]], None, None), "`M` cannot be"),
+        (lambda: hs.MechanicalSystem([10**400], None, None), "`M` cannot be"),
         (lambda: hs.MechanicalSystem([], None, None), "M is empty"),
         (lambda: hs.MechanicalSystem([1.0], None, None, contacts=[3]), "contacts contain 3"),
         (lambda: hs.MechanicalSystem([1.0], None, None, forcing=[math.inf]), "holds inf"),
@@ -106,7 +106,7 @@ def test_an_event_is_not_called_as_something_else(name: str) -> None:
 def test_a_span_of_no_length_is_pointed_out() -> None:
     sol = hs.simulate(hs.Model("m", states=[hs.State("x", 1, "-x")]), (1, 1))
     assert sol.success
-    assert sol.warnings == ("t_span begins and ends at 1.0: nothing was integrated",)
+    assert sol.warnings == ("`t_span` begins and ends at 1.0, so nothing was integrated",)
 
 
 def test_the_imaginary_part_of_a_start_is_not_dropped() -> None:

@@ -92,9 +92,7 @@ def test_a_sign_in_a_rate_is_called_a_jump() -> None:
     sol = hs.simulate(
         hs.Model("j", states=[hs.State("x", 1, der="-1 - 0.5*sign(x)")]), (0, 2), integrator="taylor"
     )
-    assert sol.explain(0).remarks == (
-        "sign(x) jumps in the rates where x = 0, and switches like a component",
-    )
+    assert sol.explain(0).remarks == ("sign(x) makes the rates jump at x = 0, and switches like a component",)
 
 
 def test_pieces_of_a_table_are_numbered() -> None:
@@ -118,7 +116,7 @@ def test_a_corner_without_an_event_can_be_explained() -> None:
     (corner,) = sol.corners
     assert sol.explain(corner).reason == (
         "max(h, 0) changes its side here: h becomes positive, and max(h, 0) is h from here on; "
-        "both sides agree at this instant, so that nothing jumps and no mode changes"
+        "both sides agree at this instant, so nothing jumps and no mode changes"
     )
     assert sol.explain(corner).remarks == (
         "the normal load of contact f (2*max(h, 0)) leaves zero here, and friction begins again",
@@ -127,7 +125,7 @@ def test_a_corner_without_an_event_can_be_explained() -> None:
     sol = hs.simulate(timed, (0, 2), integrator="taylor")
     assert sol.explain(sol.corners[0]).reason == (
         "sign(t - 1) changes its side here: t - 1 becomes positive; "
-        "it depends on time alone, so that rates may jump, but no mode changes"
+        "it depends on time alone, so the rates may jump, but no mode changes"
     )
 
 

@@ -69,7 +69,7 @@ def test_what_is_due_is_judged_with_the_values_after_it(integrator: str, by: str
     )
     due = {
         "schedule": "push was due at this instant and set F from 0 to -5: ",
-        "input": "an input has a knot here (of F), where F jumps from 0 to -5: ",
+        "input": "an input has a knot here (F), where F jumps from 0 to -5: ",
     }
     assert pushed.reason == due[by] + "slip- is the only mode that is admissible just after"
     if is_met:
@@ -191,7 +191,8 @@ def test_a_contact_that_is_set_moving_names_what_did_it(by: str) -> None:
     )
     what = "kick was due at this instant" if by == "schedule" else "low crossed zero"
     assert moved.reason == (
-        f"{what} and set v from 0 to 2, which gave it a velocity, to the side of slip+: nothing is left to decide"
+        f"{what} and set v from 0 to 2, which gave it a velocity, to the side of slip+, which determines "
+        "the mode"
     )
 
 
@@ -203,8 +204,9 @@ def test_a_belt_that_jumps_away_gives_a_contact_its_velocity(integrator: str) ->
     )
     left = why(hs.simulate(model, (0, 1.5), integrator=integrator), "f", "slip-")
     assert left.reason == (
-        "an input has a knot here (of b), where b jumps from 0 to 2, which gave it a velocity, to the side of slip-: "
-        "nothing is left to decide"
+        "an input has a knot here (b), where b jumps from 0 to 2, which gave it a velocity, to the side "
+        "of slip-, "
+        "which determines the mode"
     )
 
 
@@ -214,9 +216,7 @@ def test_two_inputs_with_a_knot_at_one_instant_name_the_one_that_jumps(integrato
     states = [X, hs.State("v", 0, "-f + F + r", nominal=1)]
     model = hs.Model("m", states=states, inputs=[ramp, FROM_0_TO_MINUS_5], contacts=[rubbing()])
     pushed = why(hs.simulate(model, (0, 1.2), integrator=integrator), "f", "slip-")
-    assert pushed.reason.startswith(
-        "an input has a knot here (of r, F), where F jumps from 0 to -5: slip- is"
-    )
+    assert pushed.reason.startswith("an input has a knot here (r, F), where F jumps from 0 to -5: slip- is")
 
 
 # -- impacts ------------------------------------------------------------------------------------------------------
@@ -291,8 +291,8 @@ def test_an_impact_that_sets_off_another_contact_is_named(integrator: str) -> No
     )
     thrown = why(hs.simulate(model, (0, 0.7), integrator=integrator), "f", "slip+")
     assert thrown.reason == (
-        "the impact of p (v from 0 to 1, w from 2 to 0) gave it a velocity, to the side of slip+: nothing is left to "
-        "decide"
+        "the impact of p (v from 0 to 1, w from 2 to 0) gave it a velocity, to the side of slip+, which determines "
+        "the mode"
     )
 
 
@@ -312,7 +312,7 @@ def test_an_impact_that_throws_another_contact_open_is_named(integrator: str) ->
     sol = hs.simulate(model, (0, 1.01), integrator=integrator)
     thrown = why(sol, "p", "open")
     assert thrown.reason == (
-        "the impact of q (w from 0 to 7.5, u from -10 to -2.5) made its gap open: nothing is left to decide"
+        "the impact of q (w from 0 to 7.5, u from -10 to -2.5) made its gap open, which determines the mode"
     )
 
 

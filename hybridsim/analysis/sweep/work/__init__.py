@@ -1,4 +1,4 @@
-"""This folder cuts the points of a sweep into pieces of work, which an executor measures.
+"""This folder divides the points of a sweep into batches, which an executor runs.
 
 Start with `measure`.
 """

@@ -1,4 +1,4 @@
-"""This module divides the points of a sweep into batches of a suitable length."""
+"""This module divides the points of a sweep into batches of suitable size."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _SECONDS = 0.1
 
 
 class Batches:
-    """Hands out ranges of points.
+    """Divides numbered points into batches.
 
     Parameters
     ----------
@@ -48,6 +48,6 @@ class Batches:
         return range(first, first + size)
 
     def learn(self, points: int, seconds: float) -> None:
-        """Adjust the size of the batches to the time that some points took."""
+        """Adapt the batch size to the measured time per point."""
         fitting = int(_SECONDS * points / seconds) if seconds > 0 else 2 * points
         self._size = max(1, min(fitting, 2 * points if points >= self._size else self._size))

@@ -1,4 +1,4 @@
-"""This module defines the work at the points of a sweep: set the model, measure it, and catch errors."""
+"""This module runs the points of a sweep: it sets the model, measures it, and catches errors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MAX_JOBS = 4  # number of sweeps whose model a worker process keeps
 
 
 class Incomplete(SimulationError):
-    """A measurement failed; `found` holds its partial results."""
+    """Raised if a measurement failed; `found` holds its partial results."""
 
     def __init__(self, message: str, found: dict[str, Reading]) -> None:
         super().__init__(message)
@@ -29,18 +29,18 @@ Settings = tuple[float | Expression, ...]
 
 
 class Measure(Protocol):
-    """The protocol of a measure, which measures a model and selects the readings to keep."""
+    """The protocol of a measure, which runs a model and selects the readings to store."""
 
     def run(self, model: Model, previous: Any) -> Any:
-        """Return the result at a point; ``previous`` is that of the neighbour in a chain, or None."""
+        """Return the result at a point; ``previous`` is the result of the point before it in a chain."""
 
     def read(self, result: Any) -> Any:
-        """Return the readings to keep: a number, an array, or a mapping of numbers, arrays and texts."""
+        """Return the readings to store: a number, an array, or a mapping of numbers, arrays and texts."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """The description of a sweep that its workers receive.
+    """The description of a sweep that is sent to its workers.
 
     Parameters
     ----------
@@ -69,21 +69,21 @@ class Job:
 
 
 class Outcome(NamedTuple):
-    """The result of a point: "ok" or the error, and the readings if there are any."""
+    """The outcome of one point: status "ok" or the error, and the readings if there are any."""
 
     status: str
     found: dict[str, Reading] | None
 
 
 class Batch(NamedTuple):
-    """The outcomes of the points that were run, in order, and the seconds that they took."""
+    """The outcomes of a batch in order, and the seconds that the batch took."""
 
     outcomes: list[Outcome]
     seconds: float
 
 
 class Watch(NamedTuple):
-    """The link from a worker thread to the sweep: asks whether to go on, and reports finished points."""
+    """The link from a worker to the sweep, which reports finished points and passes on a request to stop."""
 
     may_continue: Callable[[], bool]
     tell: Callable[[int], None]
@@ -93,7 +93,7 @@ _NOBODY = Watch(lambda: True, lambda points: None)
 
 
 def new_token() -> str:
-    """Return a token that no other sweep has."""
+    """Return a token that identifies one sweep."""
     return uuid.uuid4().hex
 
 
@@ -121,7 +121,7 @@ def run_batch(job: Job, points: Sequence[Settings], watch: Watch | None = None) 
 
 
 def _together(job: Job, points: Sequence[Settings], watch: Watch) -> list[Outcome] | None:
-    """Measure many points at once, if the measure supports it for these points."""
+    """Measure many points at once if the measure supports it, otherwise return None."""
     together = getattr(job.measure, "together", None)
     if together is None:
         return None
@@ -147,13 +147,13 @@ def _run(job: Job, settings: Settings, previous: Any) -> tuple[Outcome, Any]:
 
 
 def _message(error: Exception) -> str:
-    """Return an error in one line, with its type first."""
+    """Return an error as one line that begins with its type."""
     text = " ".join(str(error).split())
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
 def _first_copy(job: Job) -> Job:
-    """Return the first received copy of a job, because the engine's data belongs to that model object."""
+    """Return the first received copy of a job, so that all batches in a process share its compiled model."""
     known = _jobs.get(job.token)
     if known is not None:
         return known

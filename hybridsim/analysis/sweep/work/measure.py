@@ -1,4 +1,4 @@
-"""This module runs the points of a sweep on an executor, by default threads, and reports progress."""
+"""This module runs the points of a sweep on an executor, by default on threads, and reports progress."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def work(
     progress: Progress | None,
     journal: Journal | None = None,
 ) -> tuple[Collected, bool, str]:
-    """Return all results, whether they are complete, and the name of the executor.
+    """Run all points; return the results, whether they are complete, and the name of the executor.
 
     Raises
     ------
@@ -35,8 +35,8 @@ def work(
     """
     if executor is not None and not isinstance(executor, Executor):
         raise UsageError(
-            f"executor cannot be {executor!r}",
-            remedy="give a concurrent.futures.Executor; of a dask client, client.get_executor()",
+            f"`executor` cannot be {executor!r}",
+            remedy="use a concurrent.futures.Executor; a dask client has the method get_executor()",
         )
     if isinstance(executor, ProcessPoolExecutor):
         require_sendable(job)
@@ -54,7 +54,7 @@ def work(
 
 
 def _taken_over(journal: Journal, collected: Collected, chains: int | None) -> np.ndarray:
-    """Return a mask of the points (total,) known from a journal; a chain is known completely or not at all."""
+    """Return a mask (total,) of points already in a journal; a chain counts only if all of it is there."""
     total = len(collected.status)
     known = np.zeros(total, dtype=np.bool_)
     for line, (numbers, outcomes) in enumerate(journal.known, start=2):
@@ -65,7 +65,7 @@ def _taken_over(journal: Journal, collected: Collected, chains: int | None) -> n
             in_range = len(set(numbers)) == len(numbers) and not known[numbers].any()
         if not (numbers and in_range and len(numbers) == len(outcomes)):
             raise UsageError(
-                f"{journal.path}, line {line}: {numbers!r} are not points of this sweep of {total}",
+                f"{journal.path}, line {line}: {numbers!r} are not among the {total} points of this sweep",
                 remedy="remove the line, or delete the file",
             )
         known[numbers] = True
@@ -78,7 +78,7 @@ def _taken_over(journal: Journal, collected: Collected, chains: int | None) -> n
 
 
 class _ProgressReport:
-    """Reports the number of finished points and the remaining time."""
+    """Report the number of finished points and the remaining time."""
 
     def __init__(self, total: int, progress: Progress | None) -> None:
         self._total, self._progress = total, progress

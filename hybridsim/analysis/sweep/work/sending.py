@@ -1,4 +1,4 @@
-"""This module sends batches of a sweep to an executor, a few at a time, and stores the results."""
+"""This module sends a few batches of a sweep at a time to an executor, and stores the results."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ class Points(Protocol):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Shape of the arrays of results; chains run along the first axis."""
+        """Shape of the arrays of results; chains of points run along the first axis."""
 
     def settings(self, numbers: range) -> list[Settings]:
-        """Return the settings at some points."""
+        """Return the values of all axes at some points."""
 
 
 def worker_count(executor: Any, workers: int | None) -> int:
-    """Return the number of workers: the requested number, that of the executor, or one per processor."""
+    """Return the number of workers: as requested, as the executor has, or one per processor."""
     if workers is not None:
         return workers
     # The pools of the standard library have no public attribute for it; others count as one worker per
@@ -70,7 +70,7 @@ class Sending:
         self._under_way: dict[Future[Batch], range] = {}
 
     def run(self, executor: Executor, workers: int) -> bool:
-        """Run all batches; return False if interrupted, with the results so far in `collected`.
+        """Run all batches; return False if interrupted. `collected` holds the results so far.
 
         Raises
         ------
@@ -135,19 +135,19 @@ class Sending:
                 self._refused(numbers, error)
 
     def _refused(self, numbers: range, error: BaseException) -> None:
-        """Record a failure of sending; errors of the points themselves are caught by the workers."""
+        """Record a batch that could not be run; the workers themselves catch errors of single points."""
         require_sendable(self._job, error)
-        lost = Outcome(f"lost by the executor: {type(error).__name__}: {error}", None)
+        lost = Outcome(f"the executor lost the batch: {type(error).__name__}: {error}", None)
         self._collected.put(numbers, [lost] * len(numbers))
 
 
 def require_sendable(job: Job, cause: BaseException | None = None) -> None:
-    """Refuse a sweep that cannot be sent to another process, and name the part that cannot."""
+    """Raise an error if a sweep cannot be sent to another process, and name the part at fault."""
     for what, thing in (("measure", job.measure), ("model", job.model)):
         try:
             pickle.dumps(thing)
         except Exception as error:  # pickle raises any error of the object's own methods
             raise UsageError(
                 f"the {what} of the sweep cannot be sent to another process ({error})",
-                remedy="define its functions with def at the top of a module, or leave executor out",
+                remedy="define its functions with def at the top of a module, or remove `executor`",
             ) from (cause or error)
