@@ -204,10 +204,12 @@ class Solution(InTables):
             )
         if (outside := self._outside(times)) is not None:
             bad, (low, high) = times[outside][0], sorted((self.t_start, self.t_end))
-            whole = "the run" if self._save == "all" else f"what save={self._save!r} keeps of the run"
+            whole = (
+                "the run" if self._save == "all" else f"the part of the run that save={self._save!r} stores"
+            )
             raise UsageError(
-                f"t = {float(bad)!r} is outside of {whole}, which covers t = {low!r} to {high!r}",
-                remedy="give times in this range",
+                f"t = {float(bad)!r} is outside {whole}, which covers t = {low!r} to {high!r}",
+                remedy="use times in this range",
             )
         return times, side
 

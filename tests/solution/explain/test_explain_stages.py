@@ -291,7 +291,8 @@ def test_an_impact_that_sets_off_another_contact_is_named(integrator: str) -> No
     )
     thrown = why(hs.simulate(model, (0, 0.7), integrator=integrator), "f", "slip+")
     assert thrown.reason == (
-        "the impact of p (v from 0 to 1, w from 2 to 0) gave it a velocity, to the side of slip+, which determines "
+        "the impact of p (v from 0 to 1, w from 2 to 0) gave it a velocity, to the side of slip+, which "
+        "determines "
         "the mode"
     )
 
