@@ -5,12 +5,10 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterable
 
-from hybridsim.engine.native.constants import EXACTLY
-
 # A function of this many lines compiles in half a second; the interpreter evaluates a longer one.
 _LONGEST = 12000
 _COMMUTES = ("fadd", "fmul")
-ZERO, ONE, NAN, INF = "0.0", "1.0", "0x7FF8000000000000", "0x7FF0000000000000"
+ONE = "1.0"
 
 DECLARATIONS = """
 declare double @llvm.sin.f64(double)
@@ -71,12 +69,6 @@ class Lines:
     def call(self, name: str, a: str) -> str:
         """Emit a call of a function of one double."""
         return self.value("call double @" + name + "(double {})", a)
-
-    def over(self, a: str, k: int) -> str:
-        """Emit a / k, rounded as in the series of the states."""
-        if k == 1:
-            return a
-        return self.op("fdiv", a, number(k)) if k <= EXACTLY else self.op("fmul", a, number(1.0 / k))
 
     def load(self, array: str, i: int) -> str:
         """Load an element of an array that the function never writes."""
