@@ -58,25 +58,6 @@ USUAL = {
     ("plot", "panels"): "parts of a figure",
     ("studies", "panels"): "parts of a figure",
 }
-# Objects that code stores under a name in `code.shared`, a dictionary keyed by strings. The list only gets shorter.
-SHARED = {
-    "automata",
-    "corners",
-    "frame",
-    "guard parts",
-    "guards without forces",
-    "high orders",
-    "holds constants",
-    "is linear",
-    "is linear beside corners",
-    "linear",
-    "loop functions",
-    "matrix templates",
-    "optimised tapes",
-    "registers",
-    "tape cache",
-    "what is not linear",
-}
 
 
 def retired_in(name: str) -> list[str]:
@@ -157,14 +138,16 @@ def test_the_glossary_names_what_there_is() -> None:
 
 
 def test_no_registry_is_keyed_by_strings() -> None:
-    stored = {
-        node.args[0].value
+    """What all systems of one structure share is stored under the function that makes it, which has a type."""
+    users = {
+        path.name
         for path in SOURCES
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "shared" and node.args
-        if isinstance(node.args[0], ast.Constant)
+        if isinstance(node, ast.Attribute)
+        and node.attr == "shared"
+        and "code" in (getattr(node.value, "attr", ""), getattr(node.value, "id", ""))
     }
-    assert stored == SHARED, "store it in a field of its own, with its type; take off the list what is gone"
+    assert users == {"per_structure.py"}, "use `hybridsim.engine.system.per_structure`"
 
 
 def test_parts_of_names_are_seen() -> None:

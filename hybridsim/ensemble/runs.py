@@ -8,7 +8,6 @@ run of linear modes. Here this is done for all runs together, or in compiled cod
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
@@ -22,6 +21,7 @@ from hybridsim.engine.native.kernels import ENABLED, Precompiled
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.run.call_arrays import CallArrays, buffer_of
 from hybridsim.engine.run.compiled_loop import NOT_LINEAR
+from hybridsim.engine.system.per_structure import spare_scratch
 from hybridsim.engine.system.period import common_multiple
 from hybridsim.engine.system.programs.mode_tables import automata_of, tape_cache_of
 from hybridsim.engine.system.system import System
@@ -149,7 +149,7 @@ class Ensemble:
 
     def _run_group(self, group: EnsembleTables, runs: Runs) -> None:
         """Run all points of a group, unless `may_continue` returns False."""
-        spare: deque[Any] = self.system.code.shared(f"scratch of ensembles for {group.form}", deque)
+        spare = spare_scratch(self.system, "ensemble", group.form)
         try:
             group_scratch = spare.pop()
         except IndexError:

@@ -12,6 +12,7 @@ import numpy as np
 from hybridsim.engine.events.choice.verdict import side_after, side_before
 from hybridsim.engine.events.corner_sides import sides_along
 from hybridsim.engine.series.bounded import ORDER
+from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.model.meanings import Meanings
 from hybridsim.model.smoothing.one_sided import names_of
 
@@ -66,7 +67,7 @@ def certainly_leaving(resolution: EventResolution) -> set[int]:
     z, on = _modes_on_sides(resolution)
     modes = [range(len(system.automata[c].modes)) for c in on]
     if math.prod(map(len, modes)) > _MAX_FLOWS:
-        free = system.code.shared("guards without forces", lambda: _without_forces(system))
+        free = _without_forces(system)
         negative = {g for g in _negative(resolution, owners, z, order=0) if free[g][z[system.owner[g]]]}
     else:
         negative = set()
@@ -109,6 +110,7 @@ def _negative(resolution: EventResolution, owners: list[int], z: np.ndarray, ord
     return {g for g, (side, place) in found if side < 0 and place <= order}
 
 
+@per_structure
 def _without_forces(system: System) -> list[list[bool]]:
     """Return for each guard number and mode whether the guard is independent of all surface forces there."""
     meanings, components = Meanings(system.model), system.model.all_components()

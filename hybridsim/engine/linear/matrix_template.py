@@ -11,6 +11,7 @@ import numpy as np
 from hybridsim.engine.linear.form import Atoms, Form, Monomial
 from hybridsim.engine.linear.modes import LinearMode, NoMode, modes_of, single_changes
 from hybridsim.engine.linear.recipe import Numbers, Recipe
+from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
 
@@ -121,9 +122,15 @@ def _factors(monomials: Sequence[Sequence[int]], one: int) -> np.ndarray:
     return factors
 
 
+@per_structure
+def templates_of(system: System) -> dict[bytes, list[MatrixTemplate]]:
+    """Return the cached templates, by their mode vectors."""
+    return {}
+
+
 def template_of(system: System, met: np.ndarray, p: np.ndarray) -> tuple[MatrixTemplate, np.ndarray]:
     """Return the template of these mode vectors that is valid at parameters p, and its registers at p."""
-    cached: dict[bytes, list[MatrixTemplate]] = system.code.shared("matrix templates", dict)
+    cached = templates_of(system)
     inputs = p[: system.layout.parameters]
     with _lock:
         while len(cached) >= _MAX_MODE_SETS and met.tobytes() not in cached:

@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 
 from hybridsim.engine.linear.form import Atoms, DividesByZero, Form, LinearReader, Monomial, NotLinear
+from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.system import System
 from hybridsim.errors import UsageError
 from hybridsim.model.toml.automata import SINGLE
@@ -98,20 +99,18 @@ def single_changes(system: System) -> np.ndarray:
     return np.array(vectors)
 
 
+@per_structure
 def is_always_linear(system: System) -> bool:
     """Return whether a model is linear in each of its modes for any values of its parameters."""
-    return bool(system.code.shared("is linear", lambda: _first_reason(system, None) is None))
+    return _first_reason(system, None) is None
 
 
+@per_structure
 def holds_constants(system: System) -> bool:
     """Return whether each surface is linear in one state with constant coefficients; held values are then numbers.
 
     On another surface the held state follows other states or time, and is not one of the modal coordinates.
     """
-    return bool(system.code.shared("holds constants", lambda: _holds_constants(system)))
-
-
-def _holds_constants(system: System) -> bool:
     reader = _reader(system, Atoms(), np.zeros(len(system.automata), dtype=np.int64), None)
     for register in system.code.data["tape"]["surfaces"]:
         try:
@@ -133,8 +132,7 @@ def what_is_not_linear(system: System) -> str | None:
     """
     if is_always_linear(system):
         return None
-    known: dict[tuple[float, ...], str | None] = system.code.shared("what is not linear", dict)
-    values = tuple(system.values.values())
+    known, values = _reasons(system), tuple(system.values.values())
     reason = known.get(values, "")
     if reason == "":  # not known yet
         reason = _first_reason(system, values)
@@ -142,6 +140,12 @@ def what_is_not_linear(system: System) -> str | None:
             known.clear()
         known[values] = reason
     return reason
+
+
+@per_structure
+def _reasons(system: System) -> dict[tuple[float, ...], str | None]:
+    """Return the cached answers of `what_is_not_linear`, by the values of the parameters."""
+    return {}
 
 
 def _first_reason(system: System, p: Sequence[float] | None) -> str | None:
@@ -180,7 +184,7 @@ def _first_reason(system: System, p: Sequence[float] | None) -> str | None:
 
 def is_linear_beside_corners(system: System) -> bool:
     """Return whether each mode is linear on both sides of each corner, for the given parameter values."""
-    known: dict[tuple[float, ...] | None, bool] = system.code.shared("is linear beside corners", dict)
+    known = _linear_beside_corners(system)
     for p in (None, tuple(system.values.values())):
         if p not in known:
             if len(known) >= _MAX_CACHED:
@@ -189,6 +193,12 @@ def is_linear_beside_corners(system: System) -> bool:
         if known[p]:
             return True
     return False
+
+
+@per_structure
+def _linear_beside_corners(system: System) -> dict[tuple[float, ...] | None, bool]:
+    """Return the cached answers of `is_linear_beside_corners`, by the values of the parameters."""
+    return {}
 
 
 def _is_linear_beside_corners(system: System, p: Sequence[float] | None) -> bool:

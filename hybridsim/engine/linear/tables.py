@@ -15,6 +15,7 @@ from hybridsim.engine.native.constants import BOUND_TERMS
 from hybridsim.engine.native.simd_products import LANES, row_blocks_of, rows_of
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.bounded import ORDER
+from hybridsim.engine.system.per_structure import per_structure, spare_scratch
 from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
 
@@ -292,22 +293,24 @@ def tables_of(
     if last is not None and last[0] is modes:  # the values of a system's parameters do not change
         return last[1]
     made = _made(system, modes, p, horizon, None if last is None else last[2])
-    found = None if made is None else (made.tables, _scratch(system, made.tables))
+    found = None
+    if made is not None:
+        tables = made.tables
+        found = tables, spare_scratch(system, len(tables.kinds), len(tables.factors), tables.values.shape)
     system.tables[horizon] = (modes, found, made)
     return found
 
 
-def _scratch(system: System, tables: LinearTables) -> deque[Any]:
-    """Return the pool of scratch arrays for tables of this shape."""
-    form = len(tables.kinds), len(tables.factors), tables.values.shape
-    spare: deque[Any] = system.code.shared(f"scratch for linear modes of form {form}", deque)
-    return spare
+@per_structure
+def cached_tables(system: System) -> dict[bytes, Made]:
+    """Return the cached tables, by values of the parameters, mode vectors and order of magnitude of the horizon."""
+    return {}
 
 
 def _made(
     system: System, modes: np.ndarray, p: np.ndarray, horizon: float, begun: Made | None
 ) -> Made | None:
-    cached: dict[bytes, Made] = system.code.shared("linear", dict)
+    cached = cached_tables(system)
     key = p[: system.layout.parameters].tobytes() + modes.tobytes() + np.float64(horizon).tobytes()
     found = cached.get(key)
     if found is None:

@@ -27,7 +27,6 @@ _DOUBLE, _LONG, _STATUS, _BIT = ir.DoubleType(), ir.IntType(64), ir.IntType(32),
 _SIGNATURE = ir.FunctionType(
     _STATUS, [_DOUBLE, _DOUBLE.as_pointer(), _DOUBLE.as_pointer(), _LONG.as_pointer(), _DOUBLE.as_pointer()]
 )
-_ARRAYS = ("x", "p", "z", "out")
 _OF_C = ("sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "log", "pow")
 _INTRINSIC = {"sqrt": "llvm.sqrt", "abs": "llvm.fabs", "copysign": "llvm.copysign"}
 _NAMED = {"pi": 3.141592653589793, "inf": float("inf"), "nan": float("nan")}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from hybridsim.engine.native.kernels import allocating_kernel, call, kernel
+from hybridsim.engine.native.kernels import call, kernel
 
 
 @kernel
@@ -17,16 +17,4 @@ def evaluate(function: Any, t: float, x: Any, p: Any, z: Any, out: Any) -> None:
 def evaluate_rows(function: Any, times: Any, states: Any, p: Any, z: Any, out: Any) -> None:
     """Evaluate out[k] = function(times[k], states[k]) for every row."""
     for k in range(times.shape[0]):
-        call(function, times[k], states[k], p, z, out[k])
-
-
-@allocating_kernel
-def project_and_evaluate(
-    project: Any, function: Any, times: Any, states: Any, p: Any, z: Any, out: Any
-) -> None:
-    """Project held states onto their constraints in place, then evaluate a function there."""
-    work = states[0].copy()
-    for k in range(times.shape[0]):
-        work[:] = states[k]
-        call(project, times[k], work, p, z, states[k])
         call(function, times[k], states[k], p, z, out[k])

@@ -16,7 +16,6 @@ from hybridsim.engine.native.inner_parts import needed
 from hybridsim.engine.native.kernels import ENABLED, inlined
 
 WIDTH = 8
-_LINE = 64  # bytes of a vector and of a cache line
 
 if ENABLED:
     from llvmlite import ir

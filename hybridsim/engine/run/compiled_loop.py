@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 from time import perf_counter
@@ -31,10 +30,10 @@ from hybridsim.engine.run.kernel_run import KernelRun
 from hybridsim.engine.run.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, CompiledLoop, LoopResult
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.instant import Instant
-from hybridsim.engine.system.programs.code_cache import CodeCache
+from hybridsim.engine.system.per_structure import per_structure, spare_scratch
+from hybridsim.engine.system.programs.code_cache import CodeCache, series_codes
 from hybridsim.engine.system.programs.mode_code import most_fading
 from hybridsim.engine.system.programs.mode_tables import automata_of, tape_cache_of
-from hybridsim.engine.system.programs.series_code import SeriesCodeCache
 from hybridsim.engine.system.series_at import series_order
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
@@ -106,7 +105,7 @@ class CompiledLoopBase(ABC):
             layout.origin_at,
             layout.phases_at,
         )
-        self.spare: deque[Any] = system.code.shared(f"scratch for {kind}", deque)
+        self.spare = spare_scratch(system, kind)
         self.kernel_run: KernelRun | None = None  # a call made beforehand, which `advance` takes first
         beside = (_SEGMENTS + 1) * (layout.size + 1) + ALIGNED
         # largest number of steps in one call
@@ -157,26 +156,7 @@ class CompiledLoopBase(ABC):
 
     def _array_layout(self) -> ArrayLayout:
         """Return the layout of the arrays that the kernel writes; the trajectory keeps events longer than steps."""
-        system, steps, columns = self.system, self.steps, self.columns
-
-        def made() -> ArrayLayout:
-            return ArrayLayout(
-                Record,
-                (
-                    (float, (steps, 2), 0),
-                    (float, (steps, system.n, columns), 0),
-                    # one row more, for the end of the last segment
-                    (np.int64, (_SEGMENTS + 1,), 0),
-                    (float, (_SEGMENTS + 1, 2), 1),
-                    (np.int64, (_SEGMENTS + 1, len(system.automata)), 1),
-                    (float, (_SEGMENTS, system.layout.size), 0),
-                    (np.int64, (_SEGMENTS,), 1),
-                    (float, (_SEGMENTS, 2, system.n), 1),
-                ),
-            )
-
-        array_layout: ArrayLayout = system.code.shared(f"record of {steps} steps of {columns} columns", made)
-        return array_layout
+        return _step_layout(self.system, self.steps, self.columns)
 
     @property
     def place(self) -> tuple[np.ndarray, ...]:
@@ -327,6 +307,24 @@ class CompiledLoopBase(ABC):
             record.occurrences.add(kernel_run.event_block)
 
 
+@per_structure
+def _step_layout(system: System, steps: int, columns: int) -> ArrayLayout:
+    return ArrayLayout(
+        Record,
+        (
+            (float, (steps, 2), 0),
+            (float, (steps, system.n, columns), 0),
+            # one row more, for the end of the last segment
+            (np.int64, (_SEGMENTS + 1,), 0),
+            (float, (_SEGMENTS + 1, 2), 1),
+            (np.int64, (_SEGMENTS + 1, len(system.automata)), 1),
+            (float, (_SEGMENTS, system.layout.size), 0),
+            (np.int64, (_SEGMENTS,), 1),
+            (float, (_SEGMENTS, 2, system.n), 1),
+        ),
+    )
+
+
 _event_loop = Precompiled(event_loop)
 
 
@@ -337,9 +335,7 @@ class TaylorLoop(CompiledLoopBase):
         rtol = max(tolerances.rtol, _TIGHTEST)
         self.order = series_order(rtol, system.is_linear)
         super().__init__(system, self.order + 1, f"order {self.order}")
-        self.codes: SeriesCodeCache = system.code.shared(
-            f"series of order {self.order}", lambda: SeriesCodeCache(system, self.order)
-        )
+        self.codes = series_codes(system, self.order)
         self.control = (rtol, tolerances.atol, self.order, tolerances.max_step, longest)
 
     def _scratch(self) -> Any:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -57,7 +58,7 @@ class _Bounded(Trace):
     def _advance(self, row: Sequence[int], V: Coefficients, E: Coefficients, k: int) -> None:
         self.on_all_paths(self.run._advance, row, (V, E), k)
 
-    def _constant(self, r: int, k: int) -> Value | float:
+    def _constant(self, r: int, k: int) -> Any:
         """Return coefficient k of a constant."""
         if k > 0:
             return 0.0
@@ -65,7 +66,7 @@ class _Bounded(Trace):
             return self.read("%c", self.constant_sources.sources[r])
         return Value(self, number(self.constant_sources.numbers.get(r, (0.0, 0.0))[0]))
 
-    def _error(self, r: int, k: int) -> Size | float:
+    def _error(self, r: int, k: int) -> Any:
         """Return the bound of the error of a constant."""
         if k > 0 or r in self.constant_sources.sources:
             is_phase = k == 0 and r in self.constant_sources.phases

@@ -470,16 +470,6 @@ def reach(
     return h
 
 
-@kernel
-def evaluate_series(V: Any, registers: Any, order: int, d: float, out: Any) -> None:
-    """Evaluate the series of some registers at a distance d from their origin (Horner)."""
-    for i in range(registers.shape[0]):
-        total = V[registers[i], order]
-        for k in range(order - 1, -1, -1):
-            total = total * d + V[registers[i], k]
-        out[i] = total
-
-
 @polynomial_kernel
 def polynomials(coefficients: Any, d: Any, out: Any) -> None:
     """Compute out[j, i] = sum_k coefficients[i, k] d[j]**k.

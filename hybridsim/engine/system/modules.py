@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import time
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from importlib.abc import InspectLoader
@@ -30,7 +29,7 @@ class Compiled:
     module: ModuleType
     seconds: float  # time of lowering; 0 if the module was cached
     _compiled: dict[str, tuple[Any, Any]] = field(default_factory=dict)
-    _shared: dict[str, Any] = field(default_factory=dict)
+    shared: dict[Any, Any] = field(default_factory=dict)  # of `hybridsim.engine.system.per_structure`
 
     is_current = True  # expressions depend on nothing outside the model
 
@@ -38,15 +37,6 @@ class Compiled:
     def data(self) -> dict[str, Any]:
         """Return all data about the model that is not in the functions."""
         return self.module.DATA
-
-    def shared(self, name: str, make: Callable[[], Any]) -> Any:
-        """Return a value that depends on the structure alone, made once for all systems that share it.
-
-        If several threads make it at the same time, all get the value of the first one.
-        """
-        if name not in self._shared:
-            self._shared.setdefault(name, make())
-        return self._shared[name]
 
     def lengths_to_compile(self) -> list[int]:
         """Return the source lengths of the functions that have no machine code yet."""

@@ -19,6 +19,7 @@ from hybridsim.engine.series.registers import Registers
 from hybridsim.engine.system.finite_differences import DifferenceSeries, run_differences, run_jacobian
 from hybridsim.engine.system.instant import Instant, phase_of
 from hybridsim.engine.system.modules import compiled
+from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.signals import Signal
 from hybridsim.model.parts.component import Corner, LoadAutomaton
 from hybridsim.model.smoothing.explicit_corners import smoothed
@@ -177,6 +178,37 @@ class _Frame:
         return table
 
 
+@per_structure
+def _frame_of(system: System) -> _Frame:
+    return _Frame(system.model, system.code.data)
+
+
+@per_structure
+def _registers_of(system: System) -> Registers:
+    return Registers(system.code.data["tape"], system.layout)
+
+
+@per_structure
+def _has_corners(system: System) -> bool:
+    return has_corners(system.code.data["tape"])
+
+
+@per_structure
+def _optimised_tape(system: System, modes: bytes) -> OptimisedTape:
+    z = np.frombuffer(modes, dtype=np.int64)
+    active = np.flatnonzero(system.active(z))
+    return optimised(system.code.data["tape"], system.mode_rows(z), active, system.registers.separate)
+
+
+@per_structure
+def _high_rows(system: System, modes: bytes) -> list[tuple[int, ...]]:
+    z = np.frombuffer(modes, dtype=np.int64)
+    tape = system.optimised_tape(z)
+    monitored = (*tape.guards[system.active(z)].tolist(), *tape.monitors.tolist())
+    rows = list(map(tuple, tape.rows.tolist()))
+    return high_rows(rows, tape.states.tolist(), tape.derivatives.tolist(), monitored)
+
+
 _run_series = Precompiled(run_series)
 
 
@@ -194,7 +226,7 @@ class System:
         self.model = model = model if as_written else smoothed(model)
         self.code = compiled(model)
         data = self.code.data
-        self._frame = frame = self.code.shared("frame", lambda: _Frame(model, data))
+        self._frame = frame = _frame_of(self)
         self.names: tuple[str, ...] = frame.names
         self.n = len(self.names)
         self.layout: Layout = frame.layout
@@ -236,16 +268,12 @@ class System:
         )  # starts accepted by `hybridsim.engine.events.dissipation_check`
         self.has_tape: bool = data["tape"] is not None  # whether the model consists of expressions
         if self.has_tape:
-            self._registers: Registers = self.code.shared(
-                "registers", lambda: Registers(data["tape"], self.layout)
-            )
-        self._optimised: dict[bytes, OptimisedTape] = self.code.shared("optimised tapes", dict)
-        self._high: dict[bytes, list[tuple[int, ...]]] = self.code.shared("high orders", dict)
+            self.registers: Registers = _registers_of(self)  # of the tape's inputs and results
 
     @property
     def has_corners(self) -> bool:
         """Return whether a flow, guard or monitor has a corner or a jump inside a mode."""
-        return self.has_tape and self.code.shared("corners", lambda: has_corners(self.code.data["tape"]))
+        return self.has_tape and _has_corners(self)
 
     @cached_property
     def is_linear(self) -> bool:
@@ -321,11 +349,6 @@ class System:
     def address(self, name: str) -> Any:
         """Return the address of a compiled function, for kernels."""
         return self.code.address(name)
-
-    @property
-    def registers(self) -> Registers:
-        """Return the registers of the tape's inputs and results."""
-        return self._registers
 
     def rates_at(self, p: np.ndarray) -> np.ndarray:
         """Return the rates at which angles grow in time, at the parameter values in p."""
@@ -458,24 +481,11 @@ class System:
 
     def optimised_tape(self, z: np.ndarray) -> OptimisedTape:
         """Return the tape of the modes z for series of any order."""
-        key = z.tobytes()
-        if key not in self._optimised:
-            active = np.flatnonzero(self.active(z))
-            self._optimised[key] = optimised(
-                self.code.data["tape"], self.mode_rows(z), active, self._registers.separate
-            )
-        return self._optimised[key]
+        return _optimised_tape(self, z.tobytes())
 
     def high_rows(self, z: np.ndarray) -> list[tuple[int, ...]]:
         """Return the tape's rows for high orders of states, active guards and monitors."""
-        key = z.tobytes()
-        if key in self._high:
-            return self._high[key]
-        tape = self.optimised_tape(z)
-        monitored = (*tape.guards[self.active(z)].tolist(), *tape.monitors.tolist())
-        rows = list(map(tuple, tape.rows.tolist()))
-        self._high[key] = high_rows(rows, tape.states.tolist(), tape.derivatives.tolist(), monitored)
-        return self._high[key]
+        return _high_rows(self, z.tobytes())
 
     def series(
         self,
@@ -493,10 +503,10 @@ class System:
         """
         if not self.has_tape:
             return self._differences(s, x, p, z, x_error, s_error)
-        tape, count = self.optimised_tape(z), self._registers.count
+        tape, count = self.optimised_tape(z), self.registers.count
         V, E = np.empty((count, ORDER + 1)), np.empty((count, ORDER + 1))
         x, x_error, p = (np.ascontiguousarray(array, dtype=float) for array in (x, x_error, p))
-        inputs = self._registers.with_roundoff(p) if with_numbers else self._registers.inputs
+        inputs = self.registers.with_roundoff(p) if with_numbers else self.registers.inputs
         _run_series(
             tape.constant_rows, tape.rows, inputs, tape.derivatives, s, s_error, x, x_error, p, V, E
         )  # fmt: skip

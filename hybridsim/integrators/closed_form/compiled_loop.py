@@ -21,6 +21,7 @@ from hybridsim.engine.run.call_arrays import CallArrays, StateBuffer, buffer_of
 from hybridsim.engine.run.kernel_run import KernelRun
 from hybridsim.engine.run.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, LoopResult
 from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.programs.mode_tables import automata_of, tape_cache_of
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
@@ -155,26 +156,7 @@ class ClosedFormLoop:
 
     def _array_layout(self, tables: LinearTables) -> ArrayLayout:
         """Return the layout of the arrays that the kernel writes; event arrays are stored longest."""
-        widest, system = tables.values.shape[1], self.system
-
-        def made() -> ArrayLayout:
-            return ArrayLayout(
-                Record,
-                (
-                    (float, (_SEGMENTS,), 0),
-                    # one more row: all starts, and the end of the last segment
-                    (float, (_SEGMENTS + 1, 2), 1),
-                    (np.int64, (_SEGMENTS,), 0),
-                    (np.int64, (_SEGMENTS + 1, len(system.automata)), 1),
-                    (float, (_SEGMENTS, system.layout.size), 0),
-                    (complex, (_SEGMENTS, widest), 0),
-                    (np.int64, (_SEGMENTS,), 1),
-                    (float, (_SEGMENTS, 3, system.n), 1),
-                ),
-            )
-
-        array_layout: ArrayLayout = system.code.shared(f"record of {widest} modal coordinates", made)
-        return array_layout
+        return _segment_layout(self.system, tables.values.shape[1])
 
     def segments_of(self, kernel_run: KernelRun) -> ClosedFormBlock:
         """Return the segments of a call, which must have stored some and released none."""
@@ -200,3 +182,21 @@ class ClosedFormLoop:
             record.segments.add(self.segments_of(kernel_run))
         if kernel_run.event_block is not None:
             record.occurrences.add(kernel_run.event_block)
+
+
+@per_structure
+def _segment_layout(system: System, widest: int) -> ArrayLayout:
+    return ArrayLayout(
+        Record,
+        (
+            (float, (_SEGMENTS,), 0),
+            # one more row: all starts, and the end of the last segment
+            (float, (_SEGMENTS + 1, 2), 1),
+            (np.int64, (_SEGMENTS,), 0),
+            (np.int64, (_SEGMENTS + 1, len(system.automata)), 1),
+            (float, (_SEGMENTS, system.layout.size), 0),
+            (complex, (_SEGMENTS, widest), 0),
+            (np.int64, (_SEGMENTS,), 1),
+            (float, (_SEGMENTS, 3, system.n), 1),
+        ),
+    )

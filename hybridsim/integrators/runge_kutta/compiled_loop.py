@@ -18,8 +18,8 @@ from hybridsim.engine.record.hermite import (
 )
 from hybridsim.engine.record.hermite_block import TERMS, HermiteBlock
 from hybridsim.engine.run.compiled_loop import NOT_LINEAR, CompiledLoopBase
-from hybridsim.engine.system.programs.ends_code import EndsCodeCache
-from hybridsim.engine.system.programs.guard_parts import GuardParts
+from hybridsim.engine.system.programs.code_cache import ends_codes
+from hybridsim.engine.system.programs.guard_parts import guard_parts_of
 from hybridsim.engine.system.series_at import short_order
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
@@ -84,11 +84,8 @@ class RungeKuttaLoop(CompiledLoopBase):
         first = leading[0] + 1  # order of the states at the start of a segment
         self.order = max(short_order(rtol), 2 * TERMS + 1, first)
         super().__init__(system, 2 * TERMS, f"{len(tableau.c)} stages, order {self.order}")
-        self.parts: GuardParts = system.code.shared("guard parts", GuardParts)
-        shape = (TERMS, first, self.order)
-        self.codes: EndsCodeCache = system.code.shared(
-            f"ends of {shape}", lambda: EndsCodeCache(system, *shape)
-        )
+        self.parts = guard_parts_of(system)
+        self.codes = ends_codes(system, TERMS, first, self.order)
         self.method = (tableau.packed, leading, tableau.error_order, _HERMITE)
         declared_step = np.array([tolerances.first_step or 0.0])
         self.control: tuple[Any, ...] = (

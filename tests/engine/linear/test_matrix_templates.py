@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
+from hybridsim.engine.linear.matrix_template import templates_of
 from hybridsim.engine.linear.modes import what_is_not_linear
 from hybridsim.engine.linear.tables import linear_tables
 from hybridsim.engine.native.simd_products import rows_of
@@ -79,7 +80,7 @@ def test_the_order_of_values_does_not_matter() -> None:
         return [getattr(made, name).tolist() for name in ("slopes", "rates", "weights", "values", "inverse")]
 
     forward = [tables(values) for values in sets]
-    System(MODEL).code.shared("matrix templates", dict).clear()
+    templates_of(System(MODEL)).clear()
     backward = [tables(values) for values in reversed(sets)]
     assert forward == backward[::-1]
 

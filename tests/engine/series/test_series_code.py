@@ -22,7 +22,7 @@ from hybridsim.engine.series.emit_bounds import bounds_text, can_bound
 from hybridsim.engine.series.emit_series import ends_text, series_text
 from hybridsim.engine.series.interpreter import expand, measure
 from hybridsim.engine.system.instant import Instant
-from hybridsim.engine.system.programs import code_cache, mode_tables
+from hybridsim.engine.system.programs import mode_code
 from hybridsim.engine.system.programs.code_cache import CodeCache
 from hybridsim.engine.system.programs.mode_code import constant_rows, constant_sources, mode_tape
 from hybridsim.engine.system.programs.mode_tables import tape_cache_of
@@ -278,13 +278,12 @@ def test_a_run_is_the_same_with_code_and_without(
     """The first run goes by the interpreters alone, the last by machine code."""
     model, runs = hs.load(name), []
     code = System(model).code
-    with patch.dict(code._shared, clear=True):  # what other runs have left behind is code already
+    with patch.dict(code.shared, clear=True):  # what other runs have left behind is code already
         for steps in (2**62, 1, 1):
-            for module in (code_cache, mode_tables):
-                monkeypatch.setattr(module, "KNOWN", steps)
-                monkeypatch.setattr(module, "WORTH", steps)
+            monkeypatch.setattr(mode_code, "KNOWN", steps)
+            monkeypatch.setattr(mode_code, "WORTH", steps)
             runs.append(hs.simulate(model, (0, 0.1), integrator=integrator))
-        tapes, caches = tape_cache_of(System(model)).tapes, code._shared.values()
+        tapes, caches = tape_cache_of(System(model)).tapes, code.shared.values()
         made = [
             cache.of(tapes).arrays[: len(cache.functions)] for cache in caches if isinstance(cache, CodeCache)
         ]

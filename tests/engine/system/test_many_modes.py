@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.linear.tables import LinearTables, linear_tables
+from hybridsim.engine.linear.matrix_template import templates_of
+from hybridsim.engine.linear.tables import LinearTables, cached_tables, linear_tables
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.programs.mode_tables import TapeCache, tape_cache_of
 from hybridsim.engine.system.programs.modes_index import find_modes, index_of
@@ -77,7 +78,7 @@ def bits(sol: hs.Solution) -> list[Any]:
 def first_and_later(model: hs.Model, integrator: str, end: float) -> tuple[list[Any], list[Any]]:
     """Of a run that meets its modes one by one, and of one that knows them all beforehand."""
     system = system_of(model)
-    vars(system.code)["_shared"].clear()
+    system.code.shared.clear()
     system.runs.clear()
     runs = [hs.simulate(model, (0, end), integrator=integrator) for _ in range(2)]
     return bits(runs[0]), bits(runs[1])
@@ -140,7 +141,7 @@ def test_tables_that_grew_are_those_made_at_once() -> None:
         assert made is not None
         steps.append(made)
     assert len({id(step.rows) for step in steps}) < len(steps)  # some found room behind the former ones
-    system.code.shared("matrix templates", dict).clear()
+    templates_of(system).clear()
     whole = linear_tables(system, tape_cache.tapes.modes, p, 100.0)
     assert whole is not None
     for name in LinearTables._fields:
@@ -208,7 +209,7 @@ def test_threads_that_meet_the_same_modes_change_no_bit(integrator: str) -> None
     """One may put modes on the shelf while the others are on their way to them."""
     model = replace(one_way_chain(5), name=f"one-way-{integrator}")
     system = system_of(model)
-    vars(system.code)["_shared"].clear()
+    system.code.shared.clear()
     values = {"F": np.linspace(2.5, 6, 8)}
     many, one = (
         hs.sweep(model, values, "final", workers=workers, t_span=(0, 60), integrator=integrator)
@@ -221,7 +222,7 @@ def test_threads_that_meet_the_same_modes_change_no_bit(integrator: str) -> None
 def test_tables_of_many_values_do_not_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     """Those of hundreds of modes take some 30 MB each: the oldest are let go of."""
     model = cornered_chain()
-    kept = system_of(model).code.shared("linear", dict)
+    kept = cached_tables(system_of(model))
     kept.clear()
     for end in (1.0, 20.0, 400.0):  # a table for each order of magnitude
         hs.simulate(model, (0, end), integrator="exact", save="nothing")

@@ -10,6 +10,7 @@ import pytest
 
 import hybridsim as hs
 from hybridsim.engine.system import modules
+from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.programs.guard_parts import GuardParts
 from hybridsim.engine.system.programs.mode_tables import TapeCache
 from hybridsim.engine.system.system import System
@@ -40,10 +41,11 @@ def test_code_that_a_thread_runs_is_not_let_go_by_another(monkeypatch: pytest.Mo
 
 
 def test_what_is_shared_is_the_same_for_all() -> None:
-    code = modules.Compiled(System(hs.load("dfcs")).code.module, 0.0)
-    overtaking: list[Any] = []
-    make = interrupted_once(object, lambda: overtaking.append(code.shared("a thing", make)))
-    assert code.shared("a thing", make) is overtaking[0]
+    system, overtaking = System(hs.load("dfcs")), []
+    made_of = per_structure(
+        interrupted_once(lambda system: object(), lambda: overtaking.append(made_of(system)))
+    )
+    assert made_of(system) is overtaking[0] is made_of(System(hs.load("dfcs")))
 
 
 def test_parts_are_those_of_the_tapes_asked_for_while_others_ask() -> None:

@@ -10,6 +10,7 @@ from hybridsim.engine.native.kernels import ENABLED, inline_always, inlined
 from hybridsim.engine.native.simd_products import vector_of
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.bounded import ORDER
+from hybridsim.engine.system.per_structure import per_structure
 
 # Largest number of components at their surfaces at once; more have too many candidates for compiled loops.
 MAX_JOINT_COMPONENTS = 3
@@ -164,12 +165,9 @@ def _atoms(count: int) -> np.ndarray:
     return factors
 
 
+@per_structure
 def functions_of(system: Any) -> Functions:
     """Return the functions that a compiled loop calls."""
-    return system.code.shared("loop functions", lambda: _functions(system))
-
-
-def _functions(system: Any) -> Functions:
     has_surface = any(a.has_surface for a in system.automata)
     has_choice = any(not a.has_surface for a in system.automata)
     none: Any = system.address("flow")  # never called

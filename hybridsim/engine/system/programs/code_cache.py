@@ -6,46 +6,65 @@ read from disk if an earlier process stored it. Both give the same bits, so the 
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from contextlib import suppress
-from pathlib import Path
-from typing import Any, ClassVar
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.native.kernels import ENABLED, compile_series, is_stored
-from hybridsim.engine.native.llvm_text import TooLong
 from hybridsim.engine.native.struct_pack import packed
-from hybridsim.engine.series.emit_series import ModeTape
-from hybridsim.engine.system.programs.mode_code import KNOWN, NEVER, WORTH, code_path, mode_tape
+from hybridsim.engine.series.emit_bernstein import LEADING, bernstein_code
+from hybridsim.engine.series.emit_series import ModeTape, ends_text, series_text
+from hybridsim.engine.system.per_structure import per_structure
+from hybridsim.engine.system.programs.mode_code import ModeCompiler
 from hybridsim.engine.system.programs.mode_tables import Tapes
 from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
 
 
-class CodeCache(ABC):
+class Codes(NamedTuple):
+    """Addresses of machine code of Taylor's method (`hybridsim.engine.series.emit_series`) by vector of modes.
+
+    0 means that there is none. lacked: number of steps without code. bernstein: addresses of the functions of
+    `hybridsim.engine.series.emit_bernstein`.
+    """
+
+    series: np.ndarray
+    values: np.ndarray
+    ahead: np.ndarray
+    sizes: np.ndarray
+    lacked: np.ndarray
+    bernstein: np.ndarray
+
+
+class EndsCodes(NamedTuple):
+    """The same for Runge-Kutta methods: functions at the end of a step, at the start of a segment, and for guards."""
+
+    ends: np.ndarray
+    first: np.ndarray
+    along: np.ndarray
+    values: np.ndarray
+    lacked: np.ndarray
+
+
+class CodeCache:
     """Machine code of one structure, in the order of its tapes.
 
     Parameters
     ----------
     kind : name of the files in which the code is stored.
-
-    `codes` is a named tuple of integer arrays. For each of the `functions` it has the addresses, one for each vector of
-    modes, 0 for none. `lacked` counts the steps taken without code.
+    codes : a named tuple of integer arrays: for each function its addresses, one for each vector of modes, 0 for none,
+        and then `lacked`, which counts the steps taken without code.
+    text : returns the source of a module with the functions of a tape.
     """
 
-    codes: ClassVar[Any]
-    functions: ClassVar[tuple[str, ...]]
-
-    def __init__(self, system: System, kind: str) -> None:
-        self.system, self.kind = system, kind
+    def __init__(self, system: System, kind: str, codes: Any, text: Callable[[ModeTape], str]) -> None:
+        self.codes, self.functions = codes, codes._fields[: codes._fields.index("lacked")]
+        self.compiler = ModeCompiler(
+            system, kind, self.functions, lambda tape, z: partial(text, tape) if tape.is_known else None
+        )
         self._lock = SharedLock()
-        self._engines: list[Any] = []  # references that keep the code alive
         self._known: tuple[Tapes | None, Any, Any] = (None, self._blank(0), None)
-
-    @abstractmethod
-    def _text(self, tape: ModeTape) -> str:
-        """Return the source of a module with the functions of a mode, whose names end with _0."""
 
     def _blank(self, count: int) -> Any:
         """Return codes without addresses for a given number of mode vectors."""
@@ -68,26 +87,44 @@ class CodeCache(ABC):
 
     def look(self, tapes: Tapes, codes: Any) -> None:
         """Prepare code for the modes that have taken many steps without it."""
-        if not ENABLED or max(codes.lacked.tolist(), default=0) < KNOWN:
-            return
-        for k in np.flatnonzero(codes.lacked >= KNOWN).tolist():
-            place = code_path(self.system, self.kind, tapes.modes[k])
-            if codes.lacked[k] >= WORTH or is_stored(place):
-                with self._lock:
-                    self._make(tapes.modes[k], place, codes, k)
-
-    def _make(self, z: np.ndarray, place: Path | None, codes: Any, k: int) -> None:
-        if codes.lacked[k] < KNOWN:  # another thread was first
-            return
-        tape = mode_tape(self.system, z)
-        codes.lacked[k] = NEVER
-        if tape.is_known:
-            with suppress(TooLong):  # too long to compile; the interpreter stays in use
-                names = tuple(f"{name}_0" for name in self.functions)
-                addresses, engine = compile_series(place, names, lambda: self._text(tape))
-                self._engines.append(engine)
-                self._put(codes, k, addresses)
+        self.compiler.prepare(tapes.modes, codes.lacked, partial(self._put, codes))
 
     def _put(self, codes: Any, k: int, addresses: list[int]) -> None:
         for name, address in zip(self.functions[::-1], addresses[::-1], strict=True):
             getattr(codes, name)[k] = address  # in reverse order, because kernels test the first one
+
+
+class _SeriesCodes(CodeCache):
+    """Machine code of one structure for Taylor series of one order."""
+
+    def __init__(self, system: System, order: int) -> None:
+        super().__init__(system, f"series{order}", Codes, partial(series_text, order=order))
+        self.order = order
+
+    def _blank(self, count: int) -> Codes:
+        codes: Codes = super()._blank(count)
+        return codes._replace(bernstein=np.zeros(LEADING, dtype=np.int64))
+
+    def _put(self, codes: Codes, k: int, addresses: list[int]) -> None:
+        codes.bernstein[:], _ = bernstein_code(self.order)
+        super()._put(codes, k, addresses)
+
+
+@per_structure
+def series_codes(system: System, order: int) -> CodeCache:
+    """Return the machine code of Taylor series of one order."""
+    return _SeriesCodes(system, order)
+
+
+@per_structure
+def ends_codes(system: System, terms: int, first: int, order: int) -> CodeCache:
+    """Return the machine code of Runge-Kutta methods.
+
+    Parameters
+    ----------
+    terms : number of terms of the states at the end of a step.
+    first : order of the states at the start of a segment.
+    order : order of the guards along a step.
+    """
+    text = partial(ends_text, terms=terms, first=first, order=order)
+    return CodeCache(system, f"ends{terms}.{first}.{order}", EndsCodes, text)

@@ -16,7 +16,9 @@ from hybridsim.engine.series.optimise import (
     live_rows,
 )
 from hybridsim.engine.series.tape import ADD, NEG, SUB
+from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.programs.mode_tables import Tapes, in_a_row
+from hybridsim.engine.system.system import System
 
 _LINEAR = {ADD, SUB, NEG, ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB, SCALE, DIVIDE_BY}
 
@@ -71,6 +73,12 @@ class GuardParts:
             )
         )
         return parts
+
+
+@per_structure
+def guard_parts_of(system: System) -> GuardParts:
+    """Return the rows for guards shared by all systems of one structure."""
+    return GuardParts()
 
 
 def _mode_parts(tapes: Tapes, k: int) -> _ModeParts:

@@ -1,14 +1,18 @@
-"""Provide the input for machine code of one vector of modes, and its location on disk."""
+"""Provide the input for machine code of one vector of modes, compile it when it pays, and store it on disk."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridsim.engine.native.kernels import ENABLED, compile_series, is_stored
+from hybridsim.engine.native.llvm_text import TooLong
 from hybridsim.engine.series.emit_bounds import ConstantSources
 from hybridsim.engine.series.emit_series import ModeTape
 from hybridsim.engine.series.optimise import PAIRED, arguments_of
@@ -21,6 +25,7 @@ from hybridsim.engine.series.vanishing_kinds import (
     ROOT,
     register_of,
 )
+from hybridsim.forks import SharedLock
 
 if TYPE_CHECKING:
     from hybridsim.engine.system.system import System
@@ -134,3 +139,45 @@ def code_path(system: System, kind: str, z: np.ndarray) -> Path | None:
 
 def _rows(rows: np.ndarray) -> tuple[tuple[int, ...], ...]:
     return tuple(map(tuple, rows.tolist()))
+
+
+class ModeCompiler:
+    """Compile functions of one kind for vectors of modes of one structure.
+
+    Parameters
+    ----------
+    kind : name of the files in which the code is stored.
+    functions : names of the functions, which end with _0 in a module.
+    text : returns the source of a module for a tape and its modes, or None if it cannot be written.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        kind: str,
+        functions: tuple[str, ...],
+        text: Callable[[ModeTape, np.ndarray], Callable[[], str] | None],
+    ) -> None:
+        self.system, self.kind, self.functions, self._text = system, kind, functions, text
+        self._lock = SharedLock()
+        self._engines: list[Any] = []  # references that keep the code alive
+
+    def prepare(self, modes: np.ndarray, lacked: np.ndarray, put: Callable[[int, list[int]], None]) -> None:
+        """Prepare code for the modes that have taken many steps without it; put(k, addresses) receives it."""
+        if not ENABLED or max(lacked.tolist(), default=0) < KNOWN:
+            return
+        for k in np.flatnonzero(lacked >= KNOWN).tolist():
+            place = code_path(self.system, self.kind, modes[k])
+            if lacked[k] >= WORTH or is_stored(place):
+                with self._lock:
+                    if lacked[k] >= KNOWN:  # otherwise another thread was first
+                        lacked[k] = NEVER
+                        self._make(modes[k], place, partial(put, k))
+
+    def _make(self, z: np.ndarray, place: Path | None, put: Callable[[list[int]], None]) -> None:
+        text = self._text(mode_tape(self.system, z), z)
+        if text is not None:
+            with suppress(TooLong):  # too long to compile; the interpreter stays in use
+                addresses, engine = compile_series(place, [f"{name}_0" for name in self.functions], text)
+                self._engines.append(engine)
+                put(addresses)

@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 import math
-from contextlib import suppress
+from collections.abc import Callable
 from itertools import product
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.native.kernels import ENABLED, compile_series, is_stored
-from hybridsim.engine.native.llvm_text import TooLong
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.emit_bounds import bounds_text, can_bound
+from hybridsim.engine.series.emit_series import ModeTape
+from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.programs.mode_code import (
-    KNOWN,
-    NEVER,
-    WORTH,
-    code_path,
+    ModeCompiler,
     computed_rates,
     constant_rows,
     constant_sources,
     fading,
-    mode_tape,
 )
 from hybridsim.engine.system.programs.modes_index import index_of
 from hybridsim.engine.system.system import System
@@ -75,19 +70,15 @@ class Tapes(NamedTuple):
     lacked: np.ndarray  # number of times that this code was missing
 
 
-def automata_of(system: System) -> Automata:
-    """Return the arrays of a system's automata, packed for kernels."""
-    automata: Automata = system.code.shared("automata", lambda: packed(_automata(system)))
-    return automata
-
-
+@per_structure
 def tape_cache_of(system: System) -> TapeCache:
     """Return the tapes shared by all systems of one structure."""
-    tape_cache: TapeCache = system.code.shared("tape cache", lambda: TapeCache(system))
-    return tape_cache
+    return TapeCache(system)
 
 
-def _automata(system: System) -> Automata:
+@per_structure
+def automata_of(system: System) -> Automata:
+    """Return the arrays of a system's automata, packed for kernels."""
     automata, n = system.automata, system.n
     count = len(automata)
     modes = max((len(a.modes) for a in automata), default=1)
@@ -116,22 +107,25 @@ def _automata(system: System) -> Automata:
     for c, held in system.pins.items():
         pin[c, : len(held)] = held
     order = {c: k for k, c in enumerate(system.surface_of)}
-    return Automata(
-        guards_of,
-        np.array([a.hold for a in automata], dtype=np.int64),
-        np.array([a.above for a in automata], dtype=np.int64),
-        pin,
-        np.array([order.get(c, -1) for c in range(count)], dtype=np.int64),
-        system.owner,
-        place,
-        *_flat(cluster_of),
-        target,
-        reset,
-        *_flat(reset_slots),
-        system.is_corner,
-        np.array([a.is_unique for a in automata], dtype=np.bool_),
-        np.array([a.is_unilateral for a in automata], dtype=np.bool_),
+    packed_automata: Automata = packed(
+        Automata(
+            guards_of,
+            np.array([a.hold for a in automata], dtype=np.int64),
+            np.array([a.above for a in automata], dtype=np.int64),
+            pin,
+            np.array([order.get(c, -1) for c in range(count)], dtype=np.int64),
+            system.owner,
+            place,
+            *_flat(cluster_of),
+            target,
+            reset,
+            *_flat(reset_slots),
+            system.is_corner,
+            np.array([a.is_unique for a in automata], dtype=np.bool_),
+            np.array([a.is_unilateral for a in automata], dtype=np.bool_),
+        )
     )
+    return packed_automata
 
 
 def _flat(lists: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -153,7 +147,7 @@ class TapeCache:
         self._met: dict[bytes, np.ndarray] = {}
         self._surrounded: set[bytes] = set()
         self._lock = SharedLock()
-        self._engines: list[Any] = []  # references that keep the machine code alive
+        self._compiler = ModeCompiler(system, "bounds", ("bounds",), self._text)
         self._code = np.zeros((2, 0), dtype=np.int64)
         self._rows: list[_ModeRows] = []  # rows of the vectors of modes met so far
         self.tapes = self._stacked()
@@ -161,30 +155,19 @@ class TapeCache:
     def look(self) -> None:
         """Prepare code for modes in which many short series were computed without it."""
         tapes = self.tapes
-        if not ENABLED or max(tapes.lacked.tolist(), default=0) < KNOWN:
-            return
-        for k in np.flatnonzero(tapes.lacked >= KNOWN).tolist():
-            place = code_path(self.system, "bounds", tapes.modes[k])
-            if tapes.lacked[k] >= WORTH or is_stored(place):
-                with self._lock:
-                    self._make(tapes.modes[k], place, k)
 
-    def _make(self, z: np.ndarray, place: Path | None, k: int) -> None:
-        system, tapes = self.system, self.tapes
-        if tapes.lacked[k] < KNOWN:  # another thread was first
-            return
-        tape, rows = mode_tape(system, z), constant_rows(system, z)
-        tapes.lacked[k] = NEVER
-        if can_bound(tape, rows):
-            numbers = np.flatnonzero(system.active(z)).tolist()
-            with suppress(TooLong):  # too long to compile; the interpreter stays in use
-                (address,), engine = compile_series(
-                    place,
-                    ("bounds_0",),
-                    lambda: bounds_text(tape, rows, constant_sources(system), numbers, system.guard_count),
-                )
-                self._engines.append(engine)
-                tapes.bounds[k] = address
+        def put(k: int, addresses: list[int]) -> None:
+            tapes.bounds[k] = addresses[0]
+
+        self._compiler.prepare(tapes.modes, tapes.lacked, put)
+
+    def _text(self, tape: ModeTape, z: np.ndarray) -> Callable[[], str] | None:
+        """Return what writes the code for the short series of one vector of modes, or None."""
+        system, rows = self.system, constant_rows(self.system, z)
+        if not can_bound(tape, rows):
+            return None
+        numbers = np.flatnonzero(system.active(z)).tolist()
+        return lambda: bounds_text(tape, rows, constant_sources(system), numbers, system.guard_count)
 
     def surround(self, z: np.ndarray) -> None:
         """Add the tapes of a vector of modes, and of the modes to which one event may lead."""

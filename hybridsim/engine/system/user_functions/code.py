@@ -73,7 +73,7 @@ class PythonCode:
             reset=self._reset,
         )
         self._addresses: dict[str, Any] = {}
-        self._things: dict[str, Any] = {}
+        self.shared: dict[Any, Any] = {}
         self._compiler: Any = None
         self.refused = ""  # reason of numba if it cannot compile them
         self._surroundings = surroundings(self._functions)
@@ -94,12 +94,6 @@ class PythonCode:
         """Return whether the globals that the functions read are unchanged since their compilation."""
         is_live = self._compiler is None or bool(self.refused)
         return is_live or surroundings(self._functions) == self._surroundings
-
-    def shared(self, name: str, make: Callable[[], Any]) -> Any:
-        """Return a value that is computed once, as in `hybridsim.engine.system.modules.Compiled`."""
-        if name not in self._things:
-            self._things.setdefault(name, make())
-        return self._things[name]
 
     def address(self, name: str) -> Any:
         """Return the address of flow, guards, monitors, quantities or guards_and_monitors."""
