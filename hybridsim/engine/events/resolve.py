@@ -43,8 +43,8 @@ from hybridsim.engine.events.jumps.resets import combine_resets
 from hybridsim.engine.events.outcome import Change, Outcome, Situation
 from hybridsim.engine.events.rest_at_stops import together, with_tied
 from hybridsim.engine.series.bounded import ORDER, UNIT
-from hybridsim.engine.system.finite_differences import DifferenceSeries
-from hybridsim.engine.system.system import Series, System
+from hybridsim.engine.series.short_series import Series
+from hybridsim.engine.system.system import System
 
 # A legitimate cascade changes each component a few times. A model that needs more than this many rounds for each of
 # its modes is in an endless cycle.
@@ -88,7 +88,7 @@ class EventResolution:
         self.sides = np.ones(system.guard_count, dtype=np.int64)
         self.orders = np.zeros(system.guard_count, dtype=np.int64)
         # Taylor series by modes, and the arrays at which they were computed; those are replaced, never modified
-        self.series: dict[bytes, Series | DifferenceSeries] = {}
+        self.series: dict[bytes, Series] = {}
         self.behind: tuple[object, ...] = (None,) * 4
 
     # -- the rounds -----------------------------------------------------------------------------------------
@@ -233,7 +233,7 @@ class EventResolution:
             if g >= 0 and self.fired[g]
         ]
 
-    def series_of(self, z: np.ndarray, x: np.ndarray | None = None) -> Series | DifferenceSeries:
+    def series_of(self, z: np.ndarray, x: np.ndarray | None = None) -> Series:
         """Return the Taylor series along the flow of the modes z, at the present state or at x."""
         at = self.at
         x = at.x if x is None else x

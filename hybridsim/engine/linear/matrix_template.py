@@ -122,10 +122,7 @@ def _factors(monomials: Sequence[Sequence[int]], one: int) -> np.ndarray:
     return factors
 
 
-@per_structure
-def templates_of(system: System) -> dict[bytes, list[MatrixTemplate]]:
-    """Return the cached templates, by their mode vectors."""
-    return {}
+templates_of = per_structure(lambda system: dict[bytes, list[MatrixTemplate]]())  # by their mode vectors
 
 
 def template_of(system: System, met: np.ndarray, p: np.ndarray) -> tuple[MatrixTemplate, np.ndarray]:

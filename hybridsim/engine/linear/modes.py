@@ -132,23 +132,10 @@ def what_is_not_linear(system: System) -> str | None:
     """
     if is_always_linear(system):
         return None
-    known, values = _reasons(system), tuple(system.values.values())
-    reason = known.get(values, "")
-    if reason == "":  # not known yet
-        reason = _first_reason(system, values)
-        if len(known) >= _MAX_CACHED:
-            known.clear()
-        known[values] = reason
-    return reason
+    return _first_reason(system, tuple(system.values.values()))
 
 
-@per_structure
-def _reasons(system: System) -> dict[tuple[float, ...], str | None]:
-    """Return the cached answers of `what_is_not_linear`, by the values of the parameters."""
-    return {}
-
-
-def _first_reason(system: System, p: Sequence[float] | None) -> str | None:
+def _reason_at(system: System, p: tuple[float, ...] | None) -> str | None:
     vectors, of_mode = {"": np.zeros(len(system.automata), dtype=np.int64)}, {}
     for c, automaton in enumerate(system.automata):
         for m, mode in enumerate(automaton.modes):
@@ -182,26 +169,17 @@ def _first_reason(system: System, p: Sequence[float] | None) -> str | None:
     )  # a guard's title contains the mode
 
 
+_first_reason = per_structure(_reason_at, most=_MAX_CACHED)
+
+
 def is_linear_beside_corners(system: System) -> bool:
     """Return whether each mode is linear on both sides of each corner, for the given parameter values."""
-    known = _linear_beside_corners(system)
-    for p in (None, tuple(system.values.values())):
-        if p not in known:
-            if len(known) >= _MAX_CACHED:
-                known.clear()
-            known[p] = _is_linear_beside_corners(system, p)
-        if known[p]:
-            return True
-    return False
+    return _is_linear_beside_corners(system, None) or _is_linear_beside_corners(
+        system, tuple(system.values.values())
+    )
 
 
-@per_structure
-def _linear_beside_corners(system: System) -> dict[tuple[float, ...] | None, bool]:
-    """Return the cached answers of `is_linear_beside_corners`, by the values of the parameters."""
-    return {}
-
-
-def _is_linear_beside_corners(system: System, p: Sequence[float] | None) -> bool:
+def _linear_beside_corners_at(system: System, p: tuple[float, ...] | None) -> bool:
     counts = [len(automaton.modes) for automaton in system.automata]
     corners = [c for c, automaton in enumerate(system.automata) if automaton.is_corner]
     for k, c in product(corners, range(len(counts))):
@@ -215,6 +193,9 @@ def _is_linear_beside_corners(system: System, p: Sequence[float] | None) -> bool
             except NotLinear:
                 return False
     return True
+
+
+_is_linear_beside_corners = per_structure(_linear_beside_corners_at, most=_MAX_CACHED)
 
 
 def refuse_nonlinear(system: System) -> None:

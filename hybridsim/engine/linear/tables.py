@@ -301,10 +301,7 @@ def tables_of(
     return found
 
 
-@per_structure
-def cached_tables(system: System) -> dict[bytes, Made]:
-    """Return the cached tables, by values of the parameters, mode vectors and order of magnitude of the horizon."""
-    return {}
+cached_tables = per_structure(lambda system: dict[bytes, Made]())  # by parameters, mode vectors and horizon
 
 
 def _made(

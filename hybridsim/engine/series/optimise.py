@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
 from typing import Any
 
@@ -72,6 +73,11 @@ class OptimisedTape:
     guards: np.ndarray
     surfaces: np.ndarray
     monitors: np.ndarray
+
+    @cached_property
+    def results(self) -> np.ndarray:
+        """Return the registers of states, guards, surfaces and monitors."""
+        return np.concatenate([self.states, self.guards, self.surfaces, self.monitors])
 
 
 def separate_registers(tape: dict[str, Any]) -> dict[int, int]:

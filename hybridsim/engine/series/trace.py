@@ -1,7 +1,7 @@
 """Write straight-line code by running kernels on values that stand for numbers, so that each recurrence is stated once.
 
-An operator on a `Value` appends its line to the text of a function. If a kernel decides by a value, it is run again for
-each decision, and the code chooses between the results.
+An operator on a `Value` appends its line to the text of a function. If a kernel branches on a value, it is run for both
+branches, and the code selects between the results.
 """
 
 from __future__ import annotations
@@ -110,17 +110,17 @@ class Size(Value):
 
 
 class _Condition:
-    """A comparison of a value, whose result is one of the decisions of its code."""
+    """A comparison of a value, whose truth is that of the path on which its code is."""
 
     def __init__(self, name: str, value: Value, other: Any) -> None:
         self.code, self.operands = value.code, (name, value.text, written(other))
 
     def __bool__(self) -> bool:
-        return self.code.decide(self)
+        return self.code.branch(self)
 
 
 class _Undecided(Exception):
-    """A kernel needs a further decision."""
+    """The path does not say whether a condition holds."""
 
     def __init__(self, condition: _Condition) -> None:
         self.condition = condition
@@ -154,7 +154,7 @@ class Trace(Lines):
 
     def __init__(self, prefix: str, module: ModuleType, **replaced: Callable[..., Any]) -> None:
         super().__init__(prefix)
-        self._decisions: list[bool] = []
+        self._truths: list[bool] = []
         calls = {
             name: lambda u, called=called: Value(self, self.call(called, written(u)))
             for name, called in _CALLS.items()
@@ -175,11 +175,11 @@ class Trace(Lines):
         """Return an element of an array that the function never writes."""
         return Value(self, self.load(array, i))
 
-    def decide(self, condition: _Condition) -> bool:
-        """Return the decision of a condition on the current path."""
-        if not self._decisions:
+    def branch(self, condition: _Condition) -> bool:
+        """Return whether a condition holds on the current path."""
+        if not self._truths:
             raise _Undecided(condition)
-        return self._decisions.pop(0)
+        return self._truths.pop(0)
 
     def on_all_paths(
         self, step: Callable[..., Any], row: Any, tables: tuple[Coefficients, ...], k: int
@@ -192,8 +192,8 @@ class Trace(Lines):
     def _results(
         self, step: Any, row: Any, tables: tuple[Coefficients, ...], k: int, path: tuple[bool, ...]
     ) -> list[dict[tuple[int, int], Any]]:
-        """Return what the kernel writes to each table after these decisions."""
-        self._decisions = list(path)
+        """Return what the kernel writes to each table on a path."""
+        self._truths = list(path)
         for table in tables:
             table.new = {}
         try:

@@ -9,7 +9,6 @@ error. Steps are tried from very short ones upward, until truncation and roundin
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -39,19 +38,6 @@ _WORSE = 16.0  # ratio to the best bound at which the step counts as too long
 # shift of a state in units of rounding, so that its effect exceeds the noise
 _APART = 2.0**10
 _SMALLEST = 2.0**-40  # shift of a state of unknown size
-
-
-@dataclass(frozen=True)
-class DifferenceSeries:
-    """Taylor coefficients of states (n, 4), guards and monitors along a flow, with bounds of the last two."""
-
-    states: np.ndarray
-    guards: np.ndarray
-    guard_bounds: np.ndarray
-    monitors: np.ndarray
-    monitor_bounds: np.ndarray
-    surfaces: np.ndarray = field(default_factory=lambda: np.empty((0, ORDER + 1)))  # always empty
-    surface_bounds: np.ndarray = field(default_factory=lambda: np.empty((0, ORDER + 1)))
 
 
 @kernel

@@ -2,30 +2,33 @@
 
 from __future__ import annotations
 
+import sys
 from collections import deque
 from collections.abc import Callable, Hashable
 from functools import wraps
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, TypeVar, TypeVarTuple
 
-Key = ParamSpec("Key")
+Key = TypeVarTuple("Key")
 Made = TypeVar("Made")
 
 
-def per_structure(
-    make: Callable[Concatenate[Any, Key], Made],
-) -> Callable[Concatenate[Any, Key], Made]:
+def per_structure(make: Callable[[Any, *Key], Made], most: int = sys.maxsize) -> Callable[[Any, *Key], Made]:
     """Keep what a function of a system makes, for each key of further arguments, as long as the system's code lives.
 
-    If several threads make a value at the same time, all get the value of the first one.
+    If several threads make a value at the same time, all get the value of the first one. most: number of keys after
+    which all values are made again, for keys such as the values of parameters.
     """
 
-    @wraps(make)
-    def of(system: Any, *key: Key.args, **named: Key.kwargs) -> Made:
-        made, place = system.code.shared, (of, *key)
-        if place not in made:
-            made.setdefault(place, make(system, *key, **named))
-        found: Made = made[place]
-        return found
+    @wraps(make, updated=())
+    def of(system: Any, *key: *Key) -> Made:
+        made: dict[tuple[*Key], Made] = system.code.shared.setdefault(of, {})
+        try:
+            return made[key]
+        except KeyError:
+            found = make(system, *key)
+        if len(made) >= most:
+            made.clear()
+        return made.setdefault(key, found)
 
     return of
 

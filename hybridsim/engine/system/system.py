@@ -16,7 +16,8 @@ from hybridsim.engine.series.high_orders import high_rows
 from hybridsim.engine.series.layout import SIGNAL_SLOTS, Layout
 from hybridsim.engine.series.optimise import OptimisedTape, has_corners, optimised
 from hybridsim.engine.series.registers import Registers
-from hybridsim.engine.system.finite_differences import DifferenceSeries, run_differences, run_jacobian
+from hybridsim.engine.series.short_series import Series
+from hybridsim.engine.system.finite_differences import run_differences, run_jacobian
 from hybridsim.engine.system.instant import Instant, phase_of
 from hybridsim.engine.system.modules import compiled
 from hybridsim.engine.system.per_structure import per_structure
@@ -69,50 +70,6 @@ class Automaton:
     def has_surface(self) -> bool:
         """Return whether the component has a switching surface, at which the admissible mode is taken."""
         return self.hold >= 0
-
-
-@dataclass(frozen=True)
-class Series:
-    """Taylor coefficients along a flow, with the order along the last axis, and rounding error bounds."""
-
-    V: np.ndarray
-    E: np.ndarray
-    place: OptimisedTape
-
-    @property
-    def guards(self) -> np.ndarray:
-        """Return coefficients of all guards (guards, orders)."""
-        return self.V[self.place.guards]
-
-    @property
-    def guard_bounds(self) -> np.ndarray:
-        """Return error bounds of the coefficients of the guards."""
-        return self.E[self.place.guards]
-
-    @property
-    def surfaces(self) -> np.ndarray:
-        """Return coefficients of the surfaces (surfaces, orders)."""
-        return self.V[self.place.surfaces]
-
-    @property
-    def surface_bounds(self) -> np.ndarray:
-        """Return error bounds of the coefficients of the surfaces."""
-        return self.E[self.place.surfaces]
-
-    @property
-    def monitors(self) -> np.ndarray:
-        """Return coefficients of the monitors (monitors, orders)."""
-        return self.V[self.place.monitors]
-
-    @property
-    def monitor_bounds(self) -> np.ndarray:
-        """Return error bounds of the coefficients of the monitors."""
-        return self.E[self.place.monitors]
-
-    @property
-    def states(self) -> np.ndarray:
-        """Return coefficients of the states (n, orders)."""
-        return self.V[self.place.states]
 
 
 def _automaton(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automaton:
@@ -178,19 +135,9 @@ class _Frame:
         return table
 
 
-@per_structure
-def _frame_of(system: System) -> _Frame:
-    return _Frame(system.model, system.code.data)
-
-
-@per_structure
-def _registers_of(system: System) -> Registers:
-    return Registers(system.code.data["tape"], system.layout)
-
-
-@per_structure
-def _has_corners(system: System) -> bool:
-    return has_corners(system.code.data["tape"])
+_frame_of = per_structure(lambda system: _Frame(system.model, system.code.data))
+_registers_of = per_structure(lambda system: Registers(system.code.data["tape"], system.layout))
+_has_corners = per_structure(lambda system: has_corners(system.code.data["tape"]))
 
 
 @per_structure
@@ -496,7 +443,7 @@ class System:
         x_error: np.ndarray,
         s_error: float,
         with_numbers: bool = False,
-    ) -> Series | DifferenceSeries:
+    ) -> Series:
         """Return coefficients up to third order of guards, surfaces, monitors and states along the flow of z.
 
         with_numbers: whether the bounds include the roundoff of the numbers in the model.
@@ -510,11 +457,17 @@ class System:
         _run_series(
             tape.constant_rows, tape.rows, inputs, tape.derivatives, s, s_error, x, x_error, p, V, E
         )  # fmt: skip
-        return Series(V, E, tape)
+        V, E = V.take(tape.results, 0), E.take(tape.results, 0)
+        guards, surfaces = self.n, self.n + self.guard_count
+        monitors = surfaces + len(self.surface_of)
+        rows = slice(guards), slice(guards, surfaces), slice(surfaces, monitors), slice(monitors, None)
+        return Series(
+            V[rows[0]], E[rows[0]], V[rows[1]], E[rows[1]], V[rows[2]], E[rows[2]], V[rows[3]], E[rows[3]]
+        )
 
     def _differences(
         self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray, x_error: np.ndarray, s_error: float
-    ) -> DifferenceSeries:
+    ) -> Series:
         """Return the series by finite differences, for models of Python functions."""
         guards = self.guard_count
         shape = (guards + len(self.monitor_names), ORDER + 1)
@@ -524,7 +477,18 @@ class System:
             self.address("flow"), self.address("guards_and_monitors"), s, float(p[self.layout.origin_at]) + s, s_error,
             np.ascontiguousarray(x, dtype=float), x_error, p, z, C, G, E,
         )  # fmt: skip
-        return DifferenceSeries(C, G[:guards], E[:guards], G[guards:], E[guards:])
+        none = np.empty((0, ORDER + 1))
+        guard_rows, monitor_rows = slice(guards), slice(guards, None)
+        return Series(
+            C,
+            np.full_like(C, np.nan),
+            G[guard_rows],
+            E[guard_rows],
+            none,
+            none,
+            G[monitor_rows],
+            E[monitor_rows],
+        )
 
     def jacobian(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Return d(dx/dt)/dx (n, n) by differences, for models of Python functions."""

@@ -10,7 +10,6 @@ import numpy as np
 
 from hybridsim.engine.events.choice.verdict import FINE, UNDECIDED
 from hybridsim.engine.events.resolve import EventResolution
-from hybridsim.engine.system.system import Series
 
 if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Situation
@@ -114,8 +113,7 @@ class RecordedResolution(EventResolution):
         found = super().verdict(z, components)
         decreed = self._decreed(z, self._continuous(z, components))
         series = self.series_of(z)
-        assert isinstance(series, Series)  # models with surfaces are made from expressions
-        states = series.states, series.E[series.place.states]
+        states = series.states, series.state_bounds
         surfaces = series.surfaces.copy(), series.surface_bounds.copy()
         held = [z[c] == self.system.automata[c].hold for c in self.system.surface_of]
         for coefficients in surfaces:

@@ -283,9 +283,14 @@ def test_a_run_is_the_same_with_code_and_without(
             monkeypatch.setattr(mode_code, "KNOWN", steps)
             monkeypatch.setattr(mode_code, "WORTH", steps)
             runs.append(hs.simulate(model, (0, 0.1), integrator=integrator))
-        tapes, caches = tape_cache_of(System(model)).tapes, code.shared.values()
+        tapes, shared = (
+            tape_cache_of(System(model)).tapes,
+            [list(made.values()) for made in code.shared.values()],
+        )
         made = [
-            cache.of(tapes).arrays[: len(cache.functions)] for cache in caches if isinstance(cache, CodeCache)
+            cache.of(tapes).arrays[: len(cache.functions)]
+            for cache in itertools.chain(*shared)
+            if isinstance(cache, CodeCache)
         ]
         assert any(np.all(addresses) for addresses in made) and tapes.bounds.all()
     assert len(runs[0].events) > 4

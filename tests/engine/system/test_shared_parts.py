@@ -62,5 +62,5 @@ def test_parts_are_those_of_the_tapes_asked_for_while_others_ask() -> None:
             if name == "_known" and value is not None and value[0] is large.tapes:
                 self.of(small.tapes)
 
-    found, expected = Overtaken().of(large.tapes), GuardParts().of(large.tapes)
-    assert len(found.start) == len(expected.start) > len(GuardParts().of(small.tapes).start)
+    found, expected = Overtaken(system).of(large.tapes), GuardParts(system).of(large.tapes)
+    assert len(found.start) == len(expected.start) > len(GuardParts(system).of(small.tapes).start)

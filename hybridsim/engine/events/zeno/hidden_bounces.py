@@ -21,8 +21,9 @@ from hybridsim.engine.events.zeno.accumulation import Limit
 from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.record.trajectory import LOOKED_BACK_ON, Trajectory
 from hybridsim.engine.series.bounded import UNIT
+from hybridsim.engine.series.short_series import Series
 from hybridsim.engine.system.instant import Instant
-from hybridsim.engine.system.system import Automaton, Series, System
+from hybridsim.engine.system.system import Automaton, System
 
 _STRIDE = 1.5  # ratio of the speeds of the examined bounces
 _LEAST_LOSS = 1e-4  # least relative loss of speed in a bounce; less means over 10**4 bounces per digit
@@ -181,6 +182,4 @@ def _series(system: System, outcome: Outcome, c: int, instant: Instant, mode: in
     z = outcome.z.copy()
     z[c] = mode
     p = system.vector(instant, system.discrete(outcome.p))
-    series = system.series(0.0, x, p, z, outcome.x_error + 4.0 * UNIT * np.abs(x), 0.0)
-    assert isinstance(series, Series)
-    return series
+    return system.series(0.0, x, p, z, outcome.x_error + 4.0 * UNIT * np.abs(x), 0.0)

@@ -94,7 +94,7 @@ class CodeCache:
             getattr(codes, name)[k] = address  # in reverse order, because kernels test the first one
 
 
-class _SeriesCodes(CodeCache):
+class SeriesCodes(CodeCache):
     """Machine code of one structure for Taylor series of one order."""
 
     def __init__(self, system: System, order: int) -> None:
@@ -110,10 +110,7 @@ class _SeriesCodes(CodeCache):
         super()._put(codes, k, addresses)
 
 
-@per_structure
-def series_codes(system: System, order: int) -> CodeCache:
-    """Return the machine code of Taylor series of one order."""
-    return _SeriesCodes(system, order)
+series_codes = per_structure(SeriesCodes)
 
 
 @per_structure

@@ -47,9 +47,9 @@ class _ModeParts(NamedTuple):
 class GuardParts:
     """The rows for guards, made from the most recent tapes; they depend only on the model's structure."""
 
-    def __init__(self) -> None:
+    def __init__(self, system: System) -> None:
+        self.system = system
         self._known: tuple[Tapes, Parts] | None = None
-        self._of_modes: dict[bytes, _ModeParts] = {}  # reused when tapes grow
 
     def of(self, tapes: Tapes) -> Parts:
         """Return the rows for guards of the given tapes."""
@@ -59,12 +59,7 @@ class GuardParts:
         return known[1]
 
     def _parts(self, tapes: Tapes) -> Parts:
-        found = []
-        for k, modes in enumerate(tapes.modes):
-            key = modes.tobytes()
-            if key not in self._of_modes:
-                self._of_modes[key] = _mode_parts(tapes, k)
-            found.append(self._of_modes[key])
+        found = [_mode_parts(self.system, modes.tobytes()) for modes in tapes.modes]
         parts: Parts = packed(
             Parts(
                 *in_a_row([one.guards for one in found]),
@@ -75,21 +70,17 @@ class GuardParts:
         return parts
 
 
+guard_parts_of = per_structure(GuardParts)
+
+
 @per_structure
-def guard_parts_of(system: System) -> GuardParts:
-    """Return the rows for guards shared by all systems of one structure."""
-    return GuardParts()
-
-
-def _mode_parts(tapes: Tapes, k: int) -> _ModeParts:
-    optimised_rows = [
-        tuple(row)
-        for row in tapes.optimised[tapes.optimised_start[k] : tapes.optimised_start[k + 1]].tolist()
-    ]
-    active = tapes.active[tapes.active_start[k] : tapes.active_start[k + 1]]
-    guard_registers, rates = set(tapes.guards[k, active].tolist()), set(tapes.derivatives[k].tolist())
+def _mode_parts(system: System, modes: bytes) -> _ModeParts:
+    z = np.frombuffer(modes, dtype=np.int64)
+    tape = system.optimised_tape(z)
+    optimised_rows = [tuple(row) for row in tape.rows.tolist()]
+    guard_registers, rates = set(tape.guards[system.active(z)].tolist()), set(tape.derivatives.tolist())
     guards = live_rows(optimised_rows, guard_registers)
     is_linear = all(row[0] in _LINEAR for row in guards)
     steps = live_rows(optimised_rows, rates | guard_registers if is_linear else rates)
-    guard_rows, step_rows = (np.array(rows, dtype=np.int64).reshape(-1, 5) for rows in (guards, steps))
+    guard_rows, step_rows = (np.array(part, dtype=np.int64).reshape(-1, 5) for part in (guards, steps))
     return _ModeParts(guard_rows, is_linear, step_rows)

@@ -71,12 +71,6 @@ class Tapes(NamedTuple):
 
 
 @per_structure
-def tape_cache_of(system: System) -> TapeCache:
-    """Return the tapes shared by all systems of one structure."""
-    return TapeCache(system)
-
-
-@per_structure
 def automata_of(system: System) -> Automata:
     """Return the arrays of a system's automata, packed for kernels."""
     automata, n = system.automata, system.n
@@ -223,6 +217,9 @@ class TapeCache:
             )
         )
         return tapes
+
+
+tape_cache_of = per_structure(TapeCache)
 
 
 class _ModeRows(NamedTuple):
