@@ -16,6 +16,7 @@ from hybridsim.engine.events.compiled.scratch import functions_of, work_space
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.events.zeno.accumulation import MAX_EVENTS_PER_TURN, cannot_accumulate
 from hybridsim.engine.linear.tables import no_tables
+from hybridsim.engine.native.constants import MAX_SEGMENTS, TIGHTEST
 from hybridsim.engine.native.kernels import Precompiled
 from hybridsim.engine.native.struct_pack import ALIGNED, LARGEST, ArrayLayout, packed
 from hybridsim.engine.record.blocks import SegmentBlock
@@ -38,10 +39,8 @@ from hybridsim.engine.system.series_at import series_order
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
 
-_SEGMENTS = 1024  # largest number of segments in one call
 _CALL_DOUBLES = LARGEST // 8  # doubles for the steps of one call, in a reusable block of memory
 _NO_OWNERS = np.zeros(0, dtype=np.int64)
-_TIGHTEST = 1e-15
 NOT_LINEAR = no_tables()  # for kernels without tables of linear modes
 
 
@@ -107,7 +106,7 @@ class CompiledLoopBase(ABC):
         )
         self.spare = spare_scratch(system, kind)
         self.kernel_run: KernelRun | None = None  # a call made beforehand, which `advance` takes first
-        beside = (_SEGMENTS + 1) * (layout.size + 1) + ALIGNED
+        beside = (MAX_SEGMENTS + 1) * (layout.size + 1) + ALIGNED
         # largest number of steps in one call
         self.steps = max((_CALL_DOUBLES - beside) // (system.n * columns + 2), MIN_STEPS_IN_PART)
         self._renew()
@@ -168,7 +167,7 @@ class CompiledLoopBase(ABC):
         if not (place.shape == (3,) and ((place >= 0.0) & (place <= max(_CALL_DOUBLES, self.steps))).all()):
             raise damaged("the row counts of the run")
         rows, segments, steps = (int(number) for number in place)
-        if not (1 <= steps <= self.steps and rows <= steps and segments <= _SEGMENTS + 1):
+        if not (1 <= steps <= self.steps and rows <= steps and segments <= MAX_SEGMENTS + 1):
             raise damaged("the row counts of the run")
         if steps != self.steps:
             self.steps = steps
@@ -315,12 +314,12 @@ def _step_layout(system: System, steps: int, columns: int) -> ArrayLayout:
             (float, (steps, 2), 0),
             (float, (steps, system.n, columns), 0),
             # one row more, for the end of the last segment
-            (np.int64, (_SEGMENTS + 1,), 0),
-            (float, (_SEGMENTS + 1, 2), 1),
-            (np.int64, (_SEGMENTS + 1, len(system.automata)), 1),
-            (float, (_SEGMENTS, system.layout.size), 0),
-            (np.int64, (_SEGMENTS,), 1),
-            (float, (_SEGMENTS, 2, system.n), 1),
+            (np.int64, (MAX_SEGMENTS + 1,), 0),
+            (float, (MAX_SEGMENTS + 1, 2), 1),
+            (np.int64, (MAX_SEGMENTS + 1, len(system.automata)), 1),
+            (float, (MAX_SEGMENTS, system.layout.size), 0),
+            (np.int64, (MAX_SEGMENTS,), 1),
+            (float, (MAX_SEGMENTS, 2, system.n), 1),
         ),
     )
 
@@ -332,7 +331,7 @@ class TaylorLoop(CompiledLoopBase):
     """The compiled loop of Taylor series."""
 
     def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
-        rtol = max(tolerances.rtol, _TIGHTEST)
+        rtol = max(tolerances.rtol, TIGHTEST)
         self.order = series_order(rtol, system.is_linear)
         super().__init__(system, self.order + 1, f"order {self.order}")
         self.codes = series_codes(system, self.order)

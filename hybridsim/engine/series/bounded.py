@@ -1,8 +1,7 @@
 """Taylor coefficients of states and guards along a flow, each with a running bound of its rounding error.
 
-The recurrences are those of automatic differentiation (A. Jorba and M. Zou, Experimental Mathematics 14
-(2005) 99, doi:10.1080/10586458.2005.10128904); each error bound follows its recurrence to first order in the
-unit roundoff (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., 2002, section 3.3).
+The recurrences are those of `hybridsim.engine.series.interpreter`; each error bound follows its recurrence to first
+order in the unit roundoff (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., 2002, section 3.3).
 """
 
 from __future__ import annotations
@@ -10,6 +9,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from hybridsim.engine.native.constants import EXACTLY
+from hybridsim.engine.native.constants import UNIT as UNIT
 from hybridsim.engine.native.kernels import call_noinline, inlined, kernel
 from hybridsim.engine.series.optimise import (
     ADD_CONSTANT,
@@ -49,8 +50,7 @@ from hybridsim.engine.series.tape import (
     TANGENT,
 )
 
-UNIT = 2.0**-53  # unit roundoff of a double
-ORDER = 3  # order of the derivatives by which events are decided
+ORDER = EXACTLY
 
 
 @inlined

@@ -11,6 +11,7 @@ import math
 from collections.abc import Mapping, Set
 from typing import Any
 
+from hybridsim.engine.native.constants import UNIT
 from hybridsim.expr.grammar import WHOLE_POWERS
 
 # Operations. INTEGRAL gives y with y' * a = b' (log, atan, asin: the derivative is a quotient).
@@ -21,7 +22,6 @@ AGREEING = 1
 # how INTEGRAL computes its leading coefficient from the argument c
 LOG, ASIN, ACOS, ATAN, ANGLE = range(30, 35)
 
-_UNIT = 2.0**-53  # unit roundoff of a double
 # Twelve squarings; beyond it exp(n log u), which is undefined for u < 0
 _MAX_INTEGER_POWER = 4096
 
@@ -86,7 +86,7 @@ class TapeBuilder:
         if e.is_number and not e.has(sp.Function):
             value = float(e)
             is_exact = e.is_Float or (e.is_Rational and math.isfinite(value) and sp.Rational(value) == e)
-            return self._constant(value, 0.0 if is_exact else _UNIT * abs(value))
+            return self._constant(value, 0.0 if is_exact else UNIT * abs(value))
         if e.is_Add or e.is_Mul:
             return self._emit_sequence(e, known, rows)
         if e.is_Pow:

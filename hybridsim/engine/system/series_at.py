@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from hybridsim.engine.native.constants import TIGHTEST
 from hybridsim.engine.series.interpreter import SLACK, advance, expand, reach
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
@@ -18,7 +19,6 @@ _LITTLE = 2.0**-44  # step relative to the time so far that counts as none
 # Terms larger than this, or smaller than its inverse, are dropped from a series whose first terms are of moderate size.
 # They are multiplied by powers of the step, which must be doubles as well.
 _LARGEST_TERM, _MODERATE = 1e250, 1e100
-_TIGHTEST = 1e-15  # tightest tolerance of series in double precision
 
 
 def short_order(rtol: float) -> int:
@@ -46,7 +46,7 @@ class SeriesRun:
 
     def __init__(self, system: System, p: np.ndarray, z: np.ndarray, tolerances: Tolerances) -> None:
         tape, self.optimised = system.code.data["tape"], system.optimised_tape(z)
-        self.rtol, self.atol = max(tolerances.rtol, _TIGHTEST), tolerances.atol
+        self.rtol, self.atol = max(tolerances.rtol, TIGHTEST), tolerances.atol
         self.high = np.array(system.high_rows(z), dtype=np.int64).reshape(-1, 5)
         self.order = series_order(self.rtol, system.is_linear)
         self.V = np.zeros((system.registers.count, self.order + 1))

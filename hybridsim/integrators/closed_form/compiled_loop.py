@@ -11,6 +11,7 @@ from hybridsim.engine.events.compiled.scratch import work_space
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.linear.closed_form_block import ClosedFormBlock
 from hybridsim.engine.linear.tables import LinearTables, tables_of
+from hybridsim.engine.native.constants import MAX_SEGMENTS
 from hybridsim.engine.native.kernels import Precompiled
 from hybridsim.engine.native.struct_pack import ArrayLayout
 from hybridsim.engine.record.array_forms import check_modes
@@ -27,7 +28,6 @@ from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.integrators.closed_form.segments import Record, call_event_loop, link_event_loop, scratch_for
 
-_SEGMENTS = 1024  # most segments of one call
 _NO_OWNERS = np.zeros(0, dtype=np.int64)
 
 _event_loop = Precompiled(call_event_loop)
@@ -189,14 +189,14 @@ def _segment_layout(system: System, widest: int) -> ArrayLayout:
     return ArrayLayout(
         Record,
         (
-            (float, (_SEGMENTS,), 0),
+            (float, (MAX_SEGMENTS,), 0),
             # one more row: all starts, and the end of the last segment
-            (float, (_SEGMENTS + 1, 2), 1),
-            (np.int64, (_SEGMENTS,), 0),
-            (np.int64, (_SEGMENTS + 1, len(system.automata)), 1),
-            (float, (_SEGMENTS, system.layout.size), 0),
-            (complex, (_SEGMENTS, widest), 0),
-            (np.int64, (_SEGMENTS,), 1),
-            (float, (_SEGMENTS, 3, system.n), 1),
+            (float, (MAX_SEGMENTS + 1, 2), 1),
+            (np.int64, (MAX_SEGMENTS,), 0),
+            (np.int64, (MAX_SEGMENTS + 1, len(system.automata)), 1),
+            (float, (MAX_SEGMENTS, system.layout.size), 0),
+            (complex, (MAX_SEGMENTS, widest), 0),
+            (np.int64, (MAX_SEGMENTS,), 1),
+            (float, (MAX_SEGMENTS, 3, system.n), 1),
         ),
     )

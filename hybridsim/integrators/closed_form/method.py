@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from hybridsim.engine.linear.modes import refuse_nonlinear
+from hybridsim.engine.native.constants import TIGHTEST
 from hybridsim.engine.run.compiled_loop import compile_loops
 from hybridsim.engine.run.stepping import Flow, Stepper, Watch
 from hybridsim.engine.system.system import System
@@ -16,8 +17,6 @@ from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.integrators.closed_form.compiled_loop import ClosedFormLoop
 from hybridsim.integrators.contract import NEEDS_TAPE, Integrator
 from hybridsim.integrators.taylor.method import TaylorStepper
-
-_TIGHTEST = 1e-15  # rtol for series in doubles
 
 
 @dataclass(frozen=True)
@@ -68,5 +67,5 @@ class Exact(Integrator):
         watch: Watch,
     ) -> Stepper:
         """Begin a smooth segment in the general mode loop, by Taylor series with a tight tolerance."""
-        tight = Tolerances(_TIGHTEST, 1e-3 * tolerances.atol, tolerances.max_step)
+        tight = Tolerances(TIGHTEST, 1e-3 * tolerances.atol, tolerances.max_step)
         return TaylorStepper(flow, x0, s_bound, tight, first_step)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
+from hybridsim.engine.native.constants import TIGHTEST
 from hybridsim.engine.native.kernels import ENABLED, call_kernel, kernel, kernel_address, seconds_compiling
 from hybridsim.engine.native.simd_vectors import WIDTH, padded_rows
 from hybridsim.engine.native.struct_pack import packed
@@ -51,7 +52,6 @@ STATUS = {
 _SERIES_DOUBLES = 1 << 20  # doubles for the series of one call
 _EVENTS = 4096  # events per call, in addition to those of one node
 _WORK = 1 << 20  # coordinates times (steps + events) per call: about 0.1 s between checks of the limits
-_TIGHTEST = 1e-15
 _RADIUS = 2  # radius of the first patch; it adapts
 _RANGE = 280  # decades of a double, less a margin for the factors of the powers
 _MIN_ORDER = 10  # a lower order makes series useless
@@ -78,7 +78,7 @@ class MechanicalRun:
     def __init__(self, built: Built, span: tuple[float, float], x: np.ndarray, rtol: float, atol: np.ndarray,
                  max_step: float, is_recorded: bool, limits: Limits = UNLIMITED) -> None:  # fmt: skip
         self.built, self.span = built, span
-        self.rtol, self.is_recorded = max(rtol, _TIGHTEST), is_recorded
+        self.rtol, self.is_recorded = max(rtol, TIGHTEST), is_recorded
         # the linear part of a series is the more expensive one for coupled coordinates
         self.order = min(series_order(self.rtol, linear=True), _order_in_range(built, span))
         self.max_step, self.limits = max_step, limits
