@@ -41,7 +41,9 @@ class _Checker:
         """Check a node whose value must be a number, and return whether it is constant."""
         constant, boolean = self.any(node)
         if boolean:
-            raise self.fail(node, "expected a number, but this is a condition", "write '1 if ... else 0'")
+            raise self.fail(
+                node, "a number is needed here, but this is a condition", "write '1 if ... else 0'"
+            )
         return constant
 
     def truth(self, node: ast.expr) -> bool:
@@ -49,7 +51,9 @@ class _Checker:
         constant, boolean = self.any(node)
         if not boolean:
             raise self.fail(
-                node, "expected a condition, but this is a number", "write a comparison, such as 'x > 0'"
+                node,
+                "a condition is needed here, but this is a number",
+                "write a comparison, such as 'x > 0'",
             )
         return constant
 
@@ -113,7 +117,7 @@ class _Checker:
         if isinstance(value, int):
             if value > MAX_INTEGER:
                 raise self.fail(
-                    node, "the integer is too large for a double", "write it as a decimal, such as 1e20"
+                    node, "the integer is too large for a double", "write a decimal, such as 1e20"
                 )
         elif not isinstance(value, float):
             raise self.fail(node, f"{type(value).__name__} values are not allowed", "write a real number")
@@ -125,7 +129,7 @@ class _Checker:
         if name in CONSTANTS:
             return True
         if name in FUNCTIONS:
-            raise self.fail(node, f"'{name}' is a function", f"write its arguments, {name}(...)")
+            raise self.fail(node, f"'{name}' is a function", f"call the function: {name}(...)")
         if name.startswith("__"):
             raise self.fail(
                 node,
@@ -185,9 +189,7 @@ class _Checker:
                 )
             raise self.fail(node, f"unknown function '{name}'", hint)
         if node.keywords:
-            raise self.fail(
-                node, f"{name}() has no keyword arguments", f"write {function.arity} without names"
-            )
+            raise self.fail(node, f"{name}() has no keyword arguments", f"pass {function.arity} by position")
         for argument in node.args:
             if isinstance(argument, ast.Starred):
                 raise self.fail(argument, "an unpacking with * is not allowed", "list the arguments")

@@ -27,7 +27,9 @@ def evaluate(expr: Expression, values: Mapping[str, float]) -> float:
         raise expr.error(
             f"'{expr.text}' has no finite real value: {fault.reason}",
             node=fault.node,
-            remedy=f"it was evaluated with {values_shown}" if values_shown else "correct the numbers",
+            remedy=f"the expression was evaluated with {values_shown}"
+            if values_shown
+            else "correct the numbers",
         ) from None
 
 

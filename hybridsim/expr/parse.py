@@ -30,15 +30,15 @@ _NUMBER = r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"
 _WITH_UNIT, _JOINED = re.compile(_NUMBER + r"\s+[A-Za-z]"), re.compile(_NUMBER + "[A-Za-z]")
 _WITHOUT_UNIT = "write only the number; set the unit in the field 'unit' (units are not converted)"
 _PRODUCT = (
-    "write only the number and set its unit in the field 'unit', or write a product with '*', such as '2*x'"
+    "write only the number and set the unit in the field 'unit', or write a product with '*', such as '2*x'"
 )
 _AS_IN_PYTHON = "use the syntax of Python, such as 'a*sin(omega*t) - c*v'"
 _ALLOWED = re.compile(r"[A-Za-z0-9_ +\-*/().,<>=!]")
 _ADVICE = {
-    "^": "write powers as **",
-    "&": "write 'and'",
-    "|": "write 'or'",
-    "~": "write 'not'",
+    "^": "write a power with **, such as x**2",
+    "&": "write 'and' instead of '&'",
+    "|": "write 'or' instead of '|'",
+    "~": "write 'not' instead of '~'",
     "%": "the remainder is not available; declare a periodic signal as an input of kind 'wave'",
     "[": "expressions cannot contain lists or subscripts",
     "{": "expressions cannot contain sets or tables",

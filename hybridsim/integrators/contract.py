@@ -124,7 +124,7 @@ class Integrator(metaclass=_IntegratorType):
         watch: Watch,
     ) -> Stepper:
         """Begin a smooth segment."""
-        raise NotImplementedError(f"{self.name} has no start(): it drives its runs itself")
+        raise NotImplementedError(f"{self.name} has no start(), because the method run() takes all steps")
 
     def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> CompiledLoop | None:
         """Return the compiled loop of this method for one run, or None if the model rules it out."""

@@ -114,7 +114,9 @@ def option_names(cls: type[Any]) -> tuple[str, ...]:
     return tuple(f.name for f in fields(cls))
 
 
-_START = "pass the start as x0=..., by name ({'x': 1.0}) or one number per state in the order of declaration"
+_START = (
+    "pass initial values as x0=..., by name ({'x': 1.0}) or in the order in which the states are declared"
+)
 _PARAMETERS = "pass values of parameters as params={...}"
 _SPAN = "pass both ends of the run as t_span=(t0, t1)"
 _STEP = "use max_step=... to limit the step, or step=... with integrator='moreau' or 'rk4-dichotomy'"
@@ -127,9 +129,9 @@ _ELSEWHERE = {
     "events": "declare monitors in the model, hs.Monitor(name, expression); zeros of guards are always found",
     "args": _PARAMETERS,
     "p": _PARAMETERS,
-    "dense_output": "omit it: every solution is a function of time, sol(t)",
-    "vectorized": "omit it: the model is compiled",
-    "jac": "omit it: derivatives are computed from the model's expressions",
+    "dense_output": "omit dense_output: every solution is a function of time, sol(t)",
+    "vectorized": "omit vectorized: the model is compiled",
+    "jac": "omit jac: derivatives are computed from the model's expressions",
     "t0": _SPAN,
     "t1": _SPAN,
     "tspan": _SPAN,
@@ -169,5 +171,5 @@ def make_integrator(name: str, options: dict[str, Any], keywords: Iterable[str] 
         if not fits(value, kinds[option]):
             is_large = isinstance(value, int) and value > LARGEST and fits(1, kinds[option])
             remedy = f"use {kind_description(kinds[option])}" + (f", at most {LARGEST}" if is_large else "")
-            raise UsageError(f"{name}: {option} is {value!r}", remedy=remedy)
+            raise UsageError(f"{name}: `{option}` cannot be {value!r}", remedy=remedy)
     return cls(**options)

@@ -18,7 +18,7 @@ LAST_STEP_FACTOR = 1.0 + 2.0**-30
 
 @kernel
 def forget(memory: Any) -> None:
-    """Reset the step control; memory (3,): last accepted step, its error, and 1 after a rejected step."""
+    """Reset the step control; `memory` (3,): last accepted step, its error, and 1 after a rejected step."""
     memory[0], memory[1], memory[2] = 0.0, 0.0, 0.0
 
 

@@ -57,7 +57,7 @@ def load(name_or_path: str | os.PathLike[str]) -> Model:
     if not isinstance(argument, str | os.PathLike):
         remedy = "use a Model, a name or a path"
         if hasattr(argument, "to_model"):
-            remedy = "pass the system to hs.simulate directly, or use its model, system.to_model()"
+            remedy = "pass the system to hs.simulate directly, or convert it to a model by system.to_model()"
         elif callable(argument):
             remedy = "for rates from a function f(t, x, p) use hs.Model('m', states={'x': 1.0}, flow=f)"
         raise UsageError(f"The model cannot be {argument!r}", remedy=remedy)
@@ -166,10 +166,12 @@ def read_text(path: Path) -> str:
     place = Place(str(path))
     try:
         if path.is_dir():
-            raise ModelError("this is a folder", place=place, remedy="use the .toml file in it")
+            raise ModelError(
+                "the path is a folder", place=place, remedy="use a .toml file inside this folder"
+            )
         # a device or a pipe may be endless
         if path.exists() and not path.is_file() and str(path) != "/dev/stdin":
-            raise ModelError("this is not a regular file", place=place, remedy="use a .toml file")
+            raise ModelError("the path is not a regular file", place=place, remedy="use a .toml file")
         size = path.stat().st_size
         if size > MAX_BYTES:
             remedy = "move tables to CSV files in the same folder"
@@ -192,7 +194,7 @@ def read_text(path: Path) -> str:
     except UnicodeDecodeError as fault:
         line = data.count(b"\n", 0, fault.start) + 1
         raise ModelError(
-            f"this is not a text file: byte {data[fault.start]:#04x} at offset {fault.start} is not UTF-8",
+            f"the file is not a text file: byte {data[fault.start]:#04x} at offset {fault.start} is not UTF-8",
             place=Place(str(path), line),
             remedy="write the model as a TOML file in UTF-8",
         ) from None

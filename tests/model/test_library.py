@@ -109,7 +109,7 @@ def test_files_that_are_no_models(data: bytes, message: str, tmp_path: Path) -> 
 
 
 def test_a_folder_and_a_missing_file(tmp_path: Path) -> None:
-    with pytest.raises(hs.ModelError, match="this is a folder"):
+    with pytest.raises(hs.ModelError, match="the path is a folder"):
         hs.load(tmp_path)
     write(tmp_path / "scene.toml", b"")
     with pytest.raises(hs.ModelError, match=r"the file does not exist\ndid you mean 'scene.toml'"):

@@ -109,7 +109,9 @@ def test_a_fixed_step_refuses_tolerances(integrator: str, name: str) -> None:
 
 @pytest.mark.parametrize("integrator", ["rk4-dichotomy", "rk4-sign"])
 def test_a_fixed_step_is_not_above_the_longest(integrator: str) -> None:
-    with pytest.raises(UsageError, match=f"max_step is 0.0001, but the fixed step of {integrator} is 0.0002"):
+    with pytest.raises(
+        UsageError, match=f"`max_step` is 0.0001, but the fixed step of {integrator} is 0.0002"
+    ):
         hs.simulate("dfcs", SPAN, integrator=integrator, step=2e-4, max_step=1e-4)
     assert hs.simulate("dfcs", SPAN, integrator=integrator, step=1e-4, max_step=1e-4).success
 

@@ -19,7 +19,7 @@ from hybridsim.model.checks.doubtful import warnings_of
         ("args", (1,), "params="),
         ("dense_output", True, "sol(t)"),
         ("y0", [0, 0], "x0="),
-        ("jac", None, "omit it"),
+        ("jac", None, "omit jac"),
         ("dt", 0.1, "max_step"),
         ("t_end", 1.0, "t_span"),
     ],

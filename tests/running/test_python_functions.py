@@ -118,7 +118,7 @@ def test_functions_in_a_model_of_expressions_are_refused() -> None:
     model = hs.Model("m", states=states, monitors=[hs.Monitor("high", height)])
     with pytest.raises(hs.ModelError, match="monitor high is the Python function height"):
         model.validate()
-    with pytest.raises(hs.UsageError, match="states: x has no rate"):
+    with pytest.raises(hs.UsageError, match="the state 'x' has no rate"):
         hs.Model("m", states={"x": 0})
 
 

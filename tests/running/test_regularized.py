@@ -105,7 +105,7 @@ def test_a_name_that_is_taken_and_a_round_trip() -> None:
     ("model", "kind", "v0", "words"),
     [
         ("dfcs", "tan", 1e-3, "Unknown regularisation 'tan'"),
-        ("dfcs", "tanh", 0.0, "v0 cannot be 0.0"),
+        ("dfcs", "tanh", 0.0, "`v0` cannot be 0.0"),
         ("thermostat", "tanh", 1e-3, "no contact"),
         ("static-kinetic", "tanh", 1e-3, "static friction"),
         ("sampled-servo", "arctan", 1e-3, "static friction"),

@@ -67,7 +67,7 @@ def test_an_option_of_another_kind_is_refused_every_time(model: hs.Model) -> Non
     """16.0 equals 16, and is no whole number to an option."""
     hs.simulate(model, SPAN, integrator="rk4-dichotomy", max_bisections=16)
     for _ in range(2):
-        with pytest.raises(hs.UsageError, match=r"max_bisections is 16\.0"):
+        with pytest.raises(hs.UsageError, match=r"`max_bisections` cannot be 16\.0"):
             hs.simulate(model, SPAN, integrator="rk4-dichotomy", max_bisections=16.0)
 
 

@@ -88,7 +88,7 @@ class MatrixTemplate:
         self.recipe: Recipe = Recipe(numbers, None if begun is None else begun.recipe)
 
     def _first_read(self, system: System, met: np.ndarray) -> Iterable[Monomial]:
-        """Return functions of time in an order that is the same whichever modes a run enters first.
+        """Return functions of time in an order that does not depend on the modes that a run enters first.
 
         The order of sums depends on it. If all mode vectors are entered, they are read in their order.
         Otherwise vectors that differ in one component come first; they contain almost all functions of time.

@@ -58,7 +58,7 @@ class Modal:
 
 @dataclass(frozen=True)
 class _Cluster:
-    """Eigenvalues that share a block: indices of those with imaginary part >= 0; folded: conjugates included."""
+    """Eigenvalues that share a block, by the indices of the eigenvalues with imaginary part >= 0."""
 
     members: tuple[int, ...]
     folded: bool  # True for real eigenvalues

@@ -122,7 +122,7 @@ _NOTHING = np.empty((0, 1)), np.empty((0, 5), dtype=np.int64), np.empty((0, 3), 
 
 
 class Recipe:
-    """The recorded operations, for other inputs; begun: the recipe of the same numbers some operations earlier."""
+    """Recorded operations, to repeat with other inputs; `begun`: an earlier recipe of the same numbers."""
 
     def __init__(self, numbers: Numbers, begun: Recipe | None = None) -> None:
         self._inputs = len(numbers.inputs)

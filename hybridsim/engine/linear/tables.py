@@ -140,7 +140,7 @@ class Made(NamedTuple):
 def linear_tables(
     system: System, met: np.ndarray, p: np.ndarray, horizon: float, begun: Made | None = None
 ) -> Made | None:
-    """Return tables of the mode vectors (K, components) entered so far; horizon: the length of a segment.
+    """Return tables of the mode vectors (K, components) entered so far; `horizon`: length of a segment.
 
     begun: tables of the first of these vectors, which are reused as far as they agree. Return None if each
     mode has a rate or a guard with a coefficient that is not finite, or is too large to be squared.

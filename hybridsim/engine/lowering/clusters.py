@@ -1,4 +1,4 @@
-"""Data of joint solves: which contacts act on each other, and how normal forces load friction."""
+"""Data for joint solves: groups of contacts that act on each other, and loads from normal forces."""
 
 from __future__ import annotations
 

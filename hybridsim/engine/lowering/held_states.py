@@ -89,7 +89,7 @@ class HeldStates:
             surface = self.lowering.components[c[0]].surface
             if not (surface.unique or surface.is_unilateral):
                 raise ModelError(
-                    f"{self.lowering.components[c[0]].name}: its relative velocity "
+                    f"{self.lowering.components[c[0]].name}: the relative velocity "
                     f"'{self.lowering.written(c[0])}' is not linear in any state",
                     place=self.lowering.place(c[0]),
                     remedy="declare the relative velocity as a state",
@@ -120,14 +120,14 @@ class HeldStates:
         remedy = "merge contacts that share one relative velocity, and surfaces that coincide"
         kinds = [lowering.components[c].surface for c in components]
         if any(surface.is_unilateral for surface in kinds):
-            remedy += "; write gaps that are never zero together as mirror images (x and 1 - x), or as modes"
+            remedy += "; if two gaps are never zero together, write them in the form x and 1 - x, or as modes"
         if not any(surface.unique for surface in kinds):
             remedy += "; or declare the structure with its matrices as an hs.MechanicalSystem, which accepts "
             remedy += "redundant contacts"
         return ModelError(
             f"the {' and '.join(titles)} of "
             + ", ".join(lowering.components[c].name for c in components)
-            + " are not independent: no choice of one state for each keeps all of them at zero",
+            + " are not independent: they cannot all be kept at zero by one state each",
             place=lowering.place(components[0]),
             remedy=remedy,
         )
@@ -137,10 +137,10 @@ class HeldStates:
         names = ", ".join(self.lowering.components[c].name for c in components)
         titles = dict.fromkeys(self.lowering.title(c, plural=True) for c in components)
         return ModelError(
-            f"the {' and '.join(titles)} of {names} depend on each other in a circle: in no order does each "
-            "determine one state",
+            f"the {' and '.join(titles)} of {names} depend on each other in a circle: they cannot be solved "
+            "one after the other for one state each",
             place=self.lowering.place(components[0]),
-            remedy="declare one of them as a state, or use an hs.MechanicalSystem",
+            remedy=f"declare one of the {' or '.join(titles)} as a state, or use an hs.MechanicalSystem",
         )
 
     def _match(

@@ -237,7 +237,7 @@ class Lowering:
             if wrong := self._foreign(s):
                 names = ", ".join(sorted(n.name.removeprefix("v_") for n in wrong))
                 raise ModelError(
-                    f"{self.components[c].name}: its {self.title(c)} '{self.written(c)}' uses {names}, which "
+                    f"{self.components[c].name}: the {self.title(c)} '{self.written(c)}' uses {names}, which "
                     "depends on a mode",
                     place=self.place(c),
                     remedy="use only states, inputs, parameters and t in this function",
@@ -307,8 +307,8 @@ class Lowering:
             if effect[c, c] == 0:
                 if not self.components[c].surface.unique:
                     raise ModelError(
-                        f"{declared_name(unknown[c])} does not act on its own {self.title(c)} "
-                        f"'{self.written(c)}' ({self.components[c].name}), so the force cannot keep it at zero",
+                        f"the force {declared_name(unknown[c])} does not act on the {self.title(c)} "
+                        f"'{self.written(c)}' ({self.components[c].name}), and so cannot keep it at zero",
                         place=self.place(c),
                         remedy=f"use {declared_name(unknown[c])} in the derivative of the velocity state",
                     )
@@ -439,7 +439,7 @@ class Lowering:
                     f"modes of {' and '.join(self.components[c].name for c in overriding)} both change the "
                     f"derivative of {state}",
                     place=self.components[overriding[-1]].place,
-                    remedy="change it in the modes of one component only",
+                    remedy=f"change the derivative of {state} in the modes of one component only",
                 )
             free = self.sp.Piecewise((0, self.sp.Symbol("pin", real=True) > 0), (e, True))
             for c in holding or overriding:  # components that hold the same state never do so together

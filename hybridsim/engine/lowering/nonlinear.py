@@ -22,7 +22,7 @@ def refuse_powers(lowering: Lowering, unknown: dict[int, Any], rates: list[Any])
                 raise ModelError(
                     f"surface {component.name}: {name} enters the rate of {declared_name(x)} nonlinearly",
                     place=lowering.place(c),
-                    remedy=f"let {name} enter the rates linearly, or give the rates of both sides (above, below)",
+                    remedy=f"let {name} enter the rates linearly, or declare rates for both sides ('above', 'below')",
                 )
 
 
@@ -32,18 +32,18 @@ def nonlinear(lowering: Lowering, c: int, d: int, others: set[Any]) -> ModelErro
     name, component = declared_name(unknown), lowering.components[c]
     if not component.surface.unique:
         return ModelError(
-            f"{name} enters the motion of {component.name} nonlinearly, so that it cannot be solved for",
+            f"the force {name} enters the motion of {component.name} nonlinearly, so the solver cannot determine it",
             place=lowering.place(c),
             remedy="write the derivative of the velocity so that it is linear in the force",
         )
     partners = sorted({name, *map(declared_name, others)})
     if len(partners) == 1:
         message = f"{name} enters the rate of the switching function '{lowering.written(c)}' nonlinearly"
-        remedy = f"let {name} enter the rates linearly, or give the rates of both sides (above, below)"
+        remedy = f"let {name} enter the rates linearly, or declare rates for both sides ('above', 'below')"
     else:
         message = (
             f"{' and '.join(partners)} multiply each other in the rate of the switching function "
             f"'{lowering.written(c)}': at the intersection of their surfaces the sliding motion is not unique"
         )
-        remedy = "write the rates as sums of terms with one surface each, or the regions as modes with guards"
+        remedy = "write the rates as sums of terms with one surface each, or declare the regions as modes"
     return ModelError(f"surface {component.name}: {message}", place=lowering.place(c), remedy=remedy)

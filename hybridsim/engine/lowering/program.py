@@ -70,7 +70,7 @@ def ordered(items: Iterable[Item]) -> list[Item]:
             loop = sorted({n.removeprefix("v_") for i in waiting for n in assigned(i)})
             raise ModelError(
                 f"the quantities {', '.join(loop)} depend on each other in a circle",
-                remedy="write one of them without the others, or make it a state",
+                remedy="remove one of these dependencies, or declare one of the quantities as a state",
             )
         for item in independent:
             waiting.remove(item)

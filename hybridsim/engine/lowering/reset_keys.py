@@ -19,7 +19,7 @@ def is_added(key: tuple[Any, ...]) -> bool:
 
 
 def amounts_of(reset: Mapping[str, Expression]) -> dict[str, Expression]:
-    """Return the part of a reset that adds."""
+    """Return the part of a reset that adds amounts to variables."""
     return {name: amount for name, amount in reset.items() if isinstance(amount, Increment)}
 
 

@@ -74,7 +74,7 @@ def note(text: str, remedy: str) -> None:
     """Print once, on stderr, why compiled code is not cached."""
     if text not in _noted:
         _noted.add(text)
-        print(f"hybridsim: {text}; compiled code is not kept ({remedy})", file=sys.stderr, flush=True)
+        print(f"hybridsim: {text}; compiled code is not stored ({remedy})", file=sys.stderr, flush=True)
 
 
 @cache

@@ -57,7 +57,7 @@ if ENABLED:
     )
     event = find_part("numba.core", "event", "compiling takes longer, and its time is not measured")
     compiler_lock = find_part(
-        "numba.core", "compiler_lock", "a fork while another thread compiles may wait for ever"
+        "numba.core", "compiler_lock", "a process forked while another thread compiles may wait indefinitely"
     )
     CFunc = find_part("numba.core.ccallback", "CFunc", "each process compiles the largest kernels again")
     _Listener: Any = getattr(event, "Listener", object)

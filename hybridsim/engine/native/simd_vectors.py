@@ -121,7 +121,7 @@ if ENABLED:
 
     @intrinsic
     def all_larger(typingctx: Any, value: Any, other: Any) -> Any:
-        """Return whether each number of one vector is larger than that of the other."""
+        """Return whether each number of a vector is larger than the same lane of the other vector."""
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             bits = builder.bitcast(builder.fcmp_ordered(">", *args), ir.IntType(WIDTH))
@@ -167,7 +167,7 @@ else:
         return np.where(value > other, value, other)
 
     def all_larger(value: Any, other: Any) -> bool:
-        """Return whether each number of one vector is larger than that of the other."""
+        """Return whether each number of a vector is larger than the same lane of the other vector."""
         return bool((value > other).all())
 
     def size(value: Any) -> Any:

@@ -216,7 +216,7 @@ class ArrayLayout:
             self._returned.append(block)
 
     def packed(self, blocks: tuple[np.ndarray, ...], skipped: Sequence[int] | None = None) -> Any:
-        """Pack the arrays for kernels; skipped: rows to omit at the start of each array."""
+        """Pack the arrays for kernels; `skipped`: rows to omit at the start of each array."""
         if not ENABLED:
             arrays = self.rows(blocks)
             first = skipped or self._from_the_first

@@ -63,7 +63,7 @@ def check_ascending(what: str, array: np.ndarray, *, strictly: bool = False) -> 
 
 
 def check_modes(what: str, modes: np.ndarray, counts: Sequence[int], lowest: int = 0) -> None:
-    """Refuse mode numbers (..., C) that the components do not have; counts (C,): number of modes of each."""
+    """Refuse mode numbers (..., C) that the components do not have; `counts` (C,): number of modes per component."""
     if not ((modes >= lowest) & (modes < np.asarray(counts, dtype=np.int64))).all():
         raise ValueError(f"{what} is not a mode of its component")
 

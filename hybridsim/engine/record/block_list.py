@@ -135,12 +135,12 @@ class BlockList(Sequence[Item]):
             return [self[k] for k in range(*i.indices(count))]
         place = i + count if i < 0 else i
         if not 0 <= place < count:
-            raise IndexError(f"{i} is beyond {count} items")
+            raise IndexError(f"item {i} is out of range of {count} items")
         for block in self.blocks:
             if place < len(block):
                 return block[place]
             place -= len(block)
-        raise AssertionError("the blocks hold fewer items than their lengths promise")
+        raise AssertionError("the blocks contain fewer items than the sum of their lengths")
 
 
 class SegmentBlockList(BlockList[Segment]):

@@ -30,7 +30,7 @@ def shift_matrix(count: int) -> np.ndarray:
 
 @cache
 def bernstein_weights(count: int) -> np.ndarray:
-    """Return the matrix from Taylor coefficients at an end to `count` Bernstein coefficients of degree 2 K - 1 there.
+    """Return the matrix from Taylor coefficients at an end to `count` Bernstein coefficients at this end.
 
     At the right end the signs of odd coefficients change, because theta runs backward from there.
     """

@@ -32,7 +32,7 @@ UNLIMITED = Limits()
 
 
 class LimitMonitor:
-    """Compares one run with its limits."""
+    """Checks one run against its limits."""
 
     def __init__(self, limits: Limits, counters: Counters) -> None:
         self.limits, self.counters = limits, counters

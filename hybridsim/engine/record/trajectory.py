@@ -55,7 +55,7 @@ class Trajectory:
         self._mark: tuple[Made, tuple[int, int], tuple[int, int], dict[str, int]] | None = None
 
     def stop_early(self, status: str, why: str, start: float) -> None:
-        """Set status and message of a run that stopped before its end; start: time at which it began."""
+        """Set status and message of a run that stopped before its end; `start`: time at which it began."""
         head = f"{why}; stopped" if why else "interrupted"
         reached = float(self.segments[-1].end) if self.segments else start
         self.status = status

@@ -303,8 +303,8 @@ def find_roots(
         subdivisions += 1
         if subdivisions > _MAX_SUBDIVISIONS:
             raise StepFailure(
-                f"its zeros in one step could not be separated with {subdivisions} subintervals: lower max_step, or "
-                "write the function without a pole, and so that it is defined on both sides of its zero"
+                f"the zeros in one step could not be separated with {subdivisions} subintervals: lower max_step, or "
+                "write the function without poles, and so that the function is defined on both sides of each zero"
             )
         coefficients = np.empty(DEGREE + 1)
         error, largest = _represent(samples, coefficients)

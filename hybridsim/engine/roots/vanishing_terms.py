@@ -68,7 +68,7 @@ def _sizes(u: Any, order: int, h: float) -> tuple[float, float, float]:
 
 @inlined
 def may_end(u: Any, kind: int, size: float) -> bool:
-    """Return whether a step h may have to end for a function of u, by a cheap test; size: sum_k |u_k| h**k."""
+    """Return whether a step h may have to end for a function of u, by a cheap test; `size`: sum_k |u_k| h**k."""
     return kind == ROOT or size - abs(u[0]) > _SEEN
 
 

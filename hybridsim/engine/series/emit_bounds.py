@@ -87,7 +87,7 @@ def bounds_text(
     numbers: Sequence[int],
     guards: int,
 ) -> str:
-    """Return a module with the function bounds_0; numbers: indices of the tape's active guards among all guards.
+    """Return a module with the function bounds_0; `numbers`: indices of the active guards.
 
     Raise TooLong if it would take too long to compile.
     """

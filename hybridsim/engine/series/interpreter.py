@@ -146,7 +146,7 @@ def _slope(V: Any, a: int, b: int, k: int) -> float:
 
 @kernel
 def _leading(op: int, V: Any, a: int, b: int, c: int, out: int) -> None:
-    """Compute order 0 of the operations that follow a differential equation."""
+    """Compute order 0 of operations whose higher orders follow from a differential equation."""
     u = V[a, 0]
     if op == EXP:
         V[out, 0] = math.inf if u >= 709.0 else math.exp(u)  # math.exp raises an exception if it overflows
@@ -174,7 +174,7 @@ def _leading(op: int, V: Any, a: int, b: int, c: int, out: int) -> None:
 
 @kernel
 def _higher(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
-    """Compute order k >= 1 of the operations that follow a differential equation."""
+    """Compute order k >= 1 of operations whose coefficients follow from a differential equation."""
     if op == EXP:
         V[out, k] = _rise(V, a, out, k)
     elif op == SINCOS:

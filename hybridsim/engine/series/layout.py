@@ -10,7 +10,7 @@ SIGNAL_SLOTS = 6  # with d = t - c4: c0 + d (c1 + d (c2 + d c3)), or c5 + c3 sin
 
 @dataclass(frozen=True)
 class Layout:
-    """Offsets into p for a model with these counts."""
+    """Offsets of quantities in the run-time vector p, for a model with these counts."""
 
     parameters: int
     discrete: int

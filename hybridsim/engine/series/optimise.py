@@ -119,7 +119,7 @@ def optimised(
     active: Iterable[int],
     separate: Mapping[int, int] = MappingProxyType({}),
 ) -> OptimisedTape:
-    """Return the optimised form of one mode vector's rows and its active guards; separate: `separate_registers`."""
+    """Return the optimised form of one mode vector's rows and active guards; `separate`: of `separate_registers`."""
     kind = dict.fromkeys(tape["states"], SERIES) | {tape["time"]: LINEAR}
     same: dict[int, int] = {}  # copy -> original register
     constant_rows: list[tuple[int, ...]] = []

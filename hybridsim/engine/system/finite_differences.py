@@ -53,7 +53,7 @@ def _at(function: Any, s: float, moving: float, C: Any, h: float, p: Any, z: Any
 
 @allocating_kernel
 def _noise(function: Any, s: float, t: float, C: Any, p: Any, z: Any, x: Any, low: Any, high: Any) -> Any:
-    """Return the rounding error (m,) of a function's values, including that of its arguments; t: absolute time."""
+    """Return the rounding error (m,) of a function's values, including that of its arguments; `t`: absolute time."""
     m, n = low.shape[0], C.shape[0]
     noise = np.zeros(m)
     x[:] = C[:, 0]

@@ -103,7 +103,7 @@ class Moreau(Integrator):
             ("iterations", self.iterations, self.iterations >= 2, "use a whole number of at least 2"),
         ):
             if not good:
-                raise UsageError(f"{self.name}: {option} is {value!r}", remedy=remedy)
+                raise UsageError(f"{self.name}: `{option}` cannot be {value!r}", remedy=remedy)
 
     def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
         """Run a task with fixed steps."""

@@ -80,10 +80,10 @@ class Rk4Dichotomy(Integrator):
         _one_of(self.name, "friction", self.friction, ("step", "stage"))
         _one_of(self.name, "after_event", self.after_event, ("full-step", "rest-of-step"))
         if not (math.isfinite(self.eps_v) and self.eps_v > 0.0):
-            raise UsageError(f"{self.name}: eps_v is {self.eps_v!r}", remedy="use a positive number")
+            raise UsageError(f"{self.name}: `eps_v` cannot be {self.eps_v!r}", remedy="use a positive number")
         if not (isinstance(self.max_bisections, int) and self.max_bisections >= 1):
             raise UsageError(
-                f"{self.name}: max_bisections is {self.max_bisections!r}",
+                f"{self.name}: `max_bisections` cannot be {self.max_bisections!r}",
                 remedy="use a positive whole number",
             )
 

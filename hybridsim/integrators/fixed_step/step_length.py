@@ -17,7 +17,7 @@ def fixed_step_length(
     """Return the fixed step: the given value, or the forcing's period over the number of steps per period."""
     for label, value in (("step", step), ("period", period), ("steps_per_period", steps_per_period)):
         if value is not None and not (math.isfinite(value) and value > 0.0):
-            raise UsageError(f"{name}: {label} is {value!r}", remedy="use a positive number")
+            raise UsageError(f"{name}: `{label}` cannot be {value!r}", remedy="use a positive number")
     if step is not None:
         return step
     if period is None:
@@ -34,16 +34,16 @@ def refuse_longer(step: float, max_step: float, name: str) -> None:
     """Refuse a fixed step longer than max_step instead of shortening it silently."""
     if step > max_step:
         raise UsageError(
-            f"max_step is {max_step:g}, but the fixed step of {name} is {step:g}",
-            remedy="set step or steps_per_period",
+            f"`max_step` is {max_step:g}, but the fixed step of {name} is {step:g}",
+            remedy="set `step` or `steps_per_period`",
         )
 
 
 def refuse_endless(step: float, span: tuple[float, float], name: str) -> None:
-    """Refuse steps that are so short that the run would not end; they are probably a typing error."""
+    """Refuse steps so short that the run would not end in practice, probably by a typing error."""
     count = abs(span[1] - span[0]) / step
     if count > _MAX_STEPS:
         raise UsageError(
-            f"{name} is {step!r}: a run from {span[0]:g} to {span[1]:g} would take {count:.0e} steps",
-            remedy=f"use a larger step: more than {_MAX_STEPS:.0e} steps would not end",
+            f"`{name}` is {step!r}: a run from {span[0]:g} to {span[1]:g} would take {count:.0e} steps",
+            remedy=f"use a larger step: a run with more than {_MAX_STEPS:.0e} steps would not end",
         )

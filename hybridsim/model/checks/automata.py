@@ -20,7 +20,9 @@ def check_automata(scope: Scope) -> None:
             if state in owner:
                 message = f"components {owner[state]} and {component.name} both set the rate of '{state}'"
                 scope.fail(
-                    component, message, "let one component set a variable, and use it in the other's rate"
+                    component,
+                    message,
+                    "let one component set a variable, and use this variable in the other rate",
                 )
             owner.setdefault(state, component.name)
     for output in scope.model.outputs:
@@ -40,7 +42,9 @@ def _component(scope: Scope, component: Component) -> None:
     if component.initial is None and component.surface is None:
         remedy = f"write initial = true in one of the modes {', '.join(names)}"
         if not (component.place and component.place.file):
-            remedy = f"pass initial={names[0]!r} to hs.Component, or another of the modes {', '.join(names)}"
+            remedy = (
+                f"pass initial={names[0]!r} to hs.Component, or the name of another mode: {', '.join(names)}"
+            )
         scope.fail(component, f"{what} has no initial mode", remedy)
     _surface(scope, component, what, names)
     _limit(scope, component, what, names)
@@ -121,7 +125,11 @@ def _surface(scope: Scope, component: Component, what: str, names: list[str]) ->
         if name not in names:
             scope.unknown(surface, f"{what}, surface: unknown mode", name, names, "modes")
     if set(sides) <= set(names) and not len(set(sides)) == len(names) == len(sides):
-        roles = "two modes (above, hold)" if surface.is_unilateral else "three modes (above, below, hold)"
+        roles = (
+            "two modes ('above', 'hold')"
+            if surface.is_unilateral
+            else "three modes ('above', 'below', 'hold')"
+        )
         message = f"{what}: a surface needs {roles}, but the modes are {', '.join(names)}"
         scope.fail(surface, message, f"declare exactly {len(sides)} modes")
     for mode in component.modes:
@@ -131,8 +139,8 @@ def _surface(scope: Scope, component: Component, what: str, names: list[str]) ->
 
 
 _GUARDS_OF_SURFACE = (
-    "use the switching function as guard of mode above, its negative as guard of mode below, and one guard per side, "
-    "positive while the mode lasts, in mode hold"
+    "use the switching function as guard of mode 'above' and its negative as guard of mode 'below'; in mode 'hold' use "
+    "one guard for each side, which is positive while the mode lasts"
 )
 
 

@@ -59,8 +59,10 @@ def check_law(scope: Scope, law: FrictionLaw) -> None:
             scope.need_own(value, f"{what}, parameter {name}", parameters)
             used |= value.names
     for name in sorted(parameters - used - {law.copies}):
-        where = "neither in slip nor in stick" if law.is_set_valued else "nowhere in the law"
-        scope.fail(law, f"{what}: the parameter '{name}' is used {where}", "use it or remove it")
+        where = "neither in 'slip' nor in 'stick'" if law.is_set_valued else "nowhere in the law"
+        scope.fail(
+            law, f"{what}: the parameter '{name}' is used {where}", f"use or remove the parameter '{name}'"
+        )
     _form(scope, law, what)
 
 
@@ -90,14 +92,14 @@ def _form(scope: Scope, law: FrictionLaw, what: str) -> None:
                 scope.fail(
                     table,
                     f"{what}, table {table.name}: the point {table.at[0]:g} is negative, but v is the absolute speed",
-                    "start the table at 0; for a law that depends on the direction add slip_backward with a table",
+                    "start the table at 0; for a law that depends on the direction add 'slip_backward' with a table",
                 )
         for field in ("states", "definitions", "modes", "copies"):
             if getattr(law, field):
                 scope.fail(
                     law,
-                    f"{what}: a law with slip and stick has no {field}",
-                    "write force instead of slip and stick",
+                    f"{what}: a law with 'slip' and 'stick' cannot have '{field}'",
+                    "write 'force' instead of 'slip' and 'stick'",
                 )
         return
     states = [state.name for state in law.states]
@@ -113,7 +115,7 @@ def _form(scope: Scope, law: FrictionLaw, what: str) -> None:
     if law.copies is not None and law.copies not in law.parameters:
         scope.fail(
             law,
-            f"{what}: copies is '{law.copies}', which is not a parameter",
+            f"{what}: 'copies' is '{law.copies}', which is not a parameter",
             f'write parameters = ["{law.copies}", ...]; the contact then sets the number of copies',
         )
 

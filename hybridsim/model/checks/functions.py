@@ -20,34 +20,34 @@ def check_functions(scope: Scope) -> None:
     if model.flow is None:
         for part, what, expr in _uses(scope):
             if isinstance(expr, FunctionExpression):
-                remedy = "write it as an expression, or define the rates by a function too: Model(flow=...)"
+                remedy = "write an expression, or define the rates by a function too: Model(flow=...)"
                 scope.fail(
                     part, f"{what} is the Python function {expr}, but the rates are expressions", remedy
                 )
         for component, mode in modes:
             if mode.flow is not None:
-                message = f"mode {component.name}.{mode.name} has a flow, but the model has none"
+                message = f"mode {component.name}.{mode.name} has a 'flow', but the model has no 'flow'"
                 scope.fail(
-                    mode, message, "add a flow to the model, or write the rates of the mode as der = {...}"
+                    mode, message, "add a 'flow' to the model, or write the rates of the mode as der = {...}"
                 )
         return
     for field in _NEED_EXPRESSIONS:
         if getattr(model, field):
-            message = f"a model whose rates are a Python function cannot have {field}"
+            message = f"a model whose rates are a Python function cannot have '{field}'"
             scope.fail(
-                Declared(), message, f"for {field}, write the rate of each state as an expression (der)"
+                Declared(), message, f"to use '{field}', write the rate of each state as an expression (der)"
             )
     for state in model.states:
         if state.der.text not in ("0", "0.0"):
-            message = f"state {state.name} has der = '{state.der}', but the function flow defines the rates"
-            scope.fail(state, message, "remove der, or remove flow")
+            message = f"state {state.name} has der = '{state.der}', but the function 'flow' defines the rates"
+            scope.fail(state, message, "remove 'der', or remove 'flow'")
     for component, mode in modes:
         if mode.der or mode.set or component.surface:
             message = f"component {component.name}: 'der', 'set' and surfaces need rates that are expressions"
-            scope.fail(mode, message, "define the rates of the mode by flow")
+            scope.fail(mode, message, "define the rates of the mode by 'flow'")
     if len({component.name for component, mode in modes if mode.flow is not None}) > 1:
-        message = "modes of several components have a flow, so the rates are ambiguous"
-        scope.fail(Declared(), message, "define flow in the modes of one component only")
+        message = "modes of several components have a 'flow', so the rates are ambiguous"
+        scope.fail(Declared(), message, "define 'flow' in the modes of one component only")
     for part, what, expr in _uses(scope):
         if not isinstance(expr, FunctionExpression) and not expr.is_constant:
             message = f"{what} is the expression '{expr}', but the rates are a Python function"

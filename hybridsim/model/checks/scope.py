@@ -168,5 +168,5 @@ class Scope:
 def _instead(output: Output) -> str:
     """Return the remedy for an expression that uses an output."""
     if output.modes:
-        return f"write {output.expr.text} instead, since the output depends on the mode"
-    return f"declare {output.name} under [definitions] (definitions=) instead; sol.output returns definitions too"
+        return f"write '{output.expr.text}' instead, since the output depends on the mode"
+    return f"declare '{output.name}' under [definitions] (definitions=) instead; sol.output returns definitions too"

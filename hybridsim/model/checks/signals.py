@@ -45,15 +45,21 @@ def _schedule(scope: Scope, schedule: Schedule) -> None:
     check_reset(scope, schedule, what, schedule.reset)
     if schedule.times and (schedule.start or schedule.period):
         scope.fail(
-            schedule, f"{what} has both times and start or period", "use either times, or start and period"
+            schedule,
+            f"{what} has 'times' together with 'start' or 'period'",
+            "use either 'times', or both 'start' and 'period'",
         )
     if not schedule.times and schedule.start is None:
-        scope.fail(schedule, f"{what} has no times", "set times = [...], or start and period")
+        scope.fail(
+            schedule,
+            f"{what} has neither 'times' nor 'start'",
+            "set either 'times', or both 'start' and 'period'",
+        )
     if schedule.count is not None:
         if schedule.period is None:
-            scope.fail(schedule, f"{what} has count = {schedule.count} but no period", "set period")
+            scope.fail(schedule, f"{what} has count = {schedule.count} but no 'period'", "set 'period'")
         if schedule.count < 1:
-            scope.fail(schedule, f"{what}: count cannot be {schedule.count}", "use a whole number >= 1")
+            scope.fail(schedule, f"{what}: 'count' cannot be {schedule.count}", "use a whole number >= 1")
 
 
 def _input(scope: Scope, signal: Input) -> None:
@@ -65,14 +71,14 @@ def _input(scope: Scope, signal: Input) -> None:
         for field in (*REQUIRED[kind], *OPTIONAL[kind]):
             has_field = getattr(signal, field) not in (None, ())
             if has_field and field not in (*REQUIRED[signal.kind], *OPTIONAL[signal.kind]):
-                scope.fail(signal, f"{what} of kind {signal.kind} cannot have '{field}'", f"remove {field}")
+                scope.fail(signal, f"{what} of kind {signal.kind} cannot have '{field}'", f"remove '{field}'")
     for field in REQUIRED[signal.kind]:
         if getattr(signal, field) in (None, ()):
-            scope.fail(signal, f"{what} of kind {signal.kind} needs '{field}'", f"set {field}")
+            scope.fail(signal, f"{what} of kind {signal.kind} needs '{field}'", f"set '{field}'")
     if signal.shape is not None and signal.shape not in SHAPES:
         scope.unknown(signal, f"{what}: unknown shape", signal.shape, SHAPES, "shapes")
     if signal.duty is not None and signal.shape != "square":
-        scope.fail(signal, f"{what}: shape {signal.shape} cannot have 'duty'", "remove duty")
+        scope.fail(signal, f"{what}: shape '{signal.shape}' cannot have 'duty'", "remove 'duty'")
     if signal.interpolation is not None and signal.interpolation not in INTERPOLATIONS:
         remedy = nearest(signal.interpolation, INTERPOLATIONS, kind="interpolations")
         scope.fail(signal, f"{what}: unknown interpolation '{signal.interpolation}'", remedy)
@@ -85,15 +91,15 @@ def _table(scope: Scope, signal: Input, what: str) -> None:
     if len(times) != len(values):
         scope.fail(
             signal,
-            f"{what} has {len(times)} times but {len(values)} values",
-            "use the same number of times and values",
+            f"{what}: 'times' has {len(times)} numbers, but 'values' has {len(values)}",
+            "use one value for each time",
         )
     if len(times) < 2:
         scope.fail(signal, f"{what} has {len(times)} points", "a table needs at least two points")
     for name, numbers in (("times", times), ("values", values)):
         for index, number in enumerate(numbers):
             if not math.isfinite(number):
-                scope.fail(signal, f"{what}: {name}[{index}] cannot be {number}", "use finite numbers")
+                scope.fail(signal, f"{what}: '{name}[{index}]' cannot be {number}", "use finite numbers")
                 return
     for index in range(1, len(times)):
         jump = times[index] == times[index - 1]

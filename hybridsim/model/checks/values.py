@@ -35,7 +35,7 @@ def check_values(scope: Scope) -> None:
         _value(scope, discrete.start, values)
     for state in model.states:
         _value(scope, state.start, values)
-        _size(scope, state, f"state {state.name}: nominal", state.nominal)
+        _size(scope, state, f"state {state.name}: 'nominal'", state.nominal)
     for schedule in model.schedules:
         for time in (*schedule.times, *([schedule.start] if schedule.start else [])):
             _value(scope, time, values)
@@ -96,7 +96,7 @@ def _positive(
     value = None if expr is None else _value(scope, expr, values)
     if expr is not None and value is not None and value <= 0:
         shown = "" if expr.is_constant else f" ({expr.text})"
-        scope.fail(part, f"{what}: {field} cannot be {value:g}{shown}", "it must be above zero")
+        scope.fail(part, f"{what}: '{field}' cannot be {value:g}{shown}", "use a value above zero")
 
 
 def _input(scope: Scope, signal: Input, values: dict[str, float]) -> None:
@@ -107,7 +107,7 @@ def _input(scope: Scope, signal: Input, values: dict[str, float]) -> None:
             continue
         value = _value(scope, expr, values)
         if field == "duty" and value is not None and not 0 < value < 1:
-            scope.fail(signal, f"{what}: duty cannot be {value:g}", "it must be between 0 and 1")
+            scope.fail(signal, f"{what}: 'duty' cannot be {value:g}", "use a value between 0 and 1")
 
 
 def _constant_definitions(scope: Scope, values: dict[str, float]) -> dict[str, float]:
@@ -126,13 +126,15 @@ def _contact(scope: Scope, contact: Contact, values: dict[str, float]) -> None:
     """Check constant loads and constant friction forces of a contact."""
     what = f"contact {contact.name}"
     for name, size in contact.nominal.items():
-        _size(scope, contact, f"{what}: nominal of {name}", size)
+        _size(scope, contact, f"{what}: 'nominal' of {name}", size)
     if contact.normal.names <= values.keys():
         load = _value(scope, contact.normal, values)
         if load is not None and load < 0:
             shown = "" if contact.normal.is_constant else f" ({contact.normal.text})"
             scope.fail(
-                contact, f"{what}: the normal load cannot be {load:g}{shown}", "it must not be negative"
+                contact,
+                f"{what}: the normal load cannot be {load:g}{shown}",
+                "use a load that is not negative",
             )
             return
     if not contact.law.is_set_valued:

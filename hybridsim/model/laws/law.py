@@ -97,7 +97,7 @@ class FrictionLaw(Declared):
             names = as_tuple(parameters)
             if not all(isinstance(name, str) for name in names):
                 raise self._fault(
-                    f"parameters cannot be {parameters!r}",
+                    f"`parameters` cannot be {parameters!r}",
                     "use a list of names, or a dict of names and defaults",
                 )
             object.__setattr__(self, "parameters", dict.fromkeys(names))
@@ -110,12 +110,13 @@ class FrictionLaw(Declared):
         forms = [name for name in ("slip", "stick") if getattr(self, name) is not None]
         if self.force is None and len(forms) < 2:
             raise self._fault(
-                "the law has neither slip and stick nor force",
-                "set slip and stick (magnitudes), or force (with its sign)",
+                "the law needs either both `slip` and `stick`, or `force`",
+                "set `slip` and `stick` (magnitudes), or `force` (with its sign)",
             )
         if self.force is not None and forms:
             raise self._fault(
-                "the law has force together with slip or stick", "set either slip and stick, or force"
+                "the law has `force` together with `slip` or `stick`",
+                "set either both `slip` and `stick`, or `force`",
             )
 
     @property

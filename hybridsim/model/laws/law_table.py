@@ -53,14 +53,16 @@ class LawTable(Declared):
         self._expressions("over")
         if len(self.at) != len(self.values):
             raise self._fault(
-                f"at has {len(self.at)} numbers, but values has {len(self.values)}",
-                "use one value for each number in at",
+                f"`at` has {len(self.at)} numbers, but `values` has {len(self.values)}",
+                "use one value for each number in `at`",
             )
         if len(self.at) < 2:
             raise self._fault(f"the table has {len(self.at)} points", "use at least two points")
         for first, second in zip(self.at, self.at[1:], strict=False):
             if not first < second:
-                raise self._fault(f"the argument {second:g} follows {first:g}", "sort the arguments")
+                raise self._fault(
+                    f"`at` is not ascending: {second:g} follows {first:g}", "use ascending numbers in `at`"
+                )
 
     def value(self, argument: float) -> float:
         """Return the value of the function at one argument."""
@@ -105,7 +107,7 @@ class LawTable(Declared):
         return [first, *inner, last]
 
     def component(self, name: str, argument: Expression, from_zero: bool) -> Corner:
-        """Return the automaton of the pieces, which sets the variable `name` and is continuous.
+        """Return a continuous automaton with one mode for each piece, which sets the variable `name`.
 
         Parameters
         ----------

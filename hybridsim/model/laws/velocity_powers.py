@@ -173,7 +173,9 @@ def _vanishes(node: ast.expr, family: Family, numbers: Mapping[str, float], mean
 def _rounded(base: str, power: float | None, is_force: bool) -> str:
     """Return the remedy: replace the power by a smooth function that contains a small speed b."""
     if power is None or power < 0.0 or not base.isidentifier():
-        return "smooth it with a small speed b, such as (v**2 + b**2)**0.75 - b**1.5 for abs(v)**1.5"
+        return (
+            "use a smooth function with a small speed b, such as (v**2 + b**2)**0.75 - b**1.5 for abs(v)**1.5"
+        )
     if is_force:
-        return f"replace it by ({base}**2 + b**2)**{power / 2:g} - b**{power:g} with a small speed b"
-    return f"replace it by {base}*({base}**2 + b**2)**{(power - 1) / 2:g} with a small speed b"
+        return f"replace the power by ({base}**2 + b**2)**{power / 2:g} - b**{power:g} with a small speed b"
+    return f"replace the power by {base}*({base}**2 + b**2)**{(power - 1) / 2:g} with a small speed b"

@@ -176,8 +176,8 @@ class Surface(Declared):
         self._expressions("function", "jump_above", "jump_below", "restitution")
         if (self.below is None) == (self.restitution is None):
             raise self._fault(
-                f"below is {self.below!r}, restitution is {self.restitution!r}: exactly one must be set",
-                "set either below or restitution",
+                f"`below` is {self.below!r} and `restitution` is {self.restitution!r}, but exactly one is needed",
+                "set either `below` or `restitution`",
             )
 
     @property
@@ -231,16 +231,16 @@ class Component(Declared):
         initial_mode: object = self.initial
         if isinstance(initial_mode, Mode):  # a second mode passed instead of a list
             remedy = "pass several modes as a list, [hs.Mode(...), hs.Mode(...)]"
-            raise self._fault(f"initial is the mode {initial_mode.name!r}", remedy)
+            raise self._fault(f"`initial` cannot be the mode object {initial_mode.name!r}", remedy)
         self._texts("name", "initial")
         self._parts("modes", Mode)
         limit: object = self.limit
         if isinstance(limit, str):
             object.__setattr__(self, "limit", Choice(limit, place=self.place))
         elif not (limit is None or isinstance(limit, Choice)):
-            raise self._fault(f"limit cannot be {limit!r}", "use the name of a mode, or hs.Choice(...)")
+            raise self._fault(f"`limit` cannot be {limit!r}", "use the name of a mode, or hs.Choice(...)")
         if not (self.surface is None or isinstance(self.surface, Surface)):
-            raise self._fault(f"surface cannot be {self.surface!r}", "use hs.Surface(...)")
+            raise self._fault(f"`surface` cannot be {self.surface!r}", "use hs.Surface(...)")
         if self.initial is None and self.surface is None and len(self.modes) == 1:
             object.__setattr__(self, "initial", self.modes[0].name)
 

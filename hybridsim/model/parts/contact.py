@@ -77,7 +77,7 @@ class Contact(Declared):
 
             object.__setattr__(self, "law", load_law(law))
         elif not isinstance(law, FrictionLaw):
-            raise self._fault(f"law cannot be {law!r}", "use hs.FrictionLaw(...), or the name of a law")
+            raise self._fault(f"`law` cannot be {law!r}", "use hs.FrictionLaw(...), or the name of a law")
 
     def component(self, constants: Collection[str] = ()) -> Component:
         """Return the automaton with the contact's name; for a set-valued law it has three modes.
@@ -138,7 +138,7 @@ class Contact(Declared):
         if varies and not self.opens:
             message = (
                 f"normal load of contact {self.name} became negative: {self.normal.text} < 0; if the contact can lift "
-                "off, set opens = true, otherwise correct the sign of the load"
+                "off, set `opens = true`, otherwise correct the sign of the load"
             )
             loaded = (Guard("normal", self.normal, fatal=message, place=self.place),)
         if self.law.is_set_valued:

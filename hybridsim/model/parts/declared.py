@@ -28,7 +28,7 @@ class _Refusing(type):
         place = keywords.get("place")
         if not (place is None or isinstance(place, Place)):
             raise UsageError(
-                f"{cls.__name__}: place cannot be {place!r}", remedy="use hs.Place(...), or omit place"
+                f"{cls.__name__}: `place` cannot be {place!r}", remedy="use hs.Place(...), or omit `place`"
             )
         try:
             return super().__call__(*args, **keywords)
@@ -55,7 +55,7 @@ class Declared(metaclass=_Refusing):
             value = getattr(self, name)
             if not (isinstance(value, str) or (value is None and self._has_default(name))):
                 remedy = "use " + (" or ".join(map(repr, known)) if known else "a string")
-                raise self._fault(f"{name} cannot be {value!r}", remedy)
+                raise self._fault(f"`{name}` cannot be {value!r}", remedy)
 
     def _expressions(self, *fields: str, functions: bool = False) -> None:
         """Parse the fields from strings or numbers; None is kept if it is the default.
@@ -67,7 +67,7 @@ class Declared(metaclass=_Refusing):
             if value is not None:
                 object.__setattr__(self, name, self._parsed(value, name, functions))
             elif not self._has_default(name):
-                raise self._fault(f"{name} cannot be None", "use a number or an expression")
+                raise self._fault(f"`{name}` cannot be None", "use a number or an expression")
 
     def _parsed(self, value: Any, field: str, functions: bool, is_reset: bool = False) -> Expression:
         if functions and callable(value):
@@ -86,7 +86,7 @@ class Declared(metaclass=_Refusing):
         for name in fields:
             items = getattr(self, name)
             if not isinstance(items, Mapping) or not all(isinstance(key, str) for key in items):
-                raise self._fault(f"{name} cannot be {items!r}", "use a dict of names and expressions")
+                raise self._fault(f"`{name}` cannot be {items!r}", "use a dict of names and expressions")
             parsed = {
                 key: None if v is None else self._parsed(v, f"{name}[{key!r}]", functions, name == "reset")
                 for key, v in items.items()
@@ -98,14 +98,14 @@ class Declared(metaclass=_Refusing):
         for name in fields:
             items = getattr(self, name)
             if not isinstance(items, Mapping) or not all(isinstance(key, str) for key in items):
-                raise self._fault(f"{name} cannot be {items!r}", "use a dict of names and numbers")
+                raise self._fault(f"`{name}` cannot be {items!r}", "use a dict of names and numbers")
             sizes = {key: self._real(f"{name}[{key!r}]", value) for key, value in items.items()}
             object.__setattr__(self, name, FrozenMap(sizes))
 
     def _real(self, what: str, value: object) -> float:
         """Return a real number as float; numbers beyond the range of floats become infinite."""
         if not isinstance(value, Real):
-            raise self._fault(f"{what} cannot be {value!r}", "use a number, or omit it")
+            raise self._fault(f"`{what}` cannot be {value!r}", f"use a number, or omit `{what}`")
         try:
             return float(value)
         except OverflowError:
@@ -116,14 +116,14 @@ class Declared(metaclass=_Refusing):
         for name in fields:
             value = getattr(self, name)
             if not (value is None or callable(value)):
-                raise self._fault(f"{name} cannot be {value!r}", "use a Python function of (t, x, p)")
+                raise self._fault(f"`{name}` cannot be {value!r}", "use a Python function of (t, x, p)")
 
     def _flags(self, *fields: str) -> None:
         """Check that the fields are bools."""
         for name in fields:
             value = getattr(self, name)
             if type(value).__name__ != "bool":  # includes numpy.bool
-                raise self._fault(f"{name} cannot be {value!r}", "use True or False")
+                raise self._fault(f"`{name}` cannot be {value!r}", "use True or False")
             object.__setattr__(self, name, bool(value))
 
     def _parts(self, field: str, kind: type[Declared]) -> None:
@@ -131,7 +131,7 @@ class Declared(metaclass=_Refusing):
         parts = as_tuple(getattr(self, field))
         for part in parts:
             if not isinstance(part, kind):
-                raise self._fault(f"{field} contains {part!r}", f"use hs.{kind.__name__}(...) objects")
+                raise self._fault(f"`{field}` contains {part!r}", f"use hs.{kind.__name__}(...) objects")
         object.__setattr__(self, field, parts)
 
     def _numbers(self, *fields: str) -> None:
@@ -141,7 +141,7 @@ class Declared(metaclass=_Refusing):
             try:
                 object.__setattr__(self, name, tuple(_as_double(number) for number in as_tuple(entries)))
             except (TypeError, ValueError, OverflowError):
-                raise self._fault(f"{name} cannot be {entries!r}", "use numbers") from None
+                raise self._fault(f"`{name}` cannot be {entries!r}", "use numbers") from None
 
     def _has_default(self, field: str) -> bool:
         return self.__dataclass_fields__[field].default is not MISSING

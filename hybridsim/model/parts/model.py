@@ -137,7 +137,7 @@ class Model(Declared):
             definitions = tuple((name, parse(text)) for name, text in pairs)
         except (TypeError, ValueError):
             remedy = "use a dict of names and expressions, or a list of pairs"
-            raise self._fault(f"definitions cannot be {self.definitions!r}", remedy) from None
+            raise self._fault(f"`definitions` cannot be {self.definitions!r}", remedy) from None
         object.__setattr__(self, "definitions", definitions)
         object.__setattr__(self, "states", tuple(self._with_those_of_laws()))
 
@@ -162,7 +162,7 @@ class Model(Declared):
     def _state(self, name: str, start: Any) -> State:
         if self.flow is None:
             remedy = "use hs.State(name, start, der) objects, or define all rates by a function flow(t, x, p)"
-            raise self._fault(f"states: {name} has no rate", remedy)
+            raise self._fault(f"the state '{name}' has no rate", remedy)
         return State(name, start, parse(0))
 
     def _named(self, field: str, kind: Callable[[str, Any], Any]) -> None:
@@ -225,11 +225,13 @@ class Model(Declared):
                 continue
             argument = contact.arguments.get(name, contact.law.parameters[name])
             if argument is not None and argument.text in names:
-                return f"contact {contact.name} has {name} = {argument.text}; change {argument.text} instead"
+                return (
+                    f"contact {contact.name} has '{name} = {argument.text}'; change '{argument.text}' instead"
+                )
             text = "its default" if argument is None else argument.text
             return (
-                f"{name} is an argument of the law of contact {contact.name} with the value {text}; declare a "
-                f'parameter, {name} = {text} under [parameters], and write law = {{ ..., {name} = "{name}" }}'
+                f"'{name}' is an argument of the law of contact {contact.name} with the value {text}; declare a "
+                f'parameter, {name} = {text}, under [parameters], and write law = {{ ..., {name} = "{name}" }}'
             )
         return nearest(name, [*names, *others], kind="parameters and states" if others else "parameters")
 

@@ -66,5 +66,5 @@ class Schedule(Declared):
         self._flags("terminate")
         count: object = self.count
         if not (count is None or isinstance(count, Integral)) or isinstance(count, bool):
-            raise self._fault(f"count cannot be {count!r}", "use a whole number >= 1, or omit count")
+            raise self._fault(f"`count` cannot be {count!r}", "use a whole number >= 1, or omit `count`")
         self._maps("reset", functions=True)

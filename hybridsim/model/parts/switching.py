@@ -85,7 +85,8 @@ class SwitchingSurface(Declared):
         if single := sorted(set(self.above) ^ set(self.below)):
             side, other = ("above", "below") if single[0] in self.above else ("below", "above")
             raise self._fault(
-                f"'{single[0]}' has a value {side} but not {other}", f"set {single[0]} in {other} too"
+                f"'{single[0]}' is set in `{side}` but not in `{other}`",
+                f"set '{single[0]}' in `{other}` too",
             )
 
     def component(self) -> Component:

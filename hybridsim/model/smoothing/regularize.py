@@ -38,7 +38,7 @@ def regularized(model: Model, kind: str, v0: Expression | str | float) -> Model:
     changed = replace(model, parameters=(*model.parameters, width))
     value = changed.parameter_values()[name]
     if not value > 0.0:
-        raise UsageError(f"v0 cannot be {value!r}", remedy="use a velocity above zero")
+        raise UsageError(f"`v0` cannot be {value!r}", remedy="use a velocity above zero")
     build: Callable[[Model, Contact, str], Component]
     build = _karnopp if kind == "karnopp" else lambda m, contact, w: _smooth(m, contact, w, kind)
     components = tuple(

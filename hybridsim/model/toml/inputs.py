@@ -44,7 +44,7 @@ def _numbers(table: Table, key: str) -> tuple[float, ...]:
     numbers = entry if isinstance(entry, list) else [entry]
     for index, value in enumerate(numbers):
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            table.fail(f"'{key}' contains {value!r}", "it must be a list of numbers", key, index)
+            table.fail(f"'{key}' contains {value!r}", "use a list of numbers", key, index)
             return ()
     return tuple(float(value) for value in numbers)
 

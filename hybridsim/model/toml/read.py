@@ -57,7 +57,7 @@ def open_text(text: str, path: str | None, kind: str) -> Table:
     except tomllib.TOMLDecodeError as fault:
         raise _not_toml(fault, text, path) from None
     except (ValueError, RecursionError) as fault:
-        reason = "it is nested too deeply" if isinstance(fault, RecursionError) else str(fault)
+        reason = "the text is nested too deeply" if isinstance(fault, RecursionError) else str(fault)
         raise ModelError(f"invalid TOML: {reason}", place=Place(path), remedy="simplify the file") from None
     return Table(source, (), data, kind)
 
@@ -160,7 +160,10 @@ def _surfaces(root: Table) -> Iterable[SwitchingSurface]:
         for one in single:
             declared_side, side = ("above", "below") if one in above else ("below", "above")
             table.fail(
-                f"'{one}' has no value {side}", f"write {side} = {{ {one} = ... }}", declared_side, one
+                f"'{one}' is set in '{declared_side}' but not in '{side}'",
+                f"write {side} = {{ {one} = ... }}",
+                declared_side,
+                one,
             )
         if not single:
             yield SwitchingSurface(name, expr, above, below, place=table.place)

@@ -71,7 +71,7 @@ class Table:
         if value is None:
             return None
         if isinstance(value, bool) or not isinstance(value, int):
-            self.fail(f"'{key}' cannot be {_shown(value)}", "it must be a whole number", key)
+            self.fail(f"'{key}' cannot be {_shown(value)}", "use a whole number", key)
             return None
         return value
 
@@ -80,7 +80,7 @@ class Table:
         if value is None:
             return None
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            self.fail(f"'{key}' cannot be {_shown(value)}", "it must be a number", key)
+            self.fail(f"'{key}' cannot be {_shown(value)}", "use a number", key)
             return None
         return _real(value)
 
@@ -95,7 +95,7 @@ class Table:
         found = self._typed(key, list, "a list of numbers", [])
         wrong = [value for value in found if isinstance(value, bool) or not isinstance(value, (int, float))]
         if wrong:
-            self.fail(f"'{key}' contains {_shown(wrong[0])}", "it must be a list of numbers", key)
+            self.fail(f"'{key}' contains {_shown(wrong[0])}", "use a list of numbers", key)
             return ()
         return tuple(_real(value) for value in found)
 
@@ -147,7 +147,7 @@ class Table:
         """Return the sub-table at a key, or None after reporting a wrong type."""
         if not isinstance(value, dict):
             if shorthand is None or isinstance(value, list):
-                self.fail(f"{kind} cannot be {_shown(value)}", "it must be a table { ... }", *keys)
+                self.fail(f"{kind} cannot be {_shown(value)}", "use a table { ... }", *keys)
                 return None
             value = {shorthand: value}
         return Table(self.source, (*self.path, *keys), value, kind)
@@ -155,7 +155,7 @@ class Table:
     def _typed(self, key: str, kind: type, required_kind: str, default: Any) -> Any:
         value = self.data.get(key, default)
         if not isinstance(value, kind):
-            self.fail(f"'{key}' cannot be {_shown(value)}", f"it must be {required_kind}", key)
+            self.fail(f"'{key}' cannot be {_shown(value)}", f"use {required_kind}", key)
             return default
         return value
 

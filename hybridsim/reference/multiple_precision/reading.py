@@ -99,7 +99,10 @@ class Reading:
         if name not in self._names:
             if name in self._open:
                 circle = " -> ".join([*self._open[self._open.index(name) :], name])
-                raise UsageError(f"circular definition of quantities: {circle}", remedy="break the circle")
+                raise UsageError(
+                    f"circular definition of quantities: {circle}",
+                    remedy="remove one dependency of this circle",
+                )
             self._open.append(name)
             self._names[name] = self.node(self._texts[name])
             self._open.pop()

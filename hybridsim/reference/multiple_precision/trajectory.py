@@ -59,7 +59,9 @@ def multiple_precision_trajectory(
     from hybridsim.reference.multiple_precision.run import Run
 
     if not _MIN_DIGITS <= digits <= _MAX_DIGITS:
-        raise UsageError(f"digits is {digits!r}", remedy=f"give a number from {_MIN_DIGITS} to {_MAX_DIGITS}")
+        raise UsageError(
+            f"`digits` cannot be {digits!r}", remedy=f"use a number from {_MIN_DIGITS} to {_MAX_DIGITS}"
+        )
     if model.surfaces:
         names = ", ".join(surface.name for surface in model.surfaces)
         raise UsageError(
@@ -74,7 +76,7 @@ def multiple_precision_trajectory(
         )
     if not t_span[1] > t_span[0]:
         raise UsageError(
-            f"t_span is {t_span}, but the multiple-precision run goes forward only", remedy="give t1 > t0"
+            f"`t_span` is {t_span}, but the multiple-precision run goes forward only", remedy="use t1 > t0"
         )
     model = smoothed(model.validate())
     if names := ", ".join(c.name for c in model.components if c.surface and c.surface.unique):

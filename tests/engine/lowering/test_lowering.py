@@ -244,12 +244,12 @@ CONTACT = Contact("f", velocity="v", normal="1", law=STICTION)
 
 def test_a_force_that_enters_nonlinearly_is_refused() -> None:
     message = refusal(states=(State("x", 0, "v"), State("v", 0, "-f - f**3")), contacts=(CONTACT,))
-    assert "f enters the motion of f nonlinearly" in message
+    assert "the force f enters the motion of f nonlinearly" in message
 
 
 def test_a_force_that_does_not_act_on_its_velocity_is_refused() -> None:
     message = refusal(states=(State("x", 0, "v - f"), State("v", 0, "-x")), contacts=(CONTACT,))
-    assert "f does not act on its own relative velocity" in message
+    assert "the force f does not act on the relative velocity" in message
 
 
 def test_a_normal_load_that_uses_the_force_it_limits_is_a_circle() -> None:

@@ -20,9 +20,9 @@ CONTACT = '[contacts.{name}]\nvelocity = "{velocity}"\nnormal = "1"\nlaw = {{ na
 @pytest.mark.parametrize(
     ("force", "velocity", "says"),
     [
-        ("-x", "v", "f does not act on its own relative velocity 'v'"),
+        ("-x", "v", "the force f does not act on the relative velocity 'v'"),
         ("-x - f**2", "v", "f enters the motion of f nonlinearly"),
-        ("-x - f", "v*x", r"f: its relative velocity 'v\*x' is not linear in any state"),
+        ("-x - f", "v*x", r"f: the relative velocity 'v\*x' is not linear in any state"),
     ],
 )
 def test_a_contact_that_cannot_hold(force: str, velocity: str, says: str) -> None:

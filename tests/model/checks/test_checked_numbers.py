@@ -23,13 +23,13 @@ def sliding(law: hs.FrictionLaw) -> hs.Model:
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: hs.State("x", 0, 1, place="here"), "State: place cannot be 'here'"),
-        (lambda: hs.Contact("f", "v", 1, "coulomb", {"mu": 1}, opens="yes"), "opens cannot be 'yes'"),
-        (lambda: hs.Contact("f", "v", 1, "coulomb", {"mu": 1}, nominal=3), "nominal cannot be 3"),
-        (lambda: hs.Schedule("s", period=1, count=2.5), "count cannot be 2.5"),
-        (lambda: hs.Schedule("s", times=[1], terminate=1), "terminate cannot be 1"),
-        (lambda: hs.FrictionLaw("a", slip="mu", stick="mu", parameters=[["mu"]]), "parameters cannot be"),
-        (lambda: hs.LawTable("mu", at=[0, 10**400], values=[1, 2]), "at cannot be"),
+        (lambda: hs.State("x", 0, 1, place="here"), "State: `place` cannot be 'here'"),
+        (lambda: hs.Contact("f", "v", 1, "coulomb", {"mu": 1}, opens="yes"), "`opens` cannot be 'yes'"),
+        (lambda: hs.Contact("f", "v", 1, "coulomb", {"mu": 1}, nominal=3), "`nominal` cannot be 3"),
+        (lambda: hs.Schedule("s", period=1, count=2.5), "`count` cannot be 2.5"),
+        (lambda: hs.Schedule("s", times=[1], terminate=1), "`terminate` cannot be 1"),
+        (lambda: hs.FrictionLaw("a", slip="mu", stick="mu", parameters=[["mu"]]), "`parameters` cannot be"),
+        (lambda: hs.LawTable("mu", at=[0, 10**400], values=[1, 2]), "`at` cannot be"),
         (lambda: hs.Harmonic(math.nan), "Harmonic: omega is nan"),
         (lambda: hs.Harmonic(1.0, sin=math.inf), "Harmonic: sin is inf"),
         (lambda: hs.Harmonic(1.0, cos=1j), "Harmonic: cos is 1j"),
@@ -49,7 +49,7 @@ def test_a_wrong_value_is_named(make: Callable[[], Any], says: str) -> None:
 
 @pytest.mark.parametrize("nominal", [0, -1, math.nan, math.inf, 10**400])
 def test_a_size_that_is_not_above_zero_is_refused_with_the_model(nominal: float) -> None:
-    with pytest.raises(hs.ModelError, match="nominal cannot be"):
+    with pytest.raises(hs.ModelError, match="'nominal' cannot be"):
         hs.Model("m", states=[hs.State("x", 0, 1, nominal=nominal)]).validate()
 
 

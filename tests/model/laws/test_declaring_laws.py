@@ -32,17 +32,17 @@ WRONG = {
     "both forms": (
         'copies = "n"',
         'copies = "n"\nslip = "mu*N"',
-        "has force together with slip or stick",
+        "has `force` together with `slip` or `stick`",
         10,
     ),
     "foreign name": ("stiffness*z*worn", "stiffness*z*x", "unknown name 'x'", 16),
     "unknown key": ("copies", "copied", "did you mean 'copies'", 12),
     "no such copy count": ("n = 2", "n = 2.5", "whole number from 1 to 64", 5),
     "too many copies": ("n = 2", "n = 65", "whole number from 1 to 64", 5),
-    "copies by a name": ('copies = "n"', 'copies = "m"', "copies is 'm', which is not a parameter", 10),
+    "copies by a name": ('copies = "n"', 'copies = "m"', "'copies' is 'm', which is not a parameter", 10),
     "unknown state": ("nominal = { z", "nominal = { q", "the law has no state 'q'", 5),
     "start of none": ("nominal = { z = 1e-4 }", "start = { q = 1 }", "the law has no state 'q'", 5),
-    "nominal no number": ("{ z = 1e-4 }", '{ z = "a" }', "it must be a number", 9),
+    "nominal no number": ("{ z = 1e-4 }", '{ z = "a" }', "use a number", 9),
     "unused": ('"mu", "sigma", "n"', '"mu", "sigma", "n", "k"', "needs a value for 'k'", 5),
     "a name twice": ("definitions.stiffness", "definitions.z", "'z' is both a definition and a state", 10),
     "a name taken": (
@@ -54,8 +54,8 @@ WRONG = {
     "reset of another": ("reset = { z", "reset = { q", "the law has no state 'q'", 10),
     "mode sets another": ("guards.top", 'set = { g = "1" }\nguards.top', "sets 'g'", 10),
     "no such mode": ('to = "only"', 'to = "other"', "unknown mode 'other'", 18),
-    "unequal table": ("values = [1, 0.9]", "values = [1]", "at has 2 numbers, but values has 1", 15),
-    "table falls": ("at = [0, 1]", "at = [1, 0]", "sort the arguments", 15),
+    "unequal table": ("values = [1, 0.9]", "values = [1]", "`at` has 2 numbers, but `values` has 1", 15),
+    "table falls": ("at = [0, 1]", "at = [1, 0]", "use ascending numbers in `at`", 15),
     "table of texts": ("values = [1, 0.9]", 'values = [1, "a"]', "list of numbers", 15),
     "rate unknown": ('normal = "10 + x"', 'normal = "10 + f"', "cannot be used here", 7),
 }
@@ -95,7 +95,7 @@ def test_a_load_whose_rate_is_not_known_is_refused_where_the_law_asks_for_it() -
 def test_a_set_valued_law_has_no_states() -> None:
     law = hs.FrictionLaw("s", "mu*N", "mu*N", ["mu"], states=[hs.State("z", 0, "v")])
     model = hs.Model("m", [hs.State("v", 1, "-f")], contacts=[hs.Contact("f", "v", 1, law, {"mu": 1})])
-    with pytest.raises(hs.ModelError, match="a law with slip and stick has no states"):
+    with pytest.raises(hs.ModelError, match="a law with 'slip' and 'stick' cannot have 'states'"):
         model.validate()
 
 

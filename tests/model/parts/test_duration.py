@@ -32,8 +32,8 @@ def test_without_one_there_is_none() -> None:
 @pytest.mark.parametrize(
     ("written", "says"),
     [
-        ("0", "duration cannot be 0"),
-        ('"1 - k"', "duration cannot be -3"),
+        ("0", "'duration' cannot be 0"),
+        ('"1 - k"', "'duration' cannot be -3"),
         ('"x"', "state 'x'"),
         ('"t"', "time 't'"),
         ("true", "is a condition"),

@@ -71,8 +71,18 @@ def test_a_surface_of_a_component_can_ask_for_the_only_motion() -> None:
             7,
         ),
         ("[surfaces.u]\nabove = { a = 1 }\n", "'expr' is missing", "changes its sign at the surface", 6),
-        ('[surfaces.u]\nexpr = "x"\nabove = { a = 1 }\n', "'a' has no value below", "below = { a = ... }", 8),
-        ('[surfaces.u]\nexpr = "x"\nbelow = { a = 1 }\n', "'a' has no value above", "above = { a = ... }", 8),
+        (
+            '[surfaces.u]\nexpr = "x"\nabove = { a = 1 }\n',
+            "'a' is set in 'above' but not in 'below'",
+            "below = { a = ... }",
+            8,
+        ),
+        (
+            '[surfaces.u]\nexpr = "x"\nbelow = { a = 1 }\n',
+            "'a' is set in 'below' but not in 'above'",
+            "above = { a = ... }",
+            8,
+        ),
         ('[surfaces.u]\nexpr = "x"\nabouve = { a = 1 }\n', "unknown key 'abouve'", "did you mean 'above'", 8),
         (
             '[surfaces]\nx = "v"\n',
@@ -98,11 +108,11 @@ def test_faults_are_named(text: str, message: str, remedy: str, line: int) -> No
 
 
 def test_python_faults_are_named() -> None:
-    with pytest.raises(hs.UsageError, match="'a' has a value above but not below"):
+    with pytest.raises(hs.UsageError, match="'a' is set in `above` but not in `below`"):
         hs.SwitchingSurface("u", "x", above={"a": 1})
-    with pytest.raises(hs.UsageError, match="surfaces contains"):
+    with pytest.raises(hs.UsageError, match="`surfaces` contains"):
         python(surfaces=["x"])
-    with pytest.raises(hs.ModelError, match="cannot have surfaces"):
+    with pytest.raises(hs.ModelError, match="cannot have 'surfaces'"):
         hs.Model(
             "m", {"x": 1}, surfaces=[hs.SwitchingSurface("u", "x")], flow=lambda t, x, p: (-x[0],)
         ).validate()

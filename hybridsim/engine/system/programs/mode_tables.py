@@ -251,6 +251,6 @@ class _ModeRows(NamedTuple):
 
 
 def in_a_row(parts: list[np.ndarray], columns: tuple[int, ...] = (5,)) -> tuple[np.ndarray, np.ndarray]:
-    """Return the start of each integer array in their concatenation, and the concatenation; columns: entry shape."""
+    """Return the start of each integer array in their concatenation, and the concatenation; `columns`: entry shape."""
     starts = np.cumsum([0, *(len(part) for part in parts)]).astype(np.int64)
     return starts, np.concatenate([np.zeros((0, *columns), dtype=np.int64), *parts])

@@ -217,8 +217,8 @@ def _refuse_other_arguments(parts: Parts) -> None:
             name = function_name(function)
             raise ModelError(
                 f"the function {name} takes {inspect.signature(function)}, but is called with (t, x, p)",
-                remedy="give it three arguments: the time, the states in order, and the parameters by name "
-                "(p.NAME), whether it uses them or not",
+                remedy="give the function three arguments: the time, the states in order, and the parameters by name "
+                "(p.NAME), even if the function does not use all of them",
             ) from None
 
 
