@@ -225,9 +225,7 @@ class Model(Declared):
                 continue
             argument = contact.arguments.get(name, contact.law.parameters[name])
             if argument is not None and argument.text in names:
-                return (
-                    f"contact {contact.name} has '{name} = {argument.text}'; change '{argument.text}' instead"
-                )
+                return f"contact {contact.name} has '{name} = {argument.text}'; change '{argument.text}'"
             text = "its default" if argument is None else argument.text
             return (
                 f"'{name}' is an argument of the law of contact {contact.name} with the value {text}; declare a "

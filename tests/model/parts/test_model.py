@@ -175,7 +175,7 @@ def test_structure_sees_what_code_depends_on(change: str) -> None:
     ("argument", "words"),
     [
         ("0.3", r"with the value 0.3; declare a parameter, mu = 0.3 under \[parameters\], and write"),
-        ("friction", "contact f has 'mu = friction'; change 'friction' instead"),
+        ("friction", "contact f has 'mu = friction'; change 'friction'"),
     ],
 )
 def test_an_argument_of_a_law_is_no_parameter_and_how_it_becomes_one(argument: str, words: str) -> None:
