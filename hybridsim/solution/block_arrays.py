@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,10 +21,10 @@ from hybridsim.engine.record.array_forms import (
     check_range,
 )
 from hybridsim.engine.record.blocks import SegmentList
-from hybridsim.engine.record.chebyshev import ChebyshevDense, chebyshev_series
+from hybridsim.engine.record.chebyshev import chebyshev_dense, chebyshev_series
 from hybridsim.engine.record.fixed_blocks import StepSegments
 from hybridsim.engine.record.hermite_block import TERMS, HermiteBlock
-from hybridsim.engine.record.segments import Segment, end_point
+from hybridsim.engine.record.segments import PiecewiseDense, Segment, end_point
 from hybridsim.engine.record.series_block import SeriesBlock
 from hybridsim.engine.system.instant import Instant
 
@@ -262,6 +263,5 @@ def _segments(arrays: Arrays) -> Iterator[Segment]:
         if length == 1:
             yield end_point(origin, z, p, x[0])
         else:
-            yield Segment(
-                origin, z, p, s, x, ChebyshevDense(s, tuple(next(series) for _ in range(length - 1)))
-            )
+            pieces = [chebyshev_dense(a, b, next(series)) for a, b in pairwise(s)]
+            yield Segment(origin, z, p, s, x, PiecewiseDense(s, pieces))

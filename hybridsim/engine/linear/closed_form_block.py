@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -12,8 +11,8 @@ import numpy as np
 from hybridsim.engine.linear.motion import functions_of_time, moved, states_near_start, states_of
 from hybridsim.engine.linear.tables import LinearTables
 from hybridsim.engine.native.kernels import call, kernel
-from hybridsim.engine.record.segments import Segment, end_point
-from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.record.blocks import SegmentArrays
+from hybridsim.engine.record.segments import Dense
 from hybridsim.engine.system.system import System
 
 
@@ -48,7 +47,7 @@ def closed_form_states(
 
 
 @dataclass(frozen=True)
-class ClosedFormBlock(Sequence[Segment]):
+class ClosedFormBlock(SegmentArrays):
     """N consecutive segments that start at local time 0; see `hybridsim.engine.record.blocks.SegmentBlock`.
 
     Parameters
@@ -70,19 +69,15 @@ class ClosedFormBlock(Sequence[Segment]):
     vectors: np.ndarray
     jumps: np.ndarray
 
-    def __len__(self) -> int:
-        return len(self.ends)
-
     @cached_property
     def spans(self) -> np.ndarray:
         """Return the local times of start and end (N, 2)."""
         return np.stack([np.zeros(len(self)), self.ends], axis=1)
 
     @property
-    def until(self) -> Instant:
-        """Return the instant at which the last segment ends."""
-        high, low = self.origins[-1].tolist()
-        return Instant(high, low).plus(float(self.ends[-1]))
+    def last(self) -> np.ndarray:
+        """Return the states x- at the end of the last segment."""
+        return self.jumps[-1, 1]
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
         """Return states (k, n) at local times (k,) in the segments with the given numbers."""
@@ -111,10 +106,6 @@ class ClosedFormBlock(Sequence[Segment]):
             np.empty((2, lin.flows.shape[1])),
         )
 
-    def at_end(self) -> Segment:
-        """Return a segment of zero length at the end of the last segment."""
-        return end_point(self.until, self.modes[-1], self.vectors[-1], self.jumps[-1, 1])
-
     def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return start and end, the states there, the run-time vector and the modes of a segment."""
         return np.array([0.0, self.ends[i]]), self.jumps[i, :2], self.vectors[i], self.modes[i]
@@ -129,14 +120,10 @@ class ClosedFormBlock(Sequence[Segment]):
         rows = (self.rows, self.ends, self.coordinates, self.origins, self.modes, self.vectors, self.jumps)
         return ClosedFormBlock(self.system, self.tables, *(r[first:] for r in rows))
 
-    def __getitem__(self, i: Any, /) -> Any:
-        if isinstance(i, slice):
-            return [self[k] for k in range(*i.indices(len(self)))]
-        i = range(len(self))[i]
+    def motion(self, i: int) -> tuple[np.ndarray, np.ndarray, Dense]:
+        """Return start and end, the states there, and dense output of a segment."""
 
         def dense(s: np.ndarray) -> np.ndarray:
             return self.states(np.full(len(s), i), np.asarray(s, dtype=float))
 
-        high, low = self.origins[i].tolist()
-        s, x, p, z = self.steps_of(i)
-        return Segment(Instant(high, low), z, p, s, x, dense)
+        return *self.steps_of(i)[:2], dense

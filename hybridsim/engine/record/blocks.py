@@ -6,13 +6,14 @@ segments and one of events for each of its calls, with the arrays that it wrote.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from typing import Protocol, TypeVar
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from hybridsim.engine.record.segments import Occurrence, Segment, end_point
+from hybridsim.engine.record.segments import Dense, Occurrence, Segment, end_point
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
 
@@ -69,6 +70,49 @@ class SegmentBlock(Block[Segment], Protocol):
 
     def since(self, first: int) -> SegmentBlock:
         """Return a block of the segments from the given number on."""
+
+
+class SegmentArrays(Sequence[Segment]):
+    """Segments in arrays with one row for each: what the blocks of all compiled loops have in common.
+
+    A block has the fields origins (N, 2), modes (N, C) and vectors (N, P) and the methods of a `SegmentBlock`.
+    """
+
+    origins: np.ndarray
+    modes: np.ndarray
+    vectors: np.ndarray
+    spans: Any  # a cached property
+
+    @abstractmethod
+    def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return knots, states, run-time vector and modes of a segment."""
+
+    @abstractmethod
+    def motion(self, i: int) -> tuple[np.ndarray, np.ndarray, Dense]:
+        """Return knots (m + 1,), states (m + 1, n) and dense output of a segment."""
+
+    @property
+    @abstractmethod
+    def last(self) -> np.ndarray:
+        """Return the states x- (n,) at the end of the last segment."""
+
+    def __len__(self) -> int:
+        return len(self.origins)
+
+    @property
+    def until(self) -> Instant:
+        """Return the end of the last segment."""
+        return Instant(*self.origins[-1].tolist()).plus(float(self.spans[-1, 1]))
+
+    def at_end(self) -> Segment:
+        """Return the end of the last segment."""
+        return end_point(self.until, self.modes[-1], self.vectors[-1], self.last)
+
+    def __getitem__(self, i: Any, /) -> Any:
+        if isinstance(i, slice):
+            return [self[k] for k in range(*i.indices(len(self)))]
+        i = range(len(self))[i]
+        return Segment(Instant(*self.origins[i].tolist()), self.modes[i], self.vectors[i], *self.motion(i))
 
 
 class OccurrenceBlock(Block[Occurrence], Protocol):

@@ -7,8 +7,6 @@ degree is doubled until they are at rounding level (J. P. Boyd, Chebyshev and Fo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.polynomial import chebyshev
 
@@ -19,24 +17,13 @@ _NEGLIGIBLE = 2.0**-50  # relative to the size of a state
 _TAIL = 3  # last coefficients that must be negligible; one or two may be small by symmetry
 
 
-@dataclass(frozen=True)
-class ChebyshevDense:
-    """Dense output with one series per step: knots (m + 1,), coefficients (d, n) of each of the m steps."""
+def chebyshev_dense(a: float, b: float, coefficients: np.ndarray) -> Dense:
+    """Return the states (k, n) at local times (k,) of a step from a to b; coefficients (d, n) of its series."""
 
-    knots: np.ndarray
-    coefficients: tuple[np.ndarray, ...]
+    def dense(s: np.ndarray) -> np.ndarray:
+        return chebyshev.chebval((2.0 * s - (a + b)) / (b - a), coefficients).T
 
-    def __call__(self, s: np.ndarray) -> np.ndarray:
-        """Return states (k, n) at local times (k,)."""
-        ascending = self.knots[-1] >= self.knots[0]
-        inner = self.knots[1:-1] if ascending else -self.knots[1:-1]
-        index = np.searchsorted(inner, s if ascending else -s, side="right")
-        out = np.empty((len(s), self.coefficients[0].shape[1]))
-        for i in np.unique(index):
-            chosen = np.flatnonzero(index == i)
-            a, b = self.knots[i], self.knots[i + 1]
-            out[chosen] = chebyshev.chebval((2.0 * s[chosen] - (a + b)) / (b - a), self.coefficients[i]).T
-        return out
+    return dense
 
 
 def chebyshev_series(dense: Dense, a: float, b: float, sizes: np.ndarray) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -37,10 +37,10 @@ class Segment:
 
 @dataclass(frozen=True)
 class PiecewiseDense:
-    """Dense output with one interpolant for each step."""
+    """Dense output with one interpolant for each step: knots (m + 1,) and m functions of the local time."""
 
     knots: np.ndarray
-    interpolants: tuple[Dense, ...]
+    interpolants: Sequence[Dense]
 
     def __call__(self, s: np.ndarray) -> np.ndarray:
         """Return states (k, n) at local times (k,)."""
@@ -48,6 +48,8 @@ class PiecewiseDense:
         inner = self.knots[1:-1] if ascending else -self.knots[1:-1]
         index = np.searchsorted(inner, s if ascending else -s, side="right")
         parts = [(i, np.flatnonzero(index == i)) for i in np.unique(index)]
+        if not parts:
+            return self.interpolants[0](s)
         first = self.interpolants[parts[0][0]](s[parts[0][1]])
         out = np.empty((len(s), first.shape[1]))
         out[parts[0][1]] = first

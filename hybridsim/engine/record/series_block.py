@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -11,30 +10,21 @@ import numpy as np
 
 from hybridsim.engine.native.kernels import allocating_kernel, call, inlined, kernel
 from hybridsim.engine.native.simd_vectors import WIDTH, load, splat, store
-from hybridsim.engine.record.segments import Segment, end_point
+from hybridsim.engine.record.blocks import SegmentArrays
+from hybridsim.engine.record.segments import Dense, PiecewiseDense
 from hybridsim.engine.series.interpreter import polynomials
-from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
 
 
-@dataclass(frozen=True)
-class SeriesDense:
-    """Dense output with one Taylor series per step: knots (m + 1,), coefficients (m, n, order + 1)."""
+def _series_dense(coefficients: np.ndarray, start: float) -> Dense:
+    """Return the states (k, n) at local times (k,) of a step; coefficients (n, order + 1) of its series."""
 
-    knots: np.ndarray
-    coefficients: np.ndarray
-
-    def __call__(self, s: np.ndarray) -> np.ndarray:
-        """Return states (k, n) at local times (k,)."""
-        s = np.asarray(s, dtype=float)
-        index = np.searchsorted(self.knots[1:-1], s, side="right")
-        out = np.empty((len(s), self.coefficients.shape[1]))
-        for i in np.unique(index):
-            chosen = np.flatnonzero(index == i)
-            part = np.empty((len(chosen), out.shape[1]))
-            polynomials(self.coefficients[i], s[chosen] - self.knots[i], part)
-            out[chosen] = part
+    def dense(s: np.ndarray) -> np.ndarray:
+        out = np.empty((len(s), len(coefficients)))
+        polynomials(coefficients, s - start, out)
         return out
+
+    return dense
 
 
 @inlined
@@ -109,7 +99,7 @@ def _spans_of(ends: Any, steps: Any, spans: Any) -> None:
 
 
 @dataclass(frozen=True)
-class SeriesBlock(Sequence[Segment]):
+class SeriesBlock(SegmentArrays):
     """N segments of several steps each; see `hybridsim.engine.record.blocks.SegmentBlock`.
 
     Parameters
@@ -129,9 +119,6 @@ class SeriesBlock(Sequence[Segment]):
     vectors: np.ndarray
     jumps: np.ndarray
 
-    def __len__(self) -> int:
-        return len(self.ends) - 1
-
     @property
     def polynomials(self) -> np.ndarray:
         """Return coefficients (steps, n, degree + 1) of the dense output in the time since each step's start."""
@@ -145,11 +132,9 @@ class SeriesBlock(Sequence[Segment]):
         return spans
 
     @property
-    def until(self) -> Instant:
-        """Return the instant at which the last segment ends."""
-        high, low = self.origins[-1].tolist()
-        s, h = self.steps[self.ends[-1] - 1].tolist()
-        return Instant(high, low).plus(s + h)
+    def last(self) -> np.ndarray:
+        """Return the states x- at the end of the last segment."""
+        return self.jumps[-1, 0]
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
         """Return states (k, n) at local times (k,) in the segments with the given numbers."""
@@ -172,33 +157,19 @@ class SeriesBlock(Sequence[Segment]):
 
     def since(self, first: int) -> SeriesBlock:
         """Return a block of the segments from the given number on."""
-        rows = (self.origins, self.modes, self.vectors, self.jumps)
-        ends, gone = self.ends[first:], self.ends[first]
-        steps, series = self.steps[gone:], self.series[gone:]
-        return type(self)(self.system, ends - gone, steps, series, *(r[first:] for r in rows))
+        return self._part(first, len(self))
 
-    def __getitem__(self, i: Any, /) -> Any:
-        if isinstance(i, slice):
-            return [self[k] for k in range(*i.indices(len(self)))]
-        i = range(len(self))[i]
-        one = self._alone(i) if len(self) > 1 else self
-        s, *_ = self.steps_of(i)
-        x = one.states(np.zeros(len(s), dtype=np.int64), s)
-        high, low = self.origins[i].tolist()
-        dense = SeriesDense(s, one.polynomials)
-        return Segment(Instant(high, low), self.modes[i], self.vectors[i], s, x, dense)
+    def _part(self, first: int, last: int) -> SeriesBlock:
+        """Return a block of some of the segments."""
+        ends, rows = self.ends[first : last + 1], slice(self.ends[first], self.ends[last])
+        part = (r[first:last] for r in (self.origins, self.modes, self.vectors, self.jumps))
+        return type(self)(self.system, ends - ends[0], self.steps[rows], self.series[rows], *part)
 
-    def _alone(self, i: int) -> SeriesBlock:
-        """Return a block of one segment."""
-        first, last = self.ends[i], self.ends[i + 1]
-        rows = (self.origins, self.modes, self.vectors, self.jumps)
-        ends = np.array([0, last - first])
-        steps, series = self.steps[first:last], self.series[first:last]
-        return type(self)(self.system, ends, steps, series, *(r[i : i + 1] for r in rows))
-
-    def at_end(self) -> Segment:
-        """Return a segment of zero length at the end of the last segment."""
-        return end_point(self.until, self.modes[-1], self.vectors[-1], self.jumps[-1, 0])
+    def motion(self, i: int) -> tuple[np.ndarray, np.ndarray, Dense]:
+        """Return knots, states and dense output of a segment."""
+        one, (s, *_) = self._part(i, i + 1) if len(self) > 1 else self, self.steps_of(i)
+        pieces = [_series_dense(*piece) for piece in zip(one.polynomials, s.tolist(), strict=False)]
+        return s, one.states(np.zeros(len(s), dtype=np.int64), s), PiecewiseDense(s, pieces)
 
     def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return knots (m + 1,), states at starts of steps (m, n), run-time vector and modes of a segment."""
