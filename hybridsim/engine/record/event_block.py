@@ -1,4 +1,4 @@
-"""The ordinary events of a compiled loop, in which one guard of one component fires."""
+"""The events of a compiled loop or of fixed steps, in arrays."""
 
 from __future__ import annotations
 
@@ -28,7 +28,8 @@ def _taking_part(
     count, is_plain = 0, True
     for e in range(fired.shape[0]):
         for c in range(before.shape[1]):
-            if before[e, c] != after[e, c] or (c == owner[fired[e]] and not has_surface[c]):
+            is_owner = fired[e] >= 0 and c == owner[fired[e]]
+            if before[e, c] != after[e, c] or (is_owner and not has_surface[c]):
                 if count < participants.shape[1]:
                     participants[0, count], participants[1, count] = e, c
                 count += 1
@@ -69,7 +70,7 @@ class EventBlock(Sequence[Occurrence]):
     Parameters
     ----------
     instants : (E, 2), high and low.
-    fired : (E,), number of the guard that fired.
+    fired : (E,), number of the guard that fired; -1 for none.
     before, after : (E, C), modes on both sides.
     states : (E, 2, n), x- and x+.
     """
@@ -191,7 +192,7 @@ class EventBlock(Sequence[Occurrence]):
         x_plus: np.ndarray,
     ) -> Occurrence:
         automaton, guard, modes = self._system.automata[component], "", self._system.automata[component].modes
-        if component == self._system.owner[fired]:
+        if fired >= 0 and component == self._system.owner[fired]:
             guard = automaton.guard_names[source][automaton.guards[source].index(fired)]
         at = Instant(*instant)
         return Occurrence(

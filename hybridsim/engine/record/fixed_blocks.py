@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
 from copy import copy
 from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.record.blocks import SegmentList
+from hybridsim.engine.native.kernels import kernel
+from hybridsim.engine.record.blocks import SegmentArrays, SegmentList
+from hybridsim.engine.record.event_block import EventBlock
 from hybridsim.engine.record.fixed_dense import StepDense
-from hybridsim.engine.record.segments import Occurrence, Segment, end_point
-from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.record.segments import Dense
+from hybridsim.engine.system.instant import Instant, two_sum
 from hybridsim.engine.system.system import System
 
 
-class StepSegments(Sequence[Segment]):
+class StepSegments(SegmentArrays):
     """The segments of one series of fixed steps, one for each sequence of rows in the same modes.
 
     Parameters
@@ -41,9 +41,10 @@ class StepSegments(Sequence[Segment]):
         self._system, self._origin, self._p = system, origin, p
         self._s, self._x, self._z = s, x, z
         bounds = np.concatenate([[0], cuts, [len(s) - 1]])
-        self._first, self._last = bounds[:-1], bounds[1:]
-        longer = self._last > self._first
-        self._first, self._last = self._first[longer], self._last[longer]
+        longer = bounds[1:] > bounds[:-1]
+        self._first, self._last = bounds[:-1][longer], bounds[1:][longer]
+        self.origins, self.vectors = (np.tile(row, (len(self._first), 1)) for row in (np.array(origin), p))
+        self.modes = z[self._first]
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Return all arrays of the block by name; see `of_arrays`."""
@@ -61,28 +62,10 @@ class StepSegments(Sequence[Segment]):
         origin = Instant(*arrays["origin"].tolist())
         return cls(system, origin, *(arrays[name] for name in ("p", "s", "x", "z", "cuts")))
 
-    def __len__(self) -> int:
-        return len(self._first)
-
-    @property
-    def until(self) -> Instant:
-        """Return the instant at which the last segment ends."""
-        return self._origin.plus(float(self._s[self._last[-1]]))
-
-    @property
-    def origins(self) -> np.ndarray:
-        """Return the origin of local time of each segment (N, 2)."""
-        return np.tile(np.array(self._origin), (len(self), 1))
-
     @property
     def spans(self) -> np.ndarray:
         """Return the first and last local time of each segment (N, 2)."""
         return np.stack([self._s[self._first], self._s[self._last]], axis=1)
-
-    @property
-    def modes(self) -> np.ndarray:
-        """Return the modes of each segment (N, C)."""
-        return self._z[self._first]
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
         """Return states (k, n) at local times (k,) in the segments with the given numbers."""
@@ -97,103 +80,43 @@ class StepSegments(Sequence[Segment]):
         rows = np.arange(len(index)) - np.repeat(starts - self._first, counts)
         return index, self._s[rows], self._x[rows]
 
-    def at_end(self) -> Segment:
-        """Return a segment of zero length at the end of the last segment."""
-        last = int(self._last[-1])
-        return end_point(self.until, self._z[int(self._first[-1])], self._p, self._x[last])
+    @property
+    def last(self) -> np.ndarray:
+        """Return the states at the end of the last segment."""
+        return self._x[int(self._last[-1])]
 
     def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return knots, states, run-time vector and modes of one segment."""
-        first, last = int(self._first[i]), int(self._last[i])
-        return self._s[first : last + 1], self._x[first : last + 1], self._p, self._z[first]
+        rows = slice(int(self._first[i]), int(self._last[i]) + 1)
+        return self._s[rows], self._x[rows], self.vectors[i], self.modes[i]
 
     def since(self, first: int) -> StepSegments:
         """Return a block of the segments from the given number on."""
         later = copy(self)
-        later._first, later._last = self._first[first:], self._last[first:]
+        for name in ("_first", "_last", "origins", "vectors", "modes"):
+            setattr(later, name, getattr(self, name)[first:])
         return later
 
-    def __getitem__(self, i: Any, /) -> Any:
-        if isinstance(i, slice):
-            return [self[k] for k in range(*i.indices(len(self)))]
+    def motion(self, i: int) -> tuple[np.ndarray, np.ndarray, Dense]:
+        """Return knots, states and dense output of a segment, without the rows of the others."""
         s, x, p, z = self.steps_of(i)
-        dense = StepDense(self._system, p, z.copy(), s.copy(), x.copy())
-        s, x = dense.s, dense.x
-        return Segment(self._origin, dense.z, self._p, s, x, dense)
+        s, x = s.copy(), x.copy()
+        return s, x, StepDense(self._system, p, z, s, x)
 
 
-class StepOccurrences(Sequence[Occurrence]):
-    """The changes of mode in one series of fixed steps.
+@kernel
+def _write_instants(high: float, low: float, s: Any, instants: Any) -> None:
+    """Write the instants (E, 2) at local times (E,), as `Instant.plus` gives them."""
+    for i in range(s.shape[0]):
+        total, error = two_sum(high, s[i])
+        instants[i, 0], instants[i, 1] = two_sum(total, error + low)
 
-    Parameters
-    ----------
-    rows, components : (E,) the row of each change, in order, and the component that changes.
-    changes : (E, 2) modes before and after.
-    s, x : local times and states of all rows.
-    """
 
-    def __init__(
-        self,
-        system: System,
-        origin: Instant,
-        rows: np.ndarray,
-        components: np.ndarray,
-        changes: np.ndarray,
-        s: np.ndarray,
-        x: np.ndarray,
-    ) -> None:
-        self._system, self._origin = system, origin
-        self._components, self._changes = components, changes
-        self._s, self._x = s[rows], x[rows]
-
-    def __len__(self) -> int:
-        return len(self._s)
-
-    @property
-    def until(self) -> Instant:
-        """Return the instant of the last event."""
-        return self._origin.plus(float(self._s[-1]))
-
-    @property
-    def times(self) -> np.ndarray:
-        """Return the times of the events, rounded to doubles."""
-        return np.array([float(self._origin.plus(s)) for s in self._s.tolist()])
-
-    def times_of(self, component: str, kind: str | None) -> np.ndarray:
-        """Return the times of the events of a component; all are transitions."""
-        return self.times[self._are_of(component, kind)]
-
-    def states_of(self, component: str, kind: str | None, side: int) -> np.ndarray:
-        """Return the states (k, n) at events; they are equal on both sides of an event."""
-        return self._x[self._are_of(component, kind)]
-
-    def _are_of(self, component: str, kind: str | None) -> np.ndarray:
-        names = [a.name for a in self._system.automata]
-        if component not in names or kind not in (None, "transition"):
-            return np.zeros(len(self), dtype=bool)
-        return self._components == names.index(component)
-
-    def kinds(self) -> Counter[str]:
-        """Return the number of events of each kind; all are transitions."""
-        return Counter({"transition": len(self)})
-
-    def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return instants and states of the events from the given number on; both sides have equal states."""
-        instants = [self._origin.plus(s) for s in self._s[first:].tolist()]
-        states = np.stack([self._x[first:]] * 2, axis=1)
-        return np.array(instants).reshape(-1, 2), states
-
-    def since(self, first: int) -> StepOccurrences:
-        """Return a block of the events from the given number on."""
-        later = copy(self)
-        later._components, later._changes = self._components[first:], self._changes[first:]
-        later._s, later._x = self._s[first:], self._x[first:]
-        return later
-
-    def __getitem__(self, i: Any, /) -> Any:
-        if isinstance(i, slice):
-            return [self[k] for k in range(*i.indices(len(self)))]
-        automaton, x = self._system.automata[self._components[i]], self._x[i]
-        source, target = (automaton.modes[m] for m in self._changes[i].tolist())
-        instant = self._origin.plus(float(self._s[i]))
-        return Occurrence(instant, "transition", automaton.name, "", source, target, -1, x, x)
+def step_events(
+    system: System, origin: Instant, s: np.ndarray, before: np.ndarray, after: np.ndarray, x: np.ndarray
+) -> EventBlock:
+    """Return changes of modes (E, C) between fixed steps at local times (E,), at which the states (E, n) go on."""
+    instants = np.empty((len(s), 2))
+    _write_instants(*origin, s, instants)
+    no_guard = np.full(len(s), -1, dtype=np.int64)
+    return EventBlock(system, instants, no_guard, before, after, np.stack([x, x], axis=1))

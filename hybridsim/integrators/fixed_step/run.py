@@ -16,7 +16,7 @@ from hybridsim.engine.events.outcome import Situation
 from hybridsim.engine.events.resolve import EventResolution
 from hybridsim.engine.events.zeno.accumulation import Accumulation, accumulated
 from hybridsim.engine.record.checkpoint import Checkpoint, damaged
-from hybridsim.engine.record.fixed_blocks import StepOccurrences, StepSegments
+from hybridsim.engine.record.fixed_blocks import StepSegments, step_events
 from hybridsim.engine.record.limits import LimitMonitor, LimitReached
 from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.record.trajectory import Task, Trajectory
@@ -456,12 +456,12 @@ class FixedStepRun:
         if self.march.has_sides_only:
             self._side_of_zeros(z)
         sources = np.concatenate([(before if len(record.segments) else z[0])[None], z[:-1]])
-        rows, components = np.nonzero(sources != z)
-        segments = StepSegments(self.system, self.origin, p, s, x, z, np.unique(rows[rows > 0]))
-        record.segments.add(segments)
-        record.counters.events += len(rows)
-        changes = np.stack([sources[rows, components], z[rows, components]], axis=1)
-        record.occurrences.add(StepOccurrences(self.system, self.origin, rows, components, changes, s, x))
+        rows = np.flatnonzero((sources != z).any(axis=1))
+        record.segments.add(StepSegments(self.system, self.origin, p, s, x, z, rows[rows > 0]))
+        if len(rows):
+            events = step_events(self.system, self.origin, s[rows], sources[rows], z[rows], x[rows])
+            record.counters.events += len(events)
+            record.occurrences.add(events)
 
     def _side_of_zeros(self, z: np.ndarray) -> None:
         """Give rows with zero velocity the mode of the following row, because sgn has no third mode."""
