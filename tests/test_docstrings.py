@@ -53,7 +53,9 @@ def test_public_members_say_what_they_are() -> None:
         f"{name}.{member}"
         for name in NAMES
         if isinstance(getattr(hs, name), type)
-        for member, value in vars(getattr(hs, name)).items()
+        for part in getattr(hs, name).__mro__
+        if part.__module__.startswith("hybridsim")
+        for member, value in vars(part).items()
         if not member.startswith("_") and (callable(value) or isinstance(value, property | classmethod))
         if not (value.__doc__ or "").strip()
     ]

@@ -57,7 +57,6 @@ FILES = {
     "model/parts/model.py": 486,
     "model/smoothing/rewriting.py": 537,
     "solution/explain/explanation.py": 351,
-    "solution/solution.py": 477,
 }
 FUNCTIONS = {
     "analysis/advise/advise.py::advise": 93,

@@ -5,7 +5,6 @@ They are deprecated and will go in version 0.2.
 
 from __future__ import annotations
 
-from abc import ABCMeta
 from typing import TYPE_CHECKING, ClassVar
 
 from hybridsim.mechanics.series_loop.series_trajectory import SeriesTrajectory
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
     MechanicalSolution = SteppedSolution = Solution
 else:
 
-    class _Former(ABCMeta):
+    class _Former(type):
         """The class of a former name, of which those solutions are instances that once had it."""
 
         trajectory: ClassVar[type]

@@ -2,42 +2,35 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from os import PathLike
 from typing import TYPE_CHECKING
 
 from hybridsim.presentation.tables import Table, event_columns, event_frame
+from hybridsim.solution.events_and_modes import EventsAndModes
+from hybridsim.solution.files.tabulated import equal_steps
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-    from hybridsim.solution.event import Event
 
+class InTables(EventsAndModes):
+    """The results of a run in several formats; see `hybridsim.solution.solution.Solution`."""
 
-class InTables(ABC):
-    """The base class of results that have names, events and a table, with methods that export them."""
-
-    @property
-    @abstractmethod
-    def names(self) -> tuple[str, ...]:
-        """Names of the states, in the order of the rows of y."""
-
-    @property
-    @abstractmethod
-    def events(self) -> Sequence[Event]:
-        """All events in order of time."""
-
-    @abstractmethod
     def table(self, points: int | None = None) -> Table:
-        """Return times, states, outputs and modes as columns; the export methods use this table.
+        """Return times, states, quantities and modes as columns; the export methods use this table.
 
         Parameters
         ----------
         points : the number of equally spaced times, both ends included. Without it the times are ``sol.t``: the
             integrator's own steps with both sides of each event, or the grid of `simulate`.
         """
+        if points is None and self._grid is None:
+            return self._trajectory.table(None)
+        times = self.t if points is None else equal_steps(self.t_start, self.t_end, points)
+        if len(times):
+            self._within(times, "+")
+        return self._trajectory.table(times)
 
     def to_csv(self, path: str | PathLike[str], points: int | None = None) -> None:
         """Write the table as a CSV file."""
