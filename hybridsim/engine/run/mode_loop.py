@@ -20,7 +20,6 @@ from hybridsim.engine.events.zeno.hidden_bounces import bounces_of, last_bounces
 from hybridsim.engine.events.zeno.limits import behind, closed_now, holds_several
 from hybridsim.engine.record.checkpoint import Checkpoint, damaged
 from hybridsim.engine.record.limits import UNLIMITED, LimitMonitor, LimitReached
-from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.record.trajectory import Task, Trajectory
 from hybridsim.engine.run.appointment_events import events_before_appointment
 from hybridsim.engine.run.headway import Headway, NoHeadway, TakenOver
@@ -35,6 +34,7 @@ from hybridsim.engine.run.located import (
 )
 from hybridsim.engine.run.monitor_crossings import passed_events
 from hybridsim.engine.run.notices import Notices
+from hybridsim.engine.run.recording import Recorder
 from hybridsim.engine.run.segment_run import Arrival, SegmentRun
 from hybridsim.engine.run.setup import setup_of
 from hybridsim.engine.run.stepping import ARRIVED, PAUSED, CompiledLoop, Method, Watch
@@ -580,26 +580,10 @@ class ModeLoop:
         self._set_state(instant, lambda: outcome)
         for warning in outcome.warnings:
             record.warn(warning)
-        for change in outcome.changes:
-            automaton = system.automata[change.component]
-            self._occur(
-                instant,
-                automaton.kind,
-                automaton.name,
-                change.guard,
-                automaton.modes[change.source],
-                automaton.modes[change.target],
-                -1,
-                x_minus,
-                outcome.x,
-            )
-            record.counters.events += 1
-        terminated = []
-        for k in schedules:
-            schedule = system.model.schedules[k]
-            self._occur(instant, "scheduled", schedule.name, "", "", "", 0, x_minus, outcome.x)
-            terminated += [schedule.name] if schedule.terminate else []
-        ended = self._fired_monitors(instant, outcome, x_minus, monitors, is_last) if monitors else []
+        recorder = Recorder(record, system, instant, x_minus, outcome.x)
+        recorder.changes(outcome.changes)
+        terminated = recorder.schedules(schedules)
+        ended = self._fired_monitors(recorder, outcome, monitors, is_last) if monitors else []
         # a run that ends here needs no admissible modes after it
         is_over = self.forward and instant == self.end and is_only_fatal(system, outcome)
         if outcome.status and not (ended or terminated or is_over):
@@ -618,12 +602,7 @@ class ModeLoop:
         return False
 
     def _fired_monitors(
-        self,
-        instant: Instant,
-        outcome: Outcome,
-        x_minus: np.ndarray,
-        monitors: MonitorSides,
-        is_last: bool,
+        self, recorder: Recorder, outcome: Outcome, monitors: MonitorSides, is_last: bool
     ) -> list[str]:
         """Record the monitors that fire at an instant. Return those that end the run."""
         is_last = is_last or bool(outcome.status)
@@ -636,22 +615,6 @@ class ModeLoop:
             if k in monitors.recorded or not (is_last or monitor.action == "reset"):
                 continue
             monitors.recorded.add(k)
-            self._occur(instant, "monitor", monitor.name, "", "", "", direction, x_minus, outcome.x)
+            recorder.monitors([(monitor.name, direction)])
             ended += [monitor.name] if monitor.action == "terminate" else []
         return ended
-
-    def _occur(
-        self,
-        instant: Instant,
-        kind: str,
-        component: str,
-        guard: str,
-        source: str,
-        target: str,
-        direction: int,
-        x_minus: np.ndarray,
-        x_plus: np.ndarray,
-    ) -> None:
-        self.record.occurrences.append(
-            Occurrence(instant, kind, component, guard, source, target, direction, x_minus, x_plus)
-        )

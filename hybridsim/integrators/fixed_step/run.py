@@ -18,8 +18,8 @@ from hybridsim.engine.events.zeno.accumulation import Accumulation, accumulated
 from hybridsim.engine.record.checkpoint import Checkpoint, damaged
 from hybridsim.engine.record.fixed_blocks import StepSegments, step_events
 from hybridsim.engine.record.limits import LimitMonitor, LimitReached
-from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.record.trajectory import Task, Trajectory
+from hybridsim.engine.run.recording import Recorder
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
@@ -352,15 +352,8 @@ class FixedStepRun:
                 stop = True
         if resetting:  # all resets of one instant read the same state
             return self._resolve(instant, (), (), x, monitors=tuple(resetting), seen=seen) or stop
-        self._record_monitors(instant, seen, x, x)
+        Recorder(self.record, self.system, instant, x, x).monitors(seen)
         return stop
-
-    def _record_monitors(
-        self, instant: Instant, seen: Sequence[tuple[str, int]], x_minus: np.ndarray, x_plus: np.ndarray
-    ) -> None:
-        for name, direction in seen:
-            occurrence = Occurrence(instant, "monitor", name, "", "", "", direction, x_minus, x_plus)
-            self.record.occurrences.append(occurrence)
 
     def _resolve(
         self,
@@ -398,36 +391,11 @@ class FixedStepRun:
         outcome = resolution.run(fired, resets)
         self.x, self.discrete = outcome.x, system.discrete(outcome.p).copy()
         self.z = np.where(system.has_surface, self.z, outcome.z)
-        self._record_monitors(instant, seen, x_minus, outcome.x)
-        for change in outcome.changes:
-            automaton = system.automata[change.component]
-            if starting and automaton.is_corner:
-                continue
-            source, target = automaton.modes[change.source], automaton.modes[change.target]
-            record.occurrences.append(
-                Occurrence(
-                    instant,
-                    automaton.kind,
-                    automaton.name,
-                    change.guard,
-                    source,
-                    target,
-                    -1,
-                    x_minus,
-                    outcome.x,
-                )
-            )
-            record.counters.events += 1
-        for k in schedules:
-            schedule = system.model.schedules[k]
-            record.occurrences.append(
-                Occurrence(instant, "scheduled", schedule.name, "", "", "", 0, x_minus, outcome.x)
-            )
-            if schedule.terminate:
-                record.status, record.message = (
-                    "terminated",
-                    f"ended by {schedule.name} at t = {float(instant)!r}",
-                )
+        recorder = Recorder(record, system, instant, x_minus, outcome.x)
+        recorder.monitors(seen)
+        recorder.changes([c for c in outcome.changes if not (starting and system.is_corner[c.component])])
+        for name in recorder.schedules(schedules):
+            record.status, record.message = "terminated", f"ended by {name} at t = {float(instant)!r}"
         left = _left(sides, self._monitors(0.0, self.x, self._vector()))
         left[list(monitors)] = False
         if left.any():
