@@ -263,5 +263,5 @@ def _segments(arrays: Arrays) -> Iterator[Segment]:
         if length == 1:
             yield end_point(origin, z, p, x[0])
         else:
-            pieces = [chebyshev_dense(a, b, next(series)) for a, b in pairwise(s)]
-            yield Segment(origin, z, p, s, x, PiecewiseDense(s, pieces))
+            interpolants = [chebyshev_dense(a, b, next(series)) for a, b in pairwise(s)]
+            yield Segment(origin, z, p, s, x, PiecewiseDense(s, interpolants))

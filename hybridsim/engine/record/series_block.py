@@ -168,8 +168,8 @@ class SeriesBlock(SegmentArrays):
     def motion(self, i: int) -> tuple[np.ndarray, np.ndarray, Dense]:
         """Return knots, states and dense output of a segment."""
         one, (s, *_) = self._part(i, i + 1) if len(self) > 1 else self, self.steps_of(i)
-        pieces = [_series_dense(*piece) for piece in zip(one.polynomials, s.tolist(), strict=False)]
-        return s, one.states(np.zeros(len(s), dtype=np.int64), s), PiecewiseDense(s, pieces)
+        interpolants = [_series_dense(*step) for step in zip(one.polynomials, s.tolist(), strict=False)]
+        return s, one.states(np.zeros(len(s), dtype=np.int64), s), PiecewiseDense(s, interpolants)
 
     def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return knots (m + 1,), states at starts of steps (m, n), run-time vector and modes of a segment."""
