@@ -32,9 +32,8 @@ from hybridsim.engine.run.located import (
     with_evaluated,
     without_fatal,
 )
-from hybridsim.engine.run.monitor_crossings import passed_events
 from hybridsim.engine.run.notices import Notices
-from hybridsim.engine.run.recording import Recorder
+from hybridsim.engine.run.recording import Recorder, passed_events
 from hybridsim.engine.run.segment_run import Arrival, SegmentRun
 from hybridsim.engine.run.setup import setup_of
 from hybridsim.engine.run.stepping import ARRIVED, PAUSED, CompiledLoop, Method, Watch
