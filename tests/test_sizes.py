@@ -39,7 +39,7 @@ FILES = {
     "engine/roots/roots.py": 355,
     "engine/run/compiled_loop.py": 386,
     "engine/run/event_loop.py": 411,
-    "engine/run/mode_loop.py": 620,
+    "engine/run/mode_loop.py": 619,
     "engine/run/segment_run.py": 496,
     "engine/series/bounded.py": 401,
     "engine/series/interpreter.py": 485,
