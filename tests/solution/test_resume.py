@@ -181,6 +181,22 @@ def test_a_file_holds_all_of_a_solution(name: str, tmp_path: Path) -> None:
     assert np.allclose(sol.output("f", times), again.output("f", times), rtol=0, atol=1e-10)
 
 
+@pytest.mark.parametrize("name", ["exact", "dop853", "scipy-dop853"])
+def test_a_flight_from_zero_to_zero_is_kept_to_rounding(name: str, tmp_path: Path) -> None:
+    """The height is zero at both ends, which is no measure of how exactly it has to be kept."""
+    again = [hs.Choice("a", reset={"w": "-0.9*w", "h": "0"})]
+    ball = hs.Model(
+        "ball",
+        states=[hs.State("h", 1, "w"), hs.State("w", 0, "-9.81")],
+        components=[hs.Component("c", [hs.Mode("a", hs.Guard("floor", "h", again))])],
+    )
+    sol = hs.simulate(ball, (0, 5), integrator=name)
+    sol.save(tmp_path / "run.hsol")
+    times = np.linspace(0, 5, 501)
+    assert np.abs(sol(times) - hs.load_solution(tmp_path / "run.hsol")(times)).max() < 2e-14
+    assert (tmp_path / "run.hsol").stat().st_size < 60_000
+
+
 def test_solutions_come_from_other_processes() -> None:
     """Pools send them by pickle: to the last bit, and they go on as well as here."""
     here = hs.simulate("dfcs", (0.0, 0.03), integrator="exact")

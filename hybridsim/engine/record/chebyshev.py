@@ -27,11 +27,12 @@ def chebyshev_dense(a: float, b: float, coefficients: np.ndarray) -> Dense:
 
 
 def chebyshev_series(dense: Dense, a: float, b: float, sizes: np.ndarray) -> np.ndarray:
-    """Return Chebyshev coefficients (d, n) of dense output on [a, b]; sizes (n,): sizes of the states."""
+    """Return Chebyshev coefficients (d, n) of dense output on [a, b]; sizes (n,): least sizes of the states."""
     middle, half = 0.5 * (a + b), 0.5 * (b - a)
     for degree in _DEGREES:
         points = chebyshev.chebpts1(degree + 1)
         values = dense(middle + half * points)
+        sizes = np.maximum(sizes, np.abs(values).max(axis=0))  # a gap is zero at both ends of a flight
         series = 2.0 / (degree + 1) * (chebyshev.chebvander(points, degree).T @ values)
         series[0] *= 0.5
         if (np.abs(series[-_TAIL:]) <= _NEGLIGIBLE * sizes).all():

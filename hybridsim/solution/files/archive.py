@@ -117,8 +117,8 @@ def load_solution(path: str | PathLike[str]) -> Solution:
     """Load a solution that `Solution.save` wrote.
 
     The events, the modes and the states at the run's own steps are bit for bit those that were saved. So are
-    ``resume()`` and the dense output of the compiled integrators; the dense output of other integrators
-    agrees to rounding.
+    ``resume()`` and the dense output of steps in compiled loops; the dense output of other steps agrees to
+    rounding.
 
     Parameters
     ----------
