@@ -190,4 +190,4 @@ def _engine(report: Report) -> Iterator[str]:
         if report.compile_seconds
         else "cached"
     )
-    yield f"compiled code: {cost} ({report.operations} operations{written})"
+    yield f"compiled code of this model: {cost} ({report.operations} operations{written})"

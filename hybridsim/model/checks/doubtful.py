@@ -12,7 +12,7 @@ from hybridsim.errors import HybridsimError, Place
 from hybridsim.expr import Expression
 from hybridsim.expr.grammar import TIME
 from hybridsim.model.checks.pulses import pulse_in
-from hybridsim.model.laws.force_signs import wrong_signs
+from hybridsim.model.laws.force_signs import wrong_reactions, wrong_signs
 from hybridsim.model.laws.velocity_powers import velocity_powers
 from hybridsim.model.meanings import Meanings
 from hybridsim.model.smoothing.explicit_corners import smoothing_of
@@ -47,8 +47,8 @@ def warnings_of(model: Model) -> tuple[Caution, ...]:
 
     Warnings concern guards and monitors that are of one sign, constant in their mode, or without units if all other
     states have units; pulses in t; jumps that are not treated as switching surfaces; fractional powers of a contact's
-    velocity; and loads or friction forces of the wrong sign. They are based on the form of the expressions and their
-    values at the start. Guards of contacts and surfaces, which the program creates, are not checked.
+    velocity; and loads, friction forces or reactions of the wrong sign. They are based on the form of the expressions
+    and their values at the start. Guards of contacts and surfaces, which the program creates, are not checked.
     """
     return (
         *_of_signs(model),
@@ -57,6 +57,7 @@ def warnings_of(model: Model) -> tuple[Caution, ...]:
         *jumps_of(model),
         *_of_powers(model),
         *forces_of(model),
+        *(Caution(message, contact.place, remedy) for contact, message, remedy in wrong_reactions(model)),
     )
 
 

@@ -31,6 +31,10 @@ class Scope:
     def _made(self, contact: Contact) -> tuple[Component, ...]:
         try:
             return self.model.components_of(contact)
+        except ExpressionError as fault:  # in the force, with the arguments in their places
+            message = f"contact {contact.name}, law {contact.law.name}: {fault.message}"
+            self.errors.append(ExpressionError(message, place=fault.place, remedy=fault.remedy))
+            return ()
         except ModelError as fault:
             self.errors.append(fault)
             return ()

@@ -22,7 +22,7 @@ _ULP = 2.0**-52  # relative spacing of doubles: the uncertainty of a start value
 
 
 def starting_facts(model: Model) -> tuple[str, ...]:
-    """Return a sentence for each guard or surface at zero at the start, and each load that can be zero."""
+    """Return a sentence for each guard, surface or gap at its limit at the start, and each load that can be zero."""
     if model.flow is not None:
         return ()
     meanings = Meanings(model)
@@ -35,6 +35,13 @@ def _starts(model: Model, component: Component, meanings: Meanings) -> Iterator[
     name, surface = component.name, component.surface
     if isinstance(component, Corner):
         return
+    if surface is not None and surface.is_unilateral:
+        gap = _value_at_start(model, surface.function, meanings)
+        if gap is not None and gap < 0.0 and not _is_zero_at_start(model, surface.function, meanings):
+            yield (
+                f"the gap of impact {name} ({surface.function.text}) is {gap:.6g} at the start: the body begins beyond "
+                "its stop"
+            )
     if surface is not None and _is_zero_at_start(model, surface.function, meanings):
         text = surface.function.text
         if surface.is_unilateral:
@@ -59,6 +66,13 @@ def _starts(model: Model, component: Component, meanings: Meanings) -> Iterator[
                     f"guard {guard.name} of mode {component.initial}, component {name} ({guard.expr.text}) is zero at "
                     "the start: its first nonzero time derivative decides whether it fires immediately"
                 )
+
+
+def _value_at_start(model: Model, expr: Expression, meanings: Meanings) -> float | None:
+    """Return the value of an expression at the start, or None if it has none."""
+    starts = model.start_values() | model.discrete_values()
+    values = {**model.parameter_values(), **starts, TIME: 0.0}
+    return number_of(meanings.written_out(expr.tree), values, meanings.lookup)
 
 
 def _is_zero_at_start(model: Model, expr: Expression, meanings: Meanings) -> bool:

@@ -39,6 +39,28 @@ def wrong_signs(model: Model) -> Iterator[tuple[Contact, str, str]]:
             yield contact, f"contact {contact.name}: {found[0]}", found[1]
 
 
+def wrong_reactions(model: Model) -> Iterator[tuple[Contact, str, str]]:
+    """Yield each contact whose force drives a state of its velocity where it should oppose it, at the start."""
+    numbers = model.parameter_values() | model.start_values() | model.discrete_values() | {TIME: 0.0}
+    numbers |= dict.fromkeys((contact.name for contact in model.contacts), 0.0)
+    trees = {name: expr.tree for name, expr in model.definitions}
+
+    def slope(expr: Expression, name: str) -> float:
+        """Return how an expression grows with a name; 0 if it has no value."""
+        ends = [number_of(expr.tree, numbers | {name: numbers[name] + d}, trees.get) for d in (0.0, 1.0)]
+        return 0.0 if None in ends else ends[1] - ends[0]  # type: ignore[operator]  # neither is None
+
+    for contact in model.contacts:
+        for state in model.states:
+            if slope(contact.velocity, state.name) * slope(state.der, contact.name) > 0.0:
+                yield (
+                    contact,
+                    f"contact {contact.name}: its force drives '{state.name}' in the direction of slip",
+                    "the force opposes the relative velocity: correct its sign in the derivative, unless inertia "
+                    "couples the bodies",
+                )
+
+
 def _of_contact(
     model: Model, contact: Contact, numbers: Mapping[str, float], trees: Mapping[str, ast.expr]
 ) -> tuple[str, str] | None:

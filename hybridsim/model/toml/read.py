@@ -62,6 +62,21 @@ def open_text(text: str, path: str | None, kind: str) -> Table:
     return Table(source, (), data, kind)
 
 
+# Parts of the messages of tomllib, and what to do; the last one is for all other messages.
+_REMEDIES = (
+    ("at the end of a table declaration", "write the name of a table in brackets: [states]"),
+    ("overwrite a value", "this name is declared a second time: rename or remove one of the two"),
+    ("twice", "this table is declared a second time: write its lines below the first one"),
+    ("initial character for a key part", "write { ... } on one line, and all commas between its entries"),
+    ("Unclosed", "close the list with ] and { ... } with }, the latter on the same line"),
+    ("Illegal character", "close the text with the quotes that open it, on the same line"),
+    ("Unescaped", "write a backslash twice, or the text in single quotes"),
+    ("after a statement", "write one key = value in a line"),
+    ("after a key", "write key = value, such as mu = 0.3"),
+    ("", 'write key = value, with expressions in double quotes: der = "-k*x"'),
+)
+
+
 def _not_toml(fault: tomllib.TOMLDecodeError, text: str, path: str | None) -> ModelError:
     found = re.search(r"\(at line (\d+), column (\d+)\)", str(fault))
     message = re.sub(r"\s*\(at [^)]*\)", "", str(fault))
@@ -71,7 +86,7 @@ def _not_toml(fault: tomllib.TOMLDecodeError, text: str, path: str | None) -> Mo
     return ModelError(
         f"invalid TOML: {message[:1].lower()}{message[1:]}",
         place=Place(path, line, column, shown),
-        remedy='write key = value, with expressions in double quotes: der = "-k*x"',
+        remedy=next((remedy for part, remedy in _REMEDIES if part in message), _REMEDIES[-1][1]),
     )
 
 
@@ -81,7 +96,8 @@ def _split(text: str) -> list[str]:
 
 
 def _model(root: Table, folder: Path) -> Model:
-    root.only(*KEYS)
+    loose = [key for key, value in root.data.items() if key not in KEYS and type(value) in (int, float)]
+    root.only_in(*KEYS, others=loose, remedy="write the line [parameters] above them, if they are parameters")
     if root.data.get("schema", SCHEMA) != SCHEMA:
         root.fail(f"unknown schema {root.data['schema']!r}", f"write schema = {SCHEMA}", "schema")
     name = root.text("name") or (Path(root.source.file).stem if root.source.file else "model")
@@ -134,7 +150,13 @@ def _discrete(root: Table) -> Iterable[Discrete]:
 
 def _contacts(root: Table, laws: dict[str, FrictionLaw]) -> Iterable[Contact]:
     for name, table in root.entries("contacts", "contact"):
-        table.only("velocity", "normal", "law", "opens", "start", "nominal")
+        name_of_law = table.data.get("law")
+        numbers = [key for key, value in table.data.items() if type(value) in (int, float)]
+        table.only_in(
+            *("velocity", "normal", "law", "opens", "start", "nominal"),
+            others=numbers if isinstance(name_of_law, str) else [],
+            remedy=f'write arguments of a law beside its name: law = {{ name = "{name_of_law}", ... }}',
+        )
         velocity = table.required("velocity", 'write velocity = "EXPRESSION", the relative velocity')
         normal = table.required("normal", 'write normal = "EXPRESSION", the normal load')
         law = read_law_of_contact(table, laws)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -53,6 +53,13 @@ class Table:
         for key in self.data:
             if key not in known:
                 self.fail(f"unknown key '{key}'", nearest(key, known, kind="keys"), key)
+
+    def only_in(self, *known: str, others: Sequence[str], remedy: str) -> None:
+        """Report every unknown key, and those that belong to another table together, with their own remedy."""
+        others = [key for key in others if key not in known]
+        if others:
+            self.fail(f"unknown {', '.join(map(repr, others))}", remedy, others[0])
+        self.only(*known, *others)
 
     def require(self, key: str, remedy: str) -> bool:
         """Return whether the key exists, and report it if not."""
