@@ -13,12 +13,12 @@ import numpy as np
 from hybridsim import arguments
 from hybridsim.analysis.compare.comparison_request import whole
 from hybridsim.analysis.continuation.branch import Branch, BranchPoint, specials
+from hybridsim.analysis.continuation.starts import begun_elsewhere, fastest, in_shared, rates_at
 from hybridsim.analysis.steady.measures import word_of
 from hybridsim.analysis.steady.motion import Motion, point_at_end
 from hybridsim.analysis.steady.settling import relative
 from hybridsim.analysis.steady.shooting import Orbit, multipliers, rates_at_end
 from hybridsim.analysis.steady.steady_state import steady_state
-from hybridsim.analysis.variations.off_zero import rates_of
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.analysis.variations.sizes import sizes
 from hybridsim.calls import refusing
@@ -31,11 +31,7 @@ if TYPE_CHECKING:
 _CORRECTIONS = 8
 _TOL = 1e-9  # of the states' sizes and the range; the tolerance for closing an orbit
 # steps along the branch, relative to the range and the states
-_FIRST, _LARGEST, _SMALLEST = (
-    0.01,
-    0.05,
-    1e-6,
-)
+_FIRST, _LARGEST, _SMALLEST = 0.01, 0.05, 1e-6
 _MORE, _LESS = 1.5, 0.4
 _QUICK_CORRECTIONS = 3  # corrections, at most, after which the next step may grow
 _DIFFERENCE = 1e-6  # of the parameter, to differentiate the forcing's period
@@ -169,7 +165,7 @@ class _Follower:
         # start of the orbit, its period if that is free, the parameter
         self.unit = np.concatenate([scale, [orbit.period] if is_free else [], [bounds[1] - bounds[0]]])
         self.fault = ""  # the reason of the last failure
-        self.section = self.first_section = self._fastest(solution)
+        self.section = self.first_section = fastest(solution, scale)
 
     def follow(self, first: _Closing, sign: float) -> tuple[list[BranchPoint], str]:
         """Return the points of the branch towards lower (sign -1) or higher parameters, and why it ends."""
@@ -183,16 +179,10 @@ class _Follower:
             unknowns = self._unknowns(here.point) + step * tangent
             there, count = self._correct(here.point, unknowns, tangent)
             if there is None:
-                moved = None if is_moved else self._elsewhere(here)
+                moved = None if is_moved or not self.is_free else self._elsewhere(here)
                 is_moved = True
                 if moved is not None:
-                    here = moved
-                    towards = np.zeros(len(tangent))
-                    count = len(here.point.orbit.start.values)
-                    towards[count:] = tangent[
-                        count:
-                    ]  # the period and the parameter are the same from any start
-                    tangent = self._tangent(here, towards)
+                    here, tangent = moved, self._tangent(moved, in_shared(tangent, moved.point))
                     continue
                 step *= _LESS
                 if step < _SMALLEST:
@@ -215,27 +205,10 @@ class _Follower:
         return found, f"{self.parameter} = {here.point.parameter:g} (after {self.max_points} points)"
 
     def _elsewhere(self, here: _Closing) -> _Closing | None:
-        """Return the same free orbit from the middle of its longest smooth part; None for a forced one.
-
-        The next orbit starts at the same value of one state, which must lie between the events of that orbit, too.
-        """
-        point = here.point
-        if not self.is_free:
-            return None
-        solution = point.motion.run(point.orbit.start, point.orbit.period)
-        times = np.unique([solution.t_start, *(event.t for event in solution.events), solution.t_end])
-        longest = int(np.argmax(np.diff(times)))
-        middle = float(times[longest : longest + 2].mean())
-        reached = point.motion.run(point.orbit.start, middle - solution.t_start)
-        start = replace(point_at_end(reached), at=point.orbit.start.at)
-        moved = replace(point, orbit=replace(point.orbit, start=start))
-        self.section = self._fastest(point.motion.run(start, point.orbit.period))
-        return self._closing(moved, self._unknowns(moved))
-
-    def _fastest(self, solution: Solution) -> int:
-        """Return the state that changes fastest, by its unit, as a run begins."""
-        rates = np.abs(self._rates(solution, 0, len(solution.names)))
-        return int(np.argmax(rates / self.unit[: len(rates)])) if len(rates) else 0
+        """Return the same orbit from another start, since orbits next to it may not pass the present one."""
+        point, solution = begun_elsewhere(here.point)
+        self.section = fastest(solution, self.unit)
+        return self._closing(point, self._unknowns(point))
 
     def _at_bound(self, inside: BranchPoint, outside: BranchPoint) -> list[BranchPoint]:
         """Return the orbit at the bound that lies between two points, or None if Newton's method fails."""
@@ -311,7 +284,7 @@ class _Follower:
         except HybridsimError as fault:
             self.fault = fault.message
             return None
-        rates, at_start = (self._rates(solution, k, count) for k in (-1, 0))
+        rates, at_start = (rates_at(solution, k, count) for k in (-1, 0))
         columns = [found.by_start - np.eye(count)]
         columns += [rates[:, None]] if self.is_free else []
         moved = rates * (1.0 + share) - found.by_start @ at_start * share  # effect of both ends of the period
@@ -329,14 +302,6 @@ class _Follower:
         found_here = multipliers(found.by_start, rates_at_end(solution) if self.is_free else None)
         point = BranchPoint(value, orbit, motion, found_here, _word(solution), self.is_free)
         return _Closing(point, change, jacobian)
-
-    @staticmethod
-    def _rates(solution: Solution, k: int, count: int) -> np.ndarray:
-        """Return the rates (count,) of all unknowns at the start (k = 0) or at the end (k = -1) of a run."""
-        segment, found = solution._segments[k], np.zeros(count)
-        states = rates_of(solution._system, float(segment.s[k]), segment.x[k], segment.p, segment.z)
-        found[: len(states)] = states
-        return found
 
     def _forced(self, value: float) -> tuple[float, float]:
         """Return the forcing period and its derivative with respect to the parameter."""

@@ -310,8 +310,7 @@ class Lowering:
                         f"the force {declared_name(unknown[c])} does not act on the {self.title(c)} "
                         f"'{self.written(c)}' ({self.components[c].name}), and so cannot keep it at zero",
                         place=self.place(c),
-                        remedy=f"write velocities whose derivatives contain {declared_name(unknown[c])}, with opposite "
-                        "signs for the two bodies of a contact",
+                        remedy=f"write velocities in whose derivatives {declared_name(unknown[c])} has opposite signs",
                     )
                 self.never_held.add(c)
         self.partners = partners(self, surfaces, rate, effect)

@@ -1,0 +1,51 @@
+"""This module chooses where on a free periodic orbit its run begins, and which state holds the phase there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybridsim.analysis.steady.motion import point_at_end
+from hybridsim.analysis.variations.off_zero import rates_of
+
+if TYPE_CHECKING:
+    from hybridsim.analysis.continuation.branch import BranchPoint
+    from hybridsim.solution import Solution
+
+
+def begun_elsewhere(point: BranchPoint) -> tuple[BranchPoint, Solution]:
+    """Return the same orbit from the middle of its longest smooth part, with its run from there.
+
+    Orbits next to it begin at the same value of one state, so that they have to pass this value, too.
+    """
+    orbit = point.orbit
+    solution = point.motion.run(orbit.start, orbit.period)
+    times = np.unique([solution.t_start, *(event.t for event in solution.events), solution.t_end])
+    longest = int(np.argmax(np.diff(times)))
+    middle = float(times[longest : longest + 2].mean())
+    reached = point_at_end(point.motion.run(orbit.start, middle - solution.t_start))
+    start = replace(reached, at=orbit.start.at)
+    return replace(point, orbit=replace(orbit, start=start)), point.motion.run(start, orbit.period)
+
+
+def in_shared(tangent: np.ndarray, point: BranchPoint) -> np.ndarray:
+    """Return the part of a tangent that is the same from any start of the orbit: that of period and parameter."""
+    found = tangent.copy()
+    found[: len(point.orbit.start.values)] = 0.0
+    return found
+
+
+def fastest(solution: Solution, unit: np.ndarray) -> int:
+    """Return the state that changes fastest, in its unit, as a run begins."""
+    rates = np.abs(rates_at(solution, 0, len(solution.names)))
+    return int(np.argmax(rates / unit[: len(rates)])) if len(rates) else 0
+
+
+def rates_at(solution: Solution, k: int, count: int) -> np.ndarray:
+    """Return the rates (count,) of all unknowns at the start (k = 0) or the end (-1) of a run."""
+    segment, found = solution._segments[k], np.zeros(count)
+    states = rates_of(solution._system, float(segment.s[k]), segment.x[k], segment.p, segment.z)
+    found[: len(states)] = states
+    return found
