@@ -43,4 +43,6 @@ def test_the_estimate_is_of_the_size_of_the_measured_time() -> None:
     assert before.compile_seconds / 5.0 < measured < 5.0 * before.compile_seconds
     after = describe(model)
     assert after.compile_seconds == 0.0
-    assert "operations" in text and "compiled code of this model: cached" in "\n".join(lines_of(model, after, (), ()))
+    assert "operations" in text and "compiled code of this model: cached" in "\n".join(
+        lines_of(model, after, (), ())
+    )
