@@ -93,7 +93,7 @@ if ENABLED:
                     _set(_ours())
                     if so_far > _NOTICED:  # a part that no earlier run needed, such as derivatives
                         _tell(
-                            f"hybridsim: compiling a part of the engine that no run has used yet (once, 10 to 30 s); {_cache_state()} ..."
+                            f"hybridsim: compiling another part of the engine (once, 10 to 30 s); {_cache_state()} ..."
                         )
                 return
             if of.depth == 0:
