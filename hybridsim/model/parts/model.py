@@ -229,7 +229,7 @@ class Model(Declared):
             text = "its default" if argument is None else argument.text
             return (
                 f"'{name}' is an argument of the law of contact {contact.name} with the value {text}; declare a "
-                f'parameter, {name} = {text}, under [parameters], and write law = {{ ..., {name} = "{name}" }}'
+                f'parameter, {name} = {text} under [parameters], and write law = {{ ..., {name} = "{name}" }}'
             )
         return nearest(name, [*names, *others], kind="parameters and states" if others else "parameters")
 
