@@ -11,7 +11,7 @@ from hybridsim.engine.lowering.impulse_rows import gap_slopes, impulses, restitu
 from hybridsim.engine.lowering.lower import Lowering, Program
 from hybridsim.engine.lowering.program import Assign, Item, Switch, items_for
 from hybridsim.engine.lowering.program_names import user
-from hybridsim.engine.lowering.reset_keys import added, amounts_of, is_added
+from hybridsim.engine.lowering.reset_keys import amounts_of, is_added, resets_of
 from hybridsim.engine.lowering.stepped_rows import stepped
 from hybridsim.engine.lowering.stop_coupling import reported_forces
 from hybridsim.engine.series.layout import SIGNAL_SLOTS
@@ -271,24 +271,6 @@ class Emitter:
                 lines.append("        return 0")
         return "\n".join([*lines, "    return 0"])
 
-    def resets(self) -> list[tuple[tuple[Any, ...], Any]]:
-        """Return (key, mapping) of every reset of the model: of choices, limits, monitors and schedules, in this order.
-
-        After them come the amounts of the resets that add, with keys from `added`.
-        """
-        model = self.program.model
-        found: list[tuple[Any, Any]] = []
-        for c, component in enumerate(self.program.components):
-            for m, mode in enumerate(component.modes):
-                for g, guard in enumerate(mode.guards):
-                    found += [(("choice", c, m, g, k), choice.reset) for k, choice in enumerate(guard.then)]
-        limits = [(c, component.limit) for c, component in enumerate(self.program.components)]
-        found += [(("limit", c), limit.reset) for c, limit in limits if limit]
-        found += [(("monitor", k), monitor.reset) for k, monitor in enumerate(model.monitors)]
-        found += [(("schedule", k), schedule.reset) for k, schedule in enumerate(model.schedules)]
-        found = [(key, reset) for key, reset in found if reset]
-        return found + [(added(key), amounts) for key, reset in found if (amounts := amounts_of(reset))]
-
     def _reset(self) -> str:
         """Return the function that writes the values of a reset to out, first states, then discrete states.
 
@@ -298,7 +280,7 @@ class Emitter:
         names = [*(s.name for s in model.states), *(d.name for d in model.discrete)]
         place = {name: f"out[{i}]" for i, name in enumerate(names)}
         lines = ["def reset(t, x, p, z, out):"]
-        for number, (key, mapping) in enumerate(self.resets()):
+        for number, (key, mapping) in enumerate(resets_of(model)):
             converted = {n: self.lowering.convert(e) for n, e in mapping.items()}
             if not is_added(key):
                 for n in amounts_of(mapping):
@@ -325,7 +307,7 @@ class Emitter:
             "rates": len(program.rates),
             "linear": program.linear,
             "quantities": tuple(n for n, _ in self.quantities()),
-            "resets": tuple((key, tuple(mapping)) for key, mapping in self.resets()),
+            "resets": tuple((key, tuple(mapping)) for key, mapping in resets_of(program.model)),
             "tape": self._tape(guards),
         }
 

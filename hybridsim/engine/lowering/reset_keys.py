@@ -1,4 +1,4 @@
-"""Keys of resets, which identify a reset of a model and the parts of it that add to a variable."""
+"""Resets of a model with their keys, which identify a reset and the parts of it that add to a variable."""
 
 from __future__ import annotations
 
@@ -21,6 +21,26 @@ def is_added(key: tuple[Any, ...]) -> bool:
 def amounts_of(reset: Mapping[str, Expression]) -> dict[str, Expression]:
     """Return the part of a reset that adds amounts to variables."""
     return {name: amount for name, amount in reset.items() if isinstance(amount, Increment)}
+
+
+def resets_of(model: Any) -> list[tuple[tuple[Any, ...], Mapping[str, Expression]]]:
+    """Return (key, reset) of every reset of a model: of choices, limits, monitors and schedules, in this order.
+
+    After them come the amounts of the resets that add, with keys from `added`.
+    """
+    components = list(enumerate(model.all_components()))
+    found: list[tuple[tuple[Any, ...], Mapping[str, Expression]]] = [
+        (("choice", c, m, g, k), choice.reset)
+        for c, component in components
+        for m, mode in enumerate(component.modes)
+        for g, guard in enumerate(mode.guards)
+        for k, choice in enumerate(guard.then)
+    ]
+    found += [(("limit", c), component.limit.reset) for c, component in components if component.limit]
+    found += [(("monitor", k), monitor.reset) for k, monitor in enumerate(model.monitors)]
+    found += [(("schedule", k), schedule.reset) for k, schedule in enumerate(model.schedules)]
+    found = [(key, reset) for key, reset in found if reset]
+    return found + [(added(key), amounts) for key, reset in found if (amounts := amounts_of(reset))]
 
 
 def declared_reset(model: Any, key: tuple[Any, ...]) -> Mapping[str, Expression]:

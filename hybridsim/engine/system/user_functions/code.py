@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from hybridsim.engine.lowering.reset_keys import added, amounts_of
+from hybridsim.engine.lowering.reset_keys import resets_of
 from hybridsim.engine.native import kernels
 from hybridsim.engine.system.user_functions.forms import Forms, Parts, Scalar, number, parts_of, rates, value
 from hybridsim.engine.system.user_functions.surroundings import surroundings
@@ -43,7 +43,10 @@ class PythonCode:
         self.parts = parts = parts_of(model)
         _refuse_other_arguments(parts)
         self.forms = Forms(parts)
-        self.resets, self.conditions = _resets(model), _conditions(model)
+        self.resets = [
+            (key, {name: value(e) for name, e in reset.items()}) for key, reset in resets_of(model)
+        ]  # state -> function or number
+        self.conditions = _conditions(model)
         self.data = _data(model, self.resets)
         guards_and_monitors = (*parts.guards, *parts.monitors)
         self._rows: dict[str, tuple[Scalar, ...]] = {
@@ -229,27 +232,6 @@ def _conditions(model: Model) -> dict[tuple[int, int, int], tuple[Any, ...]]:
         for m, mode in enumerate(component.modes)
         for g, guard in enumerate(mode.guards)
     }
-
-
-def _resets(model: Model) -> list[tuple[tuple[Any, ...], dict[str, Any]]]:
-    """Return (key, state -> function or number) of every reset: of choices, limits, monitors and schedules.
-
-    They are followed by the added amounts, with keys made by `added`.
-    """
-    found: list[tuple[tuple[Any, ...], Any]] = [
-        (("choice", c, m, g, k), choice.reset)
-        for c, component in enumerate(model.all_components())
-        for m, mode in enumerate(component.modes)
-        for g, guard in enumerate(mode.guards)
-        for k, choice in enumerate(guard.then)
-    ]
-    limits = [(c, component.limit) for c, component in enumerate(model.all_components())]
-    found += [(("limit", c), limit.reset) for c, limit in limits if limit]
-    found += [(("monitor", k), monitor.reset) for k, monitor in enumerate(model.monitors)]
-    found += [(("schedule", k), schedule.reset) for k, schedule in enumerate(model.schedules)]
-    found = [(key, reset) for key, reset in found if reset]
-    found += [(added(key), amounts) for key, reset in found if (amounts := amounts_of(reset))]
-    return [(key, {name: value(e) for name, e in reset.items()}) for key, reset in found]
 
 
 def _data(model: Model, resets: list[tuple[tuple[Any, ...], dict[str, Any]]]) -> dict[str, Any]:
