@@ -31,7 +31,7 @@ FILES = {
     "engine/linear/modal.py": 365,
     "engine/linear/motion.py": 441,
     "engine/linear/tables.py": 325,
-    "engine/lowering/emit.py": 386,
+    "engine/lowering/emit.py": 368,
     "engine/lowering/held_states.py": 305,
     "engine/lowering/lower.py": 502,
     "engine/native/kernels.py": 508,
