@@ -8,16 +8,13 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.engine.events.choice.verdict import FINE, choose
-from hybridsim.engine.events.compiled.scratch import AT, AT_ERROR, LocatedEvent, called_by
-from hybridsim.engine.events.compiled.verdicts import (
-    candidate_verdict,
-    cluster_of,
-    guard_series,
-    members_verdict,
-)
+from hybridsim.engine.events.choice.joint_choice import is_below_limit
+from hybridsim.engine.events.choice.verdict import FINE
+from hybridsim.engine.events.compiled.guard_series import guard_series
+from hybridsim.engine.events.compiled.resolve_surface import choose_modes, cluster_of, judge
+from hybridsim.engine.events.compiled.scratch import AT, AT_ERROR, LocatedEvent, called_by, located
 from hybridsim.engine.linear.motion import functions_of_time, to_modal
-from hybridsim.engine.native.kernels import call, call_noinline, inline_always, kernel
+from hybridsim.engine.native.kernels import call, inline_always, kernel
 from hybridsim.engine.native.loop_hints import put
 from hybridsim.engine.native.simd_products import LANES
 from hybridsim.engine.run.event_loop import set_origin
@@ -62,13 +59,10 @@ def plain_start(
         return False
     at = LocatedEvent(0.0, 0.0, x, x_error, p, z)
     guard_series(tapes, inputs, none, k, at, x, x_error, work)
-    verdict = call_noinline(
-        members_verdict,
-        (
-            automata, none, k, at, x, x_error, z, work.everything, -1, False, False, work, state.sides, state.orders,
-            state.floors,
-        ),
-    )  # fmt: skip
+    verdict = judge(automata, none, k, z, work.everything, False, 0, work)
+    put(work.all_sides[0], state.sides)
+    put(work.all_orders[0], state.orders)
+    put(work.all_floors[0], state.floors)
     return verdict == FINE
 
 
@@ -96,10 +90,9 @@ def _take_sides(automata: Any, inputs: Any, surfaces: Any, pin_at: int, state: A
 def _choose_cluster(
     automata: Any, tapes: Any, inputs: Any, none: Any, state: Any, first: int, work: Any
 ) -> bool:
-    """Choose the modes of a component on its surface and of its cluster. Return whether they are certain."""
+    """Set the modes of the components on their surfaces in one cluster. Return whether they are certain."""
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
-    members, candidates, current, holds = work.members, work.candidates, work.current, work.holds
-    verdicts, trial, y = work.verdicts, work.trial, work.y
+    members, current, holds, trial, y = work.members, work.current, work.holds, work.trial, work.y
     cluster = cluster_of(automata, first)
     count = 0
     for i in range(cluster.shape[0]):
@@ -123,24 +116,18 @@ def _choose_cluster(
     work.float_slots[AT] = work.float_slots[AT_ERROR] = 0.0
     put(x, work.x_after)
     put(x_error, work.slopes)
-    total = 3**count
-    for number in range(total):
-        rest = number
-        for i in range(count - 1, -1, -1):
-            candidates[number, i] = rest % 3
-            rest //= 3
-        for i in range(count):
-            trial[members[i]] = candidates[number, i]
-        verdicts[number] = call_noinline(
-            candidate_verdict, (automata, tapes, inputs, none, state, work, -1, False, first, number)
-        )
-        if verdicts[number] < -1:  # modes without tapes
-            return False
-    number = choose(candidates[:total, :count], verdicts[:total], current[:count], holds[:count])
-    if number < 0 or verdicts[number] != FINE:
+    put(z, work.before)
+    put(z, work.now)
+    at, k = located(state, work), find_modes(tapes, trial)
+    if k < 0:
+        return False
+    guard_series(tapes, inputs, none, k, at, work.x_after, work.slopes, work)
+    for i in range(count):
+        work.keeps[i] = count > 1 and is_below_limit(automata, work, members[i])
+    if choose_modes(automata, tapes, inputs, none, at, cluster, k, True, count, work) < 0:
         return False
     for i in range(count):
-        z[members[i]] = candidates[number, i]
+        z[members[i]] = trial[members[i]]
     return True
 
 

@@ -2,61 +2,39 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from hybridsim.engine.events.choice.cancelled_guards import cancelled_by_surfaces
-from hybridsim.engine.events.choice.candidates import all_verdicts, verdicts_on
+from hybridsim.engine.events.choice.cluster_choice import ClusterChoice
 from hybridsim.engine.events.choice.guards_of_one_target import guards_taken_together
-from hybridsim.engine.events.choice.releases import Releases
-from hybridsim.engine.events.choice.surface_intersection import (
-    can_hold,
-    is_one_motion,
-    keeps_nothing,
-    message_on_cascade,
-    on_its_side,
-    refused,
-    rivals,
-)
-from hybridsim.engine.events.choice.uniqueness import other_outcomes, with_cause
-from hybridsim.engine.events.choice.verdict import (
-    LEAVES,
-    NONE,
-    NONUNIQUE,
-    UNDECIDED,
-    choose,
-    decree_orders,
-    guard_verdict,
-    joint_candidates,
-    side_after,
-)
-from hybridsim.engine.events.corner_sides import sides_along, take_corners
-from hybridsim.engine.events.corner_start import cross, past_zero, vanishing_surfaces
-from hybridsim.engine.events.diagnosis import rates_without_value
+from hybridsim.engine.events.choice.surface_intersection import message_on_cascade
+from hybridsim.engine.events.choice.verdict import LEAVES, UNDECIDED, side_after
+from hybridsim.engine.events.corner_sides import take_corners
 from hybridsim.engine.events.fatal_guards import message_of_leaving, message_of_located
 from hybridsim.engine.events.first_modes import as_read_by_conditions, certainly_leaving
 from hybridsim.engine.events.jumps.impact import strike
 from hybridsim.engine.events.jumps.resets import combine_resets
 from hybridsim.engine.events.outcome import Change, Outcome, Situation
-from hybridsim.engine.events.rest_at_stops import together, with_tied
-from hybridsim.engine.series.bounded import ORDER, UNIT
-from hybridsim.engine.series.short_series import Series
+from hybridsim.engine.series.bounded import ORDER
 from hybridsim.engine.system.system import System
 
 # A legitimate cascade changes each component a few times. A model that needs more than this many rounds for each of
 # its modes is in an endless cycle.
 _ROUNDS_PER_MODE = 8
-_SEVERAL_MOTIONS = "several motions are admissible"
-_MAX_CANDIDATES = 3**8  # a cluster of more components needs a complementarity solver, not enumeration
 
 
-class EventResolution:
-    """The resolution of one event."""
+class EventResolution(ClusterChoice):
+    """The resolution of one event.
 
-    is_thorough = False  # whether to judge all candidates, even if the choice does not need them
+    Parameters
+    ----------
+    before : the modes (C,) at the event; -1 for a component without a mode yet.
+    scope : the components decided here; a method with its own rules for surfaces leaves those out.
+    inputs : the run-time vector before the event, read by the first conditions and resets.
+    """
 
     def __init__(
         self,
@@ -67,29 +45,14 @@ class EventResolution:
         scope: Iterable[int] | None = None,
         inputs: np.ndarray | None = None,
     ) -> None:
-        self.system = system
-        # run-time vector before the event, read by the first conditions and resets
+        super().__init__(system, at, before, forward)
         self.inputs = inputs
-        # components decided here; a method with its own rules for surfaces leaves those out
         self.scope = set(range(len(system.automata))) if scope is None else set(scope)
-        self.at = at
-        self.forward = forward
-        self.fired = np.zeros(system.guard_count, dtype=np.bool_)
-        self.on_surface = np.zeros(len(system.automata), dtype=np.bool_)
-        self.changes: list[Change] = []
-        self.warnings: list[str] = []
-        self.jumped = False  # whether a reset or an unknown made the flow jump
         self.rounds = 0
         self.most_rounds = _ROUNDS_PER_MODE * (1 + sum(len(a.modes) for a in system.automata))
         self.is_kinked = False  # whether a corner changed its side: the flow is continuous, its slope is not
         # position of each guard in the order in which they reached zero
         self.rank: dict[int, int] = {}
-        self.releases = Releases(system, before)
-        self.sides = np.ones(system.guard_count, dtype=np.int64)
-        self.orders = np.zeros(system.guard_count, dtype=np.int64)
-        # Taylor series by modes, and the arrays at which they were computed; those are replaced, never modified
-        self.series: dict[bytes, Series] = {}
-        self.behind: tuple[object, ...] = (None,) * 4
 
     # -- the rounds -----------------------------------------------------------------------------------------
 
@@ -98,10 +61,9 @@ class EventResolution:
         located = {int(g) for g in fired}
         lost = message_of_located(self.system, self.at.z, located)
         self.rank = dict(fired) if isinstance(fired, Mapping) else {int(g): k for k, g in enumerate(fired)}
-        self.fired[list(located)] = True
-        self.releases.locate(located)
+        self.locate(located)
         surfaces = self._surface_components()
-        open_ = self._past_corners({c for c, _, _ in self._fired_guards()})
+        open_ = self._past_corners({c for c, _, _ in self.fired_guards()})
         at_surfaces, leaving = self._at_surfaces(open_ & surfaces), open_ - surfaces
         if leaving and at_surfaces:
             leaving -= cancelled_by_surfaces(self, leaving, at_surfaces)
@@ -116,7 +78,7 @@ class EventResolution:
             if failure:
                 return self._stop(*(("inconsistent", lost) if lost else failure))
             take_corners(self)
-            verdicts = self._guard_verdicts()
+            verdicts = self.guard_verdicts(sorted(self.scope))
             leaving = {c for c, v in verdicts.items() if v == LEAVES}
             for c, v in verdicts.items():
                 if v == UNDECIDED:
@@ -162,10 +124,9 @@ class EventResolution:
         others = open_.difference(self.system.led)
         if not take_corners(self):
             return others
-        decreed = self._decreed(self.at.z, continuous=False)
         staying = set()
         for c in others - self._surface_components():
-            if self._guard_verdict(self.at.z, self.at.x, decreed, [c]) != LEAVES:
+            if self.verdict_on_guards(self.at.z, [c], continuous=False) != LEAVES:
                 staying.add(c)
                 self.fired[list(self.system.automata[c].guards[self.at.z[c]])] = False
         return others - staying
@@ -217,53 +178,11 @@ class EventResolution:
 
     def _at_surfaces(self, components: set[int]) -> set[int]:
         """Return the components whose surfaces are zero; a guard on the load of a sliding contact does not count."""
-        fired = {(c, j) for c, j, _ in self._fired_guards()}
+        fired = {(c, j) for c, j, _ in self.fired_guards()}
         holds = [self.system.automata[c].hold for c in range(len(self.at.z))]
         return {
             c for c in components if self.at.z[c] == holds[c] or (c, 0) in fired
         }  # guard 0 of a mode is that of the surface
-
-    def _fired_guards(self) -> list[tuple[int, int, int]]:
-        """Return (component, index in its mode, guard number) of the located guards."""
-        table = self.system.guards_of(self.at.z)
-        return [
-            (c, j, int(g))
-            for c, row in enumerate(table)
-            for j, g in enumerate(row)
-            if g >= 0 and self.fired[g]
-        ]
-
-    def series_of(self, z: np.ndarray, x: np.ndarray | None = None) -> Series:
-        """Return the Taylor series along the flow of the modes z, at the present state or at x."""
-        at = self.at
-        x = at.x if x is None else x
-        behind = (at.s, x, at.p, at.x_error)
-        if not all(a is b for a, b in zip(behind, self.behind, strict=True)):
-            self.behind, self.series = behind, {}
-        key = z.tobytes()
-        if key not in self.series:
-            self.series[key] = self.system.series(at.s, x, at.p, z, at.x_error, at.s_error, at.is_put)
-        return self.series[key]
-
-    def _guard_verdict(
-        self, z: np.ndarray, x: np.ndarray, decreed: np.ndarray, components: Iterable[int]
-    ) -> int:
-        """Return the verdict on the guards of some components in the candidate modes z."""
-        series = self.series_of(z, x)
-        active = np.zeros(self.system.guard_count, dtype=np.bool_)
-        table = self.system.guards_of(z)
-        for c in components:
-            active[table[c][table[c] >= 0]] = True
-        sides, orders = np.empty_like(self.sides), np.empty_like(self.orders)
-        verdict = guard_verdict(
-            series.guards, series.guard_bounds, decreed, active, not self.forward, sides, orders
-        )
-        self.sides[active], self.orders[active] = sides[active], orders[active]
-        return int(verdict)
-
-    def _guard_verdicts(self) -> dict[int, int]:
-        decreed = self._decreed(self.at.z, self._continuous(self.at.z, range(len(self.system.automata))))
-        return {c: self._guard_verdict(self.at.z, self.at.x, decreed, [c]) for c in sorted(self.scope)}
 
     def _note_undecided(self, component: int) -> None:
         automaton = self.system.automata[component]
@@ -314,163 +233,6 @@ class EventResolution:
         numbers = self.system.automata[component].guards[self.at.z[component]]
         return min((self.rank.get(g, len(self.rank)) for g in numbers), default=len(self.rank))
 
-    # -- decisions by admissibility at surfaces -------------------------------------------------------------
-
-    def choose_jointly(self, open_: set[int]) -> tuple[str, str] | None:
-        """Decide the clusters that contain an open component: one that fired, leaves, or has no mode yet."""
-        for cluster in self.system.clusters:
-            if open_ & set(cluster):
-                failure = self._choose_cluster(cluster, open_)
-                if failure and failure[0] == "inconsistent" and (first := past_zero(self, cluster) - open_):
-                    cross(self, first)
-                    failure = self._choose_cluster(cluster, open_)
-                if (
-                    failure
-                    and failure[0] == "inconsistent"
-                    and (more := vanishing_surfaces(self, cluster) - open_)
-                ):
-                    failure = self._choose_cluster(cluster, open_ | more)
-                if failure:
-                    return failure
-        return None
-
-    def _choose_cluster(self, cluster: tuple[int, ...], open_: set[int]) -> tuple[str, str] | None:
-        at, automata = self.at, self.system.automata
-        taking_part = with_tied(
-            self.system, [c for c in cluster if c in open_ or at.z[c] == automata[c].hold]
-        )
-        for c in taking_part:
-            self.on_surface[c] = True
-        sizes = [len(automata[c].modes) for c in taking_part]
-        if math.prod(sizes) > _MAX_CANDIDATES:
-            names = ", ".join(automata[c].name for c in taking_part)
-            return (
-                "inconsistent",
-                f"{len(sizes)} coupled components reach their surfaces at once ({names}), too many to solve",
-            )
-        candidates = together(self.system, taking_part, joint_candidates(sizes))
-        at.x = self._pinned(taking_part)
-        at.x_error = np.where(self.pinned_states(taking_part), UNIT * np.abs(at.x), at.x_error)
-        holds = np.array([automata[c].hold for c in taking_part])
-        caused = candidates[with_cause(self, taking_part, candidates)]
-        current = self._current(taking_part, holds)
-        verdicts, is_whole = verdicts_on(self, taking_part, caused, current, holds, cluster)
-        if len(caused) < len(candidates) and (verdicts == LEAVES).all():
-            verdicts, is_whole = verdicts_on(self, taking_part, candidates, current, holds, cluster)
-        else:
-            candidates = caused
-        rival = rivals(self, taking_part, candidates, verdicts)
-        if len(rival):
-            return f"{'' if self.forward else 'backward-'}nonunique", self._say(
-                taking_part, rival, _SEVERAL_MOTIONS
-            )
-        number = int(choose(candidates, verdicts, current, holds))
-        if number == NONUNIQUE:
-            verdicts = verdicts if is_whole else all_verdicts(self, taking_part, candidates, cluster)
-            left = np.flatnonzero(verdicts != LEAVES)
-            if not is_one_motion(self, taking_part, candidates[left]):
-                return self._several(taking_part, candidates[left])
-            number = int(left[on_its_side(self, taking_part, candidates[left])])
-        if number == NONE:
-            return refused(self, taking_part, self._say(taking_part, candidates, "no motion is admissible"))
-        others = other_outcomes(self, taking_part, candidates, number, open_, cluster)
-        if len(others):
-            return "nonunique", self._say(
-                taking_part, np.vstack([candidates[number], others]), _SEVERAL_MOTIONS
-            )
-        source, x_minus = at.z.copy(), at.x.copy()
-        if reason := keeps_nothing(self, taking_part, self.with_modes(taking_part, candidates[number])):
-            return "nonunique", self._say(taking_part, candidates[number : number + 1], reason)
-        fired = [(c, j) for c, j, _ in self._fired_guards() if source[c] >= 0]
-        guards = {c: automata[c].guard_names[source[c]][j] for c, j in fired}
-        for c, mode in zip(taking_part, candidates[number], strict=True):
-            at.z[c] = mode
-            if source[c] != mode:
-                for g in automata[c].guards[source[c]] if source[c] >= 0 else ():
-                    self.fired[g] = False
-                if source[c] >= 0:
-                    self.changes.append(
-                        Change(c, guards.get(c, ""), int(source[c]), int(mode), x_minus, at.x)
-                    )
-        return None
-
-    def _current(self, components: list[int], holds: np.ndarray) -> np.ndarray:
-        """Return the preferred modes: the present ones, or at a start the holding modes of contacts.
-
-        Static friction therefore holds a contact that is at its limit within rounding.
-        """
-        modes = self.at.z[components]
-        begins = [modes[k] < 0 and not self.system.automata[c].is_unique for k, c in enumerate(components)]
-        return np.where(begins, holds, modes)
-
-    def _several(self, components: list[int], candidates: np.ndarray) -> tuple[str, str]:
-        """Return status and message if no joint candidate is preferred, or if a rate is not a number."""
-        at = self.at
-        for modes in candidates:
-            lost = rates_without_value(self.system, at.s, at.x, at.p, self.with_modes(components, modes))
-            if lost:
-                return "step-failure", lost
-        return "nonunique", self._say(components, candidates, _SEVERAL_MOTIONS)
-
-    def pinned_states(self, components: list[int]) -> np.ndarray:
-        mask = np.zeros(self.system.n, dtype=np.bool_)
-        mask[[i for c in components for i in self.system.pins.get(c, ())]] = True
-        return mask
-
-    def _pinned(self, components: list[int]) -> np.ndarray:
-        """Return x with the surfaces of some components exactly zero."""
-        z = np.maximum(self.at.z, 0)
-        for c in components:
-            z[c] = self.system.automata[c].hold
-        return self.system.project(self.at.s, self.at.x, self.at.p, z)
-
-    def with_modes(self, components: list[int], modes: np.ndarray) -> np.ndarray:
-        """Return the modes after a change of some modes, with corners on their sides along the motion."""
-        z = self.at.z.copy()
-        z[components] = modes
-        return sides_along(self, np.maximum(z, 0), self.at.x)[0] if self.system.led else np.maximum(z, 0)
-
-    def verdict(self, z: np.ndarray, components: Iterable[int]) -> int:
-        """Return whether the guards of some components admit the modes z just after the event."""
-        components = list(components)
-        decreed = self._decreed(z, self._continuous(z, components))
-        found = self._guard_verdict(z, self.at.x, decreed, components)
-        return LEAVES if found == UNDECIDED and not can_hold(self, components, z) else found
-
-    def _continuous(self, z: np.ndarray, components: Iterable[int]) -> bool:
-        """Return whether every change so far leaves all unknowns unchanged."""
-        return not self.jumped and self.releases.leave_unknowns(self.at, z, components)
-
-    def _decreed(self, z: np.ndarray, continuous: bool) -> np.ndarray:
-        system = self.system
-        modes = zip(system.automata, z, strict=True)
-        holding = np.array([a.has_surface and m == a.hold for a, m in modes], dtype=np.bool_)
-        released = np.array([self.releases.has(c, z) for c in range(len(z))], dtype=np.bool_)
-        decreed = np.zeros(system.guard_count, dtype=np.int64)
-        fired = self.fired & (z == self.at.z)[system.owner]
-        decree_orders(
-            system.guards_of(z),
-            holding,
-            self.on_surface,
-            released,
-            continuous,
-            fired,
-            system.is_unilateral,
-            decreed,
-        )
-        return decreed
-
-    def _say(self, components: list[int], candidates: np.ndarray, what: str) -> str:
-        automata = self.system.automata
-        rows = [
-            ", ".join(
-                f"{automata[c].name}: {automata[c].modes[m]}" for c, m in zip(components, row, strict=True)
-            )
-            for row in candidates
-        ]
-        state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(self.system.names, self.at.x, strict=True))
-        return f"{what} at {state}: {'; or '.join(rows)}"
-
     # -- results --------------------------------------------------------------------------------------------
 
     def _done(self) -> Outcome:
@@ -486,14 +248,14 @@ class EventResolution:
             at.p,
             at.z,
             self.sides,
-            np.where(self.orders > ORDER, 0, self.orders),
+            self.orders,
             monitor_sides,
             np.where(monitor_orders > ORDER, 0, monitor_orders),
             at.x_error,
-            np.where(self.orders > 0, series.guard_bounds[:, 0], 0.0),
+            self.floors,
             np.where(monitor_orders > 0, series.monitor_bounds[:, 0], 0.0),
             self.changes,
-            not self.is_kinked and self._continuous(at.z, range(len(self.system.automata))),
+            not self.is_kinked and self.is_continuous(at.z, range(len(self.system.automata))),
             "",
             "",
             self.warnings,

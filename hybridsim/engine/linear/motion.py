@@ -143,47 +143,65 @@ def linear_coefficient(
 
 
 @inlined
-def size_of_point(x: Any, x_error: Any, w: Any, w_error: Any) -> float:
-    """Return the size of y = (x, w), by which rounding errors of coefficients are bounded."""
+def has_tables(lin: Any) -> bool:
+    """Return whether there are tables of linear modes."""
+    return lin.counts.shape[0] > 0
+
+
+@inlined
+def measure_point(lin: Any, work: Any) -> None:
+    """Store the size of y = (x_after, w), by which rounding errors of coefficients are bounded."""
+    if not has_tables(lin):
+        return
     size = 0.0
+    x, x_error, w, w_error = work.x_after, work.slopes, work.w, work.w_error
     for m in range(x.shape[0]):
         short_loop()
         size += abs(x[m]) + _IN_UNITS * x_error[m]
     for m in range(w.shape[0]):
         short_loop()
         size += abs(w[m]) + _IN_UNITS * w_error[m]
-    return size
+    work.size[0] = size
 
 
 @inlined
-def clear_sign(lin: Any, k: int, g: int, order: int, x: Any, w: Any, size: float) -> int:
-    """Return the sign of a guard's Taylor coefficient at y = (x, w), or 0 if rounding may change it."""
-    value = dot(lin.series, (k, g, order), (x, w))
-    if not abs(value) > lin.largest[k, g, order] * size:
+def rough_coefficient(lin: Any, k: int, g: int, order: int, work: Any) -> tuple[float, float]:
+    """Return a Taylor coefficient of a guard in row k at y = (x_after, w), with a wide bound that costs little."""
+    return dot(lin.series, (k, g, order), (work.x_after, work.w)), lin.largest[k, g, order] * work.size[0]
+
+
+@inlined
+def rough_side(lin: Any, k: int, g: int, order: int, work: Any) -> int:
+    """Return the sign of a Taylor coefficient of a guard in row k at y = (x_after, w), or 0 if it is uncertain."""
+    value, bound = rough_coefficient(lin, k, g, order, work)
+    if not abs(value) > bound:
         return 0
     return 1 if value > 0.0 else -1
 
 
-@kernel
-def linear_side(
-    lin: Any, k: int, g: int, decreed: int, x: Any, x_error: Any, work: Any
-) -> tuple[int, int, bool]:
-    """Return the side as in `hybridsim.engine.events.choice.verdict.side_after`, and whether rounding leaves it open.
+@inlined
+def linear_series(lin: Any, k: int, g: int, first: int, work: Any) -> None:
+    """Write the coefficients of a guard with bounds to `judged`, from order `first` to the first beyond its bound.
 
-    The coefficients are evaluated one at a time.
+    Nothing is written if there are no tables of linear modes. k: row of the modes. The point is y = (x_after, w); see
+    `measure_point`.
     """
-    is_open, size = False, size_of_point(x, x_error, work.w, work.w_error)
-    for order in range(decreed, ORDER + 1):
-        sign = clear_sign(lin, k, g, order, x, work.w, size)
-        if sign != 0:  # certain
-            return sign, order, False
-        value, bound = linear_coefficient(lin, k, g, order, x, x_error, work)
-        if value > bound:
-            return 1, order, False
-        if value < -bound:
-            return -1, order, False
-        is_open = is_open or value != 0.0 or bound != 0.0
-    return 0, ORDER + 1, is_open
+    if has_tables(lin):
+        value, bound = rough_coefficient(lin, k, g, first, work)
+        work.judged[0, g, first], work.judged[1, g, first] = value, bound
+        if not abs(value) > bound:
+            call_noinline(_exact_series, (lin, k, g, first, work))
+
+
+@kernel
+def _exact_series(lin: Any, k: int, g: int, first: int, work: Any) -> None:
+    for order in range(first, ORDER + 1):
+        value, bound = rough_coefficient(lin, k, g, order, work)
+        if not abs(value) > bound:
+            value, bound = linear_coefficient(lin, k, g, order, work.x_after, work.slopes, work)
+        work.judged[0, g, order], work.judged[1, g, order] = value, bound
+        if abs(value) > bound:
+            return
 
 
 @inlined

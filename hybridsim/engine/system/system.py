@@ -325,11 +325,11 @@ class System:
         evaluate_rows(self.address(name), s, x, p, z, out)
         return out
 
-    def jumps(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> dict[int, tuple[float, float]]:
-        """Return the jump of each unknown on release to above and to below, by component."""
+    def jumps(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Return the jumps (2 m,) of the unknowns of m surfaces on release to above and to below."""
         out = np.zeros(2 * len(self.surface_of))
         self._in_python("jumps", s, x, p, z, out)
-        return {c: (float(out[2 * k]), float(out[2 * k + 1])) for k, c in enumerate(self.surface_of)}
+        return out
 
     def effects(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> dict[int, float]:
         """Return the effect of each unknown on the rate of its own surface; negative if it opposes the rate."""

@@ -111,7 +111,6 @@ class RecordedResolution(EventResolution):
     def verdict(self, z: np.ndarray, components: Iterable[int]) -> int:
         components = tuple(components)
         found = super().verdict(z, components)
-        decreed = self._decreed(z, self._continuous(z, components))
         series = self.series_of(z)
         states = series.states, series.state_bounds
         surfaces = series.surfaces.copy(), series.surface_bounds.copy()
@@ -121,7 +120,7 @@ class RecordedResolution(EventResolution):
         motion = np.concatenate([states, surfaces], axis=1)
         free = np.ones(motion.shape[1], dtype=np.bool_)
         free[self.system.evaluated(z)] = False
-        look = Look(replace(self.at), z.copy(), components, found, decreed, motion, free)
+        look = Look(replace(self.at), z.copy(), components, found, self.decreed.copy(), motion, free)
         self.decisions[-1].looks.append(look)
         return found
 

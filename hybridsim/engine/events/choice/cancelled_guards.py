@@ -24,6 +24,7 @@ def cancelled_by_surfaces(resolution: EventResolution, automata: set[int], surfa
     ahead.at = replace(resolution.at, z=resolution.at.z.copy())
     ahead.fired, ahead.on_surface = resolution.fired.copy(), resolution.on_surface.copy()
     ahead.sides, ahead.orders = resolution.sides.copy(), resolution.orders.copy()
+    ahead.floors = resolution.floors.copy()
     ahead.changes, ahead.warnings, ahead.series = [], [], {}
     open_ = set(surfaces)
     if strike(ahead, open_) or ahead.choose_jointly(open_):

@@ -1,48 +1,78 @@
-"""Enumerate the combinations of modes at the surfaces of a cluster, and test as many as the choice needs."""
+"""Judge the combinations of modes at the surfaces of a cluster, as many as the joint choice needs."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.events.choice.verdict import FINE, LEAVES, preference
+from hybridsim.engine.events.choice.joint_choice import (
+    NO_SCORE,
+    NONE,
+    is_settled,
+    joint_choice,
+    rank_candidates,
+)
+from hybridsim.engine.native.kernels import Precompiled
 
 if TYPE_CHECKING:
-    from hybridsim.engine.events.resolve import EventResolution
+    from hybridsim.engine.events.choice.event_judge import EventJudge
+
+_UNJUDGED = -2  # there is no verdict on a candidate yet
+_rank_candidates, _joint_choice, _is_settled = map(Precompiled, (rank_candidates, joint_choice, is_settled))
+
+
+class JudgedCandidates(NamedTuple):
+    """The candidates of a joint choice, the verdicts on those that were judged, and the chosen one."""
+
+    candidates: np.ndarray  # modes (k, members)
+    verdicts: np.ndarray  # (k,)
+    number: int  # of the chosen candidate, or NONUNIQUE or NONE
+
+
+def judged_candidates(
+    resolution: EventJudge,
+    members: list[int],
+    candidates: np.ndarray,
+    keeps: np.ndarray,
+    cluster: tuple[int, ...],
+) -> JudgedCandidates:
+    """Choose among joint candidates in which contacts below their limits (`keeps`) stay in their holding modes.
+
+    If a member needs a unique motion, all candidates are judged.
+    """
+    automata, count = resolution.system.automata, len(members)
+    holds = np.array([automata[c].hold for c in members])
+    # at a start, a contact prefers to hold: static friction holds one that is at its limit within rounding
+    begins = [resolution.at.z[c] < 0 and not automata[c].is_unique for c in members]
+    current, ranks = np.where(begins, holds, resolution.at.z[members]), np.empty(len(candidates), np.int64)
+    _rank_candidates(candidates, len(candidates), count, current, holds, keeps, ranks)
+    candidates, ranks = candidates[ranks >= 0], ranks[ranks >= 0]
+    verdicts, chosen, score = np.full(len(candidates), _UNJUDGED, dtype=np.int64), NONE, NO_SCORE
+    is_thorough = resolution.is_thorough or any(automata[c].is_unique for c in members)
+    for number in np.argsort(-ranks, kind="stable").tolist():
+        rank = int(ranks[number])
+        if not is_thorough and _is_settled(score, rank, count):
+            break
+        z = resolution.with_modes(members, candidates[number])
+        verdicts[number] = verdict = resolution.verdict(z, cluster)
+        chosen, score = _joint_choice(chosen, score, number, rank, verdict, count)
+    return JudgedCandidates(candidates, verdicts, chosen)
+
+
+def completed(
+    resolution: EventJudge, members: list[int], found: JudgedCandidates, cluster: tuple[int, ...]
+) -> np.ndarray:
+    """Judge the remaining candidates, and return all verdicts."""
+    for number in np.flatnonzero(found.verdicts == _UNJUDGED):
+        z = resolution.with_modes(members, found.candidates[number])
+        found.verdicts[number] = resolution.verdict(z, cluster)
+    return found.verdicts
 
 
 def all_verdicts(
-    resolution: EventResolution, members: list[int], candidates: np.ndarray, cluster: tuple[int, ...]
+    resolution: EventJudge, members: list[int], candidates: np.ndarray, cluster: tuple[int, ...]
 ) -> np.ndarray:
     """Return the verdicts on all joint candidates."""
-    found = [resolution.verdict(resolution.with_modes(members, modes), cluster) for modes in candidates]
-    return np.array(found, dtype=np.int64)
-
-
-def verdicts_on(
-    resolution: EventResolution,
-    members: list[int],
-    candidates: np.ndarray,
-    current: np.ndarray,
-    holds: np.ndarray,
-    cluster: tuple[int, ...],
-) -> tuple[np.ndarray, bool]:
-    """Return whether each combination of modes is admissible, in order of preference, and whether all were tested.
-
-    The search ends after the candidates that `choose` prefers as much as the first one it accepts. The others count as
-    not admissible. If a member needs a unique motion, all candidates are judged.
-    """
-    if resolution.is_thorough or any(resolution.system.automata[c].is_unique for c in members):
-        return all_verdicts(resolution, members, candidates, cluster), True
-    count = len(members)
-    ranks = [preference(modes, current, holds, count) for modes in candidates]
-    verdicts, least = np.full(len(candidates), LEAVES, dtype=np.int64), -1
-    for number in sorted(range(len(candidates)), key=ranks.__getitem__, reverse=True):
-        if ranks[number] < least:
-            return verdicts, False
-        verdict = resolution.verdict(resolution.with_modes(members, candidates[number]), cluster)
-        verdicts[number] = verdict
-        if verdict == FINE or (verdict != LEAVES and ranks[number] >= count * (count + 1)):
-            least = ranks[number]
-    return verdicts, True
+    verdicts = np.full(len(candidates), _UNJUDGED, dtype=np.int64)
+    return completed(resolution, members, JudgedCandidates(candidates, verdicts, 0), cluster)

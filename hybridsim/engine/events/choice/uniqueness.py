@@ -13,42 +13,41 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.engine.events.choice.candidates import all_verdicts
+from hybridsim.engine.events.choice.joint_choice import is_below_limit
 from hybridsim.engine.events.choice.surface_intersection import is_one_motion
 from hybridsim.engine.events.choice.verdict import FINE
+from hybridsim.engine.native.kernels import Precompiled
 
 if TYPE_CHECKING:
-    from hybridsim.engine.events.resolve import EventResolution
+    from hybridsim.engine.events.choice.event_judge import EventJudge
 
 # Largest number of components at their surfaces whose other outcomes are examined; 3^5 verdicts would be too slow.
 MAX_JOINT_COMPONENTS = 4
 
+_is_below_limit = Precompiled(is_below_limit)
 
-def with_cause(resolution: EventResolution, members: list[int], candidates: np.ndarray) -> np.ndarray:
-    """Return a mask of the candidates in which all friction certainly below its limits keeps sticking."""
-    system, at = resolution.system, resolution.at
-    automata, modes = system.automata, np.maximum(at.z, 0)
+
+def below_limits(resolution: EventJudge, members: list[int]) -> np.ndarray:
+    """Return a mask of the members that are certainly below their limits, if several are decided together."""
+    automata, at = resolution.system.automata, resolution.at
+    modes, keeps = np.maximum(at.z, 0), np.zeros(len(members), dtype=np.bool_)
     holding = [
         k
         for k, c in enumerate(members)
         if at.z[c] in (-1, automata[c].hold) and not (automata[c].is_unilateral or automata[c].is_unique)
     ]
-    mask = np.ones(len(candidates), dtype=np.bool_)
     if not holding or len(members) == 1:
-        return mask
+        return keeps
     begun = [members[k] for k in holding]
     modes[begun] = [automata[c].hold for c in begun]  # at a start, a contact on its surface sticks if it can
-    series = resolution.series_of(modes)
-    values, bounds = series.guards[:, 0], series.guard_bounds[:, 0]
+    event = resolution.judged(modes)
     for k in holding:
-        c = members[k]
-        guards = list(automata[c].guards[automata[c].hold])
-        if (values[guards] > bounds[guards]).all():
-            mask &= candidates[:, k] == automata[c].hold
-    return mask
+        keeps[k] = _is_below_limit(resolution.automata, event, members[k])
+    return keeps
 
 
 def other_outcomes(
-    resolution: EventResolution,
+    resolution: EventJudge,
     members: list[int],
     candidates: np.ndarray,
     number: int,

@@ -1,23 +1,42 @@
-"""The event decisions as pure functions of arrays, without model code and without tolerances.
+"""Judge one combination of modes: whether its guards stay non-negative just after an event, without tolerances.
 
-Each guard is given by Taylor coefficients along the flow of a candidate mode, with running error bounds, and by the
-number of leading coefficients that are zero by decree (the set Z of the event contract). Compiled loops and the Python
-driver share these functions.
+Each guard is given by Taylor coefficients along the flow of these modes, with running error bounds, and by the number
+of leading coefficients that are zero by decree (the set Z of the event contract). The general loop and compiled loops
+call the same kernel. It calls no model code.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.linear.motion import linear_coefficient, linear_series
 from hybridsim.engine.native.kernels import inlined, kernel
+from hybridsim.engine.series.bounded import ORDER
 
 FINE, UNDECIDED, LEAVES = 1, 0, -1  # verdicts on a guard or a candidate
-NONUNIQUE, NONE = -1, -2  # outcomes of a choice that names no candidate
+UNCHANGED, RELEASED, SWITCHED = range(3)  # how components changed their modes: `kind_of_change`
+NO_SIDE = -1  # the component was not released at the event
+
+
+class JudgedEvent(NamedTuple):
+    """What a verdict reads of an event, and where it is written; `EventScratch` has the same fields for compiled loops.
+
+    Rows of all_sides, all_orders and all_floors belong to the candidates of a joint choice.
+    """
+
+    before: np.ndarray  # modes (C,) just before the event; -1 for a component without a mode
+    now: np.ndarray  # modes (C,) that have been decided so far
+    is_zero: np.ndarray  # mask (G,) of guards that were located at zero
+    on_surface: np.ndarray  # mask (C,) of components whose surfaces are zero
+    released_to: np.ndarray  # located release of each component (C,): 0 to above, 1 to below, or NO_SIDE
+    judged: np.ndarray  # series of the guards and their bounds (2, G, 4)
+    decreed: np.ndarray  # number (G,) of leading coefficients that are zero by decree
+    all_sides: np.ndarray  # sides (., G) of the guards just after the event
+    all_orders: np.ndarray  # their leading zeros
+    all_floors: np.ndarray  # error bounds of guards that start from zero
 
 
 @inlined
@@ -57,131 +76,107 @@ def open_question(series: Any, bounds: Any, decreed: int) -> bool:
 
 
 @inlined
-def verdict_with(verdict: int, series: Any, bounds: Any, decreed: int, side: int) -> int:
-    """Combine the verdict on a candidate with the sign of one more of its guards just after the event."""
+def is_release(automata: Any, event: Any, z: Any, c: int) -> bool:
+    """Return whether a component leaves its holding mode in the modes z through the guard located at zero."""
+    return z[c] != automata.hold[c] and event.released_to[c] == (0 if z[c] == automata.above[c] else 1)
+
+
+@inlined
+def kind_of_change(automata: Any, event: Any, z: Any, members: Any) -> int:
+    """Return whether components changed their modes, and whether every change is a release; corners do not count."""
+    kind = UNCHANGED
+    for i in range(members.shape[0]):
+        c = members[i]
+        if z[c] == event.before[c] or automata.is_corner[c]:
+            continue
+        if not is_release(automata, event, z, c):
+            return SWITCHED
+        kind = RELEASED
+    return kind
+
+
+@inlined
+def is_smooth(automata: Any, event: Any, z: Any, members: Any, jumps: Any) -> bool:
+    """Return whether no unknown jumps at a release; jumps: of each surface on release to above and to below."""
+    for i in range(members.shape[0]):
+        c = members[i]
+        jump = 2 * automata.surface[c] + (0 if z[c] == automata.above[c] else 1)
+        if z[c] != event.before[c] and not automata.is_corner[c] and jumps[jump] != 0.0:
+            return False
+    return True
+
+
+@inlined
+def decreed_zeros(automata: Any, event: Any, z: Any, c: int, j: int, g: int, continuous: bool) -> int:
+    """Return how many leading coefficients of a guard the event decrees to be zero in the modes z.
+
+    g: number of the guard; c, j: its component, and its index in the mode.
+
+    The first guard of a mode beside a surface is that surface. On the surface it is zero. So is its rate if the
+    component is released and all unknowns stay unchanged (`continuous`). A gap counts as zero only if its rate is zero
+    too; this adds one zero. Another guard that was located at zero is zero while its mode continues. Guards of a
+    holding mode are limits of its unknown; a jump of another unknown may have moved it off the limit.
+    """
+    is_holding = z[c] == automata.hold[c]
+    if j == 0 and event.on_surface[c] and not is_holding:
+        is_rate_zero = continuous and is_release(automata, event, z, c)
+        return (2 if is_rate_zero else 1) + (1 if automata.is_unilateral[c] else 0)
+    is_located = event.is_zero[g] and z[c] == event.now[c]
+    return 1 if is_located and (continuous or not is_holding) else 0
+
+
+@inlined
+def verdict_with(found: int, side: int, is_open: bool) -> int:
+    """Combine the verdict on a candidate with the side of one more of its guards; is_open: rounding hides the side."""
     if side < 0:
         return LEAVES
-    if side == 0 and verdict == FINE and open_question(series, bounds, decreed):
-        return UNDECIDED
-    return verdict
-
-
-@inlined
-def guard_verdict(
-    series: Any, bounds: Any, decreed: Any, active: Any, backward: bool, sides: Any, orders: Any
-) -> int:
-    """Judge the guards of one candidate: LEAVES if any becomes negative, UNDECIDED if any is open, else FINE.
-
-    series, bounds (guards, orders); decreed, active, sides, orders (guards,). The sides and orders found are written
-    for the root search that follows.
-    """
-    verdict = FINE
-    for g in range(series.shape[0]):
-        if not active[g]:
-            sides[g], orders[g] = 1, 0
-            continue
-        if backward:
-            side, order = side_before(series[g], bounds[g], decreed[g])
-        else:
-            side, order = side_after(series[g], bounds[g], decreed[g])
-        sides[g], orders[g] = side, order
-        verdict = verdict_with(verdict, series[g], bounds[g], decreed[g], side)
-    return verdict
-
-
-@inlined
-def preference(modes: Any, current: Any, holds: Any, n: int) -> int:
-    """Return the rank of a joint candidate: unchanged modes, then holding ones; >= n*(n + 1) if none changes."""
-    unchanged, held = 0, 0
-    for i in range(n):
-        unchanged += modes[i] == current[i]
-        held += modes[i] == holds[i]
-    return held + (n + 1) * unchanged
-
-
-@inlined
-def choose(modes: Any, verdicts: Any, current: Any, holds: Any) -> int:
-    """Choose among joint candidates, given as rows of `modes` with one column for each component of the cluster.
-
-    The current modes stay if they are admissible or undecided. Otherwise the certainly admissible candidate with the
-    highest `preference` is chosen, and a tie is NONUNIQUE. Undecided candidates are chosen only if no candidate is
-    certain. The result is NONE if no candidate is left.
-    """
-    best, best_score, equal_best = -1, -1, 0
-    n = modes.shape[1]
-    for c in range(modes.shape[0]):
-        if verdicts[c] == LEAVES:
-            continue
-        rank = preference(modes[c], current, holds, n)
-        if rank >= n * (n + 1):
-            return c
-        score = rank + (n + 1) * (n + 1) * (verdicts[c] == FINE)
-        if score > best_score:
-            best, best_score, equal_best = c, score, 0
-        elif score == best_score:
-            equal_best += 1
-    if best < 0:
-        return NONE
-    return NONUNIQUE if equal_best > 0 else best
-
-
-@inlined
-def decreed_zeros(
-    is_first: bool, is_on: bool, is_holding: bool, is_smooth: bool, is_fired: bool, is_gap: bool
-) -> int:
-    """Return the number of leading coefficients of a guard that the event decrees to be zero in a candidate mode.
-
-    is_first: the guard is the first of a mode beside a surface, which is that surface. is_on: the surface is zero.
-    is_holding: the candidate holds the surface. is_smooth: the component is released and all unknowns stay unchanged,
-    so that the rate of the surface is zero as well. is_gap: the surface is a gap, which is on only if its rate is zero
-    too; this adds one zero. is_fired: the guard was located at zero, its mode continues, and `is_decreed` is true.
-    """
-    if is_first and is_on and not is_holding:
-        return (2 if is_smooth else 1) + (1 if is_gap else 0)
-    return 1 if is_fired else 0
-
-
-@inlined
-def is_decreed(is_holding: bool, continuous: bool) -> bool:
-    """Return whether a guard that was located at zero is zero in a candidate in which its mode continues.
-
-    Guards of a holding mode are limits of its unknown. A jump of another unknown may have moved it off the limit.
-    """
-    return continuous or not is_holding
+    return UNDECIDED if is_open and found == FINE else found
 
 
 @kernel
-def decree_orders(
-    guards_of: Any,
-    holding: Any,
-    on_surface: Any,
-    released: Any,
+def verdict(
+    automata: Any,
+    lin: Any,
+    k: int,
+    event: Any,
+    z: Any,
+    members: Any,
     continuous: bool,
-    fired: Any,
-    gaps: Any,
-    decreed: Any,
-) -> None:
-    """Count the leading zeros that the event decrees for the guards of one candidate; see `decreed_zeros`.
+    is_whole: bool,
+    row: int,
+) -> int:
+    """Judge the guards of some components in the modes z: LEAVES if any becomes negative, UNDECIDED if any is open.
 
-    guards_of (components, widest): active guard numbers, -1 for none. holding[c]: component c holds its surface in this
-    candidate. on_surface[c]: its surface is zero. released[c]: c leaves its holding mode here. continuous: every change
-    of this candidate leaves the unknowns unchanged. fired[g]: guard g was located at zero and its mode continues.
-    gaps[c]: the surface of c is a gap.
+    Otherwise the result is FINE. lin, k: tables of linear modes and the row of z in them; None if the series of all
+    guards are in `judged`. continuous: whether all unknowns stay unchanged. is_whole: judge all guards even if one
+    becomes negative. Sides, orders and floors of the judged guards are written to this row of the event.
     """
-    for c in range(guards_of.shape[0]):
-        for j in range(guards_of.shape[1]):
-            g = guards_of[c, j]
-            if g >= 0:
-                smooth, is_zero = released[c] and continuous, fired[g] and is_decreed(holding[c], continuous)
-                decreed[g] = decreed_zeros(j == 0, on_surface[c], holding[c], smooth, is_zero, gaps[c])
+    sides, orders, floors = event.all_sides[row], event.all_orders[row], event.all_floors[row]
+    found = FINE
+    for i in range(members.shape[0]):
+        c = members[i]
+        for j in range(automata.guards_of.shape[2]):
+            g = automata.guards_of[c, z[c], j]
+            if g < 0:
+                continue
+            zeros = decreed_zeros(automata, event, z, c, j, g, continuous)
+            if lin is not None:
+                linear_series(lin, k, g, zeros, event)
+            values, bounds = event.judged[0, g], event.judged[1, g]
+            side, order = side_after(values, bounds, zeros)
+            event.decreed[g], sides[g] = zeros, side
+            found = verdict_with(found, side, side == 0 and open_question(values, bounds, zeros))
+            if found == LEAVES and not is_whole:
+                return LEAVES
+            orders[g], floors[g] = order if order <= ORDER else 0, 0.0
+            if order > 0:
+                floors[g] = value_of(lin, k, g, event)[1]
+    return found
 
 
-def joint_candidates(sizes: Iterable[int]) -> np.ndarray:
-    """Return all combinations of modes of a cluster, one row each. The array must not be modified."""
-    return _joint(tuple(sizes))
-
-
-@cache
-def _joint(sizes: tuple[int, ...]) -> np.ndarray:
-    grid = np.indices(sizes).reshape(len(sizes), -1).T
-    return np.ascontiguousarray(grid, dtype=np.int64)
+@inlined
+def value_of(lin: Any, k: int, g: int, event: Any) -> tuple[float, float]:
+    """Return the value of a guard and its error bound."""
+    if lin is not None and lin.counts.shape[0] > 0:
+        return linear_coefficient(lin, k, g, 0, event.x_after, event.slopes, event)
+    return event.judged[0, g, 0], event.judged[1, g, 0]

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.events.compiled.guard_series import interpreted_series
 from hybridsim.engine.events.compiled.resolve_ordinary import resolve_event
 from hybridsim.engine.events.compiled.scratch import AT, AT_ERROR, FIRED, NOBODY, RESOLVE, SERIES, SPREAD
-from hybridsim.engine.events.compiled.verdicts import interpreted_series
 from hybridsim.engine.events.zeno.accumulation import CLOSING_IN
 from hybridsim.engine.native.kernels import call_kernel, inlined, kernel, kernel_address
 from hybridsim.engine.series.bounded import UNIT

@@ -1,6 +1,6 @@
 """Resolve ordinary events in compiled code: one guard of one component, with a certain outcome.
 
-The rules are those of `hybridsim.engine.events.choice.verdict`. Other events are left unchanged for
+The rules are those of `hybridsim.engine.events.choice`. Other events are left unchanged for
 `hybridsim.engine.events.resolve`, which can report the reason: several guards at once, a case undecided at rounding, a
 cascade, no or several admissible motions, an impact, or an event in a model that also slides where it jumps.
 """
@@ -10,45 +10,53 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.engine.events.choice.verdict import FINE
+from hybridsim.engine.events.choice.verdict import FINE, NO_SIDE, side_after, value_of
+from hybridsim.engine.events.compiled.guard_series import guard_series, is_continuous
 from hybridsim.engine.events.compiled.resolve_clear import resolve_clear
-from hybridsim.engine.events.compiled.resolve_surface import choose_surface_modes
+from hybridsim.engine.events.compiled.resolve_surface import choose_surface_modes, judge
 from hybridsim.engine.events.compiled.scratch import (
     DISCRETE,
     DISCRETE_AT,
     FIRED,
     NOBODY,
+    ROW,
     SPREAD,
     LocatedEvent,
     called_by,
     located,
 )
-from hybridsim.engine.events.compiled.verdicts import (
-    guard_series,
-    guard_side,
-    is_continuous,
-    is_linear,
-    members_verdict,
-    size_at,
+from hybridsim.engine.linear.motion import (
+    errors_of_time,
+    functions_of_time,
+    has_tables,
+    linear_series,
+    measure_point,
 )
-from hybridsim.engine.linear.motion import errors_of_time, functions_of_time
-from hybridsim.engine.native.kernels import call, call_noinline, inline_always, inlined
+from hybridsim.engine.native.kernels import call, inline_always, inlined
 from hybridsim.engine.native.loop_hints import fill, put
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.programs.modes_index import find_modes
 
 
 @inlined
-def is_alone(tapes: Any, lin: Any, k: int, fired: int, x: Any, x_error: Any, work: Any) -> bool:
-    """Return whether no other guard can be zero together with the fired one, given the rounding of the steps."""
+def is_alone(automata: Any, tapes: Any, lin: Any, k: int, fired: int, z: Any, work: Any) -> bool:
+    """Return whether no other guard can be zero together with the fired one, given the rounding of the steps.
+
+    A guard that rises from zero does not count, except the limit of another contact, which may be released too.
+    """
+    c = automata.owner[fired]
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         g = tapes.active[i]
         if g == fired:
             continue
-        value, bound = size_at(lin, k, g, x, x_error, work)
+        value, bound = value_of(lin, k, g, work)
         if abs(value) > work.float_slots[SPREAD] * bound:
             continue
-        if abs(value) > bound or call_noinline(guard_side, (lin, k, g, 1, x, x_error, work))[0] < 0:
+        d = automata.owner[g]
+        if abs(value) > bound or (d != c and automata.hold[d] == z[d]):
+            return False
+        linear_series(lin, k, g, 1, work)
+        if side_after(work.judged[0, g], work.judged[1, g], 1)[0] < 0:
             return False
     return True
 
@@ -102,64 +110,61 @@ def take_choice(
 
 
 @inline_always
-def resolve_ordinary(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> bool:
-    """Compute the state after an ordinary event (x_after, slopes, z_after); return False for other events.
+def resolve_ordinary(
+    automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any, fired: int
+) -> int:
+    """Compute the state after an ordinary event (x_after, slopes, trial); return -1 for other events.
 
-    A transition of a component without a surface may change the run-time vector, which is then written to p_after.
-    Sides, orders and floors of the guards in the new modes are in the work space as well. If the event is not ordinary,
+    The result is the row with sides, orders and floors of the guards in the new modes. A transition of a component
+    without a surface may change the run-time vector, which is then written to p_after. If the event is not ordinary,
     other parts of the work space may have been overwritten.
     """
-    functions, fired, at = called_by(work), work.int_slots[FIRED], located(state, work)
-    x, x_error, z, p = work.x_after, work.slopes, work.z_after, work.p_after
+    functions, at, everything = called_by(work), located(state, work), work.everything
+    x, x_error, z, p = work.x_after, work.slopes, work.trial, work.p_after
     put(at.x, x)
     put(at.x_error, x_error)
-    put(at.z, z)
-    on_surface, sides, orders, floors = work.on_surface, work.sides, work.orders, work.floors
-    fill(on_surface, False)
-    k = find_modes(tapes, z)
+    fill(work.on_surface, False)
+    k = find_modes(tapes, at.z)
     if k < 0:
-        return False
+        return -1
     is_known = tapes.active_start[k + 1] - tapes.active_start[k] > 1
     if is_known:
+        measure_point(lin, work)
         guard_series(tapes, inputs, lin, k, at, x, x_error, work)
-        if not is_alone(tapes, lin, k, fired, x, x_error, work):
-            return False
+        if not is_alone(automata, tapes, lin, k, fired, at.z, work):
+            return -1
     c = automata.owner[fired]
     for i in range(automata.cluster_start[c], automata.cluster_start[c + 1]):
         if automata.is_unilateral[automata.cluster[i]]:
-            return False
+            return -1
+    work.int_slots[ROW] = k
     if automata.hold[c] >= 0:
-        if z[c] != automata.hold[c] and automata.place[fired] > 0:
-            return False  # a guard on the load does not move the contact onto its surface
+        if at.z[c] != automata.hold[c] and automata.place[fired] > 0:
+            return -1  # a guard on the load does not move the contact onto its surface
         number = choose_surface_modes(automata, tapes, inputs, lin, state, work, fired, k, is_known)
-        if number < 0:
-            return False
-        # if the cluster has all components, `choose_surface_modes` has judged all guards
-        if automata.cluster_start[c + 1] - automata.cluster_start[c] == z.shape[0]:
-            put(work.all_sides[number], sides)
-            put(work.all_orders[number], orders)
-            put(work.all_floors[number], floors)
-            return True
-        continuous = is_continuous(functions, automata, at, x, z, work.everything, fired, work.jumps)
-        is_on, vector = z[c] == at.z[c], at.p
+        # if the cluster has all components, all guards have been judged
+        if number < 0 or automata.cluster_start[c + 1] - automata.cluster_start[c] == z.shape[0]:
+            return number
+        continuous, vector = is_continuous(automata, at, z, everything, work), at.p
     else:
+        put(at.z, z)
         put(at.p, p)
         if not take_choice(functions, automata, at, fired, x, x_error, z, p, work):
-            return False
-        if is_linear(lin):
+            return -1
+        if has_tables(lin):
             functions_of_time(lin, at.s, p, work.factors, work.w)
             errors_of_time(lin, at.s_error, work.factors, work.w_error)
-        continuous, is_on, vector = False, automata.is_corner[c], p
-    k = find_modes(tapes, z)
+            measure_point(lin, work)
+        number, continuous, vector = 0, False, p
+        work.is_zero[fired] = automata.is_corner[c]  # a corner is at zero on both sides
+        put(z, work.now)
+        work.int_slots[ROW] = find_modes(tapes, z)
+    k = work.int_slots[ROW]
     if k < 0:
-        return False
+        return -1
     after = LocatedEvent(at.s, at.s_error, x, x_error, vector, at.z)
     guard_series(tapes, inputs, lin, k, after, x, x_error, work)
-    verdict = call_noinline(
-        members_verdict,
-        (automata, lin, k, at, x, x_error, z, work.everything, fired, is_on, continuous, work, sides, orders, floors),
-    )  # fmt: skip
-    return verdict == FINE
+    return number if judge(automata, lin, k, z, everything, continuous, number, work) == FINE else -1
 
 
 def resolve_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> int:
@@ -168,20 +173,29 @@ def resolve_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, 
     If no guard fired, only the series of the active guards are written to the work space. lin: tables of linear modes,
     empty for others. state: `hybridsim.engine.events.compiled.after_segment.State`.
     """
-    if work.int_slots[FIRED] == NOBODY:
+    fired = work.int_slots[FIRED]
+    if fired == NOBODY:
         at, k = located(state, work), find_modes(tapes, state.z)
         guard_series(tapes, inputs, lin, k, at, at.x, at.x_error, work)
         return 1
-    if is_linear(lin) and resolve_clear(automata, tapes, lin, state, work):
+    if has_tables(lin) and resolve_clear(automata, tapes, lin, state, work, fired):
         return 1
-    if not resolve_ordinary(automata, tapes, inputs, lin, state, work):
+    c = automata.owner[fired]
+    put(state.z, work.now)
+    put(state.z, work.before)
+    work.is_zero[fired] = True
+    work.released_to[c] = automata.place[fired] if automata.hold[c] == state.z[c] else NO_SIDE
+    row = resolve_ordinary(automata, tapes, inputs, lin, state, work, fired)
+    work.is_zero[fired] = False
+    work.released_to[c] = NO_SIDE
+    if row < 0:
         return 0
     put(work.x_after, state.x)
     put(work.slopes, state.x_error)
-    put(work.z_after, state.z)
-    if automata.hold[automata.owner[work.int_slots[FIRED]]] < 0:
+    put(work.trial, state.z)
+    if automata.hold[c] < 0:
         put(work.p_after, state.p)
-    put(work.sides, state.sides)
-    put(work.orders, state.orders)
-    put(work.floors, state.floors)
+    put(work.all_sides[row], state.sides)
+    put(work.all_orders[row], state.orders)
+    put(work.all_floors[row], state.floors)
     return 1

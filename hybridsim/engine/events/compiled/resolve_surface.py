@@ -4,65 +4,93 @@ from __future__ import annotations
 
 from typing import Any
 
-from hybridsim.engine.events.choice.verdict import FINE, LEAVES, NONE, NONUNIQUE, choose, preference
-from hybridsim.engine.events.compiled.scratch import called_by, located
-from hybridsim.engine.events.compiled.verdicts import UNKNOWN, candidate_verdict, certainly_leaves, cluster_of
-from hybridsim.engine.native.kernels import call, call_noinline, inline_always
-from hybridsim.engine.native.loop_hints import put
+from hybridsim.engine.events.choice.joint_choice import (
+    NO_SCORE,
+    NONE,
+    is_current,
+    is_settled,
+    joint_choice,
+    rank_candidates,
+)
+from hybridsim.engine.events.choice.verdict import FINE, LEAVES, verdict
+from hybridsim.engine.events.compiled.guard_series import guard_series, is_continuous
+from hybridsim.engine.events.compiled.scratch import ROW, called_by, located
+from hybridsim.engine.linear.motion import measure_point
+from hybridsim.engine.native.kernels import call, call_noinline, inline_always, inlined
+from hybridsim.engine.native.loop_hints import fill, put
 from hybridsim.engine.series.bounded import UNIT
+from hybridsim.engine.system.programs.modes_index import find_modes
+
+_MODES = 3  # modes of a surface
 
 
 @inline_always
-def choose_single_mode(
+def cluster_of(automata: Any, c: int) -> Any:
+    """Return the components whose modes are chosen together with the mode of component c."""
+    return automata.cluster[automata.cluster_start[c] : automata.cluster_start[c + 1]]
+
+
+@inlined
+def judge(
+    automata: Any, lin: Any, k: int, z: Any, members: Any, continuous: bool, row: int, work: Any
+) -> int:
+    """Return the verdict on the modes in row k of the tapes; the sides of other guards are positive."""
+    fill(work.all_sides[row], 1)
+    fill(work.all_orders[row], 0)
+    fill(work.all_floors[row], 0.0)
+    return call_noinline(verdict, (automata, lin, k, work, z, members, continuous, False, row))
+
+
+@inline_always
+def choose_modes(
     automata: Any,
     tapes: Any,
     inputs: Any,
     lin: Any,
-    state: Any,
-    work: Any,
-    fired: int,
+    at: Any,
+    cluster: Any,
     k: int,
     is_known: bool,
-    c: int,
+    count: int,
+    work: Any,
 ) -> int:
-    """Choose the mode of one component at its surface by testing its three modes one by one."""
-    z, trial = work.z_after, work.trial
-    now, hold = z[c], automata.hold[c]
-    if not certainly_leaves(automata, lin, k, z, fired, is_known, work.x_after, work.slopes, work):
-        trial[c] = now
-        verdict = call_noinline(
-            candidate_verdict, (automata, tapes, inputs, lin, state, work, fired, is_known, c, now)
-        )
-        if verdict != LEAVES:
-            return now if verdict == FINE else -1
-    if now != hold:
-        for mode in (hold, 3 - hold - now):
-            trial[c] = mode
-            verdict = call_noinline(
-                candidate_verdict, (automata, tapes, inputs, lin, state, work, fired, False, c, mode)
-            )
-            if verdict == FINE:
-                z[c] = mode
-                return mode
-            if verdict != LEAVES:
+    """Choose the modes of the first `count` members, and write them to `trial`, which holds the other modes.
+
+    Returns the number of the chosen candidate, or -1 if the outcome is not certain. at: the event; the states after it
+    are `x_after`. k: row of the current modes, or -1 for no tapes; is_known: the series of their guards are in
+    `judged`. `ROW` becomes that of the chosen modes.
+    """
+    members, candidates, trial, ranks = work.members, work.candidates, work.trial, work.ranks
+    total, chosen, score, found = _MODES**count, NONE, NO_SCORE, LEAVES
+    for number in range(total):
+        rest = number
+        for i in range(count - 1, -1, -1):
+            candidates[number, i] = rest % _MODES
+            rest //= _MODES
+    rank_candidates(candidates, total, count, work.current, work.holds, work.keeps, ranks)
+    for rank in range((count + 1) * (count + 1) - 1, -1, -1):
+        if is_settled(score, rank, count):
+            break
+        for number in range(total):
+            if ranks[number] != rank:
+                continue
+            for i in range(count):
+                trial[members[i]] = candidates[number, i]
+            row = k if is_current(rank, count) else find_modes(tapes, trial)
+            if row < 0:
                 return -1
+            if not (is_current(rank, count) and is_known):
+                guard_series(tapes, inputs, lin, row, at, work.x_after, work.slopes, work)
+            continuous = is_continuous(automata, at, trial, cluster, work)
+            own = judge(automata, lin, row, trial, cluster, continuous, number, work)
+            chosen, score = joint_choice(chosen, score, number, rank, own, count)
+            if chosen == number:
+                found, work.int_slots[ROW] = own, row
+    if chosen < 0 or found != FINE:
         return -1
-    found = -1
-    for mode in range(3):
-        if mode == hold:
-            continue
-        trial[c] = mode
-        verdict = call_noinline(
-            candidate_verdict, (automata, tapes, inputs, lin, state, work, fired, False, c, mode)
-        )
-        if verdict == LEAVES:
-            continue
-        if verdict != FINE or found >= 0:
-            return -1
-        found = mode
-    if found >= 0:
-        z[c] = found
-    return found
+    for i in range(count):
+        trial[members[i]] = candidates[chosen, i]
+    return chosen
 
 
 @inline_always
@@ -77,77 +105,36 @@ def choose_surface_modes(
     k: int,
     is_known: bool,
 ) -> int:
-    """Write the admissible modes of the components of a cluster at their surfaces to `work.z_after`.
+    """Write the admissible modes of the components of a cluster at their surfaces to `work.trial`.
 
-    Returns the number of that candidate, or -1 if the outcome is not certain. Candidates are tried in the order of
-    preference of `choose`, up to the first accepted one. k: row of the modes before; is_known: whether the series of
-    their guards are in the work space.
+    Returns the number of that candidate, or -1 if the outcome is not certain. k: row of the modes before; is_known: the
+    series of their guards at the event are in `judged`.
     """
-    at, x, x_error, z = located(state, work), work.x_after, work.slopes, work.z_after
-    members, trial, candidates, verdicts = work.members, work.trial, work.candidates, work.verdicts
-    hold, pin, current, holds = automata.hold, automata.pin, work.current, work.holds
-    ranks = work.ranks
+    at, x, x_error, trial = located(state, work), work.x_after, work.slopes, work.trial
+    members, hold = work.members, automata.hold
     c = automata.owner[fired]
     cluster = cluster_of(automata, c)
     count, is_intersection = 0, False
+    put(at.z, trial)
     for i in range(cluster.shape[0]):
         d = cluster[i]
-        if d == c or z[d] == hold[d]:
+        if d == c or at.z[d] == hold[d]:
             if count == members.shape[0]:
                 return -1
-            members[count], current[count], holds[count] = d, z[d], hold[d]
-            count += 1
+            members[count], work.current[count], work.holds[count] = d, at.z[d], hold[d]
+            work.keeps[count] = d != c  # its guards are not zero: `is_alone`
             work.on_surface[d] = True
             is_intersection = is_intersection or automata.is_unique[d]
+            trial[d] = hold[d]
+            count += 1
     if is_intersection and count > 1:
         return -1
-    put(z, trial)
-    for i in range(count):
-        trial[members[i]] = hold[members[i]]
     call(called_by(work).project, at.s, at.x, at.p, trial, x)
     for i in range(count):
-        if pin[members[i], 0] >= 0:  # a unilateral contact holds two states and is not ordinary
-            x_error[pin[members[i], 0]] = UNIT * abs(x[pin[members[i], 0]])
+        held = automata.pin[members[i], 0]
+        if held >= 0:  # a unilateral contact holds two states and is not ordinary
+            x_error[held] = UNIT * abs(x[held])
     for i in range(x.shape[0]):
         is_known = is_known and x[i] == at.x[i] and x_error[i] == at.x_error[i]
-    if count == 1:
-        return choose_single_mode(automata, tapes, inputs, lin, state, work, fired, k, is_known, members[0])
-    total = 3**count  # a surface has three modes
-    for number in range(total):
-        rest = number
-        for i in range(count - 1, -1, -1):
-            candidates[number, i] = rest % 3
-            rest //= 3
-        verdicts[number] = LEAVES
-        ranks[number] = preference(candidates[number], current, holds, count)
-    is_found = False
-    for rank in range((count + 1) * (count + 1) - 1, -1, -1):
-        if is_found:
-            break
-        for number in range(total):
-            if ranks[number] != rank:
-                continue
-            # a contact below its limits has no cause to release: `hybridsim.engine.events.choice.uniqueness`
-            is_caused = True
-            for i in range(count):
-                trial[members[i]] = candidates[number, i]
-                is_caused = is_caused and (members[i] == c or candidates[number, i] == holds[i])
-            if not is_caused:
-                continue
-            is_current = rank >= (count + 1) * count
-            if is_current and certainly_leaves(automata, lin, k, z, fired, is_known, x, x_error, work):
-                continue
-            verdict = call_noinline(
-                candidate_verdict,
-                (automata, tapes, inputs, lin, state, work, fired, is_current and is_known, c, number),
-            )
-            if verdict == UNKNOWN:
-                return -1
-            verdicts[number] = verdict
-            is_found = is_found or verdict == FINE or (is_current and verdict != LEAVES)
-    number = choose(candidates[:total, :count], verdicts[:total], current[:count], holds[:count])
-    if number in (NONE, NONUNIQUE) or verdicts[number] != FINE:
-        return -1
-    for i in range(count):
-        z[members[i]] = candidates[number, i]
-    return number
+    measure_point(lin, work)
+    return choose_modes(automata, tapes, inputs, lin, at, cluster, k, is_known, count, work)

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.events.choice.verdict import NO_SIDE
 from hybridsim.engine.native.kernels import ENABLED, inline_always, inlined
 from hybridsim.engine.native.simd_products import vector_of
 from hybridsim.engine.native.struct_pack import packed
@@ -56,7 +57,7 @@ class EventScratch(NamedTuple):
     y_error: np.ndarray  # their error bounds (n,)
     slopes: np.ndarray  # rates (n,) at the event, then error bounds of x_after
     x_after: np.ndarray  # states (n,) after the event
-    z_after: np.ndarray  # modes (C,) after the event
+    size: np.ndarray  # size (1,) of the point x_after of linear modes
     p_after: np.ndarray  # run-time vector after the event
     V: np.ndarray  # Taylor coefficients (registers, 4)
     E: np.ndarray  # their error bounds (registers, 4)
@@ -65,23 +66,24 @@ class EventScratch(NamedTuple):
     w_error: np.ndarray  # their error bounds
     sizes: np.ndarray  # sizes (n,) of the states
     w_sizes: np.ndarray  # sizes of the monomials
-    judged: np.ndarray  # series of the guards and their bounds (2, G, 4)
-    sides: np.ndarray  # sides (G,) of the guards just after the event
-    orders: np.ndarray  # their leading zeros (G,)
-    floors: np.ndarray  # their error bounds (G,)
-    on_surface: np.ndarray  # mask (C,) of components on their surfaces
+    before: np.ndarray  # this and the next six, as well as the last three: see `JudgedEvent`
+    now: np.ndarray
+    is_zero: np.ndarray
+    on_surface: np.ndarray
+    released_to: np.ndarray
+    judged: np.ndarray
+    decreed: np.ndarray
     jumps: np.ndarray
     out: np.ndarray
     everything: np.ndarray
     members: np.ndarray
     current: np.ndarray
     holds: np.ndarray
+    keeps: np.ndarray
     trial: np.ndarray
     asked: np.ndarray
     candidates: np.ndarray
     ranks: np.ndarray
-    verdicts: np.ndarray
-    smooth: np.ndarray
     all_sides: np.ndarray
     all_orders: np.ndarray
     all_floors: np.ndarray
@@ -124,7 +126,7 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> EventScratch:
             ),
             float_slots=np.zeros(3),
             **{name: vector_of(system.n) for name in ("y", "y_error", "slopes", "x_after")},
-            z_after=numbers(count),
+            size=np.zeros(1),
             p_after=np.empty(system.layout.size),
             V=np.empty((registers, ORDER + 1)),
             E=np.empty((registers, ORDER + 1)),
@@ -133,23 +135,24 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> EventScratch:
             w_error=vector_of(monomials),
             sizes=vector_of(system.n),
             w_sizes=vector_of(monomials),
-            judged=np.empty((2, guards, ORDER + 1)),
-            sides=np.ones(guards, dtype=np.int64),
-            orders=numbers(guards),
-            floors=np.zeros(guards),
+            before=numbers(count),
+            now=numbers(count),
+            is_zero=flags(guards),
             on_surface=flags(count),
+            released_to=np.full(count, NO_SIDE, dtype=np.int64),
+            judged=np.empty((2, guards, ORDER + 1)),
+            decreed=numbers(guards),
             jumps=np.zeros(2 * max(len(system.surface_of), 1)),
             out=np.zeros(max(system.n + len(system.model.discrete), 1)),
             everything=np.arange(count, dtype=np.int64),
             members=numbers(together),
             current=numbers(together),
             holds=numbers(together),
+            keeps=flags(together),
             trial=numbers(count),
             asked=numbers(count + 3),
             candidates=numbers(joint, together),
             ranks=numbers(joint),
-            verdicts=numbers(joint),
-            smooth=flags(joint),
             all_sides=numbers(joint, guards),
             all_orders=numbers(joint, guards),
             all_floors=np.zeros((joint, guards)),
