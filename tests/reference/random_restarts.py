@@ -16,11 +16,11 @@ import numpy as np
 from numpy.polynomial.polynomial import polyder, polyfromroots, polyval
 
 import hybridsim as hs
-from hybridsim.engine.events.choice.verdict import guard_verdict
 from hybridsim.engine.roots.first_exit import FOUND, NEVER, first_exit
 from hybridsim.engine.system.instant import Instant, phase
 from hybridsim.engine.system.system import System
 from reference.integer_series import BITS, Flow, fixed, real, text
+from reference.judged_guards import verdict_on
 from reference.random_trees import random_tree
 from reference.releases import KINDS, MODEL, draw
 from reference.sturm import Sturm
@@ -55,9 +55,7 @@ class Restart:
 def held(tally: Verdicts, restart: Restart) -> None:
     """Judge one guard and hold the verdict against the truth, or where that is inside the bounds, against the rule."""
     kind, d = restart.kind, restart.decreed
-    side, order = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
-    series, bounds = restart.series[None], restart.bounds[None]
-    guard_verdict(series, bounds, np.array([d]), np.ones(1, dtype=bool), False, side, order)
+    side = verdict_on(restart.series[None], restart.bounds[None], [d])[1].all_sides[0]
     true = [real(c) for c in restart.true]
     first = next((k for k in range(d, ORDERS) if true[k] != 0), None)
     for k in range(d, ORDERS):

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hybridsim.engine.events.choice.candidates import verdicts_on
-from hybridsim.engine.events.choice.verdict import FINE, LEAVES, UNDECIDED, choose, joint_candidates
+from hybridsim.engine.events.choice.candidates import judged_candidates
+from hybridsim.engine.events.choice.joint_choice import joint_candidates
+from hybridsim.engine.events.choice.verdict import FINE, LEAVES, UNDECIDED
 
 HOLD = 1  # of three modes
 
@@ -18,7 +19,7 @@ HOLD = 1  # of three modes
 def _settling(
     current: tuple[int, ...], table: dict[tuple[int, ...], int], *, thorough: bool, unique: bool = False
 ) -> Any:
-    """What `verdicts_on` asks of a resolution, its verdicts in a table; `asked` notes which."""
+    """What `judged_candidates` asks of a resolution, its verdicts in a table; `asked` notes which."""
     asked: list[tuple[int, ...]] = []
 
     def verdict(modes: np.ndarray, _: Any) -> int:
@@ -27,7 +28,7 @@ def _settling(
 
     return SimpleNamespace(
         is_thorough=thorough,
-        system=SimpleNamespace(automata=[SimpleNamespace(is_unique=unique)] * len(current)),
+        system=SimpleNamespace(automata=[SimpleNamespace(is_unique=unique, hold=HOLD)] * len(current)),
         at=SimpleNamespace(z=np.array(current)),
         with_modes=lambda _, modes: modes,
         verdict=verdict,
@@ -38,14 +39,12 @@ def _settling(
 def _chosen(current: tuple[int, ...], verdicts: tuple[int, ...], thorough: bool) -> tuple[int, int]:
     """The choice, and how many verdicts it took."""
     n = len(current)
-    candidates, holds = joint_candidates([3] * n), np.full(n, HOLD)
+    candidates = joint_candidates([3] * n)
     table = {tuple(row): verdict for row, verdict in zip(candidates.tolist(), verdicts, strict=True)}
     resolution = _settling(current, table, thorough=thorough)
-    found, is_whole = verdicts_on(
-        resolution, list(range(n)), candidates, np.array(current), holds, tuple(range(n))
-    )
-    assert is_whole == (len(resolution.asked) == len(candidates))
-    return int(choose(candidates, found, np.array(current), holds)), len(resolution.asked)
+    none = np.zeros(n, dtype=np.bool_)
+    found = judged_candidates(resolution, list(range(n)), candidates, none, tuple(range(n)))
+    return found.number, len(resolution.asked)
 
 
 @pytest.mark.parametrize("current", [(-1,), (0,), (1,), (2,)])
@@ -67,7 +66,6 @@ def test_random_verdicts_on_two_components() -> None:
 
 
 def test_where_a_motion_has_to_be_the_only_one_all_are_judged() -> None:
-    candidates = joint_candidates([3])
     resolution = _settling((1,), {(0,): FINE, (1,): FINE, (2,): FINE}, thorough=False, unique=True)
-    verdicts_on(resolution, [0], candidates, np.array([1]), np.array([HOLD]), (0,))
+    judged_candidates(resolution, [0], joint_candidates([3]), np.zeros(1, dtype=np.bool_), (0,))
     assert len(resolution.asked) == 3

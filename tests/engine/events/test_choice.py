@@ -9,17 +9,23 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from reference.judged_guards import Parts, verdict_on
 
+from hybridsim.engine.events.choice.joint_choice import (
+    NO_SCORE,
+    NONE,
+    NONUNIQUE,
+    is_settled,
+    joint_candidates,
+    joint_choice,
+    rank_candidates,
+)
 from hybridsim.engine.events.choice.verdict import (
     FINE,
     LEAVES,
-    NONE,
-    NONUNIQUE,
     UNDECIDED,
-    choose,
-    decree_orders,
-    guard_verdict,
-    joint_candidates,
+    JudgedEvent,
+    decreed_zeros,
     side_after,
     side_before,
 )
@@ -78,33 +84,22 @@ def test_a_certain_side_is_right_for_every_guard_within_the_bounds(
 
 
 @given(
-    st.lists(st.tuples(coefficients, margins, st.integers(0, 4), st.booleans()), min_size=1, max_size=4),
-    st.booleans(),
+    st.lists(st.tuples(coefficients, margins, st.integers(0, 3), st.booleans()), min_size=1, max_size=4),
     st.randoms(use_true_random=False),
 )
 def test_a_candidate_is_judged_by_its_worst_guard_in_any_order(
-    guards: list[tuple[list[float], list[float], int, bool]], backward: bool, random: object
+    guards: list[tuple[list[float], list[float], int, bool]], random: object
 ) -> None:
     def verdict(rows: list[tuple[list[float], list[float], int, bool]]) -> int:
-        count = len(rows)
-        sides, orders = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
-        return guard_verdict(
-            np.array([r[0] for r in rows]),
-            np.array([r[1] for r in rows]),
-            np.array([r[2] for r in rows]),
-            np.array([r[3] for r in rows]),
-            backward,
-            sides,
-            orders,
-        )
+        series, bounds, decreed, _ = zip(*rows, strict=True)
+        return verdict_on(series, bounds, decreed, [k for k, row in enumerate(rows) if row[3]])[0]
 
     one_by_one = [verdict([guard]) for guard in guards]
     shuffled = list(guards)
     random.shuffle(shuffled)
     assert verdict(shuffled) == min(one_by_one)
     for (series, bounds, decreed, active), alone in zip(guards, one_by_one, strict=True):
-        epsilon = Fraction(-1 if backward else 1, 2**90)
-        sign = sign_near(kept(series, bounds, decreed), epsilon)
+        sign = sign_near(kept(series, bounds, decreed), Fraction(1, 2**90))
         open_ = any(c != 0 or e != 0 for c, e in zip(series[decreed:], bounds[decreed:], strict=True))
         expected = FINE if not active or sign > 0 or not open_ else LEAVES if sign < 0 else UNDECIDED
         assert alone == expected
@@ -112,40 +107,39 @@ def test_a_candidate_is_judged_by_its_worst_guard_in_any_order(
 
 @pytest.mark.parametrize(
     ("decreed", "expected"),
-    [(0, LEAVES), (1, LEAVES), (2, FINE), (3, LEAVES), (4, FINE)],
+    [(0, LEAVES), (1, LEAVES), (2, FINE), (3, LEAVES)],
 )
 def test_a_release_is_decided_by_the_first_derivative_that_is_not_decreed(
     decreed: int, expected: int
 ) -> None:
     """v = 0, a = 0 by decree, both -1e-12 as computed; the jerk is 3 and what follows it -1."""
-    series = np.array([[-1e-12, -1e-12, 3.0, -1.0]])
-    bounds = np.full((1, 4), 1e-15)
-    one = np.zeros(1, dtype=np.int64)
-    verdict = guard_verdict(
-        series, bounds, np.array([decreed]), np.ones(1, dtype=bool), False, one.copy(), one.copy()
-    )
-    assert verdict == expected
+    assert verdict_on([[-1e-12, -1e-12, 3.0, -1.0]], np.full((1, 4), 1e-15), [decreed])[0] == expected
 
 
 def test_a_guard_that_is_zero_throughout_admits_its_mode() -> None:
-    one = np.zeros(1, dtype=np.int64)
-    zero = np.zeros((1, 4))
-    assert guard_verdict(zero, zero, one, np.ones(1, dtype=bool), False, one.copy(), one.copy()) == FINE
+    assert verdict_on(np.zeros((1, 4)), np.zeros((1, 4)), [0])[0] == FINE
 
 
 def test_what_is_not_a_number_is_undecided() -> None:
-    one = np.zeros(1, dtype=np.int64)
-    nan = np.full((1, 4), np.nan)
-    assert guard_verdict(nan, nan, one, np.ones(1, dtype=bool), False, one.copy(), one.copy()) == UNDECIDED
+    assert verdict_on(np.full((1, 4), np.nan), np.full((1, 4), np.nan), [0])[0] == UNDECIDED
 
 
 # -- the choice among candidates --------------------------------------------------------------------------------
 
 
+def ranks_of(modes: np.ndarray, current: np.ndarray, keeps: np.ndarray | None = None) -> np.ndarray:
+    total, n = modes.shape
+    ranks = np.zeros(total, dtype=np.int64)
+    none = np.zeros(n, dtype=np.bool_)
+    rank_candidates(modes, total, n, current, np.full(n, HOLD), none if keeps is None else keeps, ranks)
+    return ranks
+
+
 def pick(modes: np.ndarray, verdicts: np.ndarray, current: np.ndarray) -> tuple[int, ...] | int:
-    holds = np.full(modes.shape[1], HOLD)
-    number = int(choose(modes, verdicts, current, holds))
-    return tuple(int(m) for m in modes[number]) if number >= 0 else number
+    chosen, score = NONE, NO_SCORE
+    for number, (rank, verdict) in enumerate(zip(ranks_of(modes, current), verdicts, strict=True)):
+        chosen, score = joint_choice(chosen, score, number, int(rank), int(verdict), modes.shape[1])
+    return tuple(int(m) for m in modes[chosen]) if chosen >= 0 else chosen
 
 
 def expected_choice(verdicts: dict[tuple[int, ...], int], current: tuple[int, ...]) -> tuple[int, ...] | int:
@@ -234,6 +228,27 @@ def test_the_candidates_are_all_combinations_once(sizes: list[int]) -> None:
     assert len(set(rows)) == len(rows)
 
 
+@given(st.integers(1, 3), st.data())
+def test_no_candidate_after_a_settled_choice_changes_it(n: int, data: st.DataObject) -> None:
+    modes = joint_candidates([3] * n)
+    current = np.array(data.draw(st.lists(st.integers(-1, 2), min_size=n, max_size=n)))
+    verdicts = data.draw(st.lists(st.sampled_from([LEAVES, LEAVES, UNDECIDED, FINE]),
+                                  min_size=len(modes), max_size=len(modes)))  # fmt: skip
+    ranks = ranks_of(modes, current)
+    chosen, score, settled = NONE, NO_SCORE, None
+    for number in np.argsort(-ranks, kind="stable").tolist():
+        if settled is None and is_settled(score, int(ranks[number]), n):
+            settled = chosen
+        chosen, score = joint_choice(chosen, score, number, int(ranks[number]), verdicts[number], n)
+    assert settled in (None, chosen)
+
+
+def test_what_is_below_its_limits_keeps_holding() -> None:
+    modes = joint_candidates([3, 3])
+    ranks = ranks_of(modes, np.array([HOLD, HOLD]), np.array([False, True]))
+    assert {tuple(row) for row in modes[ranks >= 0].tolist()} == {(m, HOLD) for m in range(3)}
+
+
 # -- the zeros that an event decrees ----------------------------------------------------------------------------
 
 
@@ -246,21 +261,26 @@ def test_the_candidates_are_all_combinations_once(sizes: list[int]) -> None:
 def test_decreed_zeros(
     holding: bool, on_surface: bool, released: bool, continuous: bool, fired: bool, gap: bool
 ) -> None:
-    """Two components; guards 0, 1 belong to the first, 2, 3 to the second, which is at rest in all respects."""
-    decreed = np.full(5, 7, dtype=np.int64)
-    decree_orders(
-        np.array([[0, 1], [3, -1]]),
-        np.array([holding, False]),
-        np.array([on_surface, False]),
-        np.array([released, False]),
-        continuous,
-        np.array([fired, fired, True, False, True]),
-        np.array([gap, gap]),
-        decreed,
+    """Guards 0 and 1 of the only component, which begins to slip upward or goes on holding."""
+    z, count = np.array([HOLD if holding else ABOVE]), 2
+    parts = Parts(
+        np.arange(count).reshape(1, 1, 2).repeat(3, axis=1).copy(),
+        np.array([HOLD]),
+        np.array([ABOVE]),
+        np.array([gap]),
     )
+    event = JudgedEvent(
+        before=z, now=z, is_zero=np.full(count, fired), on_surface=np.array([on_surface]),
+        released_to=np.array([0 if released else 1]), judged=np.zeros((2, count, 4)),
+        decreed=np.zeros(count, dtype=np.int64), all_sides=np.zeros((1, count), dtype=np.int64),
+        all_orders=np.zeros((1, count), dtype=np.int64), all_floors=np.zeros((1, count)),
+    )  # fmt: skip
+    found = [decreed_zeros(parts, event, z, 0, j, j, continuous) for j in range(count)]
     beside = on_surface and not holding
     # a limit that another unknown's jump may have undone is none
     at_zero = fired and (continuous or not holding)
     # a gap is held together with its rate
     surface = (2 if released and continuous else 1) + gap if beside else int(at_zero)
-    assert decreed.tolist() == [surface, int(at_zero), 7, 0, 7]
+    assert found == [surface, int(at_zero)]
+    elsewhere = event._replace(now=1 - np.minimum(z, 1))  # a mode that did not go on
+    assert decreed_zeros(parts, elsewhere, z, 0, 1, 1, continuous) == 0

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from reference.releases import KINDS, LATE, MODES, Case, compare, draw
 
-from hybridsim.engine.events import resolve
-from hybridsim.engine.events.choice.verdict import FINE, LEAVES, UNDECIDED
+from hybridsim.engine.events.choice import event_judge, verdict
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -60,47 +59,45 @@ def verdicts(count: int) -> Counter[str]:
     return result
 
 
-def only_the_velocity(*arguments: Any) -> None:
+def only_the_velocity(*arguments: Any) -> int:
     """Decree v = 0 at a release, and not that the acceleration is zero too."""
-    decree_orders(*arguments)
-    decreed = arguments[-1]
-    decreed[decreed == 2] = 1
+    zeros = decreed_zeros(*arguments)
+    return 1 if zeros == 2 else zeros
 
 
-def by_the_letter(
-    series: Any, bounds: Any, decreed: Any, active: Any, backward: bool, sides: Any, orders: Any
-) -> int:
+def by_the_letter(series: Any, bounds: Any, k: int) -> tuple[int, int]:
     """A guard whose first coefficient without decree is within its bound is undecided, and its mode is kept."""
-    verdict = FINE
-    for g in np.flatnonzero(active):
-        k = int(decreed[g])
-        sides[g] = 0 if abs(series[g, k]) <= bounds[g, k] else int(np.sign(series[g, k]))
-        orders[g] = k
-        verdict = LEAVES if sides[g] < 0 else min(verdict, UNDECIDED if sides[g] == 0 else FINE)
-    return verdict
+    return (0 if abs(series[k]) <= bounds[k] else int(np.sign(series[k]))), k
 
 
-def as_computed(series: Any, bounds: Any, *rest: Any) -> int:
+def as_computed(series: Any, bounds: Any, k: int) -> tuple[int, int]:
     """Every coefficient is taken for what rounding made of it."""
-    return guard_verdict(series, np.zeros_like(bounds), *rest)
+    return side_after(series, np.zeros_like(bounds), k)
 
 
-decree_orders, guard_verdict = resolve.decree_orders, resolve.guard_verdict
+decreed_zeros, side_after = verdict.decreed_zeros, verdict.side_after
+
+
+def judged_by(monkeypatch: pytest.MonkeyPatch, decree: Any, rule: Any) -> None:
+    """Let the general loop judge by other rules, in the Python of the verdict."""
+    monkeypatch.setattr(verdict, "decreed_zeros", decree)
+    monkeypatch.setattr(verdict, "side_after", rule)
+    monkeypatch.setattr(event_judge, "_verdict", getattr(verdict.verdict, "py_func", verdict.verdict))
 
 
 @pytest.mark.parametrize(
     ("decree", "rule", "least", "most"),
     [
-        pytest.param(decree_orders, guard_verdict, 200, 200, id="as it is"),
-        pytest.param(decree_orders, by_the_letter, 200, 200, id="with Z, by the letter"),
-        pytest.param(decree_orders, as_computed, 200, 200, id="with Z, no error bounds at all"),
+        pytest.param(decreed_zeros, side_after, 200, 200, id="as it is"),
+        pytest.param(decreed_zeros, by_the_letter, 200, 200, id="with Z, by the letter"),
+        pytest.param(decreed_zeros, as_computed, 200, 200, id="with Z, no error bounds at all"),
         pytest.param(only_the_velocity, by_the_letter, 0, 100, id="without Z, by the letter"),
         pytest.param(only_the_velocity, as_computed, 100, 180, id="without Z, by the computed sign"),
     ],
 )
 def test_releases_need_the_zeros_by_decree(
-    decree: Callable[..., None],
-    rule: Callable[..., int],
+    decree: Callable[..., int],
+    rule: Callable[..., tuple[int, int]],
     least: int,
     most: int,
     monkeypatch: pytest.MonkeyPatch,
@@ -110,12 +107,11 @@ def test_releases_need_the_zeros_by_decree(
     Without it 7 in 10 stay undecided where a coefficient within its bound is (417 of 600), and every sixth run
     stops for want of a motion where the sign of the computed acceleration is believed (106 of 600).
     """
-    monkeypatch.setattr(resolve, "decree_orders", decree)
-    monkeypatch.setattr(resolve, "guard_verdict", rule)
+    judged_by(monkeypatch, decree, rule)
     assert least <= verdicts(200)["right"] <= most
 
 
 def test_the_error_bounds_alone_would_find_the_releases_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two lines of defence: the computed acceleration is within its bound, so the jerk decides even without Z."""
-    monkeypatch.setattr(resolve, "decree_orders", only_the_velocity)
+    judged_by(monkeypatch, only_the_velocity, side_after)
     assert verdicts(200)["right"] == 200
