@@ -53,7 +53,7 @@ HANDED_ON = {
     "model.smoothing.rewriting",
     "reference.multiple_precision.reading",
     "engine.lowering.lower",
-    "engine.events.choice.event_judge",
+    "engine.events.choice.event_verdicts",
     "engine.events.resolve",
     "solution.model_trajectory",
     "solution.solution",

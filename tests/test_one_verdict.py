@@ -19,7 +19,7 @@ OWN_RULES = ("integrators/fixed_step/", "reference/", "mechanics/")
 RUN_PATH = ("engine/", "ensemble/", "integrators/")
 CHOICE = "engine/events/choice/"
 VERDICT, JOINT = f"{CHOICE}verdict.py", f"{CHOICE}joint_choice.py"
-MOTION = "engine/linear/motion.py"
+COEFFICIENTS = "engine/linear/guard_coefficients.py"
 
 CHOOSERS = {
     f"{CHOICE}candidates.py",
@@ -28,13 +28,13 @@ CHOOSERS = {
 }
 # The parts of the rules, and who may use them besides the two modules.
 PARTS = {
-    "verdict": {f"{CHOICE}event_judge.py", "engine/events/compiled/resolve_surface.py"},
+    "verdict": {f"{CHOICE}event_verdicts.py", "engine/events/compiled/resolve_surface.py"},
     "verdict_with": {"engine/events/compiled/resolve_clear.py"},
     "decreed_zeros": {"engine/events/compiled/resolve_clear.py"},
     "open_question": {"mechanics/series_loop/decision.py"},
     "is_release": set(),
-    "kind_of_change": {f"{CHOICE}event_judge.py", "engine/events/compiled/guard_series.py"},
-    "is_smooth": {f"{CHOICE}event_judge.py", "engine/events/compiled/guard_series.py"},
+    "kind_of_change": {f"{CHOICE}event_verdicts.py", "engine/events/compiled/guard_series.py"},
+    "is_smooth": {f"{CHOICE}event_verdicts.py", "engine/events/compiled/guard_series.py"},
     "joint_choice": CHOOSERS,
     "is_settled": CHOOSERS,
     "rank_candidates": {f"{CHOICE}candidates.py", "engine/events/compiled/resolve_surface.py"},
@@ -49,15 +49,15 @@ READERS = {
     f"{VERDICT}::verdict": "",
     f"{VERDICT}::value_of": "",
     f"{JOINT}::is_below_limit": "",
-    f"{CHOICE}event_judge.py::judged": "passes them to the verdict",
-    f"{CHOICE}event_judge.py::verdict_on_guards": "passes them to the verdict",
+    f"{CHOICE}event_verdicts.py::judged": "passes them to the verdict",
+    f"{CHOICE}event_verdicts.py::verdict_on_guards": "passes them to the verdict",
     f"{CHOICE}uniqueness.py::below_limits": "passes them to `is_below_limit`",
     "engine/events/compiled/guard_series.py::interpreted_series": "computes them",
     "engine/events/compiled/guard_series.py::guard_series": "computes them",
-    "engine/linear/motion.py::linear_coefficient": "computes them",
-    "engine/linear/motion.py::rough_coefficient": "computes them",
-    "engine/linear/motion.py::linear_series": "computes them",
-    "engine/linear/motion.py::_exact_series": "computes them",
+    "engine/linear/guard_coefficients.py::linear_coefficient": "computes them",
+    "engine/linear/guard_coefficients.py::rough_coefficient": "computes them",
+    "engine/linear/guard_coefficients.py::linear_series": "computes them",
+    "engine/linear/guard_coefficients.py::_exact_series": "computes them",
     "engine/events/compiled/resolve_ordinary.py::is_alone": "whether a second guard is zero",
     "engine/events/compiled/at_end.py::may_vanish": "whether a guard is zero at a known time",
     "engine/events/compiled/after_segment.py::is_hidden": "whether a zero was located by rounding",
@@ -85,7 +85,7 @@ MODES = ("z", "trial", "z_plus")
 WRITERS = {
     f"{CHOICE}cluster_choice.py::_enter": "enters the chosen modes",
     f"{CHOICE}cluster_choice.py::_pinned": "all surfaces held, to project the states",
-    f"{CHOICE}event_judge.py::with_modes": "one candidate",
+    f"{CHOICE}event_verdicts.py::with_modes": "one candidate",
     f"{CHOICE}surface_intersection.py::_pull": "modes in which rates are compared",
     "engine/events/compiled/resolve_clear.py::resolve_clear": "candidates, and the chosen mode",
     "engine/events/compiled/resolve_ordinary.py::take_choice": "the target of a declared transition",
@@ -130,7 +130,7 @@ def function_of(tree: ast.AST) -> Iterator[tuple[str, ast.AST]]:
 def imported(text: str) -> set[str]:
     """Parts of the rules that a module imports."""
     rules = tuple(
-        f"hybridsim.{path.removesuffix('.py').replace('/', '.')}" for path in (VERDICT, JOINT, MOTION)
+        f"hybridsim.{path.removesuffix('.py').replace('/', '.')}" for path in (VERDICT, JOINT, COEFFICIENTS)
     )
     return {
         alias.name

@@ -37,7 +37,7 @@ MODEL, PYTHON = "functions of the model, other kernels", "Python, NumPy and the 
 PARTS = {
     "first_zero": ZEROS, "earliest_exit": ZEROS, "first_exit": ZEROS, "bernstein": ZEROS,
     "linear_event_loop": MOTION, "event_loop": MOTION,
-    "candidate_verdict": MODES, "resolve_event": MODES, "resolve_clear": MODES, "bounds": MODES,
+    "verdict": MODES, "resolve_event": MODES, "resolve_clear": MODES, "bounds": MODES,
     "series": SERIES, "values": SERIES, "ahead": SERIES, "sizes": SERIES, "advance": SERIES, "expand": SERIES,
 }  # fmt: skip
 

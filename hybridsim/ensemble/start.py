@@ -11,7 +11,7 @@ from typing import Any
 from hybridsim.engine.events.choice.joint_choice import is_below_limit
 from hybridsim.engine.events.choice.verdict import FINE
 from hybridsim.engine.events.compiled.guard_series import guard_series
-from hybridsim.engine.events.compiled.resolve_surface import choose_modes, cluster_of, judge
+from hybridsim.engine.events.compiled.resolve_surface import choose_modes, cluster_of, row_verdict
 from hybridsim.engine.events.compiled.scratch import AT, AT_ERROR, LocatedEvent, called_by, located
 from hybridsim.engine.linear.motion import functions_of_time, to_modal
 from hybridsim.engine.native.kernels import call, inline_always, kernel
@@ -59,7 +59,7 @@ def plain_start(
         return False
     at = LocatedEvent(0.0, 0.0, x, x_error, p, z)
     guard_series(tapes, inputs, none, k, at, x, x_error, work)
-    verdict = judge(automata, none, k, z, work.everything, False, 0, work)
+    verdict = row_verdict(automata, none, k, z, work.everything, False, 0, work)
     put(work.all_sides[0], state.sides)
     put(work.all_orders[0], state.orders)
     put(work.all_floors[0], state.floors)
@@ -124,7 +124,7 @@ def _choose_cluster(
     guard_series(tapes, inputs, none, k, at, work.x_after, work.slopes, work)
     for i in range(count):
         work.keeps[i] = count > 1 and is_below_limit(automata, work, members[i])
-    if choose_modes(automata, tapes, inputs, none, at, cluster, k, True, count, work) < 0:
+    if choose_modes(automata, tapes, inputs, none, at, k, True, count, work) < 0:
         return False
     for i in range(count):
         z[members[i]] = trial[members[i]]

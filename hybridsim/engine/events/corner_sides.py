@@ -18,7 +18,7 @@ from hybridsim.engine.events.input_jumps import gaps_jump
 from hybridsim.engine.events.outcome import Change
 
 if TYPE_CHECKING:
-    from hybridsim.engine.events.choice.event_judge import EventJudge
+    from hybridsim.engine.events.choice.event_verdicts import EventVerdicts
     from hybridsim.engine.events.resolve import EventResolution
     from hybridsim.engine.system.system import Automaton
 
@@ -26,7 +26,7 @@ _ROUNDS_PER_MODE = 4  # orders of a series: each order settles at least one more
 
 
 def sides_along(
-    resolution: EventJudge, z: np.ndarray, x: np.ndarray, has_flow: bool = True
+    resolution: EventVerdicts, z: np.ndarray, x: np.ndarray, has_flow: bool = True
 ) -> tuple[np.ndarray, dict[int, int]]:
     """Return the modes z with each corner and load on its side along the flow, and the guards that are zero.
 

@@ -9,10 +9,10 @@ import numpy as np
 from hybridsim.engine.events.outcome import Change
 
 if TYPE_CHECKING:
-    from hybridsim.engine.events.choice.event_judge import EventJudge
+    from hybridsim.engine.events.choice.event_verdicts import EventVerdicts
 
 
-def vanishing_surfaces(resolution: EventJudge, cluster: tuple[int, ...]) -> set[int]:
+def vanishing_surfaces(resolution: EventVerdicts, cluster: tuple[int, ...]) -> set[int]:
     """Return the components of a cluster whose surfaces are zero within rounding.
 
     No step crosses a surface that stays at zero because another component keeps its function constant, such as a relay
@@ -24,7 +24,7 @@ def vanishing_surfaces(resolution: EventJudge, cluster: tuple[int, ...]) -> set[
     return {c for k, c in enumerate(system.surface_of) if near[k]} & set(cluster)
 
 
-def past_zero(resolution: EventJudge, cluster: tuple[int, ...]) -> set[int]:
+def past_zero(resolution: EventVerdicts, cluster: tuple[int, ...]) -> set[int]:
     """Return the components of a cluster that are past their surfaces without a crossing.
 
     A step that is repeated to end at an event may end past a surface that it did not cross before, because of its
@@ -42,7 +42,7 @@ def past_zero(resolution: EventJudge, cluster: tuple[int, ...]) -> set[int]:
     return found & set(cluster)
 
 
-def cross(resolution: EventJudge, components: set[int]) -> None:
+def cross(resolution: EventVerdicts, components: set[int]) -> None:
     """Move components to the other side of their surfaces, before the located event."""
     at = resolution.at
     resolution.fired[:] = False

@@ -15,7 +15,7 @@ from hybridsim.engine.linear.guards import FARTHEST
 from hybridsim.engine.native.constants import BOUND_TERMS
 from hybridsim.engine.native.kernels import allocating_kernel, call_noinline, inlined, kernel
 from hybridsim.engine.native.loop_hints import short_loop
-from hybridsim.engine.native.simd_products import LANES, dot, product, times
+from hybridsim.engine.native.simd_products import product, times
 from hybridsim.engine.native.simd_vectors import WIDTH, load, splat, store
 from hybridsim.engine.roots.certify import (
     falls_over,
@@ -25,7 +25,7 @@ from hybridsim.engine.roots.certify import (
     zero_of_terms,
 )
 from hybridsim.engine.roots.first_exit import FOUND, NEVER, OPEN
-from hybridsim.engine.series.bounded import ORDER, UNIT
+from hybridsim.engine.series.bounded import UNIT
 
 _SPREAD = 2.0  # largest norm for which the exponential of a block less its mean is summed in one part
 _PARTS = 10**6  # most parts of that size, about one second of work
@@ -34,8 +34,6 @@ _TERMS = 30  # most terms of a series near its start, in addition to the number 
 # A guard is followed from at most this many points, which takes a second, so that a run can be interrupted. Points of a
 # block with many coordinates count in proportion to its entries.
 POINTS = 10**6
-# A row's rounding is at least ten units of its absolute values: the effect of errors of y, relative to that.
-_IN_UNITS = 0.125 / UNIT
 # A damped motion grows backward, by at most exp(1) over this share of the forward range of a polynomial.
 _TURNED = 2.0  # roundings: of the speed and of its product with the time
 _BACK, _BACKWARD = 1.0 / FARTHEST, 4.0
@@ -120,88 +118,6 @@ def errors_of_time(lin: Any, s_error: float, factors: Any, w_error: Any) -> None
             if i > 0:
                 error += UNIT * abs(product)
         w_error[m] = error
-
-
-@inlined
-def linear_coefficient(
-    lin: Any, k: int, g: int, order: int, x: Any, x_error: Any, work: Any
-) -> tuple[float, float]:
-    """Return a Taylor coefficient of a guard in the modes of row k at y = (x, w), with its error bound."""
-    w, w_error, sizes, w_sizes, bound = work.w, work.w_error, work.sizes, work.w_sizes, 0.0
-    for m in range(x.shape[0]):
-        short_loop()
-        sizes[m] = abs(x[m]) + x_error[m]
-        bound += abs(lin.series[k, g, order, m]) * x_error[m]
-    n = lin.series.shape[3] - w.shape[0]
-    n -= n % LANES
-    for m in range(w.shape[0]):
-        short_loop()
-        w_sizes[m] = abs(w[m]) + w_error[m]
-        bound += abs(lin.series[k, g, order, n + m]) * w_error[m]
-    value = dot(lin.series, (k, g, order), (x, w))
-    return value, bound + dot(lin.roundings, (k, g, order), (sizes, w_sizes))
-
-
-@inlined
-def has_tables(lin: Any) -> bool:
-    """Return whether there are tables of linear modes."""
-    return lin.counts.shape[0] > 0
-
-
-@inlined
-def measure_point(lin: Any, work: Any) -> None:
-    """Store the size of y = (x_after, w), by which rounding errors of coefficients are bounded."""
-    if not has_tables(lin):
-        return
-    size = 0.0
-    x, x_error, w, w_error = work.x_after, work.slopes, work.w, work.w_error
-    for m in range(x.shape[0]):
-        short_loop()
-        size += abs(x[m]) + _IN_UNITS * x_error[m]
-    for m in range(w.shape[0]):
-        short_loop()
-        size += abs(w[m]) + _IN_UNITS * w_error[m]
-    work.size[0] = size
-
-
-@inlined
-def rough_coefficient(lin: Any, k: int, g: int, order: int, work: Any) -> tuple[float, float]:
-    """Return a Taylor coefficient of a guard in row k at y = (x_after, w), with a wide bound that costs little."""
-    return dot(lin.series, (k, g, order), (work.x_after, work.w)), lin.largest[k, g, order] * work.size[0]
-
-
-@inlined
-def rough_side(lin: Any, k: int, g: int, order: int, work: Any) -> int:
-    """Return the sign of a Taylor coefficient of a guard in row k at y = (x_after, w), or 0 if it is uncertain."""
-    value, bound = rough_coefficient(lin, k, g, order, work)
-    if not abs(value) > bound:
-        return 0
-    return 1 if value > 0.0 else -1
-
-
-@inlined
-def linear_series(lin: Any, k: int, g: int, first: int, work: Any) -> None:
-    """Write the coefficients of a guard with bounds to `judged`, from order `first` to the first beyond its bound.
-
-    Nothing is written if there are no tables of linear modes. k: row of the modes. The point is y = (x_after, w); see
-    `measure_point`.
-    """
-    if has_tables(lin):
-        value, bound = rough_coefficient(lin, k, g, first, work)
-        work.judged[0, g, first], work.judged[1, g, first] = value, bound
-        if not abs(value) > bound:
-            call_noinline(_exact_series, (lin, k, g, first, work))
-
-
-@kernel
-def _exact_series(lin: Any, k: int, g: int, first: int, work: Any) -> None:
-    for order in range(first, ORDER + 1):
-        value, bound = rough_coefficient(lin, k, g, order, work)
-        if not abs(value) > bound:
-            value, bound = linear_coefficient(lin, k, g, order, work.x_after, work.slopes, work)
-        work.judged[0, g, order], work.judged[1, g, order] = value, bound
-        if abs(value) > bound:
-            return
 
 
 @inlined

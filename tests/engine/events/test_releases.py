@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from reference.releases import KINDS, LATE, MODES, Case, compare, draw
 
-from hybridsim.engine.events.choice import event_judge, verdict
+from hybridsim.engine.events.choice import event_verdicts, verdict
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -82,7 +82,7 @@ def judged_by(monkeypatch: pytest.MonkeyPatch, decree: Any, rule: Any) -> None:
     """Let the general loop judge by other rules, in the Python of the verdict."""
     monkeypatch.setattr(verdict, "decreed_zeros", decree)
     monkeypatch.setattr(verdict, "side_after", rule)
-    monkeypatch.setattr(event_judge, "_verdict", getattr(verdict.verdict, "py_func", verdict.verdict))
+    monkeypatch.setattr(event_verdicts, "_verdict", getattr(verdict.verdict, "py_func", verdict.verdict))
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from hybridsim.engine.events.choice.joint_choice import (
 from hybridsim.engine.native.kernels import Precompiled
 
 if TYPE_CHECKING:
-    from hybridsim.engine.events.choice.event_judge import EventJudge
+    from hybridsim.engine.events.choice.event_verdicts import EventVerdicts
 
 _UNJUDGED = -2  # there is no verdict on a candidate yet
 _rank_candidates, _joint_choice, _is_settled = map(Precompiled, (rank_candidates, joint_choice, is_settled))
@@ -31,7 +31,7 @@ class JudgedCandidates(NamedTuple):
 
 
 def judged_candidates(
-    resolution: EventJudge,
+    resolution: EventVerdicts,
     members: list[int],
     candidates: np.ndarray,
     keeps: np.ndarray,
@@ -61,7 +61,7 @@ def judged_candidates(
 
 
 def completed(
-    resolution: EventJudge, members: list[int], found: JudgedCandidates, cluster: tuple[int, ...]
+    resolution: EventVerdicts, members: list[int], found: JudgedCandidates, cluster: tuple[int, ...]
 ) -> np.ndarray:
     """Judge the remaining candidates, and return all verdicts."""
     for number in np.flatnonzero(found.verdicts == _UNJUDGED):
@@ -71,7 +71,7 @@ def completed(
 
 
 def all_verdicts(
-    resolution: EventJudge, members: list[int], candidates: np.ndarray, cluster: tuple[int, ...]
+    resolution: EventVerdicts, members: list[int], candidates: np.ndarray, cluster: tuple[int, ...]
 ) -> np.ndarray:
     """Return the verdicts on all joint candidates."""
     verdicts = np.full(len(candidates), _UNJUDGED, dtype=np.int64)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from hybridsim.engine.events.choice.candidates import completed, judged_candidates
-from hybridsim.engine.events.choice.event_judge import EventJudge
+from hybridsim.engine.events.choice.event_verdicts import EventVerdicts
 from hybridsim.engine.events.choice.joint_choice import NONE, NONUNIQUE, joint_candidates
 from hybridsim.engine.events.choice.surface_intersection import (
     is_one_motion,
@@ -30,7 +30,7 @@ _MAX_CANDIDATES = 3**8  # a cluster of more components needs a complementarity s
 Failure = tuple[str, str]  # status and message
 
 
-class ClusterChoice(EventJudge):
+class ClusterChoice(EventVerdicts):
     """The joint choices of modes at one event."""
 
     def choose_jointly(self, open_: set[int]) -> tuple[str, str] | None:

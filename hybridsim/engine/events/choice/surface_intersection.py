@@ -22,13 +22,13 @@ from hybridsim.engine.series.bounded import UNIT
 from hybridsim.model.meanings import Meanings
 
 if TYPE_CHECKING:
-    from hybridsim.engine.events.choice.event_judge import EventJudge
+    from hybridsim.engine.events.choice.event_verdicts import EventVerdicts
 
 _SAME = 64.0 * UNIT  # relative difference of two series of one motion, by the rounding of a few operations
 
 
 def rivals(
-    resolution: EventJudge, members: list[int], candidates: np.ndarray, verdicts: np.ndarray
+    resolution: EventVerdicts, members: list[int], candidates: np.ndarray, verdicts: np.ndarray
 ) -> np.ndarray:
     """Return the admissible joint candidates if they differ in the mode of a switching surface and in the motion.
 
@@ -44,7 +44,7 @@ def rivals(
     return fine
 
 
-def is_one_motion(resolution: EventJudge, members: list[int], candidates: np.ndarray) -> bool:
+def is_one_motion(resolution: EventVerdicts, members: list[int], candidates: np.ndarray) -> bool:
     """Return whether the states have the same Taylor series in all of these modes."""
     motions = [resolution.series_of(resolution.with_modes(members, modes)).states for modes in candidates]
     if not np.isfinite(motions).all():
@@ -53,7 +53,7 @@ def is_one_motion(resolution: EventJudge, members: list[int], candidates: np.nda
     return all((np.abs(other - motions[0]) <= _SAME * sizes).all() for other in motions[1:])
 
 
-def can_hold(resolution: EventJudge, members: list[int], z: np.ndarray) -> bool:
+def can_hold(resolution: EventVerdicts, members: list[int], z: np.ndarray) -> bool:
     """Return whether the held surfaces in the modes z are compatible, so that their holding forces exist."""
     automata = resolution.system.automata
     if sum(automata[c].has_surface and z[c] == automata[c].hold for c in members) < 2:
@@ -62,7 +62,7 @@ def can_hold(resolution: EventJudge, members: list[int], z: np.ndarray) -> bool:
     return bool(np.isfinite(resolution.series_of(z).guards[numbers[numbers >= 0], 0]).all())
 
 
-def on_its_side(resolution: EventJudge, members: list[int], candidates: np.ndarray) -> int:
+def on_its_side(resolution: EventVerdicts, members: list[int], candidates: np.ndarray) -> int:
     """Return the number of the first candidate that moves to its own side of every surface, or 0.
 
     A body at rest may slip either way within rounding. Its holding mode leaves it a speed, or a rate, of some sign.
@@ -82,7 +82,7 @@ def on_its_side(resolution: EventJudge, members: list[int], candidates: np.ndarr
     return 0
 
 
-def keeps_nothing(resolution: EventJudge, members: list[int], z: np.ndarray) -> str:
+def keeps_nothing(resolution: EventVerdicts, members: list[int], z: np.ndarray) -> str:
     """Return why a motion along several surfaces may not be unique, or an empty text if it is."""
     automata = resolution.system.automata
     sliding = [c for c in members if automata[c].is_unique and z[c] == automata[c].hold]
@@ -108,7 +108,7 @@ def keeps_nothing(resolution: EventJudge, members: list[int], z: np.ndarray) -> 
     return ""
 
 
-def _pull(resolution: EventJudge, sliding: list[int], z: np.ndarray) -> np.ndarray:
+def _pull(resolution: EventVerdicts, sliding: list[int], z: np.ndarray) -> np.ndarray:
     """Return -B (k, k): how much the rate of each surface falls from below to above each other surface."""
     automata, order = resolution.system.automata, resolution.system.surface_of
     rows = [order.index(c) for c in sliding]
@@ -127,7 +127,7 @@ def _pull(resolution: EventJudge, sliding: list[int], z: np.ndarray) -> np.ndarr
     return found
 
 
-def refused(resolution: EventJudge, members: list[int], message: str) -> tuple[str, str]:
+def refused(resolution: EventVerdicts, members: list[int], message: str) -> tuple[str, str]:
     """Return status and message if no joint candidate is admissible, with hints on switching surfaces."""
     system = resolution.system
     if fatal := message_of_every_mode(system, members, resolution.sides):
@@ -149,7 +149,7 @@ def refused(resolution: EventJudge, members: list[int], message: str) -> tuple[s
     return "inconsistent", message
 
 
-def message_on_cascade(resolution: EventJudge) -> str:
+def message_on_cascade(resolution: EventVerdicts) -> str:
     """Return a hint on transitions that repeat without end, or an empty text."""
     for make_message in (_message_on_opposed_modes, _message_on_negative_guard, _message_on_drift):
         if found := make_message(resolution):
@@ -157,7 +157,7 @@ def message_on_cascade(resolution: EventJudge) -> str:
     return ""
 
 
-def _message_on_drift(resolution: EventJudge) -> str:
+def _message_on_drift(resolution: EventVerdicts) -> str:
     """Return a hint if a guard is slightly below zero after a transition leads back to its mode."""
     system, last = resolution.system, resolution.changes[-2:]
     if len(last) < 2 or last[0].component != last[1].component or last[0].source != last[1].target:
@@ -178,7 +178,7 @@ def _message_on_drift(resolution: EventJudge) -> str:
     return ""
 
 
-def _message_on_negative_guard(resolution: EventJudge) -> str:
+def _message_on_negative_guard(resolution: EventVerdicts) -> str:
     """Return a hint on a guard that stays negative after its transition."""
     if not resolution.changes:
         return ""
@@ -197,7 +197,7 @@ def _message_on_negative_guard(resolution: EventJudge) -> str:
     )
 
 
-def _message_on_opposed_modes(resolution: EventJudge) -> str:
+def _message_on_opposed_modes(resolution: EventVerdicts) -> str:
     """Return a hint on two modes that drive the motion against each other across one surface."""
     model, last = resolution.system.model, resolution.changes[-2:]
     if len(last) < 2 or last[0].component != last[1].component or last[0].source != last[1].target:

@@ -19,7 +19,7 @@ from hybridsim.engine.events.choice.verdict import FINE
 from hybridsim.engine.native.kernels import Precompiled
 
 if TYPE_CHECKING:
-    from hybridsim.engine.events.choice.event_judge import EventJudge
+    from hybridsim.engine.events.choice.event_verdicts import EventVerdicts
 
 # Largest number of components at their surfaces whose other outcomes are examined; 3^5 verdicts would be too slow.
 MAX_JOINT_COMPONENTS = 4
@@ -27,7 +27,7 @@ MAX_JOINT_COMPONENTS = 4
 _is_below_limit = Precompiled(is_below_limit)
 
 
-def below_limits(resolution: EventJudge, members: list[int]) -> np.ndarray:
+def below_limits(resolution: EventVerdicts, members: list[int]) -> np.ndarray:
     """Return a mask of the members that are certainly below their limits, if several are decided together."""
     automata, at = resolution.system.automata, resolution.at
     modes, keeps = np.maximum(at.z, 0), np.zeros(len(members), dtype=np.bool_)
@@ -47,7 +47,7 @@ def below_limits(resolution: EventJudge, members: list[int]) -> np.ndarray:
 
 
 def other_outcomes(
-    resolution: EventJudge,
+    resolution: EventVerdicts,
     members: list[int],
     candidates: np.ndarray,
     number: int,

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.linear.motion import linear_coefficient, linear_series
+from hybridsim.engine.linear.guard_coefficients import linear_coefficient, linear_series
 from hybridsim.engine.native.kernels import inlined, kernel
 from hybridsim.engine.series.bounded import ORDER
 

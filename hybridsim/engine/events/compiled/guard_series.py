@@ -6,7 +6,7 @@ from typing import Any
 
 from hybridsim.engine.events.choice.verdict import RELEASED, UNCHANGED, is_smooth, kind_of_change
 from hybridsim.engine.events.compiled.scratch import SERIES, called_by
-from hybridsim.engine.linear.motion import has_tables
+from hybridsim.engine.linear.guard_coefficients import has_tables
 from hybridsim.engine.native.kernels import array_at, call, call_kernel, call_series, inlined
 from hybridsim.engine.series.bounded import run_series
 

@@ -13,7 +13,7 @@ from hybridsim.engine.events.choice.joint_choice import NO_SCORE, NONE, is_settl
 from hybridsim.engine.events.choice.verdict import FINE, NO_SIDE, UNDECIDED, decreed_zeros, verdict_with
 from hybridsim.engine.events.compiled.guard_series import is_continuous
 from hybridsim.engine.events.compiled.scratch import ROW, called_by, located
-from hybridsim.engine.linear.motion import linear_coefficient, measure_point, rough_side
+from hybridsim.engine.linear.guard_coefficients import linear_coefficient, measure_point, rough_side
 from hybridsim.engine.native.kernels import call, inlined, kernel
 from hybridsim.engine.native.loop_hints import put, short_loop
 from hybridsim.engine.series.bounded import UNIT

@@ -13,7 +13,7 @@ from typing import Any
 from hybridsim.engine.events.choice.verdict import FINE, NO_SIDE, side_after, value_of
 from hybridsim.engine.events.compiled.guard_series import guard_series, is_continuous
 from hybridsim.engine.events.compiled.resolve_clear import resolve_clear
-from hybridsim.engine.events.compiled.resolve_surface import choose_surface_modes, judge
+from hybridsim.engine.events.compiled.resolve_surface import choose_surface_modes, row_verdict
 from hybridsim.engine.events.compiled.scratch import (
     DISCRETE,
     DISCRETE_AT,
@@ -25,13 +25,8 @@ from hybridsim.engine.events.compiled.scratch import (
     called_by,
     located,
 )
-from hybridsim.engine.linear.motion import (
-    errors_of_time,
-    functions_of_time,
-    has_tables,
-    linear_series,
-    measure_point,
-)
+from hybridsim.engine.linear.guard_coefficients import has_tables, linear_series, measure_point
+from hybridsim.engine.linear.motion import errors_of_time, functions_of_time
 from hybridsim.engine.native.kernels import call, inline_always, inlined
 from hybridsim.engine.native.loop_hints import fill, put
 from hybridsim.engine.series.bounded import UNIT
@@ -164,7 +159,7 @@ def resolve_ordinary(
         return -1
     after = LocatedEvent(at.s, at.s_error, x, x_error, vector, at.z)
     guard_series(tapes, inputs, lin, k, after, x, x_error, work)
-    return number if judge(automata, lin, k, z, everything, continuous, number, work) == FINE else -1
+    return number if row_verdict(automata, lin, k, z, everything, continuous, number, work) == FINE else -1
 
 
 def resolve_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> int:

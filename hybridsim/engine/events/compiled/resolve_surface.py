@@ -15,7 +15,7 @@ from hybridsim.engine.events.choice.joint_choice import (
 from hybridsim.engine.events.choice.verdict import FINE, LEAVES, verdict
 from hybridsim.engine.events.compiled.guard_series import guard_series, is_continuous
 from hybridsim.engine.events.compiled.scratch import ROW, called_by, located
-from hybridsim.engine.linear.motion import measure_point
+from hybridsim.engine.linear.guard_coefficients import measure_point
 from hybridsim.engine.native.kernels import call, call_noinline, inline_always, inlined
 from hybridsim.engine.native.loop_hints import fill, put
 from hybridsim.engine.series.bounded import UNIT
@@ -31,7 +31,7 @@ def cluster_of(automata: Any, c: int) -> Any:
 
 
 @inlined
-def judge(
+def row_verdict(
     automata: Any, lin: Any, k: int, z: Any, members: Any, continuous: bool, row: int, work: Any
 ) -> int:
     """Return the verdict on the modes in row k of the tapes; the sides of other guards are positive."""
@@ -48,7 +48,6 @@ def choose_modes(
     inputs: Any,
     lin: Any,
     at: Any,
-    cluster: Any,
     k: int,
     is_known: bool,
     count: int,
@@ -61,6 +60,7 @@ def choose_modes(
     `judged`. `ROW` becomes that of the chosen modes.
     """
     members, candidates, trial, ranks = work.members, work.candidates, work.trial, work.ranks
+    cluster = cluster_of(automata, members[0])
     total, chosen, score, found = _MODES**count, NONE, NO_SCORE, LEAVES
     for number in range(total):
         rest = number
@@ -82,7 +82,7 @@ def choose_modes(
             if not (is_current(rank, count) and is_known):
                 guard_series(tapes, inputs, lin, row, at, work.x_after, work.slopes, work)
             continuous = is_continuous(automata, at, trial, cluster, work)
-            own = judge(automata, lin, row, trial, cluster, continuous, number, work)
+            own = row_verdict(automata, lin, row, trial, cluster, continuous, number, work)
             chosen, score = joint_choice(chosen, score, number, rank, own, count)
             if chosen == number:
                 found, work.int_slots[ROW] = own, row
@@ -137,4 +137,4 @@ def choose_surface_modes(
     for i in range(x.shape[0]):
         is_known = is_known and x[i] == at.x[i] and x_error[i] == at.x_error[i]
     measure_point(lin, work)
-    return choose_modes(automata, tapes, inputs, lin, at, cluster, k, is_known, count, work)
+    return choose_modes(automata, tapes, inputs, lin, at, k, is_known, count, work)

@@ -30,7 +30,7 @@ _NO_SERIES = np.zeros((2, 0, ORDER + 1))
 _verdict, _kind_of_change, _is_smooth = map(Precompiled, (verdict, kind_of_change, is_smooth))
 
 
-class EventJudge:
+class EventVerdicts:
     """The verdicts on modes at one event. before: the modes (C,) at the event, -1 for a component without one."""
 
     is_thorough = False  # whether to judge all candidates, even if the choice does not need them
