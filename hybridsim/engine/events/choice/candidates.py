@@ -50,7 +50,8 @@ def judged_candidates(
     candidates, ranks = candidates[ranks >= 0], ranks[ranks >= 0]
     verdicts, chosen, score = np.full(len(candidates), _UNJUDGED, dtype=np.int64), NONE, NO_SCORE
     is_thorough = resolution.is_thorough or any(automata[c].is_unique for c in members)
-    for number in np.argsort(-ranks, kind="stable").tolist():
+    order = np.arange(len(ranks)) if is_thorough else np.argsort(-ranks, kind="stable")
+    for number in order.tolist():
         rank = int(ranks[number])
         if not is_thorough and _is_settled(score, rank, count):
             break
