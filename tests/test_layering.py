@@ -51,7 +51,6 @@ HANDED_ON = {
     "model.parts.model",
     "model.parts.contact",
     "model.smoothing.rewriting",
-    "reference.multiple_precision.reading",
     "engine.lowering.lower",
     "engine.events.choice.event_verdicts",
     "engine.events.resolve",

@@ -68,7 +68,7 @@ class Reading:
                 self._names[surface.unknown] = self.unknowns[component.name] = ExternalSeries(self.context)
         for signal in signals:
             self.input_coefficients.append([Held(self.context, 0) for _ in range(5)])
-            self._names[signal.name] = signal.node(self, self.input_coefficients[-1])
+            self._names[signal.name] = self._signal(signal, self.input_coefficients[-1])
         for component, _ in components:
             if component.surface:
                 self.surfaces[component.name] = self.node(component.surface.function)
@@ -81,6 +81,20 @@ class Reading:
     def node(self, expr: Expression) -> Node:
         """Return the node of an expression."""
         return self._walk(expr.tree)
+
+    def _signal(self, signal: Signal, piece: Sequence[Held]) -> Node:
+        """Return the node of an input, given the knot and the four coefficients of its piece."""
+        knot, *coefficients = piece
+        passed = self.sum(self.time, knot, minus=True)
+        total: Node = coefficients[3]
+        for lower in (2, 1, 0):
+            total = self.sum(coefficients[lower], self.product(passed, total))
+        if not signal.angular:
+            return total
+        wave = self.product(
+            Held(self.context, signal.values["amplitude"]), self.functions.build("sin", total)
+        )
+        return self.sum(Held(self.context, signal.values.get("offset", 0)), wave)
 
     def product(self, a: Node, b: Node) -> Node:
         """Return a*b as a shared node."""

@@ -7,13 +7,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.expr import evaluate
-from hybridsim.reference.multiple_precision.nodes import Held, Node
 from hybridsim.reference.multiple_precision.precision import Number, Precision
 
 if TYPE_CHECKING:
     from hybridsim.model import Model
     from hybridsim.model.parts.inputs import Input
-    from hybridsim.reference.multiple_precision.reading import Reading
 
 # (knot as a fraction of the period, value there, slope per period) of the piecewise linear waves
 _CORNERS = {
@@ -46,19 +44,6 @@ class Signal:
     def angular(self) -> bool:
         """Return whether the polynomial is an angle."""
         return self.declared.kind == "chirp" or self.declared.shape == "sine"
-
-    def node(self, reading: Reading, piece: Sequence[Held]) -> Node:
-        """Return the node of an input, given the knot and the four coefficients of its piece."""
-        knot, *coefficients = piece
-        passed = reading.sum(reading.time, knot, minus=True)
-        total: Node = coefficients[3]
-        for lower in (2, 1, 0):
-            total = reading.sum(coefficients[lower], reading.product(passed, total))
-        if not self.angular:
-            return total
-        amplitude = Held(self.context, self.values["amplitude"])
-        wave = reading.product(amplitude, reading.functions.build("sin", total))
-        return reading.sum(Held(self.context, self.values.get("offset", 0)), wave)
 
     def piece(self, t: Number) -> tuple[Number, ...]:
         """Return the knot and the four coefficients that hold from t on."""
