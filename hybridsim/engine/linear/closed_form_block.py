@@ -11,7 +11,7 @@ import numpy as np
 from hybridsim.engine.linear.motion import functions_of_time, moved, states_near_start, states_of
 from hybridsim.engine.linear.tables import LinearTables
 from hybridsim.engine.native.kernels import call, kernel
-from hybridsim.engine.record.blocks import SegmentArrays
+from hybridsim.engine.record.blocks import SegmentBlock
 from hybridsim.engine.record.segments import Dense
 from hybridsim.engine.system.system import System
 
@@ -47,7 +47,7 @@ def closed_form_states(
 
 
 @dataclass(frozen=True)
-class ClosedFormBlock(SegmentArrays):
+class ClosedFormBlock(SegmentBlock):
     """N consecutive segments that start at local time 0; see `hybridsim.engine.record.blocks.SegmentBlock`.
 
     Parameters

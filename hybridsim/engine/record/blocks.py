@@ -35,61 +35,41 @@ class Block(Protocol[Item]):
         """Return a block of the items from the given number on."""
 
 
-class SegmentBlock(Block[Segment], Protocol):
-    """N consecutive segments. `hybridsim.engine.record.series_block` is an example.
+class SegmentBlock(Sequence[Segment]):
+    """N consecutive segments in arrays with one row for each. `hybridsim.engine.record.series_block` is an example.
 
-    1. origins (N, 2): the instant (high, low) from which the local time of each segment is counted. 2. spans (N, 2):
-    first and last local time of each segment; forward in time the first is below the second. 3. modes (N, C): the mode
-    of each component. 4. ``block[i]`` is the i-th segment as a `Segment`, with held states at its knots on their
-    constraints. 5. Times and states are those that the run used. The states at both ends of a segment are bit for bit
-    the x+ and x- of
-       the events there.
+    1. ``block[i]`` is the i-th segment as a `Segment`, with held states at its knots on their constraints.
+    2. Times and states are those that the run used. The states at both ends of a segment are bit for bit the x+ and x-
+       of the events there.
     """
 
-    @property
-    def origins(self) -> np.ndarray: ...
-    @property
-    def spans(self) -> np.ndarray: ...
-    @property
-    def modes(self) -> np.ndarray: ...
+    origins: np.ndarray  # (N, 2) instants (high, low) from which the local time of each segment is counted
+    modes: np.ndarray  # (N, C) modes of the components
+    vectors: np.ndarray  # (N, P) run-time vectors
+    spans: Any  # (N, 2) first and last local times, ascending if time runs forward; a property
 
+    @abstractmethod
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
         """Return states (k, n) at local times (k,) in the segments with the given numbers (k,).
 
         Held states are on their constraints. One compiled call computes all states, because there may be thousands.
         """
 
-    def at_end(self) -> Segment:
-        """Return the end of the last segment as a segment of zero length, in its own arrays."""
-
-    def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return knots (m + 1,), states at starts of steps (m or more, n), run-time vector and modes of a segment."""
-
-    def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return all steps: ascending numbers of segments (m,), local times (m,), states (m, n), with ends."""
-
-    def since(self, first: int) -> SegmentBlock:
-        """Return a block of the segments from the given number on."""
-
-
-class SegmentArrays(Sequence[Segment]):
-    """Segments in arrays with one row for each: what the blocks of all compiled loops have in common.
-
-    A block has the fields origins (N, 2), modes (N, C) and vectors (N, P) and the methods of a `SegmentBlock`.
-    """
-
-    origins: np.ndarray
-    modes: np.ndarray
-    vectors: np.ndarray
-    spans: Any  # a cached property
-
     @abstractmethod
     def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return knots, states, run-time vector and modes of a segment."""
+        """Return knots (m + 1,), states at starts of steps (m or more, n), run-time vector and modes of a segment."""
 
     @abstractmethod
     def motion(self, i: int) -> tuple[np.ndarray, np.ndarray, Dense]:
         """Return knots (m + 1,), states (m + 1, n) and dense output of a segment."""
+
+    @abstractmethod
+    def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return all steps: ascending numbers of segments (m,), local times (m,), states (m, n), with ends."""
+
+    @abstractmethod
+    def since(self, first: int) -> SegmentBlock:
+        """Return a block of the segments from the given number on."""
 
     @property
     @abstractmethod
@@ -105,7 +85,7 @@ class SegmentArrays(Sequence[Segment]):
         return Instant(*self.origins[-1].tolist()).plus(float(self.spans[-1, 1]))
 
     def at_end(self) -> Segment:
-        """Return the end of the last segment."""
+        """Return the end of the last segment as a segment of zero length, in its own arrays."""
         return end_point(self.until, self.modes[-1], self.vectors[-1], self.last)
 
     def __getitem__(self, i: Any, /) -> Any:
@@ -113,29 +93,6 @@ class SegmentArrays(Sequence[Segment]):
             return [self[k] for k in range(*i.indices(len(self)))]
         i = range(len(self))[i]
         return Segment(Instant(*self.origins[i].tolist()), self.modes[i], self.vectors[i], *self.motion(i))
-
-
-class OccurrenceBlock(Block[Occurrence], Protocol):
-    """Consecutive events. `hybridsim.engine.record.event_block` serves every compiled loop."""
-
-    @property
-    def times(self) -> np.ndarray:
-        """Return the times of the events, rounded to doubles."""
-
-    def times_of(self, component: str, kind: str | None) -> np.ndarray:
-        """Return the times of the events of a component and kind."""
-
-    def states_of(self, component: str, kind: str | None, side: int) -> np.ndarray:
-        """Return a new array of states (k, n) at events, before (side 0) or after (side 1) each event."""
-
-    def kinds(self) -> Counter[str]:
-        """Return the number of events of each kind."""
-
-    def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return instants (k, 2) and states x-, x+ (k, 2, n) of all transitions from a given number on."""
-
-    def since(self, first: int) -> OccurrenceBlock:
-        """Return a block of the events from the given number on."""
 
 
 class SegmentList(list[Segment]):
@@ -204,7 +161,7 @@ class SegmentList(list[Segment]):
 
 
 class OccurrenceList(list[Occurrence]):
-    """Events as objects; see `OccurrenceBlock`."""
+    """Events as objects; see `hybridsim.engine.record.event_block.EventBlock`."""
 
     @property
     def until(self) -> Instant:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.native.kernels import kernel
-from hybridsim.engine.record.blocks import SegmentArrays, SegmentList
+from hybridsim.engine.record.blocks import SegmentBlock, SegmentList
 from hybridsim.engine.record.event_block import EventBlock
 from hybridsim.engine.record.fixed_dense import StepDense
 from hybridsim.engine.record.segments import Dense
@@ -16,7 +16,7 @@ from hybridsim.engine.system.instant import Instant, two_sum
 from hybridsim.engine.system.system import System
 
 
-class StepSegments(SegmentArrays):
+class StepSegments(SegmentBlock):
     """The segments of one series of fixed steps, one for each sequence of rows in the same modes.
 
     Parameters

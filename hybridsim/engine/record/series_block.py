@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridsim.engine.native.kernels import allocating_kernel, call, inlined, kernel
 from hybridsim.engine.native.simd_vectors import WIDTH, load, splat, store
-from hybridsim.engine.record.blocks import SegmentArrays
+from hybridsim.engine.record.blocks import SegmentBlock
 from hybridsim.engine.record.segments import Dense, PiecewiseDense
 from hybridsim.engine.series.interpreter import polynomials
 from hybridsim.engine.system.system import System
@@ -99,7 +99,7 @@ def _spans_of(ends: Any, steps: Any, spans: Any) -> None:
 
 
 @dataclass(frozen=True)
-class SeriesBlock(SegmentArrays):
+class SeriesBlock(SegmentBlock):
     """N segments of several steps each; see `hybridsim.engine.record.blocks.SegmentBlock`.
 
     Parameters
