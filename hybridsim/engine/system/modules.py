@@ -137,6 +137,11 @@ class _FromMemory(InspectLoader):
         return self._text
 
 
+def module_of(name: str, text: str) -> ModuleType:
+    """Return a module with the given text."""
+    return _import(_FromMemory(name, f"DATA = {{}}\n{text}"))
+
+
 def _import(loader: _FromDisk | _FromMemory) -> ModuleType:
     spec = importlib.util.spec_from_loader(loader.name, loader)
     assert spec is not None, "it has a loader"

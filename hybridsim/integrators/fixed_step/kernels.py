@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.native.kernels import call, inlined
+from hybridsim.engine.native.kernels import Precompiled, call, inlined, kernel
 
 # reasons why a sequence of steps ended
 BOUND, FULL, GUARD, MONITOR, NOT_FINITE, RESTITUTION, RESTED = 0, 1, 2, 3, 4, 5, 6
@@ -79,3 +79,24 @@ def passed(
             if leaves_side(before[k], after[k]) and not (is_first and fresh[k]):
                 return MONITOR
     return CONTINUES
+
+
+@kernel
+def _changed_rows(before: Any, modes: Any, rows: Any) -> int:
+    """Write the rows at which modes change, and return their number."""
+    count, components, flat = 0, before.shape[0], modes.reshape(modes.size)
+    for k in range(flat.shape[0]):
+        source = before[k] if k < components else flat[k - components]
+        if flat[k] != source and (count == 0 or rows[count - 1] != k // components):
+            rows[count] = k // components
+            count += 1
+    return count
+
+
+_write_rows = Precompiled(_changed_rows)
+
+
+def changed_rows(before: np.ndarray, modes: np.ndarray) -> np.ndarray:
+    """Return the rows at which modes change; before: modes before the first row."""
+    rows = np.empty(len(modes), dtype=np.int64)
+    return rows[: _write_rows(before, modes, rows)].copy()

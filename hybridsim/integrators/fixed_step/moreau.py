@@ -115,7 +115,7 @@ class Moreau(Integrator):
 
 
 class MoreauMarch:
-    """The kernels of one run; see `hybridsim.integrators.fixed_step.run.March`."""
+    """The kernels of one run; see `hybridsim.integrators.fixed_step.march.March`."""
 
     halvings, pinned, has_sides_only = _HALVINGS, True, False
 

@@ -372,7 +372,7 @@ def moreau_steps(
     out: Any,
     counts: Any,
 ) -> tuple[int, int]:
-    """Step from local time 0 in (x, z) up to the bound; see `hybridsim.integrators.fixed_step.run.March`.
+    """Step from local time 0 in (x, z) up to the bound; see `hybridsim.integrators.fixed_step.march.March`.
 
     counts: rates, guards, steps that did not converge. out (n,): scratch space.
     """

@@ -11,9 +11,9 @@ from hybridsim.engine.record.trajectory import Task, Trajectory
 from hybridsim.engine.system.system import System
 from hybridsim.errors import UsageError
 from hybridsim.integrators.contract import Integrator
-from hybridsim.integrators.fixed_step.rk4_kernels import SIGN, ZONE
 from hybridsim.integrators.fixed_step.rk4_march import FixedStep, Rk4March
 from hybridsim.integrators.fixed_step.run import FixedStepRun
+from hybridsim.integrators.fixed_step.step_code import SIGN, ZONE
 from hybridsim.integrators.fixed_step.step_length import fixed_step_length, refuse_longer
 
 _PAPER = "He et al. 2026, doi:10.3390/sym18010057"

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from types import ModuleType
+from typing import cast
 
 import numpy as np
 
+from hybridsim.engine.native.kernels import ENABLED, Precompiled
 from hybridsim.engine.system.system import System
-from hybridsim.integrators.fixed_step.rk4_kernels import SIGN, rk4_step, run_steps, workspace
-from hybridsim.integrators.fixed_step.run import surface_table
+from hybridsim.integrators.fixed_step.rk4_kernels import rk4_step, run_steps, workspace
+from hybridsim.integrators.fixed_step.run import ROWS, surface_table
+from hybridsim.integrators.fixed_step.step_code import SIGN, StepCode, step_functions
+
+_run_steps = Precompiled(run_steps)
 
 
 @dataclass(frozen=True)
@@ -27,19 +33,32 @@ class FixedStep:
 
 
 class Rk4March:
-    """The kernels of one run; see `hybridsim.integrators.fixed_step.run.March`."""
+    """The kernels of one run; see `hybridsim.integrators.fixed_step.march.March`."""
 
     def __init__(self, system: System, settings: FixedStep) -> None:
         self.step, self.halvings, self.pinned = settings.step, settings.halvings, settings.zeroed
         self.has_sides_only = settings.rule == SIGN
         self.counts = np.zeros(3, dtype=np.int64)
         self._table = surface_table(system)
-        names = ("flow", "surfaces", "guards", "monitors", "project")
-        self._addresses = tuple(system.address(n) for n in names)
-        self._law = (settings.rule, settings.every_stage, settings.eps)
-        self._flags = (settings.dichotomy, settings.zeroed, settings.located, settings.rest_of_step)
-        monitors = len(system.monitor_names)
-        self._work = workspace(system.n, len(system.automata), len(self._table), system.guard_count, monitors)
+        rows = tuple(tuple(row) for row in self._table.tolist())
+        sizes = (system.n, len(system.automata), system.guard_count, rows)
+        code = StepCode(*sizes, settings.rule, settings.every_stage, settings.zeroed, system.layout.pin_at)
+        self._addresses = (
+            *step_functions(cast(ModuleType, system.code.module), code)[0],
+            *(system.address(name) for name in ("guards", "monitors", "project", "surfaces")),
+        )
+        self._settings = (float(settings.step), settings.halvings, float(settings.eps))
+        has_march = ENABLED and not settings.located and not system.monitor_names
+        self._flags = (
+            settings.dichotomy,
+            settings.zeroed,
+            settings.located,
+            settings.rest_of_step,
+            has_march,
+        )
+        self._work = workspace(
+            system.n, len(self._table), system.guard_count, len(system.monitor_names), ROWS
+        )
 
     def run(
         self,
@@ -51,18 +70,21 @@ class Rk4March:
         rows: tuple[np.ndarray, np.ndarray, np.ndarray],
     ) -> tuple[int, int]:
         """Step up to the bound, or until Python has to act."""
-        count, why = run_steps(
-            self._addresses, (self.step, self.halvings), self._law, self._flags, self._table, guard_numbers, bound, p,
-            *start, fresh, *rows, self._work, self.counts,
+        x, z = start
+        rows[1][0] = x
+        count, why = _run_steps(
+            self._addresses, self._settings, self._flags, self._table, guard_numbers, bound, p, z, fresh, *rows,
+            self._work, self.counts,
         )  # fmt: skip
         return count, why
 
     def trial(self, s: float, tau: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Return the state after one step of length tau."""
-        out = np.empty(len(x))
-        rk4_step(self._addresses, self._law, self._table, s, tau, x, p, z, out, self._work)
+        out = self._work[1]
+        out[-2:] = tau, self._settings[2]
+        rk4_step(self._addresses[1], s, x, p, z, out)
         self.counts[0] += 4
-        return out
+        return out[: len(x)].copy()
 
     def refused(self) -> str:
         """Return an empty message, because these methods do not support impacts."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
-from typing import Protocol
+from typing import Any
 
 import numpy as np
 
@@ -25,60 +25,38 @@ from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.timetable import Appointment, Timetable
 from hybridsim.integrators.fixed_step.gaps import gaps
-from hybridsim.integrators.fixed_step.kernels import BOUND, FULL, MONITOR, NOT_FINITE, RESTED, RESTITUTION
+from hybridsim.integrators.fixed_step.kernels import (
+    BOUND,
+    FULL,
+    MONITOR,
+    NOT_FINITE,
+    RESTED,
+    RESTITUTION,
+    changed_rows,
+)
+from hybridsim.integrators.fixed_step.march import March
 from hybridsim.integrators.fixed_step.step_length import refuse_endless
 
-_STATE = ("x", "z", "discrete", "scale", "fresh", "turned")  # attributes from which a run can continue
-_ROWS = 8192  # most steps per kernel call; each call has a new time origin, so that no digits are lost
-
-
-class March(Protocol):
-    """The kernels of one method for one run.
-
-    step, halvings: length of a step, and how often it is halved to locate the zero of a guard or monitor.
-    pinned: whether held states are evaluated from their constraints. has_sides_only: whether there is no
-    third mode and the holding mode marks an exact zero. counts: evaluations of rates and of guards.
-    """
-
-    step: float
-    halvings: int
-    pinned: bool
-    has_sides_only: bool
-    counts: np.ndarray
-
-    def run(
-        self,
-        guard_numbers: np.ndarray,
-        bound: float,
-        p: np.ndarray,
-        start: tuple[np.ndarray, np.ndarray],
-        fresh: np.ndarray,
-        rows: tuple[np.ndarray, np.ndarray, np.ndarray],
-    ) -> tuple[int, int]:
-        """Step from local time 0 in start = (x, z) up to the bound, or until Python has to act.
-
-        guard_numbers: guards of components without a surface. fresh: monitors that have just fired. Row k of rows =
-        (times, states, modes) holds the start of step k and the modes during it; the last row is the end.
-        Return (number of rows, reason).
-        """
-        ...
-
-    def trial(self, s: float, tau: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return the state after one step of length tau."""
-        ...
-
-    def refused(self) -> str:
-        """Return the message for a last call that ended with RESTITUTION."""
-        ...
-
-    def warnings(self) -> list[str]:
-        """Return warnings about the run."""
-        ...
+_STATE = ("x", "z", "discrete", "fresh", "turned")  # attributes from which a run can continue, with the scale
+ROWS = 8192  # most steps per kernel call; each call has a new time origin, so that no digits are lost
 
 
 def _left(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """Apply `hybridsim.integrators.fixed_step.kernels.leaves_side` to all monitors."""
     return ((before > 0.0) & (after <= 0.0)) | ((before < 0.0) & (after >= 0.0))
+
+
+def _scale(states: np.ndarray) -> np.ndarray:
+    """Return the largest size of each state."""
+    sizes: np.ndarray = np.abs(states).max(axis=0)
+    return sizes
+
+
+def _checkpoint(
+    instant: Instant, arrays: dict[str, np.ndarray], states: np.ndarray, *others: Any
+) -> Checkpoint:
+    """Return a checkpoint, whose scale is computed only if it is asked for."""
+    return Checkpoint(instant, arrays | {"scale": _scale(states)}, *others)
 
 
 def surface_table(system: System) -> np.ndarray:
@@ -113,7 +91,7 @@ class FixedStepRun:
         self.declared = [c for c, a in enumerate(system.automata) if not a.has_surface]
         self.located = located = march.step * 2.0**-march.halvings  # accuracy of event times
         self.accumulation = Accumulation(located, 4.0 * located)
-        self.scale = np.abs(self.x)  # sizes of the states in the last kernel call, for relative rounding
+        self.states = self.x[None, :].copy()  # of the last kernel call, whose sizes bound the rounding
         self.fresh = np.zeros(len(system.monitor_names), dtype=np.bool_)  # monitors that have just fired
         self.turned = False  # whether an input may just have jumped
 
@@ -152,7 +130,7 @@ class FixedStepRun:
         while self.origin != self.end:
             arrays = {name: np.array(getattr(self, name)) for name in _STATE}
             settled, paces = self.timetable.settled, dict(self.accumulation.paces)
-            self.record.mark(partial(Checkpoint, self.origin, arrays, settled, paces))
+            self.record.mark(partial(_checkpoint, self.origin, arrays, self.states, settled, paces))
             appointment = self.timetable.next(self.origin, forward=True)
             if self._run_kernel(appointment, appointment.instant if appointment else self.end):
                 return
@@ -162,15 +140,15 @@ class FixedStepRun:
                 self.limit_monitor.check()
 
     def _go_on_from(self, checkpoint: Checkpoint) -> None:
-        if not checkpoint.arrays.keys() >= {*_STATE}:
+        if not checkpoint.arrays.keys() >= {*_STATE, "scale"}:
             raise damaged("the place at which it continues")
         self.origin = checkpoint.instant
         if checkpoint.settled is not None:
             self.timetable.mark_done(checkpoint.settled)
         self.accumulation.go_on(checkpoint.paces)
         state = {name: checkpoint.arrays[name].copy() for name in _STATE}
-        self.x, self.z, self.discrete, self.scale, self.fresh = (state[name] for name in _STATE[:-1])
-        self.turned = bool(state["turned"])
+        self.x, self.z, self.discrete, self.fresh = (state[name] for name in _STATE[:-1])
+        self.turned, self.states = bool(state["turned"]), checkpoint.arrays["scale"][None, :]
 
     def _vector(self) -> np.ndarray:
         p = self.system.vector(self.origin, self.discrete)
@@ -181,8 +159,8 @@ class FixedStepRun:
         """Call the kernel once and resolve its end; return True if the run stops."""
         system = self.system
         p, bound = self._vector(), target.minus(self.origin)
-        times, states = np.empty(_ROWS), np.empty((_ROWS, system.n))
-        modes = np.empty((_ROWS, len(self.z)), dtype=np.int64)
+        times, states = np.empty(ROWS), np.empty((ROWS, system.n))
+        modes = np.empty((ROWS, len(self.z)), dtype=np.int64)
         numbers = (
             system.guards_of(self.z)[self.declared].ravel() if self.declared else np.zeros(0, dtype=np.int64)
         )
@@ -196,9 +174,9 @@ class FixedStepRun:
         count, why = self.march.run(numbers, bound, p, here, self.fresh, rows)
         rested = np.flatnonzero(self.fresh) if why == RESTED else None
         self.fresh[:] = False
-        if count < _ROWS:  # do not keep large buffers for few rows
+        if count < ROWS:  # do not keep large buffers for few rows
             times, states, modes = times[:count].copy(), states[:count].copy(), modes[:count].copy()
-        self.scale = np.abs(states).max(axis=0)
+        self.states = states
         self._store(p, times, states, modes, start_z)
         s, x = float(times[count - 1]), states[count - 1]
         self.x, self.z = x.copy(), modes[count - 1].copy()
@@ -377,7 +355,7 @@ class FixedStepRun:
         x, sides = self.x, np.sign(self._monitors(0.0, self.x, p))
         # the located event lies within the last halving of a step
         s_error = self.located if fired or monitors else 0.0
-        x_error = 4.0 * UNIT * np.maximum(np.abs(self.x), self.scale)
+        x_error = 4.0 * UNIT * np.maximum(np.abs(self.x), _scale(self.states))
         if s_error:
             x_error += s_error * np.abs(system.flow(0.0, self.x, p, self.z))
         at = Situation(0.0, self.x.copy(), p, self.z.copy(), x_error, s_error, bool(starting))
@@ -423,11 +401,12 @@ class FixedStepRun:
         record.counters.steps += len(s) - 1
         if self.march.has_sides_only:
             self._side_of_zeros(z)
-        sources = np.concatenate([(before if len(record.segments) else z[0])[None], z[:-1]])
-        rows = np.flatnonzero((sources != z).any(axis=1))
+        rows = changed_rows(before if record.segments else z[0], z)
         record.segments.add(StepSegments(self.system, self.origin, p, s, x, z, rows[rows > 0]))
         if len(rows):
-            events = step_events(self.system, self.origin, s[rows], sources[rows], z[rows], x[rows])
+            sources = z[rows - 1]
+            sources[rows == 0] = before
+            events = step_events(self.system, self.origin, s[rows], sources, z[rows], x[rows])
             record.counters.events += len(events)
             record.occurrences.add(events)
 

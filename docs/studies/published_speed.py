@@ -1,0 +1,96 @@
+"""How fast the published methods are beside themselves written by hand for the one system.
+
+    python docs/studies/published_speed.py [--turns 31] [--out DIR]
+
+One process; ours and the method by hand take turns at P1 and P2, 100 periods of 1200 steps, with the times of events
+and the states at them. Writes docs/studies/published-speed.md (or DIR).
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median, quantiles
+from typing import Any
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from rivals import ours, published_rk4
+from rivals.method import Method
+from rivals.page import machine
+from rivals.scenes import Scene, scene
+
+METHODS: tuple[tuple[str, Method, Method], ...] = (
+    (
+        "`rk4-dichotomy`, v zeroed",
+        ours.method("rk4-dichotomy", stick_velocity="zero"),
+        published_rk4.dichotomy(),
+    ),
+    ("`rk4-dichotomy`, v kept", ours.method("rk4-dichotomy"), published_rk4.dichotomy(zeroed=False)),
+    ("`rk4-sign`", ours.method("rk4-sign"), published_rk4.sign()),
+)
+HEAD = """# The published methods at their own speed
+
+`python docs/studies/published_speed.py`, which writes this page: `rk4-dichotomy` and `rk4-sign` beside the same methods
+as a person would write them for this one system, compiled by numba (`docs/studies/rivals/published_rk4.py`).
+
+- 100 periods of 1200 steps, {turns} turns; {machine}
+- Processor time of `hs.simulate(..., save="events")` and of reading the times of events and the states at them. The
+  method by hand records its events alone.
+- A ratio is that of two calls of one turn: the median and, in brackets, the middle nine tenths.
+- By hand, a body that is held with v = 0 has no stages. With v kept the force is e at every stage, as Eq. 4 reads.
+- The sign jumps between two values wherever the body should stick, so rounding decides how often.
+
+| method | scene | events, ours | by hand | median ms, ours | by hand | ratio |
+| --- | --- | --- | --- | --- | --- | --- |
+"""
+
+
+def main() -> None:
+    """Run the study."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--turns", type=int, default=31, help="turns of each method")
+    parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="folder of the page")
+    options = parser.parse_args()
+    lines = [line for name in ("P1", "P2") for line in _lines(scene(name), options.turns)]
+    text = HEAD.format(machine=machine(), turns=options.turns) + "\n".join(lines) + "\n"
+    (options.out / "published-speed.md").write_text(text)
+    print(text)
+
+
+def _lines(here: Scene, turns: int) -> list[str]:
+    """Return a line for each method, whose runs take turns."""
+    calls: list[Callable[[], Any]] = []
+    counts = []
+    for method in (method for _, *pair in METHODS for method in pair):
+        runs = method.start(here)
+        assert runs is not None and runs.events is not None, "all apply to this system"
+        calls.append(runs.events)
+        counts.append(len(runs.read(runs.events()).t))
+    seconds: list[list[float]] = [[] for _ in calls]
+    gc.collect()
+    gc.disable()
+    for _ in range(turns):
+        for spent, call in zip(seconds, calls, strict=True):
+            began = time.process_time()
+            call()
+            spent.append(time.process_time() - began)
+    gc.enable()
+    lines = []
+    for k, (label, *_) in enumerate(METHODS):
+        first, second = seconds[2 * k], seconds[2 * k + 1]
+        ratios = [a / b for a, b in zip(first, second, strict=True)]
+        twentieths = quantiles(ratios, n=20)
+        lines.append(
+            f"| {label} | {here.name} | {counts[2 * k]} | {counts[2 * k + 1]} | {1e3 * median(first):.2f} | "
+            f"{1e3 * median(second):.2f} | {median(ratios):.2f} ({twentieths[0]:.2f} to {twentieths[-1]:.2f}) |"
+        )
+    return lines
+
+
+if __name__ == "__main__":
+    main()
