@@ -7,7 +7,6 @@ the "address" is the Python function itself and every kernel runs as plain Pytho
 
 from __future__ import annotations
 
-import math
 import os
 import sys
 import threading
@@ -21,6 +20,7 @@ import numpy as np
 
 from hybridsim.engine.native.cache import cache_root, kernel_folder, store
 from hybridsim.engine.native.inner_parts import find_part, is_complete, needed, options
+from hybridsim.engine.native.plain_functions import as_compiled
 
 ENABLED = os.environ.get("HYBRIDSIM_JIT", "1") != "0"
 if ENABLED:
@@ -30,11 +30,6 @@ if ENABLED:
 
 _NOTICED = 1.0  # seconds of compilation after which a message is printed
 _reached: list[Any] = []  # functions by their number, kept alive here
-
-
-def _fill_nan(out: Any) -> None:
-    for i in range(len(out)):
-        out[i] = math.nan
 
 
 if ENABLED:
@@ -426,16 +421,8 @@ else:
         return elements
 
     def compile_model_function(module: Any, name: str) -> tuple[Any, Any]:
-        """Wrap the function so that a Python exception gives NaN, as in compiled code."""
-        function = getattr(module, name)
-
-        def guarded(t: float, x: Any, p: Any, z: Any, out: Any) -> int:
-            try:
-                return function(t, x, p, z, out)
-            except (ZeroDivisionError, ValueError, OverflowError):
-                _fill_nan(out)
-                return 1
-
+        """Wrap the function so that it computes as compiled code does."""
+        guarded = as_compiled(getattr(module, name))
         return guarded, guarded
 
     def texts_to_compile(module: Any) -> list[str]:
