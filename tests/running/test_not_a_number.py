@@ -128,7 +128,7 @@ def test_a_state_that_cannot_be_squared() -> None:
 )
 def test_steps_without_end_are_refused(name: str, given: dict[str, float], what: str) -> None:
     with pytest.raises(
-        hs.UsageError, match=rf"^{what} is 1e-\d+: a run from 0 to 1 would take 1e\+\d+ steps"
+        hs.UsageError, match=rf"^`{what}` is 1e-\d+: a run from 0 to 1 would take 1e\+\d+ steps"
     ):
         hs.simulate("dfcs", (0.0, 1.0), integrator=name, **given)
 
