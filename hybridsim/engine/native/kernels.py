@@ -14,13 +14,13 @@ import time
 from collections.abc import Callable, Sequence
 from functools import cache, wraps
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 import numpy as np
 
 from hybridsim.engine.native.cache import cache_root, kernel_folder, store
 from hybridsim.engine.native.inner_parts import find_part, is_complete, needed, options
-from hybridsim.engine.native.plain_functions import as_compiled
 
 ENABLED = os.environ.get("HYBRIDSIM_JIT", "1") != "0"
 if ENABLED:
@@ -30,6 +30,27 @@ if ENABLED:
 
 _NOTICED = 1.0  # seconds of compilation after which a message is printed
 _reached: list[Any] = []  # functions by their number, kept alive here
+
+
+def as_compiled(function: FunctionType) -> Callable[[float, Any, Any, Any, Any], int]:
+    """Return a function in which a fault makes a number infinite or NaN, and all numbers only as a last resort.
+
+    Python raises an error for 0.0/0.0. NumPy's numbers give NaN, which compiled code may not use at all: a force that
+    is undetermined, for example, does not matter for states that are held.
+    """
+    constants = tuple(np.float64(c) if isinstance(c, float) else c for c in function.__code__.co_consts)
+    with_numpy = FunctionType(function.__code__.replace(co_consts=constants), function.__globals__)
+
+    def guarded(t: float, x: Any, p: Any, z: Any, out: Any) -> int:
+        for one in (function, with_numpy):
+            try:
+                return int(one(t, x, p, z, out))
+            except (ZeroDivisionError, ValueError, OverflowError):
+                continue
+        out[:] = np.nan
+        return 1
+
+    return guarded
 
 
 if ENABLED:
