@@ -40,10 +40,12 @@ class StepSegments(SegmentBlock):
     ) -> None:
         self._system, self._origin, self._p = system, origin, p
         self._s, self._x, self._z = s, x, z
-        bounds = np.concatenate([[0], cuts, [len(s) - 1]])
+        bounds = np.empty(len(cuts) + 2, dtype=np.int64)
+        bounds[0], bounds[1:-1], bounds[-1] = 0, cuts, len(s) - 1
         longer = bounds[1:] > bounds[:-1]
         self._first, self._last = bounds[:-1][longer], bounds[1:][longer]
-        self.origins, self.vectors = (np.tile(row, (len(self._first), 1)) for row in (np.array(origin), p))
+        count = len(self._first)
+        self.origins, self.vectors = np.full((count, 2), origin), np.full((count, len(p)), p)
         self.modes = z[self._first]
 
     def arrays(self) -> dict[str, np.ndarray]:
