@@ -8,6 +8,7 @@ like those of the tuple. The caller must keep the arrays alive during the call.
 
 from __future__ import annotations
 
+import ctypes
 import math
 from collections.abc import Sequence
 from functools import cache, lru_cache
@@ -15,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.engine.native.buffer_pool import BufferPool
 from hybridsim.engine.native.inner_parts import needed
 from hybridsim.engine.native.kernels import ENABLED, kernel
 
@@ -24,6 +24,8 @@ ALIGNED = 64  # bytes; suitable for numbers of any kind
 _LARGE, LARGEST = 1 << 18, 1 << 21  # bytes of blocks that go through a pool
 _RETURNED = 2  # first blocks that a layout keeps for reuse
 _REST = [(0,) * (_SLOTS_PER_ARRAY - 1 - dimensions) for dimensions in range(_SLOTS_PER_ARRAY)]
+
+_MAX_FREE_BLOCKS = 4  # most free blocks in a pool
 
 if ENABLED:
     from llvmlite import ir
@@ -239,3 +241,44 @@ class ArrayLayout:
         """Return a copy of row i of the array with this name."""
         shape, dtype, k, offset = self._specs[self._kind._fields.index(name)]
         return np.ndarray(shape, dtype, blocks[k], offset)[i].copy()
+
+
+class BufferPool:
+    """A pool of blocks of one size in bytes, each of which is reused when all arrays in it have been deleted.
+
+    The operating system maps a fresh block page by page, when it is first written. In a compiled loop this can cost a
+    sixth of the time of a run of thousands of steps.
+
+    Each block is handed out as a buffer object over its memory. Every array over the buffer, and every view of such
+    an array, keeps the buffer alive. The memory returns to the pool when the buffer is deleted.
+    """
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+        self._free: list[bytearray] = []
+        self._kind = _buffer_type(size, self._free)
+
+    def block(self) -> np.ndarray:
+        """Return a block; its contents are undefined."""
+        try:
+            memory = self._free.pop()
+        except IndexError:
+            memory = bytearray(self.size)
+        buffer = self._kind.from_buffer(memory)
+        buffer.memory = memory
+        return np.frombuffer(memoryview(buffer), dtype=np.uint8)
+
+
+def _buffer_type(size: int, free: list[bytearray]) -> Any:
+    """Return a buffer type of a size in bytes whose instances return their memory to the pool when deleted."""
+
+    class PooledBuffer(ctypes.c_char * size):  # type: ignore[misc]  # the size is known at run time
+        memory: bytearray
+
+        def __del__(
+            self, limit: int = _MAX_FREE_BLOCKS
+        ) -> None:  # globals may be gone while Python shuts down
+            if len(free) < limit:
+                free.append(self.memory)
+
+    return PooledBuffer

@@ -232,7 +232,7 @@ def step_functions(module: ModuleType, code: StepCode) -> tuple[list[Any], Any]:
     text = code.text()
     if not ENABLED:
         made = module_of("steps", text)
-        functions = {name: getattr(module, name) for name in _USED}
+        functions = {name: compile_model_function(module, name)[0] for name in _USED}
         vars(made).update(functions, doubles=np.zeros, integers=lambda size: np.zeros(size, dtype=np.int64))
         return [compile_model_function(made, name)[0] for name in _EXPORTED], made
     path, digest = getattr(module, "__file__", None), hashlib.sha256(text.encode()).hexdigest()[:8]

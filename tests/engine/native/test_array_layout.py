@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from hybridsim.engine.native.buffer_pool import BufferPool
 from hybridsim.engine.native.kernels import Precompiled, kernel
-from hybridsim.engine.native.struct_pack import ArrayLayout, packed
+from hybridsim.engine.native.struct_pack import ArrayLayout, BufferPool, packed
 
 
 class Rows(NamedTuple):
