@@ -55,7 +55,9 @@ def sweep_lines(
     if over is None:  # texts have no distances
         across = max(dimensions, key=lambda name: (result.axes[name].dtype.kind == "f", lengths[name]))
     if not isinstance(across, str) or across not in dimensions:
-        raise UsageError(f"over cannot be {over!r}", remedy=nearest(str(over), dimensions, kind="parameters"))
+        raise UsageError(
+            f"`over` cannot be {over!r}", remedy=nearest(str(over), dimensions, kind="parameters")
+        )
     found = chosen_names(result, names, arrays=True)
     if axes is None:
         figure = style.figure(_WIDTH, _HEIGHT * len(found) + _MORE)

@@ -35,7 +35,7 @@ def test_regularised_forms(hybridsim: Callable, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "argv, message",
     [
-        (["compare"], "name a model"),
+        (["compare"], "add a model"),
         (["compare", "dfcs", "--suite"], "MODEL cannot be combined with --suite"),
         (["compare", "--suite", "-p", "F0=3"], "-p cannot be combined with --suite"),
         (["compare", "--suite", "--t-end", "5T"], "--t-end cannot be combined with --suite"),
@@ -44,7 +44,7 @@ def test_regularised_forms(hybridsim: Callable, tmp_path: Path) -> None:
         (["compare", "dfcs", "--scenes", "P1"], "--scenes requires --suite"),
         (["compare", "--suite", "--budget", "0"], "--budget"),
         (["compare", "dfcs", "--v0", "1e-3"], "`v0` requires `regularized`"),
-        (["compare", "dfcs", "--regularized", "tan"], "no regularisation 'tan'"),
+        (["compare", "dfcs", "--regularized", "tan"], "`regularized` cannot contain 'tan'"),
     ],
 )
 def test_bad_usage(hybridsim: Callable, argv: list[str], message: str) -> None:
