@@ -12,6 +12,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import cache, wraps
 from pathlib import Path
 from types import FunctionType
@@ -33,21 +34,15 @@ _reached: list[Any] = []  # functions by their number, kept alive here
 
 
 def as_compiled(function: FunctionType) -> Callable[[float, Any, Any, Any, Any], int]:
-    """Return a function in which a fault makes a number infinite or NaN, and all numbers only as a last resort.
+    """Return a function in which 0.0/0.0 is NaN, by numbers of NumPy; its whole result is NaN only if these fail."""
+    numbers = tuple(np.float64(c) if isinstance(c, float) else c for c in function.__code__.co_consts)
+    with_numpy = FunctionType(function.__code__.replace(co_consts=numbers), function.__globals__)
 
-    Python raises an error for 0.0/0.0. NumPy's numbers give NaN, which compiled code may not use at all: a force that
-    is undetermined, for example, does not matter for states that are held.
-    """
-    constants = tuple(np.float64(c) if isinstance(c, float) else c for c in function.__code__.co_consts)
-    with_numpy = FunctionType(function.__code__.replace(co_consts=constants), function.__globals__)
-
-    def guarded(t: float, x: Any, p: Any, z: Any, out: Any) -> int:
+    def guarded(*arguments: Any) -> int:
         for one in (function, with_numpy):
-            try:
-                return int(one(t, x, p, z, out))
-            except (ZeroDivisionError, ValueError, OverflowError):
-                continue
-        out[:] = np.nan
+            with suppress(ArithmeticError, ValueError):
+                return int(one(*arguments))
+        arguments[-1][:] = np.nan
         return 1
 
     return guarded
@@ -443,8 +438,7 @@ else:
 
     def compile_model_function(module: Any, name: str) -> tuple[Any, Any]:
         """Wrap the function so that it computes as compiled code does."""
-        guarded = as_compiled(getattr(module, name))
-        return guarded, guarded
+        return (as_compiled(getattr(module, name)),) * 2
 
     def texts_to_compile(module: Any) -> list[str]:
         """Return no texts, because nothing is compiled."""
