@@ -33,7 +33,7 @@ FILES = {
     "engine/lowering/emit.py": 368,
     "engine/lowering/held_states.py": 305,
     "engine/lowering/lower.py": 502,
-    "engine/native/kernels.py": 516,
+    "engine/native/kernels.py": 510,
     "engine/roots/roots.py": 355,
     "engine/run/compiled_loop.py": 386,
     "engine/run/event_loop.py": 411,
