@@ -11,7 +11,8 @@ from hybridsim.engine.linear.motion_summary import sum_up
 from hybridsim.engine.native.kernels import call_kernel, inlined, kernel
 from hybridsim.engine.native.loop_hints import fill, put
 from hybridsim.engine.native.struct_pack import pack_at
-from hybridsim.engine.run.event_loop import AT_TARGET, FULL
+from hybridsim.engine.run.event_loop import AT_TARGET, FULL, LONGEST
+from hybridsim.engine.run.event_loop import SEGMENTS as SEGMENTS_AT
 from hybridsim.engine.system.instant import two_sum
 from hybridsim.ensemble.start import keeps_holding, plain_start
 
@@ -26,7 +27,7 @@ NEXT, BEGUN, STORED, RESUMED = range(4)  # indices of `Runs.at`
 class Runs(NamedTuple):
     """The m runs of a group, with their results."""
 
-    tables: np.ndarray  # addresses (m,) of tables
+    tables: np.ndarray  # addresses (m,) of tables; the present one is put into the table of the model's pack
     vectors: np.ndarray  # run-time vectors (m, P)
     rates: np.ndarray  # rates (m, R) of angles
     starts: np.ndarray  # initial states (m, n)
@@ -44,11 +45,9 @@ class Runs(NamedTuple):
 
 @kernel
 def run_ensemble(
-    automata: Any,
-    tapes: Any,
-    inputs: Any,
+    model: Any,
+    lin_at: Any,
     none: Any,
-    lin: Any,
     vector_positions: Any,
     surfaces: Any,
     hold: Any,
@@ -57,23 +56,28 @@ def run_ensemble(
     slopes: Any,
     state: Any,
     work: Any,
-    scratch: Any,
+    loop: Any,
+    own: Any,
     late: Any,
     record: Any,
     found: Any,
 ) -> None:
     """Run the points of a group in order, until all are done or a number of segments is computed.
 
-    lin: tables of the common type. vector_positions: positions of the origin, the phases and the pin in p. hold:
-    holding mode of each component. rule: nodes and weights. slopes (3, n): scratch for `sum_up`. record: twice as
-    many segments as one compiled call has; late: its second half.
+    model: `LoopModel` with tables of the common type; lin_at (1,): their address in it, which each run changes. none:
+    empty tables. vector_positions: positions of the origin, the phases and the pin in p. hold: holding mode of each
+    component. rule: nodes and weights. slopes (3, n): scratch for `sum_up`. record: `LoopRecord` and `ClosedFormRows`
+    of twice as many segments as one compiled call has. late: the last arguments of `event_loop`, with their second
+    half.
     """
+    automata, tapes, inputs = model.automata, model.tapes, model.inputs
     origin_at, phases_at, pin_at = vector_positions
-    at, clock, target = runs.at, scratch.times[2:], scratch.times[:2]
+    at, clock, target = runs.at, loop.times[2:], loop.times[:2]
+    common, rows = record
     segments = 0
     while at[NEXT] < runs.ends.shape[0] and segments < _SEGMENTS_PER_CHECK:
         i = at[NEXT]
-        tables, rates = pack_at(runs.tables[i], lin), runs.rates[i]
+        tables, rates = pack_at(runs.tables[i], model.lin), runs.rates[i]
         if at[BEGUN] == 0:
             put(runs.starts[i], state.x)
             put(runs.vectors[i], state.p)
@@ -84,36 +88,37 @@ def run_ensemble(
             ):  # fmt: skip
                 at[NEXT] += 1
                 continue
-            if keeps_holding(tapes, tables, state, work, scratch.c):
+            if keeps_holding(tapes, tables, state, work, own.c):
                 _take_rest(hold, runs.periods[i], state, found)
                 _store_results(found, runs, i)
                 at[NEXT] += 1
                 continue
-            put(rates, scratch.rates)
-            for k in range(scratch.hints.shape[0]):
-                fill(scratch.hints[k], 0.0)
+            put(rates, loop.rates)
+            for k in range(own.hints.shape[0]):
+                fill(own.hints[k], 0.0)
             clock[0], clock[1], target[0], target[1] = 0.0, 0.0, runs.ends[i], 0.0
-            scratch.longest[0] = runs.longest[i]
+            loop.float_slots[LONGEST] = runs.longest[i]
             at[BEGUN], at[STORED], at[RESUMED] = 1, 0, 0
+        lin_at[0] = runs.tables[i]
         code = call_kernel(
-            work.entry_points[EVENT_LOOP], (automata, tapes, inputs, tables, state, work, scratch, late)
+            work.entry_points[EVENT_LOOP], (model, loop, state, work, late[0], late[1], late[2])
         )
-        count = scratch.committed[0]
+        count = loop.int_slots[SEGMENTS_AT]
         segments += count if code != FULL else _SEGMENTS_PER_CHECK
         if code == AT_TARGET:
-            first, begin = _begin(record, at[STORED], count, runs.ends[i] - runs.periods[i])
+            first, begin = _begin(common, at[STORED], count, runs.ends[i] - runs.periods[i])
             if first >= 0:
                 _clear(found)
                 if sum_up(
-                    tables, hold, (record.ends, record.rows, record.modes, record.coordinates, record.jumps),
-                    first, SEGMENTS + count, begin, rule[0], rule[1], (scratch.v, slopes), found,
+                    tables, hold, (rows.ends, rows.rows, common.modes, rows.coordinates, common.jumps),
+                    first, SEGMENTS + count, begin, rule[0], rule[1], (own.v, slopes), found,
                 ):  # fmt: skip
                     _store_results(found, runs, i)
             count = 0
         elif count > 0:
             at[RESUMED] += 0 if code == FULL else 1
             at[STORED] = min(at[STORED] + count, SEGMENTS)
-            _shift_back(record, at[STORED], count)
+            _shift_back(common, rows, at[STORED], count)
         if count == 0 or at[RESUMED] > _MAX_RESUMPTIONS:
             at[NEXT] += 1
             at[BEGUN] = 0
@@ -133,13 +138,13 @@ def _begin(record: Any, stored: int, count: int, since: float) -> tuple[int, flo
 
 
 @inlined
-def _shift_back(record: Any, stored: int, count: int) -> None:
+def _shift_back(record: Any, rows: Any, stored: int, count: int) -> None:
     """Move the segments after the middle of a record to its start, to free rows for new segments."""
     for i in range(SEGMENTS - stored, SEGMENTS):
-        record.ends[i], record.rows[i] = record.ends[i + count], record.rows[i + count]
+        rows.ends[i], rows.rows[i] = rows.ends[i + count], rows.rows[i + count]
         put(record.clocks[i + count], record.clocks[i])
         put(record.modes[i + count], record.modes[i])
-        put(record.coordinates[i + count], record.coordinates[i])
+        put(rows.coordinates[i + count], rows.coordinates[i])
         for side in range(record.jumps.shape[1]):
             put(record.jumps[i + count, side], record.jumps[i, side])
 

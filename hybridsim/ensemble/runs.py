@@ -13,14 +13,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.events.compiled.scratch import MAX_JOINT_COMPONENTS, work_space
+from hybridsim.engine.events.compiled.scratch import MAX_JOINT_COMPONENTS
 from hybridsim.engine.events.outcome import Outcome
+from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.linear.modes import holds_constants, is_always_linear
 from hybridsim.engine.linear.motion_summary import NODES, WEIGHTS, MotionSummary
 from hybridsim.engine.native.kernels import ENABLED, Precompiled
-from hybridsim.engine.native.struct_pack import packed
-from hybridsim.engine.run.call_arrays import CallArrays, buffer_of
-from hybridsim.engine.run.compiled_loop import NOT_LINEAR
+from hybridsim.engine.native.struct_pack import address_in, opaque, packed, replaced
+from hybridsim.engine.run.compiled_loop import CallArrays
+from hybridsim.engine.run.event_loop import LoopRecord, link_event_loop
+from hybridsim.engine.run.method_kernels import NOT_LINEAR
 from hybridsim.engine.system.per_structure import spare_scratch
 from hybridsim.engine.system.period import common_multiple
 from hybridsim.engine.system.programs.mode_tables import automata_of, tape_cache_of
@@ -28,7 +30,8 @@ from hybridsim.engine.system.system import System
 from hybridsim.ensemble.run import NEXT, SEGMENTS, Runs, run_ensemble
 from hybridsim.ensemble.start import opposing
 from hybridsim.ensemble.tables import EnsembleTables, ensemble_tables
-from hybridsim.integrators.closed_form.segments import Record, link_event_loop, scratch_for
+from hybridsim.integrators.closed_form.compiled_loop import ClosedFormKernels
+from hybridsim.integrators.closed_form.segments import ClosedFormRows
 
 _GROUP_SIZE = 128  # runs whose tables are made together, so that they fit in the processor's cache
 _RENEWAL_TURNS = 100  # longest segment in turns of the fastest angle, as in `hybridsim.engine.run.setup`
@@ -157,8 +160,9 @@ class Ensemble:
         under_way = packed(runs)
         while True:
             _run(
-                self.automata, self.tapes, self.inputs, NOT_LINEAR, group.first, self.vector_positions,
-                self.surfaces, self.hold, (NODES, WEIGHTS), under_way, group_scratch.slopes, *group_scratch.packs,
+                replaced(group_scratch.model, lin=group.first), group_scratch.lin_at, NOT_LINEAR,
+                self.vector_positions, self.surfaces, self.hold, (NODES, WEIGHTS), under_way, group_scratch.slopes,
+                *group_scratch.packs,
             )  # fmt: skip
             if runs.at[NEXT] == len(runs.ends) or not self.may_continue():
                 break
@@ -183,23 +187,27 @@ class _GroupScratch:
     def __init__(self, ensemble: Ensemble, tables: Any, p: np.ndarray) -> None:
         system = ensemble.system
         n, widest, count, whole = system.n, tables.values.shape[1], len(ensemble.hold), np.int64
-        work = work_space(system, len(tables.kinds), len(tables.factors))
         none, guards = np.zeros(0, dtype=whole), system.guard_count
         blank = Outcome(
             np.zeros(n), p.copy(), np.zeros(count, dtype=whole), np.ones(guards, dtype=whole),
             np.zeros(guards, dtype=whole), none, none, np.zeros(n), np.zeros(guards), np.zeros(0),
         )  # fmt: skip
-        call_arrays = CallArrays.of(buffer_of(blank, p), work, scratch_for(system, tables))
+        kernels = ClosedFormKernels(system, math.inf)
+        kernels.lin = tables
+        arrays = CallArrays(kernels, HybridState.of(blank, p), ensemble.tapes, tables)
         size = 2 * SEGMENTS
-        record = Record(
-            ends=np.empty(size),
+        record = LoopRecord(
             clocks=np.empty((size, 2)),
-            rows=np.empty(size, dtype=whole),
             modes=np.empty((size, count), dtype=whole),
             vectors=np.empty((size, system.layout.size)),
-            coordinates=np.empty((size, widest), dtype=complex),
+            last_steps=np.empty(size, dtype=whole),
             fires=np.empty(size, dtype=whole),
             jumps=np.empty((size, 3, n)),
+        )
+        rows = ClosedFormRows(
+            ends=np.empty(size),
+            rows=np.empty(size, dtype=whole),
+            coordinates=np.empty((size, widest), dtype=complex),
         )
         found = MotionSummary(
             extremes=np.empty((2, n)),
@@ -208,16 +216,21 @@ class _GroupScratch:
             held=np.empty((2, count)),
             holding=np.empty((2, count), dtype=np.bool_),
         )
-        late = packed(Record(*(part[SEGMENTS:] for part in record)))
+        late, late_rows = (packed(type(part)(*(a[SEGMENTS:] for a in part))) for part in (record, rows))
         link_event_loop(
-            ensemble.automata,
-            ensemble.tapes,
-            ensemble.inputs,
-            tables,
-            call_arrays.as_packed,
-            work,
-            call_arrays.scratch,
+            kernels.segment,
+            arrays.model,
+            arrays.call,
+            arrays.as_packed,
+            arrays.work,
             late,
+            arrays.own,
+            late_rows,
         )
-        self.packs = call_arrays.as_packed, work, call_arrays.scratch, late, packed(record), packed(found)
+        self.model, self.rows = arrays.model, late_rows
+        self.lin_at = address_in(arrays.model, "lin")
+        self.packs = (
+            arrays.as_packed, arrays.work, arrays.call, arrays.own, (late, opaque(arrays.own), opaque(late_rows)),
+            (packed(record), packed(rows)), packed(found),
+        )  # fmt: skip
         self.slopes = np.zeros((3, n))

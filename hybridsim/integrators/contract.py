@@ -10,8 +10,10 @@ from typing import ClassVar
 import numpy as np
 
 from hybridsim.engine.record.trajectory import Task, Trajectory
+from hybridsim.engine.run.compiled_loop import CompiledLoop
+from hybridsim.engine.run.method_kernels import MethodKernels
 from hybridsim.engine.run.single_call import run_task
-from hybridsim.engine.run.stepping import CompiledLoop, Flow, Root, Step, Stepper, Watch
+from hybridsim.engine.run.stepping import Flow, Root, Step, Stepper, Watch
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
@@ -21,6 +23,7 @@ __all__ = [
     "NEEDS_TAPE",
     "Flow",
     "Integrator",
+    "MethodKernels",
     "Root",
     "Step",
     "StepFailure",

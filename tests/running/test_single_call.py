@@ -11,13 +11,12 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.run.compiled_loop import CompiledLoopBase
+from hybridsim.engine.run.compiled_loop import CompiledLoop
 from hybridsim.engine.run.mode_loop import ModeLoop
 from hybridsim.engine.run.segment_run import SegmentRun
 from hybridsim.engine.run.single_call import LazyTrajectory
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.errors import RunInterrupted
-from hybridsim.integrators.closed_form.compiled_loop import ClosedFormLoop
 
 ENGINES = ["exact", "taylor", "dop853", "tsit5"]
 ENOUGH = {"seconds": 1e6}  # a run with limits goes through the mode loop from the first call on
@@ -159,7 +158,7 @@ def test_who_breaks_off_while_it_is_made_asks_again(monkeypatch: pytest.MonkeyPa
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(ClosedFormLoop, "advance", broken)
+        patch.setattr(CompiledLoop, "advance", broken)
         with pytest.raises(KeyboardInterrupt):
             sol.warnings  # noqa: B018  # reading it is the test
     assert content(sol, "all") == wanted
@@ -205,7 +204,7 @@ def test_an_error_of_the_first_call_ends_the_run_as_ever(
     def broken(*_: Any) -> Any:
         raise error
 
-    monkeypatch.setattr(ClosedFormLoop if engine == "exact" else CompiledLoopBase, "go", broken)
+    monkeypatch.setattr(CompiledLoop, "go", broken)
     try:
         sol = hs.simulate(model, (0, 60), integrator=engine)
     except RunInterrupted as stopped:

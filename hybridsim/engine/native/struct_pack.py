@@ -3,15 +3,18 @@
 A kernel that is given a tuple of arrays receives seven words per array, copied at every call, and counts
 references to each. With a hundred arrays that costs more than the kernel's own work and most of its compile
 time. A packed tuple is the address of a table of the arrays' addresses and shapes. Kernels read its fields
-like those of the tuple. The caller must keep the arrays alive during the call.
+like those of the tuple. A field may be another packed tuple. The caller must keep the arrays alive during the call.
 """
 
 from __future__ import annotations
 
 import ctypes
+import hashlib
 import math
+from collections import namedtuple
 from collections.abc import Sequence
 from functools import cache, lru_cache
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -57,25 +60,28 @@ if ENABLED:
             def __getattr__(self, name: str) -> Any: ...
 
     class PackType(types.Type):
-        """The numba type of a packed tuple: its name, and (name, dtype, dimensions) of each field."""
+        """The numba type of a packed tuple: its name, and the name and the numba type of each field."""
 
-        def __init__(self, title: str, fields: tuple[tuple[str, str, int], ...]) -> None:
+        def __init__(self, title: str, fields: tuple[tuple[str, Any], ...]) -> None:
             self.title, self.fields = title, fields
-            super().__init__(name=f"Pack({title}, {fields})")
+            # the name is part of the names of all kernels that take the pack
+            digest = hashlib.sha256(str(fields).encode()).hexdigest()[:12]
+            super().__init__(name=f"Pack({title}, {digest})")
 
         def place(self, name: str) -> int:
             """Return the row of a field in the table."""
             return [field[0] for field in self.fields].index(name)
 
-        def array(self, name: str) -> Any:
-            """Return the numba type of a field."""
-            _, dtype, dimensions = self.fields[self.place(name)]
-            return types.Array(from_dtype(np.dtype(dtype)), dimensions, "C")
-
     @cache
-    def _type_of_arrays(kind: Any, fields: tuple[tuple[str, int], ...]) -> PackType:
-        named = zip(kind._fields, fields, strict=True)
-        return PackType(kind.__name__, tuple((name, str(np.dtype(char)), n) for name, (char, n) in named))
+    def _type_of_fields(kind: Any, fields: tuple[Any, ...]) -> PackType:
+        """Return the type of a named tuple; fields: a `PackType`, or dtype and dimensions of an array."""
+        found = [
+            field
+            if isinstance(field, PackType)
+            else types.Array(from_dtype(np.dtype(field[0])), field[1], "C")
+            for field in fields
+        ]
+        return PackType(kind.__name__, tuple(zip(kind._fields, found, strict=True)))
 
     @typeof_impl.register(Packed)
     def _type_of(value: Packed, context: Any) -> PackType:
@@ -98,11 +104,11 @@ if ENABLED:
         key = PackType
 
         def generic_resolve(self, kind: PackType, name: str) -> Any:
-            return kind.array(name) if name in [field[0] for field in kind.fields] else None
+            return dict(kind.fields).get(name)
 
     @lower_getattr_generic(PackType)
     def _field(context: Any, builder: Any, kind: PackType, address: Any, name: str) -> Any:
-        array_type, word = kind.array(name), ir.IntType(64)
+        array_type, word = dict(kind.fields)[name], ir.IntType(64)
         row = kind.place(name) * _SLOTS_PER_ARRAY
         constant = builder.module.add_metadata([])
 
@@ -112,6 +118,8 @@ if ENABLED:
             value.set_metadata("invariant.load", constant)  # arrays do not move while a kernel runs
             return value
 
+        if isinstance(array_type, PackType):
+            return loaded(0)
         array = context.make_array(array_type)(context, builder)
         size = context.get_abi_sizeof(context.get_data_type(array_type.dtype))
         shape = [loaded(1 + i) for i in range(array_type.ndim)]
@@ -129,25 +137,60 @@ if ENABLED:
         """Return the pack whose table is at an address, with the type of another pack."""
         return like(types.int64, like), lambda context, builder, signature, arguments: arguments[0]
 
+    def opaque(pack: Any) -> Any:
+        """Return a pack for a kernel that only passes it on to a kernel that knows its type: its address."""
+        return pack.address
+
+    def address_in(pack: Any, name: str) -> np.ndarray:
+        """Return the place (1,) of the address of a field in the table of a pack."""
+        row = pack.numba_type.place(name) * _SLOTS_PER_ARRAY
+        place: np.ndarray = pack.table[row : row + 1]
+        return place
+
+    def replaced(pack: Any, **inner: Any) -> Any:
+        """Return a pack with other packs in it: itself, with new addresses. No kernel may be using it."""
+        for name, other in inner.items():
+            if getattr(pack, name) is not other:
+                address_in(pack, name)[0] = other.address
+                setattr(pack, name, other)
+        return pack
+
 else:
 
     def pack_at(address: int, like: Any) -> Any:
         """Raise an error: without a compiler there are no addresses."""
         raise NotImplementedError
 
+    def opaque(pack: Any) -> Any:
+        """Return the tuple itself, because the compiler is off."""
+        return pack
+
+    def address_in(pack: Any, name: str) -> np.ndarray:
+        """Raise an error: without a compiler there are no addresses."""
+        raise NotImplementedError
+
+    def replaced(pack: Any, **inner: Any) -> Any:
+        """Return a tuple with other tuples in it."""
+        return pack._replace(**inner)
+
 
 def packed(arrays: Any) -> Any:
-    """Pack a named tuple of arrays for kernels; return the tuple itself if the compiler is off."""
+    """Pack a named tuple of arrays and packs for kernels; return the tuple itself if the compiler is off."""
     if not ENABLED:
         return arrays
     entries: list[int] = []
+    form: list[Any] = []
     for array in arrays:
+        if isinstance(array, Packed):
+            entries += (array.address, *_REST[0])
+            form.append(array.numba_type)
+            continue
         assert array.flags.c_contiguous
         entries += (array.__array_interface__["data"][0], *array.shape, *_REST[array.ndim])
-    kind: Any = type(arrays)
-    form = _type_of_arrays(kind, tuple((a.dtype.char, a.ndim) for a in arrays))
+        form.append((array.dtype.char, array.ndim))
     table = np.array(entries, dtype=np.int64)
-    return Packed(arrays, table, form, table.__array_interface__["data"][0])
+    kind: Any = type(arrays)
+    return Packed(arrays, table, _type_of_fields(kind, tuple(form)), table.__array_interface__["data"][0])
 
 
 @kernel
@@ -175,12 +218,13 @@ class ArrayLayout:
 
     Parameters
     ----------
-    kind : type of the named tuple.
+    kinds : types of named tuples, whose arrays lie one behind the other.
     fields : dtype, shape and block number of each array.
     """
 
-    def __init__(self, kind: Any, fields: Sequence[tuple[Any, tuple[int, ...], int]]) -> None:
-        self._kind = kind
+    def __init__(self, kinds: Sequence[Any], fields: Sequence[tuple[Any, tuple[int, ...], int]]) -> None:
+        self._kinds = [(kind, len(kind._fields)) for kind in kinds]
+        self._kind: Any = namedtuple("Rows", [name for kind in kinds for name in kind._fields])  # type: ignore[misc]
         self._specs: list[tuple[tuple[int, ...], np.dtype[Any], int, int]] = []
         self._sizes = [0] * (1 + max(block for *_, block in fields))
         # the table without the addresses of the blocks
@@ -195,8 +239,13 @@ class ArrayLayout:
             self._steps[k, :2] = row, -1
             self._sizes[block] += -(-row * shape[0] // ALIGNED) * ALIGNED
         self._pools = [BufferPool(size) if _LARGE <= size <= LARGEST else None for size in self._sizes]
-        form = tuple((dtype.char, len(shape)) for shape, dtype, *_ in self._specs)
-        self._type: Any = _type_of_arrays(kind, form) if ENABLED else None
+        form = [(dtype.char, len(shape)) for shape, dtype, *_ in self._specs]
+        self._types: list[
+            tuple[Any, int]
+        ] = []  # the type of each pack, and the bytes of its part of the table
+        for kind, count in self._kinds if ENABLED else ():
+            self._types.append((_type_of_fields(kind, tuple(form[:count])), 8 * _SLOTS_PER_ARRAY * count))
+            del form[:count]
         self._returned: list[np.ndarray] = []
         self._from_the_first = np.zeros(len(fields), dtype=np.int64)
 
@@ -217,16 +266,21 @@ class ArrayLayout:
         if len(self._returned) < _RETURNED:
             self._returned.append(block)
 
-    def packed(self, blocks: tuple[np.ndarray, ...], skipped: Sequence[int] | None = None) -> Any:
-        """Pack the arrays for kernels; `skipped`: rows to omit at the start of each array."""
+    def packed(self, blocks: tuple[np.ndarray, ...], skipped: Sequence[int] | None = None) -> list[Any]:
+        """Pack the arrays of each named tuple for kernels; skipped: rows to omit at the start of each array."""
+        packs: list[Any] = []
         if not ENABLED:
-            arrays = self.rows(blocks)
-            first = skipped or self._from_the_first
-            return self._kind(*(a[k:] for a, k in zip(arrays, first, strict=True)))
+            arrays = iter(zip(self.rows(blocks), skipped or self._from_the_first, strict=True))
+            for kind, count in self._kinds:
+                packs.append(kind(*(a[k:] for a, k in islice(arrays, count))))
+            return packs
         rows = self._from_the_first if skipped is None else _whole_numbers(tuple(skipped))
         table = np.empty_like(self._entries)
         address = _lay_out(self._entries, self._steps, self._owners, rows, blocks, table)
-        return Packed(None, table, self._type, address)
+        for form, size in self._types:
+            packs.append(Packed(None, table, form, address))
+            address += size
+        return packs
 
     def rows(self, blocks: tuple[np.ndarray | None, ...]) -> Any:
         """Return the arrays, with None for arrays in missing blocks."""

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -15,10 +16,27 @@ from hybridsim.engine.system.instant import Instant
 
 if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Outcome
+    from hybridsim.engine.events.state import HybridState
     from hybridsim.engine.native.struct_pack import ArrayLayout
     from hybridsim.engine.record.counters import Counters
-    from hybridsim.engine.run.call_arrays import StateBuffer
     from hybridsim.engine.system.system import System
+
+
+ARRIVED, PAUSED, BEFORE_SOMETHING = 0, 1, 2  # why a compiled call ended
+
+
+class LoopResult(NamedTuple):
+    """The end of a compiled call: the origin of the next segment, the state there, and why it ended.
+
+    end: ARRIVED at the target, PAUSED because the arrays are full, or BEFORE_SOMETHING that is not ordinary. instants
+    (E, 2): instants of the events. owners (E,): the components whose guards fired. outcome: makes the state on demand.
+    """
+
+    origin: Instant
+    outcome: Callable[[], Outcome]
+    end: int
+    instants: np.ndarray
+    owners: np.ndarray
 
 
 @dataclass(eq=False)
@@ -27,29 +45,29 @@ class KernelRun:
 
     Parameters
     ----------
-    array_layout, memory : layout of the record, and its two blocks of memory, for segments and for events. The block of
-    segments
-        is None after they are released. The call wrote from row `first` on.
-    code, steps, count : return values of the kernel: why it ended, and the numbers of steps and segments.
+    array_layout, memory : layout of the record, and its two blocks of memory, for segments and for events. The memory
+        is None after the segments are released. The call wrote from rows `first_step` and `first` on.
+    code, steps, count : why the call ended, and the numbers of steps and segments.
     clock, end : the instant (high, low) at which it ended, and the state there.
     has_news : whether it met modes without tables, so that another call may continue.
     seconds : time in compiled code.
-    beside : further results of the compiled loop.
+    result : further results of the method.
     vector : the last run-time vector, if only the events are kept.
     """
 
     system: System
     array_layout: ArrayLayout
     memory: tuple[np.ndarray, ...] | None
+    first_step: int
     first: int
     code: int
     steps: int
     count: int
     clock: list[float]
-    end: StateBuffer
+    end: HybridState
     has_news: bool
     seconds: float
-    beside: Any
+    result: Any
     vector: np.ndarray | None = None
 
     def __post_init__(self) -> None:
@@ -57,10 +75,8 @@ class KernelRun:
         self._happened = rows = self.array_layout.rows((None, self.memory[1]))
         first, count = self.first, self.count
         self.events = 0  # number of segments that an event ended: all, or all except the last
-        if count:  # without segments there may be no row left
-            last = first + count  # the end of a segment is stored in the row of the next one
-            rows.clocks[last], rows.modes[last] = self.clock, self.end.part("z")
-            self.events = count if rows.fires[last - 1] >= 0 else count - 1
+        if count:
+            self.events = count if rows.fires[first + count - 1] >= 0 else count - 1
         self._event_block: EventBlock | None = None
 
     @cached_property
@@ -68,10 +84,6 @@ class KernelRun:
         """Return all arrays of the record as a named tuple."""
         assert self.memory is not None
         return self.array_layout.rows(self.memory)
-
-    def after(self) -> Outcome:
-        """Return the outcome at the end of the call."""
-        return self.end.outcome()
 
     @property
     def is_at_target(self) -> bool:

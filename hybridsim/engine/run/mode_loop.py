@@ -22,7 +22,9 @@ from hybridsim.engine.record.checkpoint import Checkpoint, damaged
 from hybridsim.engine.record.limits import UNLIMITED, LimitMonitor, LimitReached
 from hybridsim.engine.record.trajectory import Task, Trajectory
 from hybridsim.engine.run.appointment_events import events_before_appointment
+from hybridsim.engine.run.compiled_loop import CompiledLoop
 from hybridsim.engine.run.headway import Headway, NoHeadway, TakenOver
+from hybridsim.engine.run.kernel_run import ARRIVED, PAUSED
 from hybridsim.engine.run.lazy_state import LazyState
 from hybridsim.engine.run.located import (
     Located,
@@ -36,7 +38,7 @@ from hybridsim.engine.run.notices import Notices
 from hybridsim.engine.run.recording import Recorder, passed_events
 from hybridsim.engine.run.segment_run import Arrival, SegmentRun
 from hybridsim.engine.run.setup import setup_of
-from hybridsim.engine.run.stepping import ARRIVED, PAUSED, CompiledLoop, Method, Watch
+from hybridsim.engine.run.stepping import Method, Watch
 from hybridsim.engine.system.failures import Collapsed, StepFailure
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
@@ -59,9 +61,8 @@ class ModeLoop:
         self.system, self.method, self.task = system, method, task
         self.forward = task.forward
         self.record = task.record or Trajectory(system, task.retention)
-        self.limit_monitor = (
-            None if task.limits is UNLIMITED else LimitMonitor(task.limits, self.record.counters)
-        )
+        is_limited = task.limits is not UNLIMITED
+        self.limit_monitor = LimitMonitor(task.limits, self.record.counters) if is_limited else None
         self.setup = setup = setup_of(system, method, task)
         self.origin, self.end, self.renewal = setup.origin, setup.end, setup.renewal
         self.timetable = Timetable(system, self.end)
@@ -72,9 +73,8 @@ class ModeLoop:
         self.headway = Headway(system, self.record.counters, self.origin, self.end)
         self.compiled_loop = compiled_loop or setup.compiled_loop()
         self._led = set(system.led)
-        stiffness_monitor = (
-            self.headway if task.successor is not None and method is not task.successor else None
-        )
+        is_replaceable = task.successor is not None and method is not task.successor
+        stiffness_monitor = self.headway if is_replaceable else None
         self.notices = Notices(
             system, method, task, self.record, stiffness_monitor, self.compiled_loop is not None
         )

@@ -8,14 +8,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.engine.events.start import settled_start
-from hybridsim.engine.run.call_arrays import StateBuffer, buffer_of
+from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.run.lazy_state import LazyState
 from hybridsim.engine.system.instant import Instant
 
 if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Outcome
     from hybridsim.engine.record.trajectory import Task
-    from hybridsim.engine.run.stepping import CompiledLoop, Method
+    from hybridsim.engine.run.compiled_loop import CompiledLoop
+    from hybridsim.engine.run.stepping import Method
     from hybridsim.engine.system.system import System
 
 # Number of turns of the fastest angle after which a segment without events is restarted, because rounding then reaches
@@ -33,7 +34,7 @@ class RunSetup:
         self._pattern = self._compiled_loop(task)
         self.begins_silently = False  # set by `start`: whether nothing is recorded at the start
         self._start: tuple[Outcome, np.ndarray] | None = None
-        self._buffer: StateBuffer | None = None  # the same in the layout of compiled loops
+        self._buffer: HybridState | None = None  # the same in the layout of compiled loops
 
     def _compiled_loop(self, task: Task) -> CompiledLoop | None:
         """Return the compiled loop if method and model allow it, else None."""
@@ -53,7 +54,7 @@ class RunSetup:
         return None if self._pattern is None else self._pattern.fresh_copy()
 
     @property
-    def silent_start(self) -> StateBuffer | None:
+    def silent_start(self) -> HybridState | None:
         """Return the read-only start state if an earlier run has shown that the start records nothing.
 
         The result is None if an event is recorded at the start, if there are schedules or input signals, or if there is
@@ -62,7 +63,7 @@ class RunSetup:
         system = self.system
         is_free = self._pattern is not None and not system.model.schedules and not system.signals
         if self._buffer is None and is_free and self.begins_silently and self._start is not None:
-            self._buffer = buffer_of(*self._start)
+            self._buffer = HybridState.of(*self._start)
         return self._buffer
 
     def start(self, task: Task, due: tuple[int, ...]) -> LazyState:

@@ -21,9 +21,10 @@ from hybridsim.engine.record.blocks import OccurrenceList
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.limits import UNLIMITED
 from hybridsim.engine.record.trajectory import Task, Trajectory
+from hybridsim.engine.run.compiled_loop import CompiledLoop
 from hybridsim.engine.run.mode_loop import ModeLoop
 from hybridsim.engine.run.setup import setup_of
-from hybridsim.engine.run.stepping import CompiledLoop, Method
+from hybridsim.engine.run.stepping import Method
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.system import System
 
@@ -111,7 +112,7 @@ def _is_over(system: System, kernel_run: KernelRun) -> bool:
     fires = kernel_run.fires
     last = system.owner[fires[-1]]
     if not system.has_surface[last] and may_be_hidden(
-        system, kernel_run.after(), kernel_run.event_block or ()
+        system, kernel_run.end.outcome(), kernel_run.event_block or ()
     ):
         return False
     work = np.empty((2, MAX_EVENTS_PER_TURN))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -15,12 +15,7 @@ from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
 
 if TYPE_CHECKING:
-    from hybridsim.engine.events.outcome import Outcome
-    from hybridsim.engine.record.blocks import SegmentBlock
-    from hybridsim.engine.record.trajectory import Trajectory
-    from hybridsim.engine.run.call_arrays import StateBuffer
-    from hybridsim.engine.run.kernel_run import KernelRun
-    from hybridsim.engine.system.instant import Instant
+    from hybridsim.engine.run.compiled_loop import CompiledLoop
 
 
 @dataclass(frozen=True)
@@ -148,64 +143,6 @@ class Stepper(Protocol):
         """Repeat the step from its start to exactly s, with the accuracy of the method.
 
         If the error there exceeds the tolerance, return a shorter step, from whose end the next one continues.
-        """
-
-
-ARRIVED, PAUSED, BEFORE_SOMETHING = 0, 1, 2  # why a compiled call ended
-
-
-class LoopResult(NamedTuple):
-    """The end of a compiled call: the origin of the next segment, the state there, and why it ended.
-
-    end: ARRIVED at the target, PAUSED because the arrays are full, or BEFORE_SOMETHING that is not ordinary. instants
-    (E, 2): instants of the events. owners (E,): the components whose guards fired. outcome: makes the state on demand.
-    """
-
-    origin: Instant
-    outcome: Callable[[], Outcome]
-    end: int
-    instants: np.ndarray
-    owners: np.ndarray
-
-
-class CompiledLoop(Protocol):
-    """A compiled mode loop of one run, which integrates whole segments with their ordinary events.
-
-    It adds them to the record as blocks (`hybridsim.engine.record.blocks`) and updates its counters. kernel_run: a
-    kernel call that `go` made in advance, with which `advance` starts.
-    """
-
-    kernel_run: KernelRun | None
-
-    @property
-    def place(self) -> tuple[np.ndarray, ...]:
-        """Return the state between calls as arrays that are never modified, for a checkpoint."""
-
-    @place.setter
-    def place(self, place: np.ndarray) -> None:
-        """Restore the state between calls from one concatenated array."""
-
-    def fresh_copy(self) -> CompiledLoop:
-        """Return a fresh copy for another run; this object must not have been used."""
-
-    def advance(
-        self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
-    ) -> LoopResult:
-        """Run until an event that is not ordinary, the target, or the end of the arrays, and commit the result."""
-
-    def go(self, origin: Instant, buffer: StateBuffer, target: Instant) -> KernelRun | None:
-        """Call the kernel without committing the result; None if it cannot be called."""
-
-    def count(self, kernel_run: KernelRun, counters: Counters) -> None:
-        """Add the cost of a call to the counters."""
-
-    def segments_of(self, kernel_run: KernelRun) -> SegmentBlock:
-        """Return the segments of a call, which must have stored some and released none."""
-
-    def forget_segments(self, kernel_run: KernelRun) -> bool:
-        """Release the memory of segments except the end of the last one. Return False if it is needed.
-
-        `advance` must not be called afterwards.
         """
 
 

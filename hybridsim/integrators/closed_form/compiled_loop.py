@@ -1,56 +1,103 @@
-"""The compiled loop over segments of linear modes, for the general mode loop."""
+"""The part of closed forms in the compiled loop of a run: tables, arrays and record."""
 
 from __future__ import annotations
 
 import math
-from time import perf_counter
+from collections import deque
+from collections.abc import Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 
-from hybridsim.engine.events.compiled.scratch import work_space
-from hybridsim.engine.events.outcome import Outcome
+from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.linear.closed_form_block import ClosedFormBlock
 from hybridsim.engine.linear.tables import LinearTables, tables_of
-from hybridsim.engine.native.constants import MAX_SEGMENTS
-from hybridsim.engine.native.kernels import Precompiled
-from hybridsim.engine.native.struct_pack import ArrayLayout
+from hybridsim.engine.native.constants import BOUND_TERMS
+from hybridsim.engine.native.simd_products import vector_of
+from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.record.array_forms import check_modes
 from hybridsim.engine.record.checkpoint import damaged
-from hybridsim.engine.record.counters import Counters
-from hybridsim.engine.record.trajectory import Trajectory
-from hybridsim.engine.run.call_arrays import CallArrays, StateBuffer, buffer_of
-from hybridsim.engine.run.kernel_run import KernelRun
-from hybridsim.engine.run.stepping import ARRIVED, BEFORE_SOMETHING, PAUSED, LoopResult
+from hybridsim.engine.run.method_kernels import MethodKernels
 from hybridsim.engine.system.instant import Instant
-from hybridsim.engine.system.per_structure import per_structure
-from hybridsim.engine.system.programs.mode_tables import automata_of, tape_cache_of
+from hybridsim.engine.system.programs.mode_tables import Tapes, tape_cache_of
 from hybridsim.engine.system.system import System
-from hybridsim.engine.system.tolerances import Tolerances
-from hybridsim.integrators.closed_form.segments import Record, call_event_loop, link_event_loop, scratch_for
-
-_NO_OWNERS = np.zeros(0, dtype=np.int64)
-
-_event_loop = Precompiled(call_event_loop)
+from hybridsim.integrators.closed_form.segments import ClosedFormArrays, ClosedFormRows, closed_form_segment
 
 
-class ClosedFormLoop:
-    """The compiled loop of one run."""
+class ClosedFormKernels(MethodKernels):
+    """The part of linear modes in closed form."""
 
-    def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
-        self.system, self.longest = system, longest
-        self.horizon = 0.0  # longest segment that was possible so far
-        # as in `Scratch.hints` after the last call
+    segment = staticmethod(closed_form_segment)
+    rows = ClosedFormRows
+    is_continued: ClassVar[bool] = False
+    remembers: ClassVar[bool] = True
+    keeps_starts: ClassVar[bool] = True
+
+    def __init__(self, system: System, longest: float) -> None:
+        super().__init__(system, longest)
+        self.horizon = self._reach = 0.0  # longest segment that was possible so far
+        # as in `ClosedFormArrays.hints` after the last call
         self.hints = np.zeros((0, system.guard_count))
-        self.tape_cache, self.automata = tape_cache_of(system), automata_of(system)
-        self.tables: LinearTables | None = None  # tables for which the layout was made
-        self.array_layout: ArrayLayout
-        self.kernel_run: KernelRun | None = None  # a call made beforehand, which `advance` takes first
+        self.tape_cache = tape_cache_of(system)
+        self.columns = 0  # number of modal coordinates
+        self.lin: LinearTables
 
-    def fresh_copy(self) -> ClosedFormLoop:
-        """Return the same loop for another run."""
-        other: ClosedFormLoop = object.__new__(type(self))
-        vars(other).update(vars(self))
-        return other
+    def tables(
+        self, tapes: Tapes, state: HybridState, origin: Instant, target: Instant
+    ) -> tuple[Any, deque[Any]] | None:
+        """Return the tables of the modes met so far, and reusable arrays for tables of this shape."""
+        self._reach = max(self.horizon, min(target.minus(origin), self.longest))
+        found = tables_of(self.system, tapes.modes, state.p, self._reach)
+        if found is None:
+            self.horizon = self._reach
+            return None
+        self.lin, self.columns = found[0], found[0].values.shape[1]
+        return found
+
+    def arrays(self) -> Any:
+        """Return new arrays of the kernel for one call, as a pack."""
+        tables, widest = self.lin, self.lin.values.shape[1]
+        return packed(
+            ClosedFormArrays(
+                points=np.zeros(1, dtype=np.int64),
+                c=np.zeros(widest, dtype=complex),
+                v=np.zeros(widest, dtype=complex),
+                sizes=vector_of(widest),
+                terms=np.zeros((2, BOUND_TERMS)),
+                starts=np.zeros((self.system.guard_count, BOUND_TERMS + 2)),
+                hints=np.zeros(tables.farthest.shape),
+                former=np.zeros(tables.farthest.shape[1]),
+                series=np.zeros((2, tables.flows.shape[1])),
+            )
+        )
+
+    def fields(self) -> Sequence[tuple[Any, tuple[int, ...]]]:
+        """Return the dtype and the shape of a row of each array in `rows`."""
+        return (float, ()), (np.int64, ()), (complex, (self.columns,))
+
+    def begin(self, own: Any, tapes: Tapes) -> Any:
+        """Write the last zeros of guards in this run to the arrays."""
+        known = len(self.hints)
+        own.hints[:known], own.hints[known:] = self.hints, 0.0
+        return own
+
+    def end(self, own: Any, tapes: Tapes, lin: Any) -> Any:
+        """Return the tables of the call, the horizon for which they were made, and the last zeros of guards."""
+        return lin, self._reach, own.hints.copy()
+
+    def take(self, result: Any) -> None:
+        """Keep the horizon and the last zeros of guards."""
+        _, self.horizon, self.hints = result
+
+    def block(
+        self,
+        result: Any,
+        rows: ClosedFormRows,
+        last_steps: np.ndarray,
+        *record: np.ndarray,
+    ) -> ClosedFormBlock:
+        """Return the committed segments of a call."""
+        return ClosedFormBlock(self.system, result[0], rows.rows, rows.ends, rows.coordinates, *record)
 
     @property
     def place(self) -> tuple[np.ndarray, ...]:
@@ -84,119 +131,3 @@ class ClosedFormLoop:
         rows = self.tape_cache.rows_of(vectors[is_known])
         self.hints = np.zeros((max(rows.tolist(), default=-1) + 1, guards))
         self.hints[rows] = hints[is_known]
-
-    def go(self, origin: Instant, buffer: StateBuffer, target: Instant) -> KernelRun | None:
-        """Call the kernel; return None if there are no tables."""
-        system, tape_cache = self.system, self.tape_cache
-        tape_cache.surround(buffer.part("z"))
-        tapes, inputs = tape_cache.tapes, system.registers.inputs
-        horizon = max(self.horizon, min(target.minus(origin), self.longest))
-        found = tables_of(system, tapes.modes, buffer.part("p"), horizon)
-        if found is None:
-            self.horizon = horizon
-            return None
-        tables, spare = found
-        if tables is not self.tables:
-            self.tables, self.array_layout = tables, self._array_layout(tables)
-        memory = self.array_layout.blank()
-        rows = self.array_layout.packed(memory)
-        try:
-            call_arrays = spare.pop()
-        except IndexError:
-            work = work_space(system, len(tables.kinds), len(tables.factors))
-            call_arrays = CallArrays.of(buffer, work, scratch_for(system, tables))
-            link_event_loop(
-                self.automata, tapes, inputs, tables, call_arrays.as_packed, work, call_arrays.scratch, rows
-            )
-        call_arrays.set_state(buffer)
-        scratch = call_arrays.scratch
-        scratch.rates[:], scratch.longest[0] = system.rates, self.longest
-        scratch.times[:] = *target, *origin
-        hints, known = scratch.hints, len(self.hints)
-        hints[:known], hints[known:] = self.hints, 0.0
-        began = perf_counter()
-        code = _event_loop(
-            self.automata, tapes, inputs, tables, call_arrays.as_packed, call_arrays.work, scratch, rows
-        )
-        seconds = perf_counter() - began
-        end, clock, count = call_arrays.final_state(), scratch.times[2:].tolist(), int(scratch.committed[0])
-        beside = (tables, horizon, hints.copy())
-        spare.append(call_arrays)
-        tape_cache.surround(end.part("z"))
-        has_news = count > 0 and len(tape_cache.tapes.modes) != len(tapes.modes)
-        return KernelRun(
-            system, self.array_layout, memory, 0, code, count, count, clock, end, has_news, seconds, beside
-        )
-
-    def advance(
-        self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
-    ) -> LoopResult:
-        """Run over ordinary events until another kind of event, the target, or the end of the arrays."""
-        kernel_run, self.kernel_run = self.kernel_run or self.go(origin, buffer_of(outcome, p), target), None
-        if kernel_run is None:
-            return LoopResult(origin, outcome.copy, BEFORE_SOMETHING, np.zeros((0, 2)), _NO_OWNERS)
-        _, self.horizon, self.hints = kernel_run.beside
-        self.count(kernel_run, record.counters)
-        if kernel_run.count:
-            self._commit(kernel_run, record)
-        may_continue = kernel_run.is_full or kernel_run.has_news
-        end = ARRIVED if kernel_run.is_at_target else (PAUSED if may_continue else BEFORE_SOMETHING)
-        return LoopResult(
-            Instant(*kernel_run.clock), kernel_run.after, end, kernel_run.instants, kernel_run.owners
-        )
-
-    def count(self, kernel_run: KernelRun, counters: Counters) -> None:
-        """Add the cost of a call to the counters."""
-        kernel_run.count_in(counters)
-
-    def forget_segments(self, kernel_run: KernelRun) -> bool:
-        """Release all segments except the end of the last one."""
-        kernel_run.forget_segments()
-        return True
-
-    def _array_layout(self, tables: LinearTables) -> ArrayLayout:
-        """Return the layout of the arrays that the kernel writes; event arrays are stored longest."""
-        return _segment_layout(self.system, tables.values.shape[1])
-
-    def segments_of(self, kernel_run: KernelRun) -> ClosedFormBlock:
-        """Return the segments of a call, which must have stored some and released none."""
-        ends, origins, numbers, modes, vectors, coordinates, _, jumps = kernel_run.rows
-        begun, tables = slice(0, kernel_run.count), kernel_run.beside[0]
-        return ClosedFormBlock(
-            self.system,
-            tables,
-            numbers[begun],
-            ends[begun],
-            coordinates[begun],
-            origins[begun],
-            modes[begun],
-            vectors[begun],
-            jumps[begun],
-        )
-
-    def _commit(self, kernel_run: KernelRun, record: Trajectory) -> None:
-        """Transfer the segments and the events to the trajectory."""
-        if record.segments.is_end_alone:
-            record.segments.set_end(kernel_run.last_end)
-        else:
-            record.segments.add(self.segments_of(kernel_run))
-        if kernel_run.event_block is not None:
-            record.occurrences.add(kernel_run.event_block)
-
-
-@per_structure
-def _segment_layout(system: System, widest: int) -> ArrayLayout:
-    return ArrayLayout(
-        Record,
-        (
-            (float, (MAX_SEGMENTS,), 0),
-            # one more row: all starts, and the end of the last segment
-            (float, (MAX_SEGMENTS + 1, 2), 1),
-            (np.int64, (MAX_SEGMENTS,), 0),
-            (np.int64, (MAX_SEGMENTS + 1, len(system.automata)), 1),
-            (float, (MAX_SEGMENTS, system.layout.size), 0),
-            (complex, (MAX_SEGMENTS, widest), 0),
-            (np.int64, (MAX_SEGMENTS,), 1),
-            (float, (MAX_SEGMENTS, 3, system.n), 1),
-        ),
-    )

@@ -10,13 +10,18 @@ import numpy as np
 
 from hybridsim.engine.linear.modes import refuse_nonlinear
 from hybridsim.engine.native.constants import TIGHTEST
-from hybridsim.engine.run.compiled_loop import compile_loops
+from hybridsim.engine.run.compiled_loop import CompiledLoop, compile_loops
 from hybridsim.engine.run.stepping import Flow, Stepper, Watch
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
-from hybridsim.integrators.closed_form.compiled_loop import ClosedFormLoop
+from hybridsim.integrators.closed_form.compiled_loop import ClosedFormKernels
 from hybridsim.integrators.contract import NEEDS_TAPE, Integrator
 from hybridsim.integrators.taylor.method import TaylorStepper
+
+
+def _kernels(system: System, tolerances: Tolerances, longest: float) -> ClosedFormKernels:
+    """Return the part of the compiled loop; tolerances are not used."""
+    return ClosedFormKernels(system, longest)
 
 
 @dataclass(frozen=True)
@@ -51,11 +56,12 @@ class Exact(Integrator):
     def prepare(self, system: System) -> None:
         """Compile the mode loop; refuse a model that is not piecewise linear."""
         refuse_nonlinear(system)
-        compile_loops(system, ClosedFormLoop)
+        compile_loops(system, _kernels)
 
-    def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> ClosedFormLoop | None:
-        """Return the compiled mode loop, or None if max_step is set, because the loop has no steps."""
-        return ClosedFormLoop(system, tolerances, longest) if math.isinf(tolerances.max_step) else None
+    def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> CompiledLoop | None:
+        """Return the compiled loop, or None if max_step is set, because a closed form has no steps."""
+        is_free = math.isinf(tolerances.max_step)
+        return CompiledLoop(_kernels(system, tolerances, longest)) if is_free else None
 
     def start(
         self,

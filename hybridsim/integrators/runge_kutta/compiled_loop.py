@@ -1,13 +1,13 @@
-"""The compiled mode loop of a Runge-Kutta method, for the general mode loop."""
+"""The part of Runge-Kutta methods in the compiled loop of a run: arrays, record and cost."""
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, NamedTuple, cast
+from collections.abc import Sequence
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.native.kernels import Precompiled
-from hybridsim.engine.native.struct_pack import packed
+from hybridsim.engine.native.struct_pack import packed, replaced
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.hermite import (
     Hermite,
@@ -17,13 +17,14 @@ from hybridsim.engine.record.hermite import (
     shift_matrix,
 )
 from hybridsim.engine.record.hermite_block import TERMS, HermiteBlock
-from hybridsim.engine.run.compiled_loop import NOT_LINEAR, CompiledLoopBase
+from hybridsim.engine.run.method_kernels import MethodKernels
 from hybridsim.engine.system.programs.code_cache import ends_codes
 from hybridsim.engine.system.programs.guard_parts import guard_parts_of
+from hybridsim.engine.system.programs.mode_tables import Tapes, tape_cache_of
 from hybridsim.engine.system.series_at import short_order
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
-from hybridsim.integrators.runge_kutta.segments import rk_event_loop
+from hybridsim.integrators.runge_kutta.segments import runge_kutta_segment
 from hybridsim.integrators.runge_kutta.step import Tableau
 
 _HERMITE = packed(
@@ -31,9 +32,25 @@ _HERMITE = packed(
 )
 
 
-class Scratch(NamedTuple):
-    """Scratch arrays of the kernel: series of all registers, of guards, of the states at both ends, vectors."""
+class RungeKuttaSettings(NamedTuple):
+    """The method and the settings of a run."""
 
+    tableau: Any  # `hybridsim.integrators.runge_kutta.step.Coefficients`
+    hermite: Any  # `hybridsim.engine.record.hermite.Hermite`
+    leading_orders: np.ndarray  # orders of the main and the low estimate, see `first_length`
+    leading: np.ndarray  # their coefficients
+    orders: np.ndarray  # order of the error estimate, and of the series of guards
+    control: np.ndarray  # rtol, longest step
+    atol: np.ndarray  # (n,)
+
+
+class RungeKuttaArrays(NamedTuple):
+    """Arrays of the kernel: settings, series of all registers, of guards, of the states at both ends, vectors."""
+
+    settings: Any  # `RungeKuttaSettings`
+    parts: Any  # `hybridsim.engine.system.programs.guard_parts.Parts` of the tapes
+    codes: Any  # `hybridsim.engine.system.programs.ends_code.EndsCodes` of the tapes
+    first_step: np.ndarray  # length of the first step (0: unknown), which is cleared after use
     V: np.ndarray
     W: np.ndarray
     a: np.ndarray
@@ -56,7 +73,6 @@ class Scratch(NamedTuple):
     guards_left: np.ndarray
     guards_right: np.ndarray
     lack: np.ndarray
-    scale: np.ndarray
     dx: np.ndarray
     ahead: np.ndarray
     rates: np.ndarray
@@ -65,62 +81,74 @@ class Scratch(NamedTuple):
     sides: np.ndarray
     orders: np.ndarray
     floors: np.ndarray
-    pace: np.ndarray
     memory: np.ndarray
     counts: np.ndarray
 
 
-_event_loop = Precompiled(rk_event_loop)
+class RungeKuttaRows(NamedTuple):
+    """The committed steps."""
+
+    steps: np.ndarray  # start and length (S, 2)
+    series: np.ndarray  # Taylor coefficients (S, n, 2 TERMS) of the states at both ends
 
 
-class RungeKuttaLoop(CompiledLoopBase):
-    """The compiled loop of an explicit Runge-Kutta method."""
+class RungeKuttaKernels(MethodKernels):
+    """The part of an explicit Runge-Kutta method."""
 
+    segment = staticmethod(runge_kutta_segment)
+    rows = RungeKuttaRows
     is_looked_at: ClassVar[bool] = True  # whether stiffness is monitored
+    remembers: ClassVar[bool] = True
 
     def __init__(self, system: System, tolerances: Tolerances, longest: float, tableau: Tableau) -> None:
-        rtol = tolerances.rtol
-        self.tableau, leading = tableau, tableau.leading_terms
-        first = leading[0] + 1  # order of the states at the start of a segment
-        self.order = max(short_order(rtol), 2 * TERMS + 1, first)
-        super().__init__(system, 2 * TERMS, f"{len(tableau.c)} stages, order {self.order}")
+        super().__init__(system, longest)
+        self.tableau, (q, c, c_next, q_low, c_low) = tableau, tableau.leading_terms
+        first = q + 1  # order of the states at the start of a segment
+        self.order = max(short_order(tolerances.rtol), 2 * TERMS + 1, first)
+        self.kind = f"{len(tableau.c)} stages, order {self.order}"
+        self.columns = system.n * 2 * TERMS + 2
         self.parts = guard_parts_of(system)
         self.codes = ends_codes(system, TERMS, first, self.order)
-        self.method = (tableau.packed, leading, tableau.error_order, _HERMITE)
-        declared_step = np.array([tolerances.first_step or 0.0])
-        self.control: tuple[Any, ...] = (
-            rtol,
-            tolerances.atol,
-            self.order,
-            tolerances.max_step,
-            longest,
-            declared_step,
+        self.settings = packed(
+            RungeKuttaSettings(
+                tableau.packed,
+                _HERMITE,
+                np.array([q, q_low], dtype=np.int64),
+                np.array([c, c_next, c_low]),
+                np.array([tableau.error_order, self.order], dtype=np.int64),
+                np.array([tolerances.rtol, tolerances.max_step]),
+                np.array(tolerances.atol, dtype=float),
+            )
         )
+        self.first_step = tolerances.first_step or 0.0
 
-    def fresh_copy(self) -> RungeKuttaLoop:
-        """Return a fresh loop for another run, which determines its own first step."""
-        other = cast("RungeKuttaLoop", super().fresh_copy())
-        *rest, declared_step = self.control
-        other.control = (*rest, declared_step.copy())
-        return other
-
-    def _scratch(self) -> Scratch:
-        system, n, columns = self.system, self.system.n, self.order + 1
-        guards, registers = system.guard_count, system.registers.count
-        scratch: Scratch = packed(
-            Scratch(
+    def arrays(self) -> Any:
+        """Return new arrays of the kernel for one call, as a pack."""
+        system, n, columns, tapes = (
+            self.system,
+            self.system.n,
+            self.order + 1,
+            tape_cache_of(self.system).tapes,
+        )
+        guards, registers, whole = system.guard_count, system.registers.count, np.int64
+        return packed(
+            RungeKuttaArrays(
+                settings=self.settings,
+                parts=self.parts.of(tapes),
+                codes=self.codes.of(tapes),
+                first_step=np.empty(1),
                 V=np.zeros((registers, columns)),
                 W=np.zeros((registers, columns)),
                 a=np.empty(columns),
                 b=np.empty(columns),
                 stack=np.empty((64, columns + 2)),
                 powers=np.empty(columns + 1),
-                **{name: np.empty(guards) for name in ("values", "sums", "totals")},
-                bernstein=np.zeros(0, dtype=np.int64),
+                **{name: np.empty(guards) for name in ("values", "sums", "totals", "floors")},
+                bernstein=np.zeros(0, dtype=whole),
                 stages=np.empty((len(self.tableau.c), n)),
                 states=np.empty((n, columns)),
                 guard_series=np.empty((guards, columns)),
-                everyone=np.arange(guards, dtype=np.int64),
+                everyone=np.arange(guards, dtype=whole),
                 first=np.empty((n, self.tableau.leading_terms[0] + 2)),
                 left=np.empty((n, TERMS)),
                 right=np.empty((n, TERMS)),
@@ -129,47 +157,43 @@ class RungeKuttaLoop(CompiledLoopBase):
                 guards_left=np.empty((guards, TERMS)),
                 guards_right=np.empty((guards, TERMS)),
                 lack=np.empty(TERMS),
-                **{name: np.empty(n) for name in ("scale", "dx", "ahead", "rates")},
+                **{name: np.empty(n) for name in ("dx", "ahead", "rates")},
                 **{
-                    name: np.empty(guards, dtype=np.int64)
+                    name: np.empty(guards, dtype=whole)
                     for name in ("guard_registers", "numbers", "sides", "orders")
                 },
-                floors=np.empty(guards),
-                pace=np.empty(3),
                 memory=np.empty(3),
-                counts=np.zeros(2, dtype=np.int64),
+                counts=np.zeros(2, dtype=whole),
             )
         )
-        return scratch
 
-    def _go(
-        self,
-        to: np.ndarray,
-        clock: np.ndarray,
-        state: Any,
-        work: Any,
-        scratch: Any,
-        rows: Any,
-    ) -> tuple[int, int, int]:
-        scratch.counts[:] = 0
-        tapes = self.tape_cache.tapes  # the same tapes for both, since another thread may extend the cache
-        codes = self.codes.of(tapes)
-        code, steps, count = _event_loop(
-            self.functions, self.automata, tapes, self.parts.of(tapes), self.inputs, NOT_LINEAR, codes,
-            self.phase_layout, self.method, self.control, to, clock, state, work, scratch, rows,
-        )  # fmt: skip
-        self.taken = tapes, codes
-        return code, steps, count
+    def fields(self) -> Sequence[tuple[Any, tuple[int, ...]]]:
+        """Return the dtype and the shape of a row of each array in `rows`."""
+        return (float, (2,)), (float, (self.system.n, 2 * TERMS))
 
-    def _cost(self, scratch: Any) -> tuple[int, int]:
-        tries, rejected = scratch.counts.tolist()
-        return tries, rejected
+    def begin(self, own: Any, tapes: Tapes) -> Any:
+        """Put the settings of the run and the code of the tapes into the arrays."""
+        own.first_step[0], own.counts[:] = self.first_step, 0
+        return replaced(own, settings=self.settings, parts=self.parts.of(tapes), codes=self.codes.of(tapes))
 
-    def _count(self, counters: Counters, steps: int, cost: tuple[int, int]) -> None:
-        tries, rejected = cost
+    def end(self, own: Any, tapes: Tapes, lin: Any) -> Any:
+        """Return the numbers of tried and rejected steps, and the length of the next step."""
+        self.codes.look(tapes, own.codes)
+        return (*own.counts.tolist(), float(own.first_step[0]))
+
+    def count(self, counters: Counters, steps: int, result: Any) -> None:
+        """Add the cost of the steps to the counters."""
+        tries, rejected, _ = result
         counters.rejected += rejected
         # the series include the slope; one more in the middle
         counters.rhs_evaluations += tries * (len(self.tableau.c) - 1) + 2 * steps
 
-    def _block(self, *arrays: np.ndarray) -> HermiteBlock:
-        return HermiteBlock(self.system, *arrays)
+    def take(self, result: Any) -> None:
+        """Keep the length of the next step, if a call ended within a segment."""
+        self.first_step = result[2]
+
+    def block(
+        self, result: Any, rows: RungeKuttaRows, last_steps: np.ndarray, *record: np.ndarray
+    ) -> HermiteBlock:
+        """Return the committed segments of a call."""
+        return HermiteBlock(self.system, last_steps, *rows, *record)

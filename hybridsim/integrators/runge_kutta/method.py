@@ -9,13 +9,13 @@ import numpy as np
 
 from hybridsim.engine.record.hermite import hermite, holds_between, middle_weights
 from hybridsim.engine.record.segments import Dense
-from hybridsim.engine.run.compiled_loop import compile_loops
+from hybridsim.engine.run.compiled_loop import CompiledLoop, compile_loops
 from hybridsim.engine.run.stepping import Flow, Stepper, Watch
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.integrators.contract import Integrator
 from hybridsim.integrators.one_step import OneStepStepper, Point, Trial
-from hybridsim.integrators.runge_kutta.compiled_loop import RungeKuttaLoop
+from hybridsim.integrators.runge_kutta.compiled_loop import RungeKuttaKernels
 from hybridsim.integrators.runge_kutta.step import Tableau, attempt
 
 __all__ = ["RungeKuttaIntegrator", "RungeKuttaStepper", "Tableau"]
@@ -104,18 +104,18 @@ class RungeKuttaIntegrator(Integrator):
         return self.tableau.rounding
 
     @classmethod
-    def _compiled_loop(cls, system: System, tolerances: Tolerances, longest: float) -> RungeKuttaLoop:
-        return RungeKuttaLoop(system, tolerances, longest, cls.tableau)
+    def _kernels(cls, system: System, tolerances: Tolerances, longest: float) -> RungeKuttaKernels:
+        return RungeKuttaKernels(system, tolerances, longest, cls.tableau)
 
     def prepare(self, system: System) -> None:
         """Compile the mode loop."""
         if system.has_tape and not system.has_corners:
-            compile_loops(system, self._compiled_loop)
+            compile_loops(system, self._kernels)
 
-    def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> RungeKuttaLoop | None:
+    def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> CompiledLoop | None:
         """Return the compiled mode loop; None for a model with corners or Python functions."""
         has_compiled_loop = system.has_tape and not system.has_corners
-        return self._compiled_loop(system, tolerances, longest) if has_compiled_loop else None
+        return CompiledLoop(self._kernels(system, tolerances, longest)) if has_compiled_loop else None
 
     def start(
         self,

@@ -12,7 +12,7 @@ from hybridsim.engine.native.time_grid import on_the_grid
 from hybridsim.engine.record.segments import Dense
 from hybridsim.engine.roots.defect_check import BETWEEN
 from hybridsim.engine.roots.vanishing_terms import STACK_ROWS, where_it_ends
-from hybridsim.engine.run.compiled_loop import TaylorLoop, compile_loops
+from hybridsim.engine.run.compiled_loop import CompiledLoop, compile_loops
 from hybridsim.engine.run.stepping import Flow, Step, Stepper, Watch
 from hybridsim.engine.series.interpreter import polynomials
 from hybridsim.engine.series.vanishing_kinds import KINDS, power_of, register_of
@@ -22,6 +22,7 @@ from hybridsim.engine.system.series_at import SeriesRun
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.integrators.contract import NEEDS_TAPE, Integrator
+from hybridsim.integrators.taylor.compiled_loop import TaylorKernels
 
 _SMALLEST = 10.0  # a remainder of fewer ulps of the local time is merged into the last step
 _SHORTER = 0.25  # factor on a step at whose end the series does not satisfy the equation
@@ -177,11 +178,11 @@ class Taylor(Integrator):
 
     def prepare(self, system: System) -> None:
         """Compile the mode loop."""
-        compile_loops(system, TaylorLoop)
+        compile_loops(system, TaylorKernels)
 
-    def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> TaylorLoop:
+    def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> CompiledLoop:
         """Return the compiled mode loop."""
-        return TaylorLoop(system, tolerances, longest)
+        return CompiledLoop(TaylorKernels(system, tolerances, longest))
 
     def start(
         self,

@@ -38,19 +38,19 @@ def _number(rows: Any) -> int:
 
 @pytest.mark.parametrize("skipped", [None, (2, 1, 5)])
 def test_a_kernel_writes_to_the_rows_of_a_layout(skipped: tuple[int, ...] | None) -> None:
-    array_layout = ArrayLayout(Rows, FIELDS)
+    array_layout = ArrayLayout((Rows,), FIELDS)
     blocks = array_layout.blank()
     rows = array_layout.rows(blocks)
     rows.numbers[:], rows.words[:] = -1.0, -1
     first = skipped or (0, 0, 0)
-    assert _number(array_layout.packed(blocks, skipped)) == 6 - first[1] + 100 * (5 - first[2])
+    assert _number(*array_layout.packed(blocks, skipped)) == 6 - first[1] + 100 * (5 - first[2])
     assert rows.numbers[first[0] :].ravel().tolist() == list(range(10 - 2 * first[0]))
     assert rows.words[first[1] :].tolist() == list(range(10, 16 - first[1]))
     assert (rows.numbers[: first[0]] == -1.0).all() and (rows.words[: first[1]] == -1).all()
 
 
 def test_arrays_of_different_blocks_do_not_hold_each_other() -> None:
-    array_layout = ArrayLayout(Rows, FIELDS)
+    array_layout = ArrayLayout((Rows,), FIELDS)
     rows = array_layout.rows(array_layout.blank())
     assert not np.shares_memory(rows.numbers, rows.words)
     assert rows.numbers.base is not rows.words.base
@@ -76,7 +76,7 @@ def test_memory_is_handed_on_once_nobody_holds_it(view: Callable[[np.ndarray], A
 
 
 def test_large_layouts_take_such_memory() -> None:
-    array_layout = ArrayLayout(Rows, ((float, (1 << 15, 2), 0), (np.int64, (6,), 1), (complex, (5, 0), 0)))
+    array_layout = ArrayLayout((Rows,), ((float, (1 << 15, 2), 0), (np.int64, (6,), 1), (complex, (5, 0), 0)))
     numbers = array_layout.rows(array_layout.blank()).numbers
     numbers[:] = 1.0
     place = numbers.ctypes.data
@@ -97,7 +97,7 @@ def test_a_precompiled_kernel_is_the_same_kernel() -> None:
 
 
 def test_a_block_that_is_taken_back_is_the_next_one() -> None:
-    array_layout = ArrayLayout(Rows, FIELDS)
+    array_layout = ArrayLayout((Rows,), FIELDS)
     first, _ = array_layout.blank()
     assert array_layout.blank()[0] is not first
     array_layout.take_back(first)

@@ -1,14 +1,12 @@
-"""Resolve the event at the end of a segment in a compiled loop: error bounds there, the event, the next origin."""
+"""Resolve the event at the end of a segment in a compiled loop: error bounds there, and the event."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Any
 
 from hybridsim.engine.events.compiled.guard_series import interpreted_series
 from hybridsim.engine.events.compiled.resolve_ordinary import resolve_event
-from hybridsim.engine.events.compiled.scratch import AT, AT_ERROR, FIRED, NOBODY, RESOLVE, SERIES, SPREAD
+from hybridsim.engine.events.compiled.scratch import AT, AT_ERROR, FIRED, NOBODY, RESOLVE, SERIES
 from hybridsim.engine.events.zeno.accumulation import CLOSING_IN
 from hybridsim.engine.native.kernels import call_kernel, inlined, kernel, kernel_address
 from hybridsim.engine.series.bounded import UNIT
@@ -19,18 +17,6 @@ _SHALLOW = 2.0**-18  # least depth below zero, times four, relative to a guard's
 _HIDDEN = 16.0  # least depth below zero, times four, in rounding errors of the guard
 STAGES = 200.0  # the largest `rounding` of a method with a compiled loop
 _ULPS = 64.0  # events closer than this are left to the general mode loop
-
-
-class State(NamedTuple):
-    """The state at the start of a segment."""
-
-    x: np.ndarray  # states (n,)
-    x_error: np.ndarray  # error bounds (n,)
-    z: np.ndarray  # modes (C,)
-    p: np.ndarray  # run-time vector
-    sides: np.ndarray  # sides (G,) of the guards
-    orders: np.ndarray  # leading zeros (G,) of the guards
-    floors: np.ndarray  # error bounds (G,) of the guards
 
 
 @kernel
@@ -78,57 +64,45 @@ def is_shallow(slope: float, bend: float, length: float) -> bool:
 
 
 @inlined
-def fill_guard_series(
-    automata: Any, tapes: Any, inputs: Any, lin: Any, s: float, s_error: float, state: Any, work: Any
-) -> None:
+def resolve(model: Any, s: float, s_error: float, fired: int, state: Any, work: Any) -> bool:
+    """Resolve an ordinary event at the state y, y_error of the work space; return False for other events.
+
+    model: `LoopModel`. state: `StateArrays`, replaced by the state after the event.
+    """
+    work.float_slots[AT], work.float_slots[AT_ERROR], work.int_slots[FIRED] = s, s_error, fired
+    arguments = (model.automata, model.tapes, model.inputs, model.lin, state, work)
+    return call_kernel(work.entry_points[RESOLVE], arguments) != 0
+
+
+@inlined
+def fill_guard_series(model: Any, s: float, s_error: float, state: Any, work: Any) -> None:
     """Write the series of the active guards with bounds to `judged` of the work space, at the state y, y_error."""
-    work.float_slots[AT], work.float_slots[AT_ERROR], work.int_slots[FIRED] = s, s_error, NOBODY
-    call_kernel(work.entry_points[RESOLVE], (automata, tapes, inputs, lin, state, work))
+    resolve(model, s, s_error, NOBODY, state, work)
 
 
 @inlined
 def is_hidden(
-    automata: Any,
-    tapes: Any,
-    inputs: Any,
-    lin: Any,
-    g: int,
-    slope: float,
-    bend: float,
-    s: float,
-    s_error: float,
-    state: Any,
-    work: Any,
+    model: Any, g: int, slope: float, bend: float, s: float, s_error: float, state: Any, work: Any
 ) -> bool:
     """Return whether a guard turns back before it exceeds the rounding error of its expression.
 
     The state is that in the work space, at local time s.
     """
-    fill_guard_series(automata, tapes, inputs, lin, s, s_error, state, work)
+    fill_guard_series(model, s, s_error, state, work)
     return slope * slope < _HIDDEN * bend * work.judged[1, g, 0]
 
 
 @kernel
-def differ_by_rounding(
-    automata: Any,
-    tapes: Any,
-    inputs: Any,
-    lin: Any,
-    k: int,
-    s: float,
-    values: Any,
-    sums: Any,
-    state: Any,
-    work: Any,
-) -> bool:
+def differ_by_rounding(model: Any, k: int, s: float, values: Any, sums: Any, state: Any, work: Any) -> bool:
     """Return whether values of the active guards and the sums of their series agree within rounding.
 
     A guard may be the small difference of large terms, and then shorter steps do not improve the agreement. k: row of
     the modes. y of the work space is the state from which the series are computed, at local time s.
     """
+    tapes = model.tapes
     for i in range(work.y.shape[0]):
         work.y_error[i] = 4.0 * UNIT * abs(work.y[i])
-    fill_guard_series(automata, tapes, inputs, lin, s, 0.0, state, work)
+    fill_guard_series(model, s, 0.0, state, work)
     for j in range(values.shape[0]):
         rounding = work.judged[1, tapes.active[tapes.active_start[k] + j], 0]
         if not abs(sums[j] - values[j]) <= 4.0 * rounding:
@@ -143,37 +117,10 @@ def moved_on(high: float, low: float, s: float) -> tuple[float, float]:
     return two_sum(high, rest + low)
 
 
-def link_event_resolution(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> None:
+def link_event_resolution(model: Any, state: Any, work: Any) -> None:
     """Compile the kernel that resolves events and its callees if needed, and store their addresses."""
-    x = work.y
+    x, (automata, tapes, inputs, lin) = work.y, (model.automata, model.tapes, model.inputs, model.lin)
     work.entry_points[SERIES] = kernel_address(
         interpreted_series, tapes, inputs, 0, 0.0, 0.0, x, x, state.p, work
     )
     work.entry_points[RESOLVE] = kernel_address(resolve_event, automata, tapes, inputs, lin, state, work)
-
-
-@inlined
-def resolve_and_advance(
-    automata: Any,
-    tapes: Any,
-    inputs: Any,
-    lin: Any,
-    s: float,
-    s_error: float,
-    fired: int,
-    steps: int,
-    clock: Any,
-    state: Any,
-    work: Any,
-) -> bool:
-    """Resolve an ordinary event and begin the next segment; return False for other events.
-
-    y, y_error of the work space are the state at the event, after `steps` steps. lin: tables of linear modes, empty for
-    others. state: `State`, advanced together with the clock.
-    """
-    work.float_slots[AT], work.float_slots[AT_ERROR], work.int_slots[FIRED] = s, s_error, fired
-    work.float_slots[SPREAD] = spread(steps, STAGES)
-    if call_kernel(work.entry_points[RESOLVE], (automata, tapes, inputs, lin, state, work)) == 0:
-        return False
-    clock[0], clock[1] = moved_on(clock[0], clock[1], s)
-    return True

@@ -29,29 +29,18 @@ def is_clear(values: Any, largest: Any, s: float, time: float) -> bool:
 
 @kernel
 def may_vanish(
-    automata: Any,
-    tapes: Any,
-    inputs: Any,
-    lin: Any,
-    k: int,
-    s: float,
-    time: float,
-    steps: int,
-    scale: Any,
-    slopes: Any,
-    state: Any,
-    work: Any,
+    model: Any, k: int, s: float, time: float, steps: int, scale: Any, slopes: Any, state: Any, work: Any
 ) -> bool:
     """Return whether a guard of the modes in row k may be zero and about to become negative.
 
     y of the work space is the state at local time s, after `steps` steps of the segment; slopes: its rates; scale: as
     for `state_errors`.
     """
-    s_error = 8.0 * 2.0**-52 * time
+    s_error, tapes = 8.0 * 2.0**-52 * time, model.tapes
     for i in range(scale.shape[0]):
         rounded = UNIT * (16.0 * steps + STAGES) * (2.0 + steps) * scale[i]
         work.y_error[i] = 2.0 * state.x_error[i] + rounded + s_error * abs(slopes[i])
-    fill_guard_series(automata, tapes, inputs, lin, s, s_error, state, work)
+    fill_guard_series(model, s, s_error, state, work)
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         series, bounds = work.judged[0, tapes.active[i]], work.judged[1, tapes.active[i]]
         is_still = True

@@ -166,7 +166,7 @@ def resolve_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, 
     """Resolve the event in the work space and replace the state. Return 1, or 0 if it is not ordinary.
 
     If no guard fired, only the series of the active guards are written to the work space. lin: tables of linear modes,
-    empty for others. state: `hybridsim.engine.events.compiled.after_segment.State`.
+    empty for others. state: `hybridsim.engine.events.state.StateArrays`.
     """
     fired = work.int_slots[FIRED]
     if fired == NOBODY:

@@ -1,0 +1,89 @@
+"""The state of a hybrid system at an instant, in one block of memory that compiled loops advance."""
+
+from __future__ import annotations
+
+from itertools import accumulate
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybridsim.engine.events.outcome import Outcome
+from hybridsim.engine.native.simd_products import filled_up
+from hybridsim.engine.native.struct_pack import packed
+
+_NO_MONITORS, _NO_MONITOR_FLOORS = np.zeros(0, dtype=np.int64), np.zeros(0)  # compiled loops have no monitors
+
+
+class StateArrays(NamedTuple):
+    """The arrays of a `HybridState`, as kernels receive them."""
+
+    x: np.ndarray  # states (n,)
+    x_error: np.ndarray  # error bounds (n,)
+    p: np.ndarray  # run-time vector
+    floors: np.ndarray  # error bounds (G,) of the guards
+    z: np.ndarray  # modes (C,)
+    sides: np.ndarray  # sides (G,) of the guards
+    orders: np.ndarray  # leading zeros (G,) of the guards
+
+
+_FIELDS = StateArrays._fields
+_INTEGERS = ("z", "sides", "orders")
+
+
+class HybridState:
+    """A state in one block of memory; one copy suffices for all arrays of `StateArrays`, which are its attributes.
+
+    Each array is padded with zeros. Integers lie in the same block as doubles.
+    """
+
+    x: np.ndarray
+    x_error: np.ndarray
+    p: np.ndarray
+    floors: np.ndarray
+    z: np.ndarray
+    sides: np.ndarray
+    orders: np.ndarray
+
+    def __init__(self, memory: np.ndarray, offsets: dict[str, tuple[int, int]]) -> None:
+        self.memory, self.offsets = memory, offsets  # offsets: length and offset in bytes of each array
+
+    @classmethod
+    def of(cls, outcome: Outcome, p: np.ndarray) -> HybridState:
+        """Return the state of an outcome with the run-time vector p."""
+        fields = StateArrays(
+            outcome.x, outcome.x_error, p, outcome.guard_floors, outcome.z, outcome.sides, outcome.orders
+        )
+        begins = list(accumulate((filled_up(len(values)) for values in fields), initial=0))
+        offsets = {
+            name: (len(values), 8 * k) for name, values, k in zip(_FIELDS, fields, begins, strict=False)
+        }
+        state = cls(np.zeros(begins[-1]), offsets)
+        for name, values in zip(_FIELDS, fields, strict=True):
+            getattr(state, name)[:] = values
+        return state
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        """Make the view of an array when it is first read."""
+        if name not in _FIELDS:
+            raise AttributeError(name)
+        length, offset = self.offsets[name]
+        values: np.ndarray = np.ndarray(
+            (length,), np.int64 if name in _INTEGERS else float, self.memory, offset
+        )
+        setattr(self, name, values)
+        return values
+
+    def copy(self) -> HybridState:
+        """Return a copy with its own memory."""
+        return HybridState(self.memory.copy(), self.offsets)
+
+    def packed(self) -> Any:
+        """Return the arrays for kernels; the pack keeps the memory alive."""
+        return packed(StateArrays(*(getattr(self, name) for name in _FIELDS)))
+
+    def outcome(self) -> Outcome:
+        """Return the state as an `Outcome` that shares the memory."""
+        return Outcome(
+            self.x, self.p, self.z, self.sides, self.orders, _NO_MONITORS, _NO_MONITORS, self.x_error,
+            self.floors, _NO_MONITOR_FLOORS,
+        )  # fmt: skip

@@ -1,0 +1,122 @@
+"""The contract between the compiled event loop and a method: a segment kernel, its arrays, and its record."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from hybridsim.engine.events.state import HybridState
+from hybridsim.engine.linear.tables import no_tables
+from hybridsim.engine.record.blocks import SegmentBlock
+from hybridsim.engine.record.counters import Counters
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.per_structure import spare_scratch
+from hybridsim.engine.system.programs.mode_tables import Tapes
+from hybridsim.engine.system.system import System
+
+NOT_LINEAR = no_tables()  # for kernels without tables of linear modes
+
+
+class MethodKernels(ABC):
+    """What a method adds to the compiled event loop of one run, in which no segment is longer than `longest`.
+
+    ``segment(model, call, state, work, own, rows)`` is a plain function in the language of numba. It is compiled once
+    and called by its address, so it returns an integer. Its arguments are the packs `LoopModel`, `LoopCall`,
+    `StateArrays`, `EventScratch`, and two of the method: `arrays` and the arrays of `fields`. It follows one segment
+    from local time 0, in the modes of row ``call.int_slots[MODE_ROW]`` of the tapes:
+
+    1. The segment begins in ``state``, which the kernel must not change. It ends at the latest at local time
+       ``call.float_slots[BOUND]``. If it would be longer than LONGEST, return STOPPED.
+    2. It ends at the first zero of an active guard. If zeros are not certain, or any number is not finite, return
+       STOPPED; the general loop then takes the segment. Return FULL if the arrays are full.
+    3. Otherwise write the end: local time END, guard FIRED or -1, number of steps TAKEN, the states in ``work.y``, the
+       largest states in ``call.scale``. At BOUND no guard may be zero within rounding; see
+       `hybridsim.engine.events.compiled.at_end`. An END before BOUND without a guard divides the segment.
+    4. For a guard write also the rates in ``work.slopes``, the error of the time EVENT_ERROR, the local time EVENT_AT,
+       the first two Taylor coefficients SLOPE and BEND of the guard there, and the length LAST_STEP of the last step.
+       BEND = 0 if the guard is certain to become negative. Return FOLLOWED.
+    5. Write steps from row ``call.int_slots[STEPS]`` of the record on, and other data in row SEGMENTS.
+    6. A kernel may set the origin of the next segment in ``state.p`` and give EVENT_AT = 0. It then sets IS_AHEAD. If
+       IS_AHEAD is set at the next start, nothing has changed p since.
+    7. If IS_REJECTED is set, the last segment is not committed: restore what the kernel remembers of it, and return.
+    """
+
+    segment: ClassVar[Callable[..., int]]
+    rows: ClassVar[Any]  # named tuple of the method's part of the record, with a row for each step
+    is_looked_at: ClassVar[bool] = False  # whether steps are examined after a call, even if they are not kept
+    is_continued: ClassVar[bool] = True  # whether calls share one record until it is full
+    remembers: ClassVar[bool] = False  # whether a call depends on earlier calls of the run
+    keeps_starts: ClassVar[bool] = False  # whether the record keeps the state at the start of each segment
+    kind: str  # name of the arrays, which are reused from run to run
+    columns: int  # doubles that are recorded for each step
+
+    def __init__(self, system: System, longest: float) -> None:
+        self.system, self.longest = system, longest
+        self._reusable: tuple[Any, deque[Any]] | None = None
+
+    def fresh_copy(self) -> MethodKernels:
+        """Return a copy for another run, or itself if the method remembers nothing from call to call."""
+        if not self.remembers:
+            return self
+        other: MethodKernels = object.__new__(type(self))
+        vars(other).update(vars(self))
+        return other
+
+    @abstractmethod
+    def arrays(self) -> Any:
+        """Return new arrays of the kernel for one call, as a pack."""
+
+    @abstractmethod
+    def fields(self) -> Sequence[tuple[Any, tuple[int, ...]]]:
+        """Return the dtype and the shape of a row of each array in `rows`."""
+
+    @abstractmethod
+    def block(
+        self,
+        result: Any,
+        rows: Any,
+        last_steps: np.ndarray,
+        origins: np.ndarray,
+        modes: np.ndarray,
+        vectors: np.ndarray,
+        jumps: np.ndarray,
+    ) -> SegmentBlock:
+        """Return the committed segments of a call; last_steps (N + 1,): 0, then the last step of each segment."""
+
+    def tables(
+        self, tapes: Tapes, state: HybridState, origin: Instant, target: Instant
+    ) -> tuple[Any, deque[Any]] | None:
+        """Return tables of linear modes, and reusable arrays of calls; None if the kernel cannot be called."""
+        if self._reusable is None:
+            self._reusable = NOT_LINEAR, spare_scratch(self.system, self.kind)
+        return self._reusable
+
+    def begin(self, own: Any, tapes: Tapes) -> Any:
+        """Write the settings of the run to the arrays before a call. Return the arrays."""
+        return own
+
+    def end(self, own: Any, tapes: Tapes, lin: Any) -> Any:
+        """Return the result of a call besides its record, for `count`, `take` and `block`."""
+        return None
+
+    def count(self, counters: Counters, steps: int, result: Any) -> None:
+        """Add the cost of the steps to the counters, except for their number."""
+        return
+
+    def take(self, result: Any) -> None:
+        """Keep what the next call of this run needs of a result."""
+        return
+
+    @property
+    def place(self) -> tuple[np.ndarray, ...]:
+        """Return the method's state between calls as arrays, for a checkpoint, if calls do not share a record."""
+        return ()
+
+    @place.setter
+    def place(self, place: np.ndarray) -> None:
+        """Restore the method's state between calls."""
+        return

@@ -1,0 +1,119 @@
+"""The part of Taylor's method in the compiled loop of a run: arrays, record and cost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybridsim.engine.native.constants import TIGHTEST
+from hybridsim.engine.native.struct_pack import packed, replaced
+from hybridsim.engine.record.counters import Counters
+from hybridsim.engine.record.series_block import SeriesBlock
+from hybridsim.engine.roots.defect_check import ahead_size
+from hybridsim.engine.run.method_kernels import MethodKernels
+from hybridsim.engine.system.programs.code_cache import series_codes
+from hybridsim.engine.system.programs.mode_code import most_fading
+from hybridsim.engine.system.programs.mode_tables import Tapes, tape_cache_of
+from hybridsim.engine.system.series_at import series_order
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.tolerances import Tolerances
+from hybridsim.integrators.taylor.segments import taylor_segment
+
+
+class TaylorSettings(NamedTuple):
+    """The settings of a run."""
+
+    control: np.ndarray  # rtol, longest step
+    atol: np.ndarray  # (n,)
+
+
+class TaylorArrays(NamedTuple):
+    """Arrays of the kernel, for R registers, order + 1 terms, and G guards."""
+
+    codes: Any  # `hybridsim.engine.system.programs.series_code.Codes` of the tapes
+    settings: Any  # `TaylorSettings`
+    V: np.ndarray  # Taylor coefficients (R, order + 1) of all registers
+    W: np.ndarray  # the same for values at other points, if the interpreter computes them
+    guard_series: np.ndarray  # coefficients of active guards and of vanishing functions
+    ahead: np.ndarray  # guards ahead of the step
+    sizes: np.ndarray  # powers of a step, then sizes of guards over it
+    numbers: np.ndarray  # 0, 1, ... for the guards
+    a: np.ndarray  # coefficients (order + 1,) of a polynomial
+    b: np.ndarray  # the same
+    stack: np.ndarray  # its Bernstein forms
+    sides: np.ndarray  # sides (G,) of the guards
+    orders: np.ndarray  # their leading orders (G,)
+    floors: np.ndarray  # their error bounds (G,)
+    guard_registers: np.ndarray  # registers of the guards
+    everyone: np.ndarray  # 0, 1, ..., n - 1
+    largest: np.ndarray  # largest values (G,) of the guards on the segment
+
+
+class TaylorRows(NamedTuple):
+    """The committed steps."""
+
+    steps: np.ndarray  # start and length (S, 2)
+    series: np.ndarray  # Taylor coefficients (S, n, order + 1)
+
+
+class TaylorKernels(MethodKernels):
+    """The part of Taylor's method."""
+
+    segment = staticmethod(taylor_segment)
+    rows = TaylorRows
+
+    def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
+        super().__init__(system, longest)
+        rtol = max(tolerances.rtol, TIGHTEST)
+        self.order = series_order(rtol, system.is_linear)
+        atol = np.array(tolerances.atol, dtype=float)
+        self.settings = packed(TaylorSettings(np.array([rtol, tolerances.max_step]), atol))
+        self.kind, self.columns = f"order {self.order}", system.n * (self.order + 1) + 2
+        self.codes = series_codes(system, self.order)
+
+    def arrays(self) -> Any:
+        """Return new arrays of the kernel for one call, as a pack."""
+        system, order, n = self.system, self.order, self.system.n
+        registers, guards, fading = system.registers.count, system.guard_count, most_fading(system)
+        return packed(
+            TaylorArrays(
+                codes=self.codes.of(tape_cache_of(system).tapes),
+                settings=self.settings,
+                V=np.zeros((registers, order + 1)),
+                W=np.zeros((registers, order + 1)),
+                guard_series=np.zeros((guards + fading, order + 1)),
+                ahead=np.empty(ahead_size(order, n, guards)),
+                sizes=np.empty(order + 1 + guards + fading),
+                numbers=np.arange(guards, dtype=np.int64),
+                everyone=np.arange(n, dtype=np.int64),
+                a=np.empty(order + 1),
+                b=np.empty(order + 1),
+                stack=np.empty((64, order + 3)),
+                **{name: np.empty(guards) for name in ("floors", "largest")},
+                **{name: np.empty(guards, dtype=np.int64) for name in ("sides", "orders", "guard_registers")},
+            )
+        )
+
+    def fields(self) -> Sequence[tuple[Any, tuple[int, ...]]]:
+        """Return the dtype and the shape of a row of each array in `rows`."""
+        return (float, (2,)), (float, (self.system.n, self.order + 1))
+
+    def begin(self, own: Any, tapes: Tapes) -> Any:
+        """Put the settings of the run and the code of the tapes into the arrays."""
+        return replaced(own, settings=self.settings, codes=self.codes.of(tapes))
+
+    def end(self, own: Any, tapes: Tapes, lin: Any) -> None:
+        """Prepare machine code for modes with many steps."""
+        self.codes.look(tapes, own.codes)
+
+    def count(self, counters: Counters, steps: int, result: Any) -> None:
+        """Add the cost of the steps to the counters."""
+        counters.rhs_evaluations += 2 * steps  # one series and one check per step
+
+    def block(
+        self, result: Any, rows: TaylorRows, last_steps: np.ndarray, *record: np.ndarray
+    ) -> SeriesBlock:
+        """Return the committed segments of a call."""
+        return SeriesBlock(self.system, last_steps, *rows, *record)
