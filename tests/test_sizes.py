@@ -34,6 +34,7 @@ FILES = {
     "engine/lowering/held_states.py": 305,
     "engine/lowering/lower.py": 502,
     "engine/native/kernels.py": 510,
+    "engine/native/struct_pack.py": 338,
     "engine/roots/roots.py": 355,
     "engine/run/mode_loop.py": 619,
     "engine/run/segment_run.py": 496,
