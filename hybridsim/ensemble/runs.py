@@ -218,7 +218,7 @@ class _GroupScratch:
         )
         late, late_rows = (packed(type(part)(*(a[SEGMENTS:] for a in part))) for part in (record, rows))
         link_event_loop(
-            kernels.segment,
+            kernels.loop,
             arrays.model,
             arrays.call,
             arrays.as_packed,

@@ -213,7 +213,7 @@ class CompiledLoop:
         except IndexError:
             arrays = CallArrays(kernels, state, tapes, lin)
             link_event_loop(
-                kernels.segment, arrays.model, arrays.call, arrays.as_packed, arrays.work, record,
+                kernels.loop, arrays.model, arrays.call, arrays.as_packed, arrays.work, record,
                 kernels.begin(arrays.own, tapes), rows,
             )  # fmt: skip
         call, own = arrays.call, kernels.begin(arrays.own, tapes)

@@ -1,8 +1,9 @@
 """The compiled event loop: segments of one method from event to event, with ordinary events resolved without Python.
 
-It knows no method. A segment is followed by a kernel of the method, which is reached by its address; its contract is
-that of `hybridsim.engine.run.method_kernels.MethodKernels`. A call commits segments one by one. It ends at its target
-time, or before the first segment with an event that is not ordinary. The general mode loop then takes that segment.
+It knows no method. A kernel of the method, with which the loop is compiled, follows a segment. The contract of that
+kernel is in `hybridsim.engine.run.method_kernels.MethodKernels`. A call commits segments one by one. It ends at its
+target time, or before the first segment with an event that is not ordinary. The general mode loop then takes that
+segment.
 """
 
 from __future__ import annotations
@@ -23,8 +24,15 @@ from hybridsim.engine.events.compiled.after_segment import (
     spread,
     state_errors,
 )
-from hybridsim.engine.events.compiled.scratch import EVENT_LOOP, ROW, SEGMENT, SPREAD
-from hybridsim.engine.native.kernels import call_kernel, call_noinline, inlined, kernel, kernel_address
+from hybridsim.engine.events.compiled.scratch import EVENT_LOOP, ROW, SPREAD
+from hybridsim.engine.native.kernels import (
+    call_kernel,
+    call_noinline,
+    inline_always,
+    inlined,
+    kernel,
+    kernel_address,
+)
 from hybridsim.engine.native.loop_hints import put
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.series.interpreter import advance
@@ -83,12 +91,15 @@ def set_origin(place: Any, rates: Any, hi: float, lo: float, p: Any) -> None:
         p[phases_at + i] = phase_of(hi, lo, rates[i], 0.0)
 
 
-def event_loop(model: Any, call: Any, state: Any, work: Any, record: Any, own: Any, rows: Any) -> int:
-    """Run from event to event and return why the loop ended. The kernel is called by address: see `call_event_loop`.
+@inline_always
+def event_loop(
+    segment: Any, model: Any, call: Any, state: Any, work: Any, record: Any, own: Any, rows: Any
+) -> int:
+    """Run from event to event and return why the loop ended. segment: the kernel that follows one segment.
 
     The numbers of committed steps and segments are in `call`. state: `StateArrays` at the start of the segment,
-    advanced by the call, like the clock. work: `EventScratch`. record: `LoopRecord`. own, rows: addresses of packs of
-    the method, its arrays and its record. A segment with more steps than fit is committed in parts.
+    advanced by the call, like the clock. work: `EventScratch`. record: `LoopRecord`. own, rows: packs of the method,
+    for its arrays and its record. A segment with more steps than fit is committed in parts.
     """
     automata, tapes, ints, floats = model.automata, model.tapes, call.int_slots, call.float_slots
     target, clock, pace, scale, rates = call.times[:2], call.times[2:], call.pace, call.scale, call.rates
@@ -113,7 +124,7 @@ def event_loop(model: Any, call: Any, state: Any, work: Any, record: Any, own: A
         put(z, record.modes[i])
         put(p, record.vectors[i])
         put(x, jumps[i, 0])
-        outcome = call_kernel(work.entry_points[SEGMENT], (model, call, state, work, own, rows))
+        outcome = segment(model, call, state, work, own, rows)
         if outcome != FOLLOWED:
             return outcome
         fired, s, steps = ints[FIRED], floats[END], ints[TAKEN]
@@ -141,10 +152,8 @@ def event_loop(model: Any, call: Any, state: Any, work: Any, record: Any, own: A
             and is_hidden(model, fired, slope, bend, at, error, state, work)
         )
         if is_rejected or not resolve(model, at, error, fired, state, work):
-            ints[IS_REJECTED] = 1
-            call_kernel(work.entry_points[SEGMENT], (model, call, state, work, own, rows))
-            set_origin(place, rates, clock[0], clock[1], p)
-            return STOPPED
+            ints[IS_REJECTED], ints[IS_AHEAD] = 1, 0  # the kernel of the segment returns STOPPED
+            continue
         put(work.x_after, jumps[i, after])
         clock[0], clock[1] = moved_on(clock[0], clock[1], s)
         ints[STEPS], ints[SEGMENTS] = ints[STEPS] + steps, i + 1
@@ -155,7 +164,7 @@ def event_loop(model: Any, call: Any, state: Any, work: Any, record: Any, own: A
 
 @kernel
 def call_event_loop(model: Any, call: Any, state: Any, work: Any, record: Any, own: Any, rows: Any) -> int:
-    """Call `event_loop` by its address, and record the end of the last segment in the row after it."""
+    """Call the loop of a method by its address, and record the end of the last segment in the row after it."""
     code = call_kernel(work.entry_points[EVENT_LOOP], (model, call, state, work, record, own, rows))
     i = call.int_slots[SEGMENTS]
     if i > 0:  # without segments there may be no row left
@@ -165,12 +174,11 @@ def call_event_loop(model: Any, call: Any, state: Any, work: Any, record: Any, o
 
 
 def link_event_loop(
-    segment: Any, model: Any, call: Any, state: Any, work: Any, record: Any, own: Any, rows: Any
+    loop: Any, model: Any, call: Any, state: Any, work: Any, record: Any, own: Any, rows: Any
 ) -> None:
     """Compile the kernels that a call needs, if necessary, and store their addresses for other kernels."""
     link_event_resolution(model, state, work)
-    work.entry_points[SEGMENT] = kernel_address(segment, model, call, state, work, own, rows)
-    work.entry_points[EVENT_LOOP] = kernel_address(event_loop, model, call, state, work, record, 0, 0)
+    work.entry_points[EVENT_LOOP] = kernel_address(loop, model, call, state, work, record, own, rows)
 
 
 @inlined

@@ -24,10 +24,10 @@ NOT_LINEAR = no_tables()  # for kernels without tables of linear modes
 class MethodKernels(ABC):
     """What a method adds to the compiled event loop of one run, in which no segment is longer than `longest`.
 
-    ``segment(model, call, state, work, own, rows)`` is a plain function in the language of numba. It is compiled once
-    and called by its address, so it returns an integer. Its arguments are the packs `LoopModel`, `LoopCall`,
-    `StateArrays`, `EventScratch`, and two of the method: `arrays` and the arrays of `fields`. It follows one segment
-    from local time 0, in the modes of row ``call.int_slots[MODE_ROW]`` of the tapes:
+    ``segment(model, call, state, work, own, rows)`` is an `inlined` kernel that returns an integer. `loop` is a plain
+    function that passes it to `event_loop`; both are compiled together. The arguments of a segment are the packs
+    `LoopModel`, `LoopCall`, `StateArrays`, `EventScratch`, and two of the method: `arrays` and the arrays of `fields`.
+    It follows one segment from local time 0, in the modes of row ``call.int_slots[MODE_ROW]`` of the tapes:
 
     1. The segment begins in ``state``, which the kernel must not change. It ends at the latest at local time
        ``call.float_slots[BOUND]``. If it would be longer than LONGEST, return STOPPED.
@@ -42,10 +42,11 @@ class MethodKernels(ABC):
     5. Write steps from row ``call.int_slots[STEPS]`` of the record on, and other data in row SEGMENTS.
     6. A kernel may set the origin of the next segment in ``state.p`` and give EVENT_AT = 0. It then sets IS_AHEAD. If
        IS_AHEAD is set at the next start, nothing has changed p since.
-    7. If IS_REJECTED is set, the last segment is not committed: restore what the kernel remembers of it, and return.
+    7. If IS_REJECTED is set, the last segment is not committed: restore what the kernel remembers of it, and return
+       STOPPED.
     """
 
-    segment: ClassVar[Callable[..., int]]
+    loop: ClassVar[Callable[..., int]]
     rows: ClassVar[Any]  # named tuple of the method's part of the record, with a row for each step
     is_looked_at: ClassVar[bool] = False  # whether steps are examined after a call, even if they are not kept
     is_continued: ClassVar[bool] = True  # whether calls share one record until it is full

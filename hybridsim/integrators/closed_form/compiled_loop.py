@@ -21,13 +21,13 @@ from hybridsim.engine.run.method_kernels import MethodKernels
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.programs.mode_tables import Tapes, tape_cache_of
 from hybridsim.engine.system.system import System
-from hybridsim.integrators.closed_form.segments import ClosedFormArrays, ClosedFormRows, closed_form_segment
+from hybridsim.integrators.closed_form.segments import ClosedFormArrays, ClosedFormRows, closed_form_loop
 
 
 class ClosedFormKernels(MethodKernels):
     """The part of linear modes in closed form."""
 
-    segment = staticmethod(closed_form_segment)
+    loop = staticmethod(closed_form_loop)
     rows = ClosedFormRows
     is_continued: ClassVar[bool] = False
     remembers: ClassVar[bool] = True

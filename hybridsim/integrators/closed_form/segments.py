@@ -48,6 +48,7 @@ from hybridsim.engine.run.event_loop import (
     STOPPED,
     TAKEN,
     any_holding,
+    event_loop,
     set_origin,
 )
 
@@ -136,6 +137,7 @@ def stopped(hints: Any, k: int, former: Any) -> int:
     return STOPPED
 
 
+@inlined
 def closed_form_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, rows: Any) -> int:
     """Follow one segment in closed form; see `hybridsim.engine.run.method_kernels.MethodKernels`.
 
@@ -193,3 +195,8 @@ def closed_form_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, 
         slopes_of(lin, k, y, work.w, work.slopes)
         floats[EVENT_AT], floats[EVENT_ERROR], floats[BEND], ints[IS_AHEAD] = 0.0, s_error, 0.0, 1
     return FOLLOWED
+
+
+def closed_form_loop(model: Any, call: Any, state: Any, work: Any, record: Any, own: Any, rows: Any) -> int:
+    """Run from event to event over segments in closed form."""
+    return event_loop(closed_form_segment, model, call, state, work, record, own, rows)

@@ -24,7 +24,7 @@ from hybridsim.engine.system.programs.mode_tables import Tapes, tape_cache_of
 from hybridsim.engine.system.series_at import short_order
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
-from hybridsim.integrators.runge_kutta.segments import runge_kutta_segment
+from hybridsim.integrators.runge_kutta.segments import runge_kutta_loop
 from hybridsim.integrators.runge_kutta.step import Tableau
 
 _HERMITE = packed(
@@ -95,7 +95,7 @@ class RungeKuttaRows(NamedTuple):
 class RungeKuttaKernels(MethodKernels):
     """The part of an explicit Runge-Kutta method."""
 
-    segment = staticmethod(runge_kutta_segment)
+    loop = staticmethod(runge_kutta_loop)
     rows = RungeKuttaRows
     is_looked_at: ClassVar[bool] = True  # whether stiffness is monitored
     remembers: ClassVar[bool] = True

@@ -39,6 +39,7 @@ from hybridsim.engine.run.event_loop import (
     TAKEN,
     any_holding,
     any_projecting,
+    event_loop,
     load_constants,
 )
 from hybridsim.engine.series.bounded import UNIT
@@ -249,6 +250,7 @@ def is_zero(model: Any, fired: int, s: float, scale: Any, state: Any, work: Any)
     return abs(work.judged[0, fired, 0]) <= work.judged[1, fired, 0]
 
 
+@inlined
 def runge_kutta_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, rows: Any) -> int:
     """Follow one segment by Runge-Kutta steps; see `hybridsim.engine.run.method_kernels.MethodKernels`.
 
@@ -431,3 +433,8 @@ def runge_kutta_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, 
             return STOPPED
     floats[END], ints[FIRED], ints[TAKEN] = s, fired, n_steps - first_step
     return FOLLOWED
+
+
+def runge_kutta_loop(model: Any, call: Any, state: Any, work: Any, record: Any, own: Any, rows: Any) -> int:
+    """Run from event to event over segments of Runge-Kutta steps."""
+    return event_loop(runge_kutta_segment, model, call, state, work, record, own, rows)

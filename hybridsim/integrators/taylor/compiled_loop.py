@@ -19,7 +19,7 @@ from hybridsim.engine.system.programs.mode_tables import Tapes, tape_cache_of
 from hybridsim.engine.system.series_at import series_order
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
-from hybridsim.integrators.taylor.segments import taylor_segment
+from hybridsim.integrators.taylor.segments import taylor_loop
 
 
 class TaylorSettings(NamedTuple):
@@ -61,7 +61,7 @@ class TaylorRows(NamedTuple):
 class TaylorKernels(MethodKernels):
     """The part of Taylor's method."""
 
-    segment = staticmethod(taylor_segment)
+    loop = staticmethod(taylor_loop)
     rows = TaylorRows
 
     def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:

@@ -45,6 +45,7 @@ from hybridsim.engine.run.event_loop import (
     TAKEN,
     any_holding,
     any_projecting,
+    event_loop,
     load_constants,
 )
 from hybridsim.engine.series.interpreter import SLACK, expand, reach, sum_sizes
@@ -91,6 +92,7 @@ def series_at(
             U[guard_registers.shape[0] + j, k] = V[register_of(fading[j]), k]
 
 
+@inlined
 def taylor_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, rows: Any) -> int:
     """Follow one segment by Taylor steps; see `hybridsim.engine.run.method_kernels.MethodKernels`.
 
@@ -273,3 +275,8 @@ def taylor_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, rows:
         floats[SLOPE], floats[BEND] = slope, bend
     floats[END], ints[FIRED], ints[TAKEN] = s, fired, n_steps - first_step
     return FOLLOWED
+
+
+def taylor_loop(model: Any, call: Any, state: Any, work: Any, record: Any, own: Any, rows: Any) -> int:
+    """Run from event to event over segments of Taylor steps."""
+    return event_loop(taylor_segment, model, call, state, work, record, own, rows)
