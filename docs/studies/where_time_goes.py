@@ -36,7 +36,7 @@ SERIES, ELEMENTARY = "series of states and guards", "sine, cosine, exponential, 
 MODEL, PYTHON = "functions of the model, other kernels", "Python, NumPy and the memory they take"
 PARTS = {
     "first_zero": ZEROS, "earliest_exit": ZEROS, "first_exit": ZEROS, "bernstein": ZEROS,
-    "closed_form_segment": MOTION, "taylor_segment": MOTION, "event_loop": MOTION,
+    "closed_form_loop": MOTION, "taylor_loop": MOTION, "event_loop": MOTION,
     "verdict": MODES, "resolve_event": MODES, "resolve_clear": MODES, "bounds": MODES,
     "series": SERIES, "values": SERIES, "ahead": SERIES, "sizes": SERIES, "advance": SERIES, "expand": SERIES,
 }  # fmt: skip
