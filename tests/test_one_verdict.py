@@ -66,7 +66,6 @@ READERS = {
     "engine/events/first_modes.py::_negative": "automata that leave their modes in any case",
     "engine/events/zeno/hidden_bounces.py::_departure": "where a hidden bounce begins",
     "engine/run/appointment_events.py::events_before_appointment": "whether a guard turns back at a known time",
-    "engine/run/event_loop.py::event_loop": "the largest value of each guard on a segment",
     "engine/run/locate.py::_bound": "where a guard is zero",
     "engine/run/locate.py::bound": "where a guard is zero",
     "engine/run/located.py::_is_near": "which guards are zero at an instant",
@@ -78,6 +77,7 @@ READERS = {
     "engine/run/segment_run.py::_is_zero": "where a guard is zero",
     "engine/run/segment_run.py::_take_roots": "which zeros of a step are events",
     "integrators/runge_kutta/segments.py::is_zero": "where a guard is zero",
+    "integrators/taylor/segments.py::taylor_segment": "the largest value of each guard on a segment",
 }
 
 # What a vector of modes is called.
