@@ -44,7 +44,7 @@ FILES = {
     "engine/system/system.py": 504,
     "integrators/fixed_step/moreau_kernels.py": 413,
     "integrators/fixed_step/run.py": 419,
-    "integrators/runge_kutta/segments.py": 433,
+    "integrators/runge_kutta/segments.py": 440,
     "mechanics/declaration/system.py": 355,
     "mechanics/series_loop/expansion.py": 312,
     "mechanics/series_loop/steps.py": 350,
