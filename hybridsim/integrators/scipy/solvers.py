@@ -14,8 +14,8 @@ from hybridsim.integrators.first_steps import with_first_steps
 from hybridsim.integrators.scipy.native import NativeStepper
 from hybridsim.integrators.scipy.stepper import SolverStepper, series_step
 
-_LATE_LIMIT = {
-    "accumulation": "where events accumulate, the limit has the errors of all events before, hundreds of tolerances"
+_NOISE = {
+    "accumulation": "it does not resolve events closer than its tolerances, since each restart is at order one"
 }
 _EXPLICIT = {"stiff": "it is explicit: the fastest rate limits its step"}
 # roots of |R(-z)| = 1 for their stability polynomials
@@ -170,7 +170,7 @@ class ScipyBDF(ScipyIntegrator):
     reference: ClassVar[str] = "Shampine and Reichelt 1997, doi:10.1137/S1064827594276424"
     when: ClassVar[str] = "stiff modes, few events, loose tolerances"
     lacks: ClassVar[dict[str, str]] = {
-        **_LATE_LIMIT,
+        **_NOISE,
         "poles": "after a trial beyond a pole it restarts at order one, with steps below the rounding of time",
     }
     dense_is_accurate: ClassVar[bool] = True
@@ -192,7 +192,7 @@ class ScipyLSODA(ScipyIntegrator):
     order: ClassVar[str] = "1 to 12"
     reference: ClassVar[str] = "Petzold 1983, doi:10.1137/0904010"
     when: ClassVar[str] = "modes that may or may not be stiff"
-    lacks: ClassVar[dict[str, str]] = _LATE_LIMIT
+    lacks: ClassVar[dict[str, str]] = _NOISE
     dense_is_accurate: ClassVar[bool] = True
     solver: ClassVar[str] = "LSODA"
     is_multistep: ClassVar[bool] = True

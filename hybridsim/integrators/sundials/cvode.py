@@ -20,8 +20,8 @@ from hybridsim.integrators.contract import Integrator
 from hybridsim.integrators.first_steps import with_first_steps
 from hybridsim.integrators.past_steps import MAX_PAST_POINTS, converges, through
 
-_LATE_LIMIT = {
-    "accumulation": "where events accumulate, the limit has the errors of all events before, hundreds of tolerances"
+_NOISE = {
+    "accumulation": "it does not resolve events closer than its tolerances, since each restart is at order one"
 }
 # More steps than one output should need; CVODE's default of 500 would end long smooth segments.
 _MAX_STEPS = 10_000_000
@@ -191,7 +191,7 @@ class CvodeBDF(_Cvode):
     order: ClassVar[str] = "1 to 5"
     reference: ClassVar[str] = "Hindmarsh et al. 2005, doi:10.1145/1089014.1089020"
     when: ClassVar[str] = "stiff modes"
-    lacks: ClassVar[dict[str, str]] = _LATE_LIMIT
+    lacks: ClassVar[dict[str, str]] = _NOISE
     formulas: ClassVar[str] = "BDF"
 
 
@@ -209,6 +209,7 @@ class CvodeAdams(_Cvode):
     reference: ClassVar[str] = "Hindmarsh et al. 2005, doi:10.1145/1089014.1089020"
     when: ClassVar[str] = "long smooth motions, not stiff"
     lacks: ClassVar[dict[str, str]] = {
+        **_NOISE,
         "stiff": "with stiff rates its iteration converges only with very short steps: use cvode-bdf",
     }
     formulas: ClassVar[str] = "Adams"
