@@ -121,5 +121,5 @@ def test_counts_that_no_time_suffices_for(name: str, ask: Callable[[int], object
 def test_options_of_integrators_that_are_no_doubles(integrator: str, option: str) -> None:
     refused(
         lambda: hs.simulate("dfcs", (0, 0.01), integrator=integrator, **{option: 10**400}),
-        f"{integrator}: {option} is 1000(.*\n.*)use a ",
+        f"{integrator}: `{option}` cannot be 1000(.*\n.*)use a ",
     )

@@ -220,7 +220,7 @@ def test_the_times_of_output_are_those_of_each_call(model: hs.Model) -> None:
     assert [run.t.tolist() for run in runs] == [grid.tolist() for grid in grids]
     assert [run.y.tolist() for run in runs] == [plain(grid).tolist() for grid in grids]
     assert len(plain.t) > 7
-    with pytest.raises(hs.UsageError, match="outside t_span"):
+    with pytest.raises(hs.UsageError, match="outside `t_span`"):
         hs.simulate(model, SPAN, integrator="exact", t_eval=[0.0, 1.0])
 
 

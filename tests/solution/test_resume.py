@@ -279,7 +279,7 @@ def test_where_there_is_no_way_on() -> None:
         sol.resume(0.005)
     with pytest.raises(hs.UsageError, match="Unknown limit"):
         sol.resume(0.02, limits={"event": 3})
-    with pytest.raises(hs.UsageError, match="limit of steps"):
+    with pytest.raises(hs.UsageError, match="limit 'steps' cannot be 0"):
         hs.simulate("dfcs", (0.0, 0.01), limits={"steps": 0})
 
 

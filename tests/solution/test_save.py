@@ -169,9 +169,9 @@ def test_what_save_cannot_be(save: object, said: str) -> None:
 def test_what_does_not_go_together() -> None:
     with pytest.raises(UsageError, match="no forcing period"):
         hs.simulate("bouncing-ball", (0, 1), save="last-period")
-    with pytest.raises(UsageError, match="t_eval needs the states"):
+    with pytest.raises(UsageError, match="`t_eval` needs the states"):
         hs.simulate(DFCS, (0, 0.01), save="events", t_eval=[0.0])
-    with pytest.raises(UsageError, match="t_eval contains times before"):
+    with pytest.raises(UsageError, match="`t_eval` contains times before"):
         hs.simulate(DFCS, (0, 1), save=0.5, t_eval=[0.1, 0.9])
 
 

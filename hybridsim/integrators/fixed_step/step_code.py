@@ -196,7 +196,7 @@ class StepCode:
                 f"(modes[{row[0]}] == {row[3]} or before[{k}]*end[{width + k}] >= 0.0)"
                 for k, row in enumerate(self.table)
             ]
-        yield f"    if {' and '.join(ordinary)}:"
+        yield f"    if {' and '.join(ordinary) or '0 < 1'}:"  # without states and surfaces all is ordinary
         yield "        taken = taken + 1"
         yield f"        s = s + out[{count + 1}]"
         yield f"        out[{count + 2} + taken] = s"

@@ -161,7 +161,9 @@ class Model(Declared):
 
     def _state(self, name: str, start: Any) -> State:
         if self.flow is None:
-            remedy = "use hs.State(name, start, der) objects, or define all rates by a function flow(t, x, p)"
+            remedy = (
+                "use hs.State(name, start, der) in `states`, or define all rates by a function flow(t, x, p)"
+            )
             raise self._fault(f"the state '{name}' has no rate", remedy)
         return State(name, start, parse(0))
 

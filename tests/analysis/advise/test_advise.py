@@ -384,7 +384,7 @@ def test_what_does_not_fit_the_budget_is_left_out_and_said() -> None:
             {"quantity": "amplitude.x", "uncertain": {"mu": (0.2, 0.3)}},
             r"\[0.2, 0.3\] of mu does not contain the model's value 0.5",
         ),
-        ({"quantity": "amplitude.x", "uncertain": {"nu": (0.2, 0.3)}}, "no parameter"),
+        ({"quantity": "amplitude.x", "uncertain": {"nu": (0.2, 0.3)}}, "not a parameter"),
     ],
 )
 def test_what_is_refused(arguments: dict[str, Any], words: str) -> None:

@@ -41,7 +41,9 @@ def test_a_second_reference_that_takes_too_long_is_left_out() -> None:
 
 
 def test_where_no_reference_is_ready_in_time_it_is_said() -> None:
-    with pytest.raises(hs.SimulationError, match=r"rodas5p at rtol 1e-10 was not done(.*\n)*.*larger budget"):
+    with pytest.raises(
+        hs.SimulationError, match=r"rodas5p at rtol 1e-10 was not done(.*\n)*.*larger `budget`"
+    ):
         find_reference(DECAY, (0, 1), None, late("scipy-dop853", "rodas5p"), "runs", seconds=2.0)
 
 

@@ -151,7 +151,7 @@ def test_steady_sliding_of_two_blocks_is_found() -> None:
 def test_where_no_rest_is_found_it_is_said_how_to_go_on() -> None:
     adrift = hs.Model("adrift", [hs.State("x", 0, "v"), hs.State("v", 1, "1 + v*v")])
     assert hs.equilibria(adrift) == ()
-    with pytest.raises(hs.SimulationError, match=r"from its start\n.*nominal") as caught:
+    with pytest.raises(hs.SimulationError, match=r"from its initial state\n.*nominal") as caught:
         hs.linearize(adrift)
     assert "in the modes" not in str(caught.value)
 

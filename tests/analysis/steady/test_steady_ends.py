@@ -22,7 +22,7 @@ def test_a_search_that_costs_too_much_ends(monkeypatch: pytest.MonkeyPatch) -> N
     module = import_module("hybridsim.analysis.steady.steady_state")
     monkeypatch.setattr(module, "_TIME_BUDGET", 0.01)
     found = hs.steady_state(slow_and_fast())
-    assert found.kind == "not settled" and "declare the `duration`" in found.message
+    assert found.kind == "not settled" and "declare a `duration`" in found.message
 
 
 @pytest.mark.parametrize("name", ["settle", "max_periods"])
@@ -62,7 +62,7 @@ def most_steps(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 def test_a_run_that_would_cost_too_much_is_not_made(model: hs.Model, most_steps: list[int]) -> None:
     """32 periods of the slow forcing are 3.2e7 of the fast one: about 1e8 steps, and 1 in 1000 of them is taken."""
     found = hs.steady_state(model, integrator="taylor")
-    assert found.kind == "not settled" and "a smaller settle" in found.message
+    assert found.kind == "not settled" and "a smaller `settle`" in found.message
     assert most_steps[0] <= 100_000
 
 

@@ -108,7 +108,7 @@ def test_what_cannot_be_asked_for(given: dict[str, object], message: str) -> Non
 
 def test_no_period_says_what_to_do() -> None:
     found = hs.bifurcation(CIRCLE, "r", [1.0])
-    assert "no forcing of one period" in found.status[0, 0] and "section='v'" in found.status[0, 0]
+    assert "no forcing of one period" in found.status[0, 0] and "set `section` to" in found.status[0, 0]
 
 
 def test_frequency_response() -> None:

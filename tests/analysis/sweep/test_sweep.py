@@ -251,7 +251,7 @@ def test_labelled_arrays() -> None:
         ({"values": {"F0": [1, 2], "N": [1]}, "mode": "list"}, "F0 2, N 1"),
         ({"mode": "cloud"}, "`mode` cannot be 'cloud'"),
         ({"workers": 0}, "`workers` cannot be 0"),
-        ({"executor": 3}, "client.get_executor"),
+        ({"executor": 3}, "get_executor"),
         ({"measure": 3}, "`measure` cannot be 3"),
         ({"progress": 3}, "`progress` cannot be 3"),
     ],

@@ -106,5 +106,5 @@ def test_a_limit_that_rounding_hides_is_refused() -> None:
         states=[hs.State("h", 1.2, "w"), hs.State("w", 0, "-g")],
         components=[hs.Component("ball", modes, initial="flight", limit=stop)],
     )
-    with pytest.raises(UsageError, match="not followed to rounding"):
+    with pytest.raises(UsageError, match="not resolved to rounding"):
         hs.sensitivities(hs.simulate(model, (0, 1)))

@@ -133,7 +133,8 @@ def slider(
 
 def jump(system: System) -> tuple[float, float]:
     z = np.array([system.automata[0].hold])
-    return system.jumps(0.123, np.array([0.3, 0.0]), system.vector(Instant(0.4), np.zeros(0)), z)[0]
+    above, below = system.jumps(0.123, np.array([0.3, 0.0]), system.vector(Instant(0.4), np.zeros(0)), z)
+    return float(above), float(below)
 
 
 PASSED_ON = {"mu_s": "mu_s", "mu_k": "mu_k"}

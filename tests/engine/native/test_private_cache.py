@@ -90,7 +90,7 @@ class Place:
         done = self.run(cache=cache)
         assert not self.ran.exists()
         assert done.returncode == 0 and done.stdout == "-0.25\n", done.stderr
-        assert word in done.stderr and "not kept" in done.stderr
+        assert word in done.stderr and "not stored" in done.stderr
 
 
 @pytest.fixture(scope="module")
@@ -227,7 +227,7 @@ def test_own_links_are_followed(tmp_path: Path) -> None:
     (tmp_path / "real").mkdir(mode=0o700)
     (tmp_path / "link").symlink_to("real")
     done = Place(tmp_path).run(cache=tmp_path / "link")
-    assert done.stdout == "-0.25\n" and "not kept" not in done.stderr
+    assert done.stdout == "-0.25\n" and "not stored" not in done.stderr
     assert list((tmp_path / "real").glob("engine-*"))
 
 
@@ -254,7 +254,7 @@ def test_a_whole_cache_of_the_superuser_is_used_by_others(full: Place) -> None:
     before = tree(full.cache)
     done = as_somebody(SCRIPT, str(full.kernels), HYBRIDSIM_CACHE=str(full.cache))
     assert done.stdout == "-0.25\n", done.stderr
-    assert "not kept" not in done.stderr and tree(full.cache) == before
+    assert "not stored" not in done.stderr and tree(full.cache) == before
 
 
 def as_somebody(script: str, *given: str, **more: str) -> subprocess.CompletedProcess[str]:

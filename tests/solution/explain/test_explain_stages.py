@@ -93,7 +93,7 @@ def test_a_load_that_drops_shows_both_limits_after_it(integrator: str) -> None:
     found = values(slips)
     assert found["f slip+", "velocity"] == pytest.approx(2 - 0.3 * 5)
     assert found["f stick", "upper"] == pytest.approx(0.3 * 5 - 2)
-    assert "(of L), where L jumps from 10 to 5: slip+ is the only mode" in slips.reason
+    assert "(L), where L jumps from 10 to 5: slip+ is the only mode" in slips.reason
 
 
 @ALL
