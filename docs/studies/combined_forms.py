@@ -141,9 +141,8 @@ def pairs(seeds: list[int]) -> tuple[Counter[str], Counter[tuple[str, str]]]:
 
 HEAD = """# Combined forms
 
-`python docs/studies/combined_forms.py` draws whole models at random and compares each run with a judge that
-shares no code
-with hybridsim. The models combine the forms that people combine:
+`python docs/studies/combined_forms.py` draws whole models at random and compares each run with a judge that shares no
+code with hybridsim. The models combine the forms that people combine:
 
 - Every number is a literal, a parameter, an expression of parameters, a definition, a discrete state or an input.
 - Guards, loads, gaps, laws, rates, monitors and resets contain `max`, `min`, `abs` and conditionals, each in one of
