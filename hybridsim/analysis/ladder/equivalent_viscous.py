@@ -153,7 +153,5 @@ def _first(response: Response, forces: list[FirstHarmonic]) -> np.ndarray:
     except (np.linalg.LinAlgError, DoesNotApply):
         found = _balanced(response, forces, np.full(len(forces), 1e-6))
     if not (found > 0.0).all():
-        raise DoesNotApply(
-            "a contact has no normal load, so there is no friction that a damper could replace"
-        )
+        raise DoesNotApply("a contact has no normal load, so a damper has no friction to replace")
     return found

@@ -141,7 +141,7 @@ def stopped(hints: Any, k: int, former: Any) -> int:
 def closed_form_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, rows: Any) -> int:
     """Follow one segment in closed form; see `hybridsim.engine.run.method_kernels.MethodKernels`.
 
-    The loop is full after much work, too, and where states grow so far that the motion has to start anew.
+    The result is FULL also after POINTS evaluations of guards; the rest of the run then begins in another call.
     """
     ints, floats, lin = loop.int_slots, loop.float_slots, model.lin
     hints, former, k = own.hints, own.former, ints[MODE_ROW]
