@@ -11,7 +11,7 @@ import pytest
 
 import hybridsim as hs
 from hybridsim import UsageError
-from hybridsim.engine.native.struct_pack import BufferPool
+from hybridsim.engine.native.array_layout import BufferPool
 from hybridsim.solution.block_arrays import put_together, taken_apart
 
 DFCS = hs.load("dfcs")

@@ -8,27 +8,18 @@ like those of the tuple. A field may be another packed tuple. The caller must ke
 
 from __future__ import annotations
 
-import ctypes
 import hashlib
-import math
-from collections import namedtuple
-from collections.abc import Sequence
-from functools import cache, lru_cache
-from itertools import islice
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hybridsim.engine.native.inner_parts import needed
-from hybridsim.engine.native.kernels import ENABLED, kernel
+from hybridsim.engine.native.kernels import ENABLED
 
-_SLOTS_PER_ARRAY = 6  # words of 8 bytes per array in the table: its address and up to five lengths
-ALIGNED = 64  # bytes; suitable for numbers of any kind
-_LARGE, LARGEST = 1 << 18, 1 << 21  # bytes of blocks that go through a pool
-_RETURNED = 2  # first blocks that a layout keeps for reuse
-_REST = [(0,) * (_SLOTS_PER_ARRAY - 1 - dimensions) for dimensions in range(_SLOTS_PER_ARRAY)]
+SLOTS_PER_ARRAY = 6  # words of 8 bytes per array in the table: its address and up to five lengths
+_REST = [(0,) * (SLOTS_PER_ARRAY - 1 - dimensions) for dimensions in range(SLOTS_PER_ARRAY)]
 
-_MAX_FREE_BLOCKS = 4  # most free blocks in a pool
 
 if ENABLED:
     from llvmlite import ir
@@ -73,7 +64,7 @@ if ENABLED:
             return [field[0] for field in self.fields].index(name)
 
     @cache
-    def _type_of_fields(kind: Any, fields: tuple[Any, ...]) -> PackType:
+    def type_of_fields(kind: Any, fields: tuple[Any, ...]) -> PackType:
         """Return the type of a named tuple; fields: a `PackType`, or dtype and dimensions of an array."""
         found = [
             field
@@ -109,7 +100,7 @@ if ENABLED:
     @lower_getattr_generic(PackType)
     def _field(context: Any, builder: Any, kind: PackType, address: Any, name: str) -> Any:
         array_type, word = dict(kind.fields)[name], ir.IntType(64)
-        row = kind.place(name) * _SLOTS_PER_ARRAY
+        row = kind.place(name) * SLOTS_PER_ARRAY
         constant = builder.module.add_metadata([])
 
         def loaded(i: int) -> Any:
@@ -143,7 +134,7 @@ if ENABLED:
 
     def address_in(pack: Any, name: str) -> np.ndarray:
         """Return the place (1,) of the address of a field in the table of a pack."""
-        row = pack.numba_type.place(name) * _SLOTS_PER_ARRAY
+        row = pack.numba_type.place(name) * SLOTS_PER_ARRAY
         place: np.ndarray = pack.table[row : row + 1]
         return place
 
@@ -190,149 +181,4 @@ def packed(arrays: Any) -> Any:
         form.append((array.dtype.char, array.ndim))
     table = np.array(entries, dtype=np.int64)
     kind: Any = type(arrays)
-    return Packed(arrays, table, _type_of_fields(kind, tuple(form)), table.__array_interface__["data"][0])
-
-
-@kernel
-def _lay_out(entries: Any, steps: Any, owners: Any, skipped: Any, blocks: Any, table: Any) -> int:
-    """Fill the table of arrays that lie in some blocks and return its address; see `ArrayLayout`."""
-    for k in range(entries.shape[0]):
-        for i in range(entries.shape[1]):
-            table[k, i] = entries[k, i] + skipped[k] * steps[k, i]
-        table[k, 0] += blocks[owners[k]].ctypes.data
-    address: int = table.ctypes.data
-    return address
-
-
-@lru_cache(64)
-def _whole_numbers(numbers: tuple[int, ...]) -> np.ndarray:
-    return np.array(numbers, dtype=np.int64)
-
-
-class ArrayLayout:
-    """A layout of arrays of rows that lie one behind the other in a few blocks of memory.
-
-    Offsets are computed once; a new block is a single allocation, and packing all arrays takes a few
-    additions. A block is freed with the last array in it, so arrays with different lifetimes belong in
-    different blocks.
-
-    Parameters
-    ----------
-    kinds : types of named tuples, whose arrays lie one behind the other.
-    fields : dtype, shape and block number of each array.
-    """
-
-    def __init__(self, kinds: Sequence[Any], fields: Sequence[tuple[Any, tuple[int, ...], int]]) -> None:
-        self._kinds = [(kind, len(kind._fields)) for kind in kinds]
-        self._kind: Any = namedtuple("Rows", [name for kind in kinds for name in kind._fields])  # type: ignore[misc]
-        self._specs: list[tuple[tuple[int, ...], np.dtype[Any], int, int]] = []
-        self._sizes = [0] * (1 + max(block for *_, block in fields))
-        # the table without the addresses of the blocks
-        self._entries = np.zeros((len(fields), _SLOTS_PER_ARRAY), dtype=np.int64)
-        self._steps = np.zeros_like(self._entries)  # change of the table per skipped row
-        self._owners = np.array([block for *_, block in fields], dtype=np.int64)
-        for k, (name, shape, block) in enumerate(fields):
-            dtype, offset = np.dtype(name), self._sizes[block]
-            row = dtype.itemsize * math.prod(shape[1:])
-            self._specs.append((shape, dtype, block, offset))
-            self._entries[k, : 1 + len(shape)] = offset, *shape
-            self._steps[k, :2] = row, -1
-            self._sizes[block] += -(-row * shape[0] // ALIGNED) * ALIGNED
-        self._pools = [BufferPool(size) if _LARGE <= size <= LARGEST else None for size in self._sizes]
-        form = [(dtype.char, len(shape)) for shape, dtype, *_ in self._specs]
-        self._types: list[
-            tuple[Any, int]
-        ] = []  # the type of each pack, and the bytes of its part of the table
-        for kind, count in self._kinds if ENABLED else ():
-            self._types.append((_type_of_fields(kind, tuple(form[:count])), 8 * _SLOTS_PER_ARRAY * count))
-            del form[:count]
-        self._returned: list[np.ndarray] = []
-        self._from_the_first = np.zeros(len(fields), dtype=np.int64)
-
-    def blank(self) -> tuple[np.ndarray, ...]:
-        """Return uninitialised blocks that nothing else uses."""
-        try:
-            first = self._returned.pop()
-        except IndexError:  # another thread may take the last one after a test
-            first = self._block(0)
-        return first, *map(self._block, range(1, len(self._sizes)))
-
-    def _block(self, k: int) -> np.ndarray:
-        pool = self._pools[k]
-        return np.empty(self._sizes[k], dtype=np.uint8) if pool is None else pool.block()
-
-    def take_back(self, block: np.ndarray) -> None:
-        """Return an unused first block to the layout, which uses it again for the next call."""
-        if len(self._returned) < _RETURNED:
-            self._returned.append(block)
-
-    def packed(self, blocks: tuple[np.ndarray, ...], skipped: Sequence[int] | None = None) -> list[Any]:
-        """Pack the arrays of each named tuple for kernels; skipped: rows to omit at the start of each array."""
-        packs: list[Any] = []
-        if not ENABLED:
-            arrays = iter(zip(self.rows(blocks), skipped or self._from_the_first, strict=True))
-            for kind, count in self._kinds:
-                packs.append(kind(*(a[k:] for a, k in islice(arrays, count))))
-            return packs
-        rows = self._from_the_first if skipped is None else _whole_numbers(tuple(skipped))
-        table = np.empty_like(self._entries)
-        address = _lay_out(self._entries, self._steps, self._owners, rows, blocks, table)
-        for form, size in self._types:
-            packs.append(Packed(None, table, form, address))
-            address += size
-        return packs
-
-    def rows(self, blocks: tuple[np.ndarray | None, ...]) -> Any:
-        """Return the arrays, with None for arrays in missing blocks."""
-        return self._kind(
-            *[
-                None if blocks[k] is None else np.ndarray(shape, dtype, blocks[k], offset)
-                for shape, dtype, k, offset in self._specs
-            ]
-        )
-
-    def row(self, blocks: tuple[np.ndarray, ...], name: str, i: int) -> np.ndarray:
-        """Return a copy of row i of the array with this name."""
-        shape, dtype, k, offset = self._specs[self._kind._fields.index(name)]
-        return np.ndarray(shape, dtype, blocks[k], offset)[i].copy()
-
-
-class BufferPool:
-    """A pool of blocks of one size in bytes, each of which is reused when all arrays in it have been deleted.
-
-    The operating system maps a fresh block page by page, when it is first written. In a compiled loop this can cost a
-    sixth of the time of a run of thousands of steps.
-
-    Each block is handed out as a buffer object over its memory. Every array over the buffer, and every view of such
-    an array, keeps the buffer alive. The memory returns to the pool when the buffer is deleted.
-    """
-
-    def __init__(self, size: int) -> None:
-        self.size = size
-        self._free: list[bytearray] = []
-        self._kind = _buffer_type(size, self._free)
-
-    def block(self) -> np.ndarray:
-        """Return a block; its contents are undefined."""
-        try:
-            memory = self._free.pop()
-        except IndexError:
-            memory = bytearray(self.size)
-        buffer = self._kind.from_buffer(memory)
-        buffer.memory = memory
-        return np.frombuffer(memoryview(buffer), dtype=np.uint8)
-
-
-def _buffer_type(size: int, free: list[bytearray]) -> Any:
-    """Return a buffer type of a size in bytes whose instances return their memory to the pool when deleted."""
-
-    class PooledBuffer(ctypes.c_char * size):  # type: ignore[misc]  # the size is known at run time
-        memory: bytearray
-
-        def __del__(
-            self, limit: int = _MAX_FREE_BLOCKS
-        ) -> None:  # globals may be gone while Python shuts down
-            if len(free) < limit:
-                free.append(self.memory)
-
-    return PooledBuffer
+    return Packed(arrays, table, type_of_fields(kind, tuple(form)), table.__array_interface__["data"][0])

@@ -13,9 +13,10 @@ from hybridsim.engine.events.compiled.scratch import functions_of, work_space
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.events.zeno.accumulation import MAX_EVENTS_PER_TURN, cannot_accumulate
+from hybridsim.engine.native.array_layout import ALIGNED, LARGEST, ArrayLayout
 from hybridsim.engine.native.constants import MAX_SEGMENTS
 from hybridsim.engine.native.kernels import Precompiled
-from hybridsim.engine.native.struct_pack import ALIGNED, LARGEST, ArrayLayout, opaque, packed, replaced
+from hybridsim.engine.native.struct_pack import opaque, packed, replaced
 from hybridsim.engine.record.blocks import SegmentBlock
 from hybridsim.engine.record.checkpoint import damaged
 from hybridsim.engine.record.counters import Counters

@@ -17,7 +17,7 @@ from hybridsim.engine.system.instant import Instant
 if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Outcome
     from hybridsim.engine.events.state import HybridState
-    from hybridsim.engine.native.struct_pack import ArrayLayout
+    from hybridsim.engine.native.array_layout import ArrayLayout
     from hybridsim.engine.record.counters import Counters
     from hybridsim.engine.system.system import System
 

@@ -8,8 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
+from hybridsim.engine.native.array_layout import ArrayLayout, BufferPool
 from hybridsim.engine.native.kernels import Precompiled, kernel
-from hybridsim.engine.native.struct_pack import ArrayLayout, BufferPool, packed
+from hybridsim.engine.native.struct_pack import packed
 
 
 class Rows(NamedTuple):
