@@ -55,7 +55,7 @@ class ArrayLayout:
 
     def __init__(self, kinds: Sequence[Any], fields: Sequence[tuple[Any, tuple[int, ...], int]]) -> None:
         self._kinds = [(kind, len(kind._fields)) for kind in kinds]
-        self._kind: Any = namedtuple("Rows", [name for kind in kinds for name in kind._fields])  # type: ignore[misc]
+        self._kind: Any = namedtuple("Rows", [name for kind in kinds for name in kind._fields])  # type: ignore[misc]  # names known at run time
         self._specs: list[tuple[tuple[int, ...], np.dtype[Any], int, int]] = []
         self._sizes = [0] * (1 + max(block for *_, block in fields))
         # the table without the addresses of the blocks
