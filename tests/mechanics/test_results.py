@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -114,3 +116,13 @@ def test_pictures_are_refused_with_a_way_to_one(picture: Any) -> None:
 
 def test_the_way_that_is_named_leads_there() -> None:
     assert as_model().explain(0).reason
+
+
+@pytest.mark.parametrize("way", [pickle.dumps, copy.copy, copy.deepcopy])
+def test_a_run_by_series_is_not_copied_without_its_padding(way: Any) -> None:
+    with pytest.raises(hs.UsageError, match="cannot be pickled or copied") as caught:
+        way(run("taylor")._trajectory)
+    assert "to_model()" in str(caught.value)
+    with pytest.raises(hs.UsageError, match="cannot be pickled or copied"):
+        pickle.dumps(run("taylor"))
+    assert (pickle.loads(pickle.dumps(run("moreau"))).y == run("moreau").y).all()

@@ -71,6 +71,18 @@ def test_a_run_that_is_stopped_at_any_step_of_the_general_loop_goes_on(name: str
         assert part.status == "limit" and not difference(whole, part.resume(limits=None)), steps
 
 
+@pytest.mark.parametrize("name", ["rk4-dichotomy", "rk4-sign", "moreau"])
+def test_a_run_of_fixed_steps_goes_on_with_a_limit_below_one_call(name: str) -> None:
+    """Each part begins where the one before it ended, so that no step is taken twice and the parts come to an end."""
+    whole = hs.simulate("dfcs", (0.0, 0.4), integrator=name)
+    part, ends = hs.simulate("dfcs", (0.0, 0.4), integrator=name, limits={"steps": 5000}), [0.0]
+    while part.status == "limit":
+        assert part.t_end > ends[-1]
+        ends.append(part.t_end)
+        part = part.resume(limits={"steps": 5000})
+    assert len(ends) > 2 and part.stats["steps"] == whole.stats["steps"] and not difference(whole, part)
+
+
 @pytest.mark.parametrize("name", COMPILED)
 def test_a_run_goes_further(name: str) -> None:
     short = hs.simulate("dfcs", (0.0, 0.0123), integrator=name)

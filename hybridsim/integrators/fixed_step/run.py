@@ -127,17 +127,18 @@ class FixedStepRun:
                 self.origin, (), due, self.task.x0.copy(), starting=True
             ):
                 return
+        began = self.origin
         while self.origin != self.end:
             arrays = {name: np.array(getattr(self, name)) for name in _STATE}
             settled, paces = self.timetable.settled, dict(self.accumulation.paces)
             self.record.mark(partial(_checkpoint, self.origin, arrays, self.states, settled, paces))
+            if self.origin != began:  # after the mark, so that a resumed run begins here
+                self.limit_monitor.check()
             appointment = self.timetable.next(self.origin, forward=True)
             if self._run_kernel(appointment, appointment.instant if appointment else self.end):
                 return
             if self.progress:
                 self.progress((float(self.origin) - self.task.t0) / (self.task.t1 - self.task.t0))
-            if self.origin != self.end:
-                self.limit_monitor.check()
 
     def _go_on_from(self, checkpoint: Checkpoint) -> None:
         if not checkpoint.arrays.keys() >= {*_STATE, "scale"}:

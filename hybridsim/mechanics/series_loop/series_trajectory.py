@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, NoReturn, overload
 
 import numpy as np
 
 from hybridsim.engine.native.struct_pack import packed
+from hybridsim.errors import UsageError
 from hybridsim.mechanics.arrays import CASCADE, DONE, INCONSISTENT, LIMITED, LOST
 from hybridsim.mechanics.arrays_trajectory import ArraysTrajectory
 from hybridsim.mechanics.series_loop.node_segments import NodeSegments, instants, quantities
@@ -45,6 +46,13 @@ class SeriesTrajectory(ArraysTrajectory):
         self._event = np.ascontiguousarray(event)
         self._when = instants(np.concatenate([*run.when, np.zeros((0, 3))]))
         self._place = np.argsort(run.built.contacts)
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse to pickle or copy: the arrays for kernels have padding that a copy would lose."""
+        raise UsageError(
+            'a run of a MechanicalSystem with integrator="taylor" cannot be pickled or copied',
+            remedy="use its tables, such as sol.to_npz(path) or sol.table(), or run system.to_model()",
+        )
 
     # -- times and states -----------------------------------------------------------------------------------
 
