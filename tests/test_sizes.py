@@ -43,7 +43,7 @@ FILES = {
     "engine/series/tape.py": 306,
     "engine/system/system.py": 504,
     "integrators/fixed_step/moreau_kernels.py": 413,
-    "integrators/fixed_step/run.py": 419,
+    "integrators/fixed_step/run.py": 420,
     "integrators/runge_kutta/segments.py": 440,
     "mechanics/declaration/system.py": 355,
     "mechanics/series_loop/expansion.py": 312,
