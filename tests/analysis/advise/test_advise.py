@@ -343,7 +343,7 @@ def test_a_rung_dearer_than_the_full_model_is_stopped() -> None:
     limits = Limits(Budget(1e9), least=0.05, repeat=False)
     model = with_contact_outputs(dfcs(20.08, 1.03))
     question = question_of(model, "amplitude.x", None, 1e-8)
-    full = question.ask(model)
+    full = replace(question.ask(model), seconds=0.0)
     (step,) = climb([Tanh()], scene_of(model, full.motion, None), question, full, 0.01, limits)
     assert step.verdict == "stopped" and "slower than the full model: not finished after" in step.why
     assert step.value is None and not step.is_adequate
