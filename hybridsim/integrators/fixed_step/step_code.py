@@ -248,7 +248,9 @@ def _machine_text(module: Any, code: StepCode) -> str:
     pin = _Pin(code.pin_at, float(code.zeroed))
     texts = [ast.unparse(pin.visit(python_tree(text))) for text in texts]
     forcing = _Forcing(code.n)
-    forced = [ast.unparse(forcing.visit(python_tree(text))).replace("def ", "def forced_") for text in texts]
+    forced = [
+        ast.unparse(forcing.visit(python_tree(text))).replace("def ", "def forced_", 1) for text in texts
+    ]
     if forcing.values:
         lines = (f"    out[{code.n + k}] = {value}\n" for k, value in enumerate(forcing.values))
         texts += [*forced, "def force(t, x, p, z, out):\n" + "".join(lines) + "    return 0"]

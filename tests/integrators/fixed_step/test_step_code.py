@@ -20,6 +20,20 @@ KINDS = [
         ("kept", "zero"), ("step", "stage"), ("full-step", "rest-of-step")
     )
 ] + [("rk4-sign", {"friction": friction}) for friction in ("step", "stage")]
+MASS = """
+[parameters]
+k = 1
+omega = 3
+[definitions]
+STIFFNESS = "2*k"
+[states]
+x = { start = 1, der = "v" }
+v = { start = 0, der = "-STIFFNESS*x + cos(omega*t) - f" }
+[contacts.f]
+velocity = "v"
+normal = 0.5
+law = { name = "coulomb", mu = 1 }
+"""
 RUN = f"""
 import hybridsim as hs
 for integrator, options in {[KINDS[0], KINDS[7], KINDS[-1]]}:
@@ -67,3 +81,12 @@ def test_components_without_forcing_and_several_contacts_have_steps_in_one_call(
         watched = replace(model, monitors=(hs.Monitor("far", f"{model.states[0].name} - 1e6"),))
         found = [hs.simulate(m, (0.0, 2.0), integrator=integrator, step=0.002).y for m in (model, watched)]
         assert np.array_equal(*found)
+
+
+@pytest.mark.parametrize("integrator", ["rk4-dichotomy", "rk4-sign"])
+def test_a_definition_may_end_with_the_word_that_begins_a_function(integrator: str) -> None:
+    motions = []
+    for name in ("k_def", "twice"):
+        text = MASS.replace("STIFFNESS", name)
+        motions.append(hs.simulate(hs.Model.from_toml(text), (0.0, 4.0), integrator=integrator, step=0.01).y)
+    assert np.array_equal(*motions)
