@@ -51,6 +51,8 @@ _HOME = {
     "Solution": "hybridsim.solution",
     "list_integrators": "hybridsim.integrators",
     "load_solution": "hybridsim.solution",
+    "SavedState": "hybridsim.simulator",
+    "Simulator": "hybridsim.simulator",
     "simulate": "hybridsim.simulate",
     "to_ivp": "hybridsim.ivp",
     # analysis

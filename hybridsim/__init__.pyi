@@ -59,6 +59,8 @@ from hybridsim.model import list_models as list_models
 from hybridsim.model import load as load
 from hybridsim.model import load_law as load_law
 from hybridsim.simulate import simulate as simulate
+from hybridsim.simulator import SavedState as SavedState
+from hybridsim.simulator import Simulator as Simulator
 from hybridsim.solution import Event as Event
 from hybridsim.solution import Explanation as Explanation
 from hybridsim.solution import Solution as Solution

@@ -47,7 +47,7 @@ _ALSO = {
 }
 # Made by calls and not by users; errors.
 _RESULTS = {
-    *("Event", "Explanation", "Solution", "SteadyState", "Sweep"),
+    *("Event", "Explanation", "SavedState", "Solution", "SteadyState", "Sweep"),
     *("Comparison", "SuiteComparison", "Advice", "Branch", "Equilibrium", "Linearization", "Sensitivities"),
     *(
         "HybridsimError",
@@ -60,7 +60,10 @@ _RESULTS = {
     ),
 }
 # Of declarations only these methods are for users.
-_METHODS = {"Model": {"from_toml", "regularized"}}
+_METHODS = {
+    "Model": {"from_toml", "regularized"},
+    "Simulator": {"run", "start", "advance", "set", "output", "restore"},
+}
 _NOT_CALLED = {"Place.at"}
 
 
@@ -93,6 +96,13 @@ def tiny() -> hs.Model:
 
 
 @cache
+def started() -> hs.Simulator:
+    """A simulator that has started."""
+    sim = hs.Simulator(tiny(), integrator="taylor")
+    sim.start(0.0)
+    return sim
+
+
 def sliding() -> hs.Solution:
     """A run with a contact, whose methods are called."""
     return hs.simulate("dfcs", (0, 0.05), integrator="taylor")
@@ -186,6 +196,13 @@ CALLS: dict[str, tuple[Callable[[], Callable[..., Any]], Callable[[], dict[str, 
     ),
     "MechanicalSystem": (lambda: hs.MechanicalSystem, lambda: {"M": [1.0], "C": None, "K": [1.0]}),
     "simulate": (lambda: hs.simulate, lambda: {"model": tiny(), "t_span": (0, 0.1), "integrator": "taylor"}),
+    "Simulator": (lambda: hs.Simulator, lambda: {"model": tiny(), "integrator": "taylor"}),
+    "Simulator.run": (lambda: hs.Simulator(tiny(), integrator="taylor").run, lambda: {"t_span": (0, 0.1)}),
+    "Simulator.start": (lambda: hs.Simulator(tiny(), integrator="taylor").start, lambda: {"t0": 0.0}),
+    "Simulator.advance": (lambda: started().advance, lambda: {"to": 0.1}),
+    "Simulator.set": (lambda: started().set, lambda: {"inputs": {}}),
+    "Simulator.output": (lambda: started().output, lambda: {"name": "x"}),
+    "Simulator.restore": (lambda: started().restore, lambda: {"saved": started().save()}),
     "simulate a mechanical system": (
         lambda: hs.simulate,
         lambda: {"model": mechanical(), "t_span": (0, 0.1)},

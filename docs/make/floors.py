@@ -45,6 +45,7 @@ FLOORS = (
     "preparation",
     "mechanics",
     "simulate",
+    "simulator",
     "ivp",
     "analysis",
     "testing",

@@ -177,11 +177,12 @@ CHIRP = {
     "kind": {"const": "chirp"}, "f0": EXPRESSION, "f1": EXPRESSION, "duration": EXPRESSION, "amplitude": EXPRESSION,
     "phase": EXPRESSION,
 }  # fmt: skip
+HELD = {"kind": {"const": "held"}, "value": said("until it is set from outside", EXPRESSION), "unit": UNIT}
 POINTS_IN_TIME = {
     "kind": {"const": "table"}, "times": NUMBERS, "values": NUMBERS, "file": said("a CSV beside the model", TEXT),
     "columns": {"type": "array"}, "interpolation": {"enum": ["linear", "cubic"]},
 }  # fmt: skip
-INPUT = {"oneOf": [table(keys, ("kind",)) for keys in (WAVE, CHIRP, POINTS_IN_TIME)]}
+INPUT = {"oneOf": [table(keys, ("kind",)) for keys in (WAVE, CHIRP, POINTS_IN_TIME, HELD)]}
 OUTPUT = table(
     {"expr": EXPRESSION, "unit": UNIT, "modes": said('"component.mode" = the expression there', EXPRESSIONS)},
     ("expr",),

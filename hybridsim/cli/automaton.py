@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from hybridsim.expr import assignment
+from hybridsim.model.parts.inputs import HeldInput
 from hybridsim.model.parts.switching import ATTRACTION
 from hybridsim.model.smoothing.nonsmooth import COMPONENT, MODE, POWER, SURFACE, TIMED, UNCHANGED
 
@@ -93,7 +94,8 @@ def _states(model: Model) -> Iterator[str]:
 def _discrete(model: Model) -> Iterator[str]:
     starts = model.discrete_values()
     for part in model.discrete:
-        yield f"{part.name}   from {starts[part.name]:.12g} {part.unit}".rstrip()
+        held = isinstance(part, HeldInput)
+        yield f"{part.name}   {'held input, ' if held else ''}from {starts[part.name]:.12g} {part.unit}".rstrip()
 
 
 def _input(declared: Input) -> str:

@@ -137,7 +137,7 @@ class ModelTrajectory:
 
     def own_values(self, name: str) -> np.ndarray:
         """Return a quantity at the steps."""
-        parts = [self._value(name, g, g.s, g.x) for g in self.segments]
+        parts = [self.value_at(name, g, g.s, g.x) for g in self.segments]
         return np.concatenate(parts) if parts else np.zeros(0)
 
     def values(self, name: str, times: np.ndarray, side: str) -> np.ndarray:
@@ -145,10 +145,10 @@ class ModelTrajectory:
         out = np.empty(len(times))
         x, by_segment = self.by_segment(times, side)
         for segment, chosen, s in by_segment:
-            out[chosen] = self._value(name, segment, s, x[chosen])
+            out[chosen] = self.value_at(name, segment, s, x[chosen])
         return out
 
-    def _value(self, name: str, segment: Segment, s: np.ndarray, x: np.ndarray) -> np.ndarray:
+    def value_at(self, name: str, segment: Segment, s: np.ndarray, x: np.ndarray) -> np.ndarray:
         if name in self.names:
             return x[:, self.names.index(name)]
         if name in self._velocities:

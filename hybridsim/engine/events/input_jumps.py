@@ -28,8 +28,13 @@ def surfaces_jump(system: System, instant: Instant, at: Situation, forward: bool
     joined = _JOINED * math.ulp(max(abs(float(instant)), math.ulp(1.0)))
     earlier = instant.plus(-joined if forward else joined)
     before = system.vector(earlier, system.discrete(at.p), not forward)
+    return vectors_jump(system, at, before, joined)
+
+
+def vectors_jump(system: System, at: Situation, before: np.ndarray, s_error: float = 0.0) -> bool:
+    """Return whether surfaces, or rates of closed gaps, differ between the run-time vectors before and at an event."""
     z = np.maximum(at.z, 0)
-    return _differ(system, at, ((before, z), (at.p.copy(), z)), joined)
+    return bool(system.surface_of) and _differ(system, at, ((before, z), (at.p.copy(), z)), s_error)
 
 
 def gaps_jump(system: System, at: Situation, before: np.ndarray, after: np.ndarray) -> bool:

@@ -171,6 +171,7 @@ class Task:
     limits: Limits = UNLIMITED
     record: Trajectory | None = None  # record to continue, from its checkpoint
     successor: Any = None  # a stiff method (`hybridsim.engine.run.stepping.Method`), which may take over
+    is_stepped: bool = False  # whether t1 is an instant of its own, at which the run leaves a checkpoint
 
     @cached_property
     def forward(self) -> bool:

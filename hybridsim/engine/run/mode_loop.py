@@ -65,7 +65,7 @@ class ModeLoop:
         self.limit_monitor = LimitMonitor(task.limits, self.record.counters) if is_limited else None
         self.setup = setup = setup_of(system, method, task)
         self.origin, self.end, self.renewal = setup.origin, setup.end, setup.renewal
-        self.timetable = Timetable(system, self.end)
+        self.timetable = Timetable(system, self.end, task.is_stepped)
         self.adopted: Instant | None = None  # instant of the last resolved event
         self.lazy_state: LazyState  # state at the origin
         self.accumulation = Accumulation(forward=self.forward)
@@ -208,6 +208,8 @@ class ModeLoop:
             step_size = segment.last_step if self.outcome.continuous else None
             if self.notices.takes_over:
                 self._take_over()
+        if task.is_stepped and self.record.status in ("finished", "terminated"):
+            self._mark(None)  # t1 may have cut the last step short
 
     def _reach(self) -> float:
         """Return the longest segment allowed from here."""
@@ -584,7 +586,8 @@ class ModeLoop:
         terminated = recorder.schedules(schedules)
         ended = self._fired_monitors(recorder, outcome, monitors, is_last) if monitors else []
         # a run that ends here needs no admissible modes after it
-        is_over = self.forward and instant == self.end and is_only_fatal(system, outcome)
+        is_end = self.forward and instant == self.end and not self.task.is_stepped
+        is_over = is_end and is_only_fatal(system, outcome)
         if outcome.status and not (ended or terminated or is_over):
             record.status, record.message = outcome.status, f"at t = {float(instant):.9g}: {outcome.message}"
             return True

@@ -125,7 +125,7 @@ def run_task(
     """Run a task with its compiled loop if possible, and with the mode loop for the rest."""
     setup, retention = setup_of(system, method, task), task.retention
     start = setup.silent_start
-    is_plain = progress is None and task.record is None and task.limits is UNLIMITED
+    is_plain = progress is None and task.record is None and task.limits is UNLIMITED and not task.is_stepped
     # with limited retention the record must be small, but the arrays of the loop are not
     keeps_all = retention.events == math.inf and retention.segments in (None, math.inf)
     if start is None or not is_plain or not keeps_all:

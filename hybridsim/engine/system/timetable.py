@@ -27,10 +27,14 @@ class Appointment:
 
 
 class Timetable:
-    """The scheduled times of one run that ends at a given instant."""
+    """The scheduled times of one run that ends at a given instant.
 
-    def __init__(self, system: System, end: Instant) -> None:
+    has_end: whether the end is an appointment as well, as for a run in steps.
+    """
+
+    def __init__(self, system: System, end: Instant, has_end: bool = False) -> None:
         self._end = end
+        self._last = Appointment(end, ()) if has_end else None
         self.settled: Instant | None = None  # last completed appointment, or the start of the run
         values = system.values
         self._signals = system.signals
@@ -71,7 +75,7 @@ class Timetable:
             if knot is not None:
                 found.append((knot, -1))
         if not found:
-            return None
+            return self._last
         nearest = min(found, key=lambda f: abs(f[0].minus(after)))[0]
         slack = self._slack(nearest)
         together = [k for time, k in found if abs(time.minus(nearest)) <= slack]
@@ -81,7 +85,7 @@ class Timetable:
         if abs(self._end.minus(nearest)) <= slack:
             latest = self._end
         elif (self._end.minus(nearest) < 0.0) == forward:
-            return None
+            return self._last
         due = sorted(k for k in together if k >= 0)
         return Appointment(latest, tuple(k for k in due for _ in range(self._count(k, nearest))))
 

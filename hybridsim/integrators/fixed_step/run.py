@@ -85,7 +85,7 @@ class FixedStepRun:
         self.record = task.record or Trajectory(system, task.retention)
         self.limit_monitor = LimitMonitor(task.limits, self.record.counters)
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
-        self.timetable = Timetable(system, self.end)
+        self.timetable = Timetable(system, self.end, task.is_stepped)
         self.x, self.z, self.discrete = task.x0.copy(), np.maximum(task.z0, 0), task.discrete.copy()
         self._holds = np.array([a.hold for a in system.automata], dtype=np.int64)
         self.declared = [c for c, a in enumerate(system.automata) if not a.has_surface]
@@ -129,16 +129,22 @@ class FixedStepRun:
                 return
         began = self.origin
         while self.origin != self.end:
-            arrays = {name: np.array(getattr(self, name)) for name in _STATE}
-            settled, paces = self.timetable.settled, dict(self.accumulation.paces)
-            self.record.mark(partial(_checkpoint, self.origin, arrays, self.states, settled, paces))
+            self._mark()
             if self.origin != began:  # after the mark, so that a resumed run begins here
                 self.limit_monitor.check()
             appointment = self.timetable.next(self.origin, forward=True)
             if self._run_kernel(appointment, appointment.instant if appointment else self.end):
-                return
+                break
             if self.progress:
                 self.progress((float(self.origin) - self.task.t0) / (self.task.t1 - self.task.t0))
+        if self.task.is_stepped and self.record.status in ("finished", "terminated"):
+            self._mark()
+
+    def _mark(self) -> None:
+        """Store a checkpoint from which the run can continue."""
+        arrays = {name: np.array(getattr(self, name)) for name in _STATE}
+        settled, paces = self.timetable.settled, dict(self.accumulation.paces)
+        self.record.mark(partial(_checkpoint, self.origin, arrays, self.states, settled, paces))
 
     def _go_on_from(self, checkpoint: Checkpoint) -> None:
         if not checkpoint.arrays.keys() >= {*_STATE, "scale"}:

@@ -11,6 +11,7 @@ from hybridsim.expr import Expression, FunctionExpression, require_names
 from hybridsim.expr.grammar import TIME
 from hybridsim.model.parts.component import Component
 from hybridsim.model.parts.declared import Declared
+from hybridsim.model.parts.inputs import HeldInput
 from hybridsim.model.parts.quantities import Output
 
 if TYPE_CHECKING:
@@ -64,7 +65,8 @@ class Scope:
         model = self.model
         yield from (("parameter", part.name, part) for part in model.parameters)
         yield from (("state", part.name, part) for part in model.states)
-        yield from (("discrete state", part.name, part) for part in model.discrete)
+        for part in model.discrete:
+            yield "held input" if isinstance(part, HeldInput) else "discrete state", part.name, part
         yield from (("input", part.name, part) for part in model.inputs)
         for name, expr in model.definitions:
             yield "definition", name, Declared(place=expr.place)
@@ -92,7 +94,8 @@ class Scope:
 
     @cached_property
     def changed_by_reset(self) -> tuple[str, ...]:
-        return (*(part.name for part in self.model.states), *(part.name for part in self.model.discrete))
+        changed = [part for part in self.model.discrete if not isinstance(part, HeldInput)]
+        return (*(part.name for part in self.model.states), *(part.name for part in changed))
 
     @cached_property
     def all_names(self) -> frozenset[str]:

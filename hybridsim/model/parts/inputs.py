@@ -6,21 +6,29 @@ from dataclasses import dataclass
 
 from hybridsim.expr import Expression
 from hybridsim.model.parts.declared import Declared
+from hybridsim.model.parts.quantities import Discrete
 
-KINDS = ("table", "wave", "chirp")
+KINDS = ("table", "wave", "chirp", "held")
 SHAPES = ("square", "triangle", "sawtooth", "sine")
 INTERPOLATIONS = ("linear", "cubic")
 # Required fields of each kind (REQUIRED), and fields with defaults (OPTIONAL).
-REQUIRED = {"table": ("times", "values"), "wave": ("shape", "period"), "chirp": ("f0", "f1", "duration")}
+REQUIRED = {
+    "table": ("times", "values"),
+    "wave": ("shape", "period"),
+    "chirp": ("f0", "f1", "duration"),
+    "held": (),
+}
 OPTIONAL = {
     "table": ("interpolation",),
     "wave": ("amplitude", "phase", "offset", "duty"),
     "chirp": ("amplitude", "phase"),
+    "held": ("value", "unit"),
 }
 _DEFAULTS: dict[str, dict[str, object]] = {
     "table": {"interpolation": "linear"},
     "wave": {"amplitude": 1, "phase": 0, "offset": 0},
     "chirp": {"amplitude": 1, "phase": 0},
+    "held": {"value": 0, "unit": ""},
 }
 
 
@@ -38,21 +46,26 @@ class Input(Declared):
     chirp
         amplitude sin(phase + 2 pi (f0 t + (f1 - f0) t^2/(2 duration))) for 0 <= t <= duration; the frequency goes from
         f0 to f1, and is f0 before and f1 after. ``phase`` is an angle in radians.
+    held
+        A value that `Simulator` sets from outside; it is constant between two calls. It is ``value`` at the start, and
+        during the whole of a run by `simulate`. ``x0`` can replace it. A model lists it in ``discrete``.
 
     Parameters
     ----------
     name : str
         Name of the input in expressions.
     kind : str
-        "table", "wave" or "chirp".
+        "table", "wave", "chirp" or "held".
     times, values : sequence of float, optional
         Times and values (k,) of a table.
     interpolation : str, optional
         Interpolation of a table, "linear" or "cubic".
     shape : str, optional
         Shape of a wave, "square", "sine", "triangle" or "sawtooth".
-    amplitude, period, phase, offset, duty, f0, f1, duration : str or float, optional
+    amplitude, period, phase, offset, duty, f0, f1, duration, value : str or float, optional
         Expressions of parameters.
+    unit : str, optional
+        Unit of a held input.
     place : Place, optional
         Place of the declaration, for error messages.
 
@@ -77,17 +90,28 @@ class Input(Declared):
     f0: Expression | None = None
     f1: Expression | None = None
     duration: Expression | None = None
+    value: Expression | None = None
+    unit: str | None = None
 
     def __post_init__(self) -> None:
-        self._texts("name", "kind", "interpolation", "shape")
+        self._texts("name", "kind", "interpolation", "shape", "unit")
         defaults = dict(_DEFAULTS.get(self.kind, {}))
         if self.shape == "square":
             defaults["duty"] = 0.5
         for name, value in defaults.items():
             if getattr(self, name) is None:
                 object.__setattr__(self, name, value)
-        self._expressions("amplitude", "period", "phase", "offset", "duty", "f0", "f1", "duration")
+        self._expressions("amplitude", "period", "phase", "offset", "duty", "f0", "f1", "duration", "value")
         self._numbers("times", "values")
+
+    def as_held(self) -> HeldInput:
+        """Return an input of kind "held" as the part that a model keeps."""
+        known = {"place", "name", "kind", *OPTIONAL["held"]}
+        extra = [name for name in self.__dataclass_fields__ if name not in known and getattr(self, name)]
+        if extra:
+            raise self._fault(f"an input of kind held cannot have '{extra[0]}'", f"remove '{extra[0]}'")
+        assert self.value is not None and self.unit is not None
+        return HeldInput(self.name, self.value, self.unit, place=self.place)
 
     @property
     def subject(self) -> str:
@@ -97,5 +121,22 @@ class Input(Declared):
     @property
     def expressions(self) -> dict[str, Expression]:
         """The expressions of parameters by field name."""
-        fields = ("amplitude", "period", "phase", "offset", "duty", "f0", "f1", "duration")
+        fields = ("amplitude", "period", "phase", "offset", "duty", "f0", "f1", "duration", "value")
         return {name: getattr(self, name) for name in fields if getattr(self, name) is not None}
+
+
+@dataclass(frozen=True)
+class HeldInput(Discrete):
+    """An input of kind "held" as the engine sees it: a discrete state that no reset changes.
+
+    Parameters
+    ----------
+    name : str
+        Name of the input.
+    start : str or float
+        Its initial value.
+    unit : str, optional
+        Unit, for labels.
+    place : Place, optional
+        Place of the declaration, for error messages.
+    """

@@ -140,6 +140,14 @@ class Model(Declared):
             raise self._fault(f"`definitions` cannot be {self.definitions!r}", remedy) from None
         object.__setattr__(self, "definitions", definitions)
         object.__setattr__(self, "states", tuple(self._with_those_of_laws()))
+        self._hold_inputs()
+
+    def _hold_inputs(self) -> None:
+        """Move inputs of kind "held" to the discrete states, as which they are computed."""
+        held = [declared for declared in self.inputs if declared.kind == "held"]
+        if held:
+            object.__setattr__(self, "inputs", tuple(i for i in self.inputs if i.kind != "held"))
+            object.__setattr__(self, "discrete", (*self.discrete, *(i.as_held() for i in held)))
 
     def _with_those_of_laws(self) -> Iterable[State]:
         """Yield the states, including those that the laws of contacts add, with their current values."""

@@ -16,7 +16,7 @@ from hybridsim.expr import Expression, of_tree, parse, substitute
 from hybridsim.expr.grammar import TIME
 from hybridsim.expr.polynomial import difference
 from hybridsim.expr.rebuild import exchanged, with_names
-from hybridsim.model.parts.inputs import Input
+from hybridsim.model.parts.inputs import HeldInput, Input
 from hybridsim.model.smoothing.one_sided import names_of
 
 if TYPE_CHECKING:
@@ -61,11 +61,12 @@ def constant_inputs(model: Model) -> dict[str, float]:
 
 
 def lasting(model: Model) -> frozenset[str]:
-    """Return names that are constant during a run: unchanged discrete states and constant inputs."""
+    """Return names that are constant during a run: unchanged discrete states and constant inputs; no held inputs."""
     choices = [choice for c in model.components for m in c.modes for g in m.guards for choice in g.then]
     resets = [choice.reset for choice in choices]
     resets += [part.reset for part in model.monitors] + [part.reset for part in model.schedules]
-    return frozenset(part.name for part in model.discrete).difference(*resets) | constant_inputs(model).keys()
+    constants = (part.name for part in model.discrete if not isinstance(part, HeldInput))
+    return frozenset(constants).difference(*resets) | constant_inputs(model).keys()
 
 
 def step_of(name: str, argument: ast.expr, parameters: Set[str], title: str) -> TimeStep | None:

@@ -11,7 +11,7 @@ from hybridsim.model.parts.inputs import KINDS, OPTIONAL, REQUIRED, Input
 from hybridsim.model.toml.table import Table
 from hybridsim.model.toml.table_file import read_columns
 
-_TEXTS = ("shape", "interpolation")
+_TEXTS = ("shape", "interpolation", "unit")
 _NUMBERS = ("times", "values")
 
 

@@ -11,7 +11,7 @@ from hybridsim.model.laws.law import FrictionLaw
 from hybridsim.model.laws.law_with_states import ContactState
 from hybridsim.model.parts.component import Component, Guard
 from hybridsim.model.parts.contact import Contact
-from hybridsim.model.parts.inputs import Input
+from hybridsim.model.parts.inputs import HeldInput, Input
 from hybridsim.model.parts.monitor import Monitor
 from hybridsim.model.parts.quantities import State
 from hybridsim.model.parts.schedule import Schedule
@@ -40,9 +40,13 @@ def _document(model: Model) -> dict[str, Any]:
             "value", {p.name: _fields(p, "value", "unit", "title") for p in model.parameters}
         ),
         "states": {s.name: _state(s) for s in model.states if not isinstance(s, ContactState)},
-        "discrete": _short("start", {d.name: _fields(d, "start", "unit") for d in model.discrete}),
+        "discrete": _short(
+            "start",
+            {d.name: _fields(d, "start", "unit") for d in model.discrete if not isinstance(d, HeldInput)},
+        ),
         "definitions": dict(model.definitions),
-        "inputs": {signal.name: _input(signal) for signal in model.inputs},
+        "inputs": {signal.name: _input(signal) for signal in model.inputs}
+        | {d.name: _held(d) for d in model.discrete if isinstance(d, HeldInput)},
         "laws": {name: _law(law) for name, law in laws.items()},
         "contacts": {contact.name: _contact(contact, laws) for contact in model.contacts},
         "surfaces": {surface.name: _fields(surface, "expr", "above", "below") for surface in model.surfaces},
@@ -71,6 +75,10 @@ def _short(key: str, entries: dict[str, dict[str, Any]]) -> dict[str, Any]:
 
 def _input(signal: Input) -> dict[str, Any]:
     return {**_fields(signal, "kind", "times", "values", "interpolation", "shape"), **signal.expressions}
+
+
+def _held(held: HeldInput) -> dict[str, Any]:
+    return {"kind": "held", "value": held.start, "unit": held.unit}
 
 
 def _state(state: State) -> dict[str, Any]:

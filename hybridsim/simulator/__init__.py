@@ -1,0 +1,9 @@
+"""This package holds the simulator object, which runs a model whole or in steps.
+
+Read `position` first, then `saved_state` and `simulator`.
+"""
+
+from hybridsim.simulator.saved_state import SavedState
+from hybridsim.simulator.simulator import Simulator
+
+__all__ = ["SavedState", "Simulator"]

@@ -1,0 +1,185 @@
+"""The place at which a simulator stands: a checkpoint of its run, which moves forward and takes new inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from hybridsim.engine.record.checkpoint import Checkpoint
+from hybridsim.engine.record.counters import Counters
+from hybridsim.engine.record.retention import ALL, EVENTS
+from hybridsim.engine.record.segments import end_point
+from hybridsim.engine.record.trajectory import Task, Trajectory
+from hybridsim.engine.run.held_inputs import InputChange
+from hybridsim.engine.run.setup import setup_of
+from hybridsim.engine.system.instant import Instant
+from hybridsim.errors import SimulationError, UsageError, nearest
+from hybridsim.integrators.contract import Integrator
+from hybridsim.model.checks.denominators import denominators
+from hybridsim.model.parts.inputs import HeldInput
+from hybridsim.solution.event import Event
+from hybridsim.solution.model_trajectory import ModelTrajectory
+from hybridsim.solution.poles import end_at_pole
+from hybridsim.solution.run import Run
+
+
+@dataclass(frozen=True)
+class Position:
+    """The state of a simulator between two calls. It never changes; a call makes a new one.
+
+    Parameters
+    ----------
+    run : the model, the system, the method and the settings.
+    checkpoint : the state just after the last committed event.
+    events : events that happened but were not returned yet, because an exception ended the call.
+    ended : why the run has ended, or nothing.
+    """
+
+    run: Run
+    checkpoint: Checkpoint
+    counters: Counters
+    warnings: dict[str, int]
+    events: tuple[Event, ...] = ()
+    ended: str = ""
+
+    @property
+    def t(self) -> float:
+        """Return the time."""
+        return float(self.checkpoint.instant)
+
+    @property
+    def x(self) -> np.ndarray:
+        """Return the states (n,)."""
+        return self.checkpoint.arrays["x"]
+
+    @property
+    def z(self) -> np.ndarray:
+        """Return the modes (C,)."""
+        return self.checkpoint.arrays["z"]
+
+    @property
+    def discrete(self) -> np.ndarray:
+        """Return the discrete states and held inputs; methods with fixed steps store them apart."""
+        arrays = self.checkpoint.arrays
+        return self.run.system.discrete(arrays["p"]) if "p" in arrays else arrays["discrete"]
+
+    @property
+    def places(self) -> dict[str, int]:
+        """Return the place of each held input in `discrete`."""
+        return {d.name: k for k, d in enumerate(self.run.model.discrete) if isinstance(d, HeldInput)}
+
+    def value(self, name: str) -> float:
+        """Return a state, an output or another quantity."""
+        system, instant = self.run.system, self.checkpoint.instant
+        p = system.vector(instant, self.discrete)
+        trajectory = ModelTrajectory(self.run, Trajectory(system), 0.0, 0.0)
+        known = (*trajectory.names, *trajectory.quantities)
+        if not isinstance(name, str) or name not in known:
+            raise UsageError(
+                f"model {self.run.model.name} has no quantity {name!r}",
+                remedy=nearest(str(name), known, kind="quantities"),
+            )
+        segment = end_point(instant, self.z, p, self.x)
+        return float(trajectory.value_at(name, segment, segment.s, segment.x)[0])
+
+
+def begun(run: Run, commit: Callable[[Position], None]) -> None:
+    """Commit the position just after the start of a run; its task must end where it begins."""
+    run = stepped(run)
+    empty = Position(run, Checkpoint(Instant(run.task.t0), {}, None, {}), Counters(), {})
+    _follow(empty, run.task, lambda task: run.method.run(run.system, task), commit)
+
+
+def stepped(run: Run) -> Run:
+    """Return a prepared run for steps: it stores events, and states only to find poles."""
+    retention = ALL if denominators(run.model) else EVENTS
+    return replace(run, task=replace(run.task, is_stepped=True, retention=retention))
+
+
+def advanced(position: Position, to: float, commit: Callable[[Position], None]) -> None:
+    """Commit the position at a later time. An exception leaves the one at the last event committed."""
+    run = position.run
+    _follow(position, _task(position, to), lambda task: run.method.run(run.system, task), commit)
+
+
+def changed(position: Position, discrete: np.ndarray, commit: Callable[[Position], None]) -> None:
+    """Commit the position with other values of discrete states and held inputs at the same instant."""
+    run = position.run
+    if type(run.method).run is Integrator.run:
+        task = _task(position, position.t)
+        _follow(
+            position, task, lambda task: InputChange(run.system, run.method, task, discrete).run(), commit
+        )
+        return
+    # a method with fixed steps judges modes at the beginning of its next step
+    arrays = position.checkpoint.arrays | {"discrete": discrete, "turned": np.array(True)}
+    commit(replace(position, checkpoint=replace(position.checkpoint, arrays=arrays)))
+
+
+def _task(position: Position, to: float) -> Task:
+    """Return the task from a position to a time."""
+    run, record = position.run, Trajectory(position.run.system, position.run.task.retention)
+    record.checkpoint = position.checkpoint
+    record.counters, record.warnings = copy(position.counters), dict(position.warnings)
+    task = replace(run.task, t0=position.t, t1=to, record=record)
+    setup = copy(setup_of(run.system, run.method, run.task))  # its compiled loop serves all spans
+    setup.origin, setup.end = Instant(task.t0), Instant(task.t1)
+    task.setups["last"] = setup
+    return task
+
+
+def _follow(
+    position: Position,
+    task: Task,
+    go: Callable[[Task], Trajectory],
+    commit: Callable[[Position], None],
+) -> None:
+    """Carry out a task and commit its end, or the last event before it stopped, which raises an error."""
+    record = task.record
+    try:
+        record = go(task)
+    except BaseException:
+        if record is not None:
+            record.seal()
+            _commit(position, record, commit)
+        raise
+    end_at_pole(position.run.system, record)
+    _commit(position, record, commit)
+    if record.status == "interrupted":
+        raise KeyboardInterrupt(record.message)
+    if record.status not in ("finished", "terminated"):
+        raise SimulationError(
+            f"{position.run.model.name}: {record.status}, {record.message}",
+            remedy="the simulator stands just after the last event before this; restore a saved state, or start again",
+        )
+
+
+def _commit(position: Position, record: Trajectory, commit: Callable[[Position], None]) -> None:
+    checkpoint = record.checkpoint
+    if checkpoint is None:
+        return
+    happened: list[Any] = list(record.occurrences)
+    happened = happened[: len(happened) - checkpoint.occurrences]
+    events = [Event(float(o.instant), *o[1:]) for o in happened if o.kind != "corner"]
+    checkpoint = replace(checkpoint, segments=0, occurrences=0)
+    ended = record.message if record.status == "terminated" else ""
+    commit(
+        Position(
+            position.run, checkpoint, record.counters, record.warnings, (*position.events, *events), ended
+        )
+    )
+
+
+def require_running(position: Position | None, call: str) -> Position:
+    """Return the position of a simulator that has started and has not ended."""
+    if position is None:
+        raise UsageError(f"{call}() needs a simulator that has started", remedy="call sim.start(t0) first")
+    if position.ended:
+        raise UsageError(
+            f"{call}(): the run has {position.ended}", remedy="call sim.start(), sim.reset() or sim.restore()"
+        )
+    return position

@@ -1,0 +1,441 @@
+"""The class Simulator: a model with an integrator that runs whole spans, or goes step by step."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from hybridsim import arguments
+from hybridsim.calls import refusing
+from hybridsim.errors import UsageError, nearest
+from hybridsim.mechanics.declaration.system import MechanicalSystem
+from hybridsim.model import Model
+from hybridsim.preparation import prepared
+from hybridsim.simulate import KEYWORDS, simulate
+from hybridsim.simulator.position import Position, advanced, begun, changed, require_running
+from hybridsim.simulator.saved_state import SavedState, model_of, require_fit, source_of
+from hybridsim.solution.event import Event
+from hybridsim.solution.run import Run
+from hybridsim.solution.solution import Solution
+
+
+class Simulator:
+    """A model with an integrator and its settings, for many runs or for one run in steps.
+
+    `run` simulates a whole span. `start` and `advance` go from instant to instant, for example with a controller or
+    another simulator that sets inputs of kind "held" in between. One thread at a time uses a simulator: the one that
+    made it. A `copy` belongs to the thread that takes it.
+
+    Parameters
+    ----------
+    model : str, path or Model
+        A `Model`, the name of a packaged model, or the path of a ``.toml`` file.
+    integrator : str, optional
+        A name from `list_integrators`, or "auto", as in `simulate`. "auto" selects it again at each start.
+    rtol, atol : float, mapping of str to float or sequence of float, optional
+        Error control, as in `simulate`.
+    max_step, first_step : float, optional
+        Largest step, and first step after a start, as in `simulate`.
+    **options : Any
+        Options of the integrator.
+
+    Raises
+    ------
+    UsageError
+        If an argument does not fit the model or the integrator.
+    ModelError
+        If the model is faulty.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> sim = hs.Simulator("dfcs", integrator="exact")
+    >>> sim.start(0.0)
+    ()
+    >>> sim.advance(0.002)
+    (<transition f stick -> slip+ at t = 0.00171998458>,)
+    >>> sim.t, sim.modes
+    (0.002, {'f': 'slip+'})
+    """
+
+    @refusing
+    def __init__(
+        self,
+        model: Model | str | PathLike[str],
+        *,
+        integrator: str = "auto",
+        rtol: float | None = None,
+        atol: float | Mapping[str, float] | Sequence[float] | None = None,
+        max_step: float = math.inf,
+        first_step: float | None = None,
+        **options: Any,
+    ) -> None:
+        if isinstance(model, MechanicalSystem):
+            raise UsageError(
+                "a MechanicalSystem cannot be run in steps",
+                remedy="use hs.simulate, or convert the system to a model by system.to_model()",
+            )
+        self.model = arguments.chosen_model(model, None)
+        self._settings: dict[str, Any] = {
+            "integrator": integrator, "rtol": rtol, "atol": atol, "max_step": max_step, "first_step": first_step,
+        }  # fmt: skip
+        self._options = options
+        self._prepared((0.0, 0.0), self.model, None, None)  # checks the arguments, and binds the model once
+        self._position: Position | None = None
+        self._first: Position | None = None  # just after the last start
+        self._own()
+
+    def _own(self) -> None:
+        """Make the current thread the owner."""
+        self._owner, self._busy = threading.current_thread(), False
+
+    @contextmanager
+    def _mine(self, call: str) -> Iterator[None]:
+        """Refuse calls of other threads, and calls from within a call."""
+        here = threading.current_thread()
+        if self._owner is not here:
+            raise UsageError(
+                f"the simulator of model {self.model.name} belongs to thread {self._owner.name!r}, and {here.name!r} "
+                f"called {call}()",
+                remedy="let the other thread work on its own sim.copy()",
+            )
+        if self._busy:
+            raise UsageError(
+                f"{call}() was called during another call of the same simulator", remedy="use sim.copy()"
+            )
+        self._busy = True
+        try:
+            yield
+        finally:
+            self._busy = False
+
+    def _prepared(self, t_span: tuple[float, float], model: Model, x0: Any, z0: Any) -> Run:
+        """Return a prepared run with the settings of the simulator."""
+        run, _ = prepared(
+            model, t_span, x0=x0, z0=z0, t_eval=None, save="events", limits=None, options=self._options,
+            keywords=KEYWORDS, **self._settings,
+        )  # fmt: skip
+        return run
+
+    def _commit(self, position: Position) -> None:
+        self._position = position
+
+    # -- whole runs -----------------------------------------------------------------------------------------
+
+    @refusing
+    def run(
+        self,
+        t_span: tuple[float, float],
+        *,
+        params: Mapping[str, Any] | None = None,
+        x0: Mapping[str, float] | Sequence[float] | None = None,
+        z0: Mapping[str, str] | None = None,
+        t_eval: Sequence[float] | None = None,
+        save: str | float = "all",
+        limits: Mapping[str, float] | None = None,
+        progress: Callable[[float], None] | None = None,
+    ) -> Solution:
+        """Simulate a whole span and return its solution, as `simulate` does; the steps of `advance` are not affected.
+
+        Parameters
+        ----------
+        t_span : tuple of float
+            (t0, t1).
+        params, x0, z0 : mapping, optional
+            As in `simulate`.
+        t_eval : sequence of float, optional
+            As in `simulate`.
+        save : str or float, optional
+            As in `simulate`.
+        limits : mapping of str to float, optional
+            As in `simulate`.
+        progress : callable, optional
+            As in `simulate`.
+
+        Returns
+        -------
+        Solution
+            The solution.
+        """
+        return simulate(
+            self.model, t_span, params=params, x0=x0, z0=z0, t_eval=t_eval, save=save, limits=limits,
+            progress=progress, **self._settings, **self._options,
+        )  # fmt: skip
+
+    # -- steps ----------------------------------------------------------------------------------------------
+
+    @refusing
+    def start(
+        self,
+        t0: float = 0.0,
+        *,
+        params: Mapping[str, Any] | None = None,
+        x0: Mapping[str, float] | Sequence[float] | None = None,
+        z0: Mapping[str, str] | None = None,
+    ) -> tuple[Event, ...]:
+        """Start a run at t0 and return the events of that instant.
+
+        Parameters
+        ----------
+        t0 : float, optional
+            The time of the start.
+        params, x0, z0 : mapping, optional
+            As in `simulate`. A held input in x0 has that value from the start.
+
+        Returns
+        -------
+        tuple of Event
+            The events at t0, such as a clock that ticks there.
+
+        Raises
+        ------
+        UsageError
+            If an argument does not fit the model or the integrator.
+        SimulationError
+            If no motion begins from these values.
+        """
+        with self._mine("start"):
+            begin = arguments.finite_number(t0, "t0")
+            model = arguments.chosen_model(self.model, params)
+            begun(self._prepared((begin, begin), model, x0, z0), self._commit)
+            found = self._taken()
+            self._first = self._position
+            return found
+
+    @refusing
+    def advance(self, to: float, inputs: Mapping[str, float] | None = None) -> tuple[Event, ...]:
+        """Go forward to a later time and return what happened on the way, the events at that time included.
+
+        Parameters
+        ----------
+        to : float
+            The time to reach.
+        inputs : mapping of str to float, optional
+            Held inputs to set at the present time, before going on; see `set`.
+
+        Returns
+        -------
+        tuple of Event
+            The events since the last call, in order of time.
+
+        Raises
+        ------
+        UsageError
+            If an argument does not fit, or the run has ended.
+        SimulationError
+            If the motion cannot be continued to this time. The simulator then stands just after the last event.
+        """
+        with self._mine("advance"):
+            position = require_running(self._position, "advance")
+            discrete = self._with(position, inputs)
+            target = arguments.finite_number(to, "to")
+            if target < position.t:
+                raise UsageError(
+                    f"`to` is {to!r}, and the simulator is already at {position.t!r}",
+                    remedy="use a later time, or sim.restore() for an earlier state",
+                )
+            if discrete is not None:
+                changed(position, discrete, self._commit)
+                position = require_running(self._position, "advance")
+            if target > position.t:
+                advanced(position, target, self._commit)
+            return self._taken()
+
+    @refusing
+    def set(self, inputs: Mapping[str, float]) -> tuple[Event, ...]:
+        """Set held inputs at the present time and return the events that this causes at once.
+
+        A changed value is a further change at this instant: corners and modes are judged again with it. A value that
+        is equal to the present one changes nothing.
+
+        Parameters
+        ----------
+        inputs : mapping of str to float
+            New values by name. The other inputs keep theirs.
+
+        Returns
+        -------
+        tuple of Event
+            The events, for example the release of a contact.
+
+        Raises
+        ------
+        UsageError
+            For an unknown input or a value that is not a finite number.
+        SimulationError
+            If no motion is possible with these values. The simulator then stands just before the change.
+        """
+        with self._mine("set"):
+            position = require_running(self._position, "set")
+            discrete = self._with(position, inputs)
+            if discrete is not None:
+                changed(position, discrete, self._commit)
+            return self._taken()
+
+    def _with(self, position: Position, inputs: Any) -> np.ndarray | None:
+        """Return the discrete values with new inputs, or None if they are those of now."""
+        if inputs is None:
+            return None
+        if not isinstance(inputs, Mapping):
+            raise arguments.cannot_be("inputs", inputs, "use a dict of names and numbers")
+        places, discrete = position.places, position.discrete.copy()
+        for name, value in inputs.items():
+            if name not in places:
+                raise UsageError(
+                    f"`inputs` contains {name!r}, which is not a held input of model '{self.model.name}'",
+                    remedy=nearest(str(name), places, kind="held inputs"),
+                )
+            discrete[places[name]] = arguments.finite_number(value, f"`inputs` of {name}")
+        return None if discrete.tobytes() == position.discrete.tobytes() else discrete
+
+    def _taken(self) -> tuple[Event, ...]:
+        """Return the events that were not returned yet."""
+        position = self._standing
+        if position.events:
+            self._position = replace(position, events=())
+        return position.events
+
+    @property
+    def _standing(self) -> Position:
+        if self._position is None:
+            raise UsageError("the simulator has not started", remedy="call sim.start(t0) first")
+        return self._position
+
+    # -- the present state ----------------------------------------------------------------------------------
+
+    @property
+    def t(self) -> float:
+        """The present time."""
+        return self._standing.t
+
+    @property
+    def state(self) -> dict[str, float]:
+        """The present states by name."""
+        position = self._standing
+        return dict(zip(position.run.system.names, position.x.tolist(), strict=True))
+
+    @property
+    def modes(self) -> dict[str, str]:
+        """The present mode of each component, by name."""
+        system, z = self._standing.run.system, self._standing.z
+        return {a.name: a.modes[m] for a, m in zip(system.declared, z.tolist(), strict=False)}
+
+    @property
+    def inputs(self) -> dict[str, float]:
+        """The present values of the held inputs."""
+        position = self._standing
+        return {name: float(position.discrete[k]) for name, k in position.places.items()}
+
+    @property
+    def ended(self) -> str:
+        """Why the run has ended, such as a monitor that terminates it; empty while it can go on."""
+        return self._standing.ended
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Warnings since the start."""
+        return tuple(f"{m} ({n} times)" if n > 1 else m for m, n in self._standing.warnings.items())
+
+    @refusing
+    def output(self, name: str) -> float:
+        """Return the present value of a state, output, input, definition, force, or ``v_rel(contact)``.
+
+        Parameters
+        ----------
+        name : str
+            Name of the quantity, as in `Solution.output`.
+
+        Returns
+        -------
+        float
+            The value just after everything that happened so far at this time, new inputs included.
+
+        Raises
+        ------
+        UsageError
+            For an unknown name.
+        """
+        return self._standing.value(name)
+
+    # -- copies ---------------------------------------------------------------------------------------------
+
+    def copy(self) -> Simulator:
+        """Return an independent copy at the same state, which belongs to the thread that calls this.
+
+        Returns
+        -------
+        Simulator
+            The copy.
+        """
+        other = object.__new__(type(self))
+        vars(other).update(vars(self))
+        other._own()
+        return other
+
+    __copy__ = copy
+
+    def __deepcopy__(self, memo: object) -> Simulator:
+        return self.copy()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the model as text and the state as numbers; the result belongs to the thread that reads it."""
+        saved = [position and SavedState(position, self._about) for position in (self._position, self._first)]
+        return _unpickled, (source_of(self.model), self._settings | self._options, *saved)
+
+    def save(self) -> SavedState:
+        """Return the present state, to which `restore` goes back. It can be pickled.
+
+        Returns
+        -------
+        SavedState
+            The state; it never changes.
+        """
+        return SavedState(self._standing, self._about)
+
+    @property
+    def _about(self) -> str:
+        """The settings as text, which must agree for a saved state."""
+        return repr((self._settings, self._options))
+
+    @refusing
+    def restore(self, saved: SavedState) -> None:
+        """Go back, or on, to a saved state of this simulator or of another one with the same model.
+
+        Parameters
+        ----------
+        saved : SavedState
+            What `save` returned.
+
+        Raises
+        ------
+        UsageError
+            If the state belongs to another model or to other settings.
+        """
+        with self._mine("restore"):
+            if not isinstance(saved, SavedState):
+                raise arguments.cannot_be("saved", saved, "use what sim.save() returned")
+            require_fit(saved, self.model, self._about)
+            self._position = saved.position
+
+    def reset(self) -> None:
+        """Go back to the state just after the last start."""
+        with self._mine("reset"):
+            require_running(self._first, "reset")
+            self._position = self._first
+
+
+def _unpickled(
+    source: Any, settings: dict[str, Any], now: SavedState | None, first: SavedState | None
+) -> Simulator:
+    """Return a simulator from its pickled parts."""
+    simulator = Simulator(model_of(source), **settings)
+    simulator._position = None if now is None else now.position
+    simulator._first = None if first is None else first.position
+    return simulator
