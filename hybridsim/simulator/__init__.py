@@ -1,6 +1,6 @@
 """This package holds the simulator object, which runs a model whole or in steps.
 
-Read `position` first, then `saved_state` and `simulator`.
+Read `held_inputs` and `position` first, then `saved_state` and `simulator`.
 """
 
 from hybridsim.simulator.saved_state import SavedState

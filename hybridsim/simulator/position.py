@@ -14,13 +14,13 @@ from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.retention import ALL, EVENTS
 from hybridsim.engine.record.segments import end_point
 from hybridsim.engine.record.trajectory import Task, Trajectory
-from hybridsim.engine.run.held_inputs import InputChange
 from hybridsim.engine.run.setup import setup_of
 from hybridsim.engine.system.instant import Instant
 from hybridsim.errors import SimulationError, UsageError, nearest
 from hybridsim.integrators.contract import Integrator
 from hybridsim.model.checks.denominators import denominators
 from hybridsim.model.parts.inputs import HeldInput
+from hybridsim.simulator.held_inputs import InputChange
 from hybridsim.solution.event import Event
 from hybridsim.solution.model_trajectory import ModelTrajectory
 from hybridsim.solution.poles import end_at_pole
