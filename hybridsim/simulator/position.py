@@ -68,8 +68,8 @@ class Position:
         return self.run.system.discrete(arrays["p"]) if "p" in arrays else arrays["discrete"]
 
     @property
-    def places(self) -> dict[str, int]:
-        """Return the place of each held input in `discrete`."""
+    def held_indices(self) -> dict[str, int]:
+        """Return the index of each held input in `discrete`."""
         return {d.name: k for k, d in enumerate(self.run.model.discrete) if isinstance(d, HeldInput)}
 
     def value(self, name: str) -> float:

@@ -285,25 +285,25 @@ class Simulator:
             return None
         if not isinstance(inputs, Mapping):
             raise arguments.cannot_be("inputs", inputs, "use a dict of names and numbers")
-        places, discrete = position.places, position.discrete.copy()
+        held_indices, discrete = position.held_indices, position.discrete.copy()
         for name, value in inputs.items():
-            if name not in places:
+            if name not in held_indices:
                 raise UsageError(
                     f"`inputs` contains {name!r}, which is not a held input of model '{self.model.name}'",
-                    remedy=nearest(str(name), places, kind="held inputs"),
+                    remedy=nearest(str(name), held_indices, kind="held inputs"),
                 )
-            discrete[places[name]] = arguments.finite_number(value, f"`inputs` of {name}")
+            discrete[held_indices[name]] = arguments.finite_number(value, f"`inputs` of {name}")
         return None if discrete.tobytes() == position.discrete.tobytes() else discrete
 
     def _taken(self) -> tuple[Event, ...]:
         """Return the events that were not returned yet."""
-        position = self._standing
+        position = self._current
         if position.events:
             self._position = replace(position, events=())
         return position.events
 
     @property
-    def _standing(self) -> Position:
+    def _current(self) -> Position:
         if self._position is None:
             raise UsageError("the simulator has not started", remedy="call sim.start(t0) first")
         return self._position
@@ -313,35 +313,35 @@ class Simulator:
     @property
     def t(self) -> float:
         """The present time."""
-        return self._standing.t
+        return self._current.t
 
     @property
     def state(self) -> dict[str, float]:
         """The present states by name."""
-        position = self._standing
+        position = self._current
         return dict(zip(position.run.system.names, position.x.tolist(), strict=True))
 
     @property
     def modes(self) -> dict[str, str]:
         """The present mode of each component, by name."""
-        system, z = self._standing.run.system, self._standing.z
+        system, z = self._current.run.system, self._current.z
         return {a.name: a.modes[m] for a, m in zip(system.declared, z.tolist(), strict=False)}
 
     @property
     def inputs(self) -> dict[str, float]:
         """The present values of the held inputs."""
-        position = self._standing
-        return {name: float(position.discrete[k]) for name, k in position.places.items()}
+        position = self._current
+        return {name: float(position.discrete[k]) for name, k in position.held_indices.items()}
 
     @property
     def ended(self) -> str:
         """Why the run has ended, such as a monitor that terminates it; empty while it can go on."""
-        return self._standing.ended
+        return self._current.ended
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings since the start."""
-        return tuple(f"{m} ({n} times)" if n > 1 else m for m, n in self._standing.warnings.items())
+        return tuple(f"{m} ({n} times)" if n > 1 else m for m, n in self._current.warnings.items())
 
     @refusing
     def output(self, name: str) -> float:
@@ -362,7 +362,7 @@ class Simulator:
         UsageError
             For an unknown name.
         """
-        return self._standing.value(name)
+        return self._current.value(name)
 
     # -- copies ---------------------------------------------------------------------------------------------
 
@@ -397,7 +397,7 @@ class Simulator:
         SavedState
             The state; it never changes.
         """
-        return SavedState(self._standing, self._about)
+        return SavedState(self._current, self._about)
 
     @property
     def _about(self) -> str:
