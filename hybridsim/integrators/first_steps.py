@@ -1,12 +1,14 @@
-"""Take the first steps of a multistep method by a method of high order if a guard grows late."""
+"""Take the first steps of a multistep method by a method of high order if its errors would hide a guard."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 
 from hybridsim.engine.run.stepping import Flow, Step, Stepper, Watch
+from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.integrators.runge_kutta.dop853 import Dop853
 
@@ -26,17 +28,73 @@ def with_first_steps(
     tolerances: Tolerances,
     watch: Watch,
     make: Callable[[float, np.ndarray], Stepper],
+    keeps_low: bool = True,
 ) -> Stepper:
-    """Start a multistep method; if a guard grows late, the first steps are of high order."""
-    late = [int(g) for g in watch.guards if watch.sides[g] > 0 and watch.orders[g] >= _LATE]
-    return FirstSteps(flow, x0, bound, tolerances, watch, late, make) if late else make(0.0, x0)
+    """Start a multistep method; if its errors would hide a guard, the first steps are of high order.
+
+    A guard is hidden if it grows late, or if it is low: if states jump when it is zero, and it is thrown up and falls
+    back while the states change by less than atol/rtol, as in the last of infinitely many bounces. All of this time
+    the absolute tolerance exceeds the relative one, so the errors may be as large as the guard. keeps_low: whether
+    low guards count.
+    """
+    jumps = keeps_low & _jumps(flow.system)[watch.guards]
+    guards = watch.guards[(watch.sides[watch.guards] > 0) & (jumps | (watch.orders[watch.guards] >= _LATE))]
+    if len(guards) == 0:
+        return make(0.0, x0)
+    orders, rows = watch.orders[guards], np.arange(len(guards))
+    terms = flow.system.series(0.0, x0, flow.p, flow.z, np.zeros(flow.n), 0.0).guards[guards]
+    peaks, durations = throws(terms, math.copysign(1.0, bound))
+    lows = changes(flow, guards, 0.0, x0, tolerances.atol / tolerances.rtol)[1]
+    is_low = keeps_low & _jumps(flow.system)[guards] & (peaks < lows)
+    hidden = is_low | (orders >= _LATE)
+    if not hidden.any():
+        return make(0.0, x0)
+    errors = changes(flow, guards, 0.0, x0, tolerances.atol + tolerances.rtol * np.abs(x0))[1]
+    with np.errstate(all="ignore"):
+        clear = (_CLEAR * errors / np.abs(terms[rows, orders])) ** (1.0 / np.maximum(orders, 1))
+    steps = np.where(is_low, durations, clear)[hidden]
+    first = 2.0 * float(max(steps[np.isfinite(steps) & (steps > 0.0)], default=np.inf))
+    floors = np.where(is_low, lows, 0.0)[hidden]
+    return FirstSteps(flow, x0, bound, tolerances, watch, guards[hidden], floors, first, make)
+
+
+def _jumps(system: System) -> np.ndarray:
+    """Return for each guard whether states jump when it is zero, by an impact or a reset."""
+    resets = [key[1] for key in system.resets if key[0] == "choice"]
+    return system.is_unilateral[system.owner] | np.isin(system.owner, resets)
+
+
+def throws(terms: np.ndarray, direction: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the heights to which guards are thrown by their first three terms, and the times of their return.
+
+    A guard that is not pulled back has the height inf.
+    """
+    value, rate, pull = terms[:, 0], direction * terms[:, 1], -terms[:, 2]
+    with np.errstate(all="ignore"):  # value + rate t - pull t**2
+        peaks = value + np.maximum(rate, 0.0) ** 2 / (4.0 * pull)
+        times = (rate + np.sqrt(rate**2 + 4.0 * pull * value)) / (2.0 * pull)
+    return np.where((pull > 0.0) & (times > 0.0), peaks, np.inf), times
+
+
+def changes(
+    flow: Flow, guards: np.ndarray, s: float, x: np.ndarray, sizes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the values of guards, and how much they change if each state changes by its size."""
+    values = flow.guards(np.full(flow.n + 1, s), np.vstack([x, x + np.diag(sizes)]))[:, guards]
+    return values[0], np.abs(values[1:] - values[0]).sum(axis=0)
 
 
 class FirstSteps:
-    """Take steps of DOP853 until each late guard exceeds its error, then steps of the multistep method.
+    """Take steps of DOP853 until each hidden guard exceeds its error, then steps of the multistep method.
 
-    A multistep method begins at order one with errors of the size of its tolerance, while a gap that opens
-    grows with the cube of time. Without these steps a gap that has opened would seem to close again.
+    A multistep method begins at order one with errors of the size of its tolerance. A gap that opens with the cube of
+    time would seem to close again, and of bounces that accumulate the last ones would be lost.
+
+    Parameters
+    ----------
+    hidden : numbers of the hidden guards.
+    floors : values that they must exceed as well; 0 for a guard that only grows late.
+    first : length of the first step.
     """
 
     def __init__(
@@ -46,11 +104,14 @@ class FirstSteps:
         bound: float,
         tolerances: Tolerances,
         watch: Watch,
-        late: list[int],
+        hidden: np.ndarray,
+        floors: np.ndarray,
+        first: float,
         make: Callable[[float, np.ndarray], Stepper],
     ) -> None:
-        self.flow, self.bound, self.tolerances, self.late, self.make = flow, bound, tolerances, late, make
-        first = min(self._first(x0, watch), abs(bound), tolerances.max_step)
+        self.flow, self.bound, self.tolerances, self.make = flow, bound, tolerances, make
+        self.hidden, self.floors = hidden, floors
+        first = min(first, abs(bound), tolerances.max_step)
         self.stepper: Stepper = Dop853().start(flow, x0, bound, tolerances, first, watch)
         self.count, self.is_over = 0, False
 
@@ -70,24 +131,8 @@ class FirstSteps:
             self.stepper, self.is_over = self.early, False
         return self.stepper.restep(step, s)
 
-    def _first(self, x0: np.ndarray, watch: Watch) -> float:
-        """Return a first step length at which the leading terms of late guards exceed their errors."""
-        series = self.flow.system.series(0.0, x0, self.flow.p, self.flow.z, np.zeros(self.flow.n), 0.0)
-        orders = watch.orders[self.late]
-        leading = np.abs(series.guards[self.late, orders])
-        sizes = _CLEAR * self._errors(0.0, x0)[1]
-        known = (leading > 0.0) & np.isfinite(leading)
-        steps = (sizes[known] / leading[known]) ** (1.0 / orders[known])
-        return 2.0 * float(max(steps, default=np.inf))
-
-    def _errors(self, s: float, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the values of late guards, and their changes by tolerated errors of the states."""
-        sizes = self.tolerances.atol + self.tolerances.rtol * np.abs(x)
-        states = np.vstack([x, x + np.diag(sizes)])
-        values = self.flow.guards(np.full(len(states), s), states)[:, self.late]
-        return values[0], np.abs(values[1:] - values[0]).sum(axis=0)
-
     def _is_clear(self, s: float, x: np.ndarray) -> bool:
-        """Return whether the late guards exceed their errors."""
-        values, errors = self._errors(s, x)
-        return bool((values > _CLEAR * errors).all())
+        """Return whether the hidden guards exceed their errors."""
+        sizes = self.tolerances.atol + self.tolerances.rtol * np.abs(x)
+        values, errors = changes(self.flow, self.hidden, s, x, sizes)
+        return bool((values > np.maximum(_CLEAR * errors, self.floors)).all())

@@ -43,6 +43,7 @@ class ScipyIntegrator(Integrator):
     solver: ClassVar[str]
     implicit: ClassVar[bool] = False
     is_multistep: ClassVar[bool] = False  # whether it begins at order one
+    keeps_low: ClassVar[bool] = True  # whether DOP853 takes its low bounces
     starts_blind: ClassVar[bool] = False  # whether it gives up after a first step that is far too long
 
     @property
@@ -84,6 +85,7 @@ class ScipyIntegrator(Integrator):
                     self._first(first_step, s_bound - s),
                     s,
                 ),
+                self.keeps_low,
             )
         return SolverStepper(solver, self.implicit, flow, x0, s_bound, tolerances, first_step)
 
@@ -196,5 +198,7 @@ class ScipyLSODA(ScipyIntegrator):
     dense_is_accurate: ClassVar[bool] = True
     solver: ClassVar[str] = "LSODA"
     is_multistep: ClassVar[bool] = True
+    # its errors in high bounces would end all bounces two tolerances too early, where most runs stop and say so
+    keeps_low: ClassVar[bool] = False
     implicit: ClassVar[bool] = True
     starts_blind: ClassVar[bool] = True
