@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -344,8 +345,6 @@ def retention_of(save: Any, system: System) -> Retention:
 
 def run_limits(limits: Any) -> Limits:
     """Return the limits of the run from a dict of names and numbers."""
-    from dataclasses import fields
-
     from hybridsim.engine.record.limits import UNLIMITED, Limits
 
     if limits is None:

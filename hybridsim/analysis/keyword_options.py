@@ -8,6 +8,7 @@ from typing import Any
 
 from hybridsim.arguments import integrator_name
 from hybridsim.errors import UsageError, nearest
+from hybridsim.integrators.registry import integrator_class, option_names
 
 # the choices of "auto"; an option of any of them is accepted
 _OF_AUTO = ("exact", "dop853", "taylor", "rodas5p", "cvode-bdf", "scipy-dop853", "scipy-radau")
@@ -21,8 +22,6 @@ def refuse_unknown(calls: Iterable[Callable[..., Any]], options: Mapping[str, An
     UsageError
         For a name that no function and no integrator accepts, or an unknown integrator.
     """
-    from hybridsim.integrators.registry import integrator_class, option_names
-
     own = {name for call in calls for name in _names(call)}
     name = integrator_name(options.get("integrator", "auto"))
     classes = [integrator_class(one) for one in (_OF_AUTO if name == "auto" else (name,))]

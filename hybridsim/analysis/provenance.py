@@ -8,6 +8,7 @@ import platform
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+from hybridsim import __version__
 from hybridsim.model import Model
 
 _PACKAGES = ("numpy", "scipy", "numba", "scikit-sundae", "sympy", "mpmath")
@@ -19,8 +20,6 @@ def provenance(model: Model) -> dict[str, Any]:
     The hash covers the model as text with the parameters and initial values of this run. It is None for a
     model of Python functions, which has no text.
     """
-    from hybridsim import __version__
-
     return {
         "hybridsim": __version__,
         "python": f"{platform.python_implementation()} {platform.python_version()}",

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import hybridsim
 from hybridsim.cli import options, values
 from hybridsim.cli.output import complain, say
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
-from hybridsim.cli.sweep import values_by_name
+from hybridsim.cli.sweep import number_of, values_by_name
 from hybridsim.errors import UsageError
-
-if TYPE_CHECKING:
-    from hybridsim.model import Model
+from hybridsim.model import Model
 
 _EXAMPLES = """\
 quantities of the steady motion, or with --t-end of a run: amplitude.x, peak.x, maximum.f, minimum.f, mean.x, energy.x,
@@ -86,8 +85,6 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     model = values.changed_model(args)
     over = None if args.over is None else values_by_name(model, args.over)
 
-    import hybridsim
-
     with Progress(session) as progress:
         found = hybridsim.advise(
             model,
@@ -119,8 +116,6 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 def _ranges(model: Model, pairs: list[tuple[str, str]]) -> dict[str, tuple[float, float]]:
     """Return the range of each uncertain parameter; the limits of a range may be expressions."""
-    from hybridsim.cli.sweep import number_of
-
     found = {}
     for name, text in pairs:
         low, colon, high = text.partition(":")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+import hybridsim
 from hybridsim.cli.output import complain, say
 from hybridsim.cli.session import Session
 
@@ -46,7 +47,6 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 def _warm() -> None:
     """Compile all kernels by a short run of the reference model with each integrator."""
-    import hybridsim
     from hybridsim.engine.system.period import forcing_period
 
     model = hybridsim.load("dfcs")

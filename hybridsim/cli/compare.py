@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import hybridsim
 from hybridsim.cli import options, values
 from hybridsim.cli.output import require_folder, say
 from hybridsim.cli.progress import Progress
@@ -102,8 +103,6 @@ def _model(args: argparse.Namespace, folder: Path | None, session: Session) -> i
     folder = folder or Path(f"compare-{model.name}")
     require_folder(folder, "--out")
 
-    import hybridsim
-
     with Progress(session) as progress:
         comparison = hybridsim.compare(
             model,
@@ -134,8 +133,6 @@ def _suite(args: argparse.Namespace, folder: Path, session: Session) -> int:
                 remedy=f"remove {option} or --suite",
             )
     require_folder(folder, "--out")
-
-    import hybridsim
 
     with Progress(session) as progress:
         suite = hybridsim.compare_suite(

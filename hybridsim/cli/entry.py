@@ -15,7 +15,8 @@ import traceback
 import warnings
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, NoReturn, TextIO
+from types import ModuleType
+from typing import NoReturn, TextIO
 
 from hybridsim import __version__
 from hybridsim.cli import (
@@ -38,9 +39,6 @@ from hybridsim.cli.parser import Parser
 from hybridsim.cli.session import Session
 from hybridsim.errors import HybridsimError, UsageError
 from hybridsim.files import cannot_write
-
-if TYPE_CHECKING:
-    from types import ModuleType
 
 COMMANDS: tuple[ModuleType, ...] = (
     run,

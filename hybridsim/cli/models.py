@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+import hybridsim
 from hybridsim.cli.output import print_json, print_table
 from hybridsim.cli.session import Session
+from hybridsim.model import list_laws, load_law
 
 
 def add_to(commands: Any) -> None:
@@ -23,8 +25,6 @@ def add_to(commands: Any) -> None:
 
 def execute(args: argparse.Namespace, session: Session) -> int:
     """List the packaged models, or the packaged friction laws with their parameters."""
-    import hybridsim
-
     if args.laws:
         _laws(args.json)
         return 0
@@ -37,8 +37,6 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 
 def _laws(json: bool) -> None:
-    from hybridsim.model import list_laws, load_law
-
     laws = [load_law(name) for name in list_laws()]
     if json:
         print_json(

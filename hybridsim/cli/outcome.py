@@ -9,6 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from hybridsim import __version__
 from hybridsim.cli import options, values
 from hybridsim.cli.output import complain, print_json, require_apart, require_writable, say
 from hybridsim.cli.session import Session
@@ -231,8 +232,6 @@ def _summary(solution: Solution) -> list[str]:
 
 
 def _record(solution: Solution) -> dict[str, Any]:
-    from hybridsim import __version__
-
     model, has_events = solution.model, _has_events(solution)
     return {
         "hybridsim": __version__,

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+import hybridsim
 from hybridsim.cli import outcome, values
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
@@ -39,8 +40,6 @@ def add_to(commands: Any) -> None:
 def execute(args: argparse.Namespace, session: Session) -> int:
     """Load the run, continue it, and write the output; the exit code is 1 if the simulation failed."""
     outcome.check_arguments(args)
-
-    import hybridsim
 
     solution = hybridsim.load_solution(args.solution)
     t_end = None if args.t_end is None else values.end_time(solution.model, args.t_end)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+import hybridsim
 from hybridsim.cli import options, outcome, values
 from hybridsim.cli.output import complain
 from hybridsim.cli.progress import Progress
@@ -69,7 +70,6 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     model = values.changed_model(args)
     t_end = values.end_time(model, args.t_end)
 
-    import hybridsim
     from hybridsim.integrators.registry import UnknownOption, integrator_class, option_names
     from hybridsim.model.checks.doubtful import forces_of, jumps_of
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
+import hybridsim
 from hybridsim.cli import options, values
 from hybridsim.cli.output import complain, print_json, say
 from hybridsim.cli.progress import Progress
@@ -70,8 +71,6 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     """Find the steady motion and print it; the exit code is 1 if no steady motion was found."""
     options.check_plot(args)
     model = values.changed_model(args)
-
-    import hybridsim
 
     with Progress(session) as progress:
         found = hybridsim.steady_state(

@@ -8,11 +8,13 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import hybridsim
 from hybridsim.cli import options, values
 from hybridsim.cli.output import complain, require_folder, say
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.errors import HybridsimError, Place, SimulationError, UsageError
+from hybridsim.expr import evaluate, parse, require_names
 from hybridsim.files import held
 
 if TYPE_CHECKING:
@@ -129,8 +131,6 @@ def _fill(
     is_new: bool,
 ) -> int:
     """Run the sweep and write its results to a folder that this process has locked."""
-    import hybridsim
-
     journal = folder / "sweep.journal"
     if journal.exists():
         complain(f"continuing from {journal}")
@@ -259,8 +259,6 @@ def _parts(text: str) -> list[str]:
 
 def number_of(model: Model, name: str, text: str) -> float:
     """Return the value of an expression in the model's parameters."""
-    from hybridsim.expr import evaluate, parse, require_names
-
     known = model.parameter_values()
     expression = parse(text, Place(file=name, text=text))
     require_names(expression, known)

@@ -8,13 +8,11 @@ import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import hybridsim
 from hybridsim.errors import ModelError, Place, UsageError
-
-if TYPE_CHECKING:
-    from hybridsim.expr import Expression
-    from hybridsim.model import Model
+from hybridsim.expr import Expression, evaluate, parse, require_names
+from hybridsim.model import Model
 
 DEFAULT_PERIODS = 100
 COMPARED_PERIODS = 20  # shorter, because a comparison runs the model dozens of times
@@ -127,8 +125,6 @@ def add_span_argument(parser: argparse.ArgumentParser, periods: int = DEFAULT_PE
 
 def changed_model(args: argparse.Namespace) -> Model:
     """Return the model with the parameters and initial values of the command line."""
-    import hybridsim
-
     model: Model = hybridsim.load(args.model)
     with blaming_the_command_line():
         if args.param:
@@ -148,8 +144,6 @@ def blaming_the_command_line() -> Iterator[None]:
 
 
 def _expressions(pairs: Iterable[tuple[str, str]], option: str) -> dict[str, Expression]:
-    from hybridsim.expr import parse
-
     found: dict[str, Expression] = {}
     for name, text in pairs:
         if name in found:
@@ -190,8 +184,6 @@ def end_time(model: Model, text: str | None, default_periods: int = DEFAULT_PERI
 
 def _record_end(model: Model) -> float:
     """Return the time at which the longest table or chirp ends, or 0 if the model has neither."""
-    from hybridsim.expr import evaluate
-
     values = model.parameter_values()
     ends = [signal.times[-1] for signal in model.inputs if signal.kind == "table"]
     ends += [evaluate(signal.duration, values) for signal in model.inputs if signal.duration is not None]
@@ -199,8 +191,6 @@ def _record_end(model: Model) -> float:
 
 
 def _time(model: Model, text: str) -> float:
-    from hybridsim.expr import evaluate, parse, require_names
-
     if _WITH_UNIT.fullmatch(text):
         raise UsageError(
             f"--t-end: cannot read '{text}'",

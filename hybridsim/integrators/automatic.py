@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,10 +13,8 @@ from hybridsim.engine.series.interpreter import advance
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.user_functions.code import PythonCode
+from hybridsim.integrators.contract import Integrator
 from hybridsim.integrators.rosenbrock.step import linearise
-
-if TYPE_CHECKING:
-    from hybridsim.integrators.contract import Integrator
 
 _SMALL = 24  # largest number of states and guards with small tables of closed forms
 _TIGHT = 1e-10  # rtol below which series of high order are fastest

@@ -5,17 +5,15 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridsim.errors import UsageError
+from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.presentation.tables import Table
 from hybridsim.solution.by_name import ByName
 from hybridsim.solution.event import ModeInterval
-
-if TYPE_CHECKING:
-    from hybridsim.mechanics.declaration.system import MechanicalSystem
 
 
 class ArraysTrajectory(ABC):

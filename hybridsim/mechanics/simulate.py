@@ -5,17 +5,20 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridsim import arguments
+from hybridsim.engine.native.kernels import announce_compilation
+from hybridsim.engine.record.retention import ALL
 from hybridsim.errors import UsageError, nearest
+from hybridsim.integrators.registry import integrator_class, keyword_elsewhere
+from hybridsim.mechanics.declaration.system import MechanicalSystem
+from hybridsim.mechanics.series_loop.mechanical_arrays import build
+from hybridsim.mechanics.series_loop.run import MechanicalRun
 from hybridsim.mechanics.series_loop.series_trajectory import SeriesTrajectory
 from hybridsim.solution.solution import Solution
-
-if TYPE_CHECKING:
-    from hybridsim.mechanics.declaration.system import MechanicalSystem
 
 # Arguments of `simulate` that are not supported here, with the alternatives.
 _OF_MODELS = {
@@ -50,12 +53,7 @@ def simulate_mechanical(
     UsageError
         For unsupported arguments: other integrators, params, z0, a first step, or a backward run.
     """
-    from hybridsim.engine.native.kernels import announce_compilation
-    from hybridsim.engine.record.retention import ALL
     from hybridsim.integrators.fixed_step.step_length import refuse_endless, refuse_longer
-    from hybridsim.integrators.registry import integrator_class, keyword_elsewhere
-    from hybridsim.mechanics.series_loop.mechanical_arrays import build
-    from hybridsim.mechanics.series_loop.run import MechanicalRun
 
     name = arguments.integrator_name(integrator)
     if name not in ("auto", "taylor", "moreau"):

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING
 
 from hybridsim.expr.grammar import TIME
 from hybridsim.expr.polynomial import Polynomial, constant_of, direction, polynomial
 from hybridsim.expr.rebuild import rebuilt, with_names
+from hybridsim.model.parts.component import Component, Mode
+from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.one_sided import names_of
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.component import Component, Mode
-    from hybridsim.model.parts.model import Model
 
 Family = frozenset[object]
 """A key that an expression shares with all its nonzero multiples."""

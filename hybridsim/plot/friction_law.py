@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import pi
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from hybridsim.errors import UsageError
 from hybridsim.expr import evaluate, parse
 from hybridsim.model import Contact, FrictionLaw, Model, Output, State, load_law
 from hybridsim.plot import style
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from hybridsim.simulate import simulate
 
 _POINTS = 2000  # per period; a loop of Iwan's model has at most a hundred corners
 
@@ -87,8 +85,6 @@ def slip_force(contact: Contact, speed: float, *, backward: bool = False) -> flo
 def _driven(
     axes: list[Axes], contact: Contact, speed: float, amplitude: float, mean: float, integrator: str
 ) -> None:
-    from hybridsim.simulate import simulate
-
     rate = speed / amplitude
     velocity = parse(f"{mean!r} + {speed!r}*cos({rate!r}*t)")
     driven = Contact("f", velocity, contact.normal, contact.law, contact.arguments)

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from matplotlib.axes import Axes
 
 from hybridsim.errors import UsageError
 from hybridsim.plot.orbit import draw_orbit
 from hybridsim.plot.smooth_parts import refuse_arrays
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from hybridsim.solution import Solution
+from hybridsim.solution import Solution
 
 
 def friction_loop(

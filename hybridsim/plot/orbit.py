@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
@@ -14,11 +14,7 @@ from numpy.typing import NDArray
 from hybridsim.plot import style
 from hybridsim.plot.scale import label_axis
 from hybridsim.plot.smooth_parts import SmoothPart, extent, smooth_parts_of, unit_of, window_of
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from hybridsim.solution import Solution
+from hybridsim.solution import Solution
 
 Points = NDArray[np.float64]
 

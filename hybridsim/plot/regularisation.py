@@ -2,20 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from matplotlib.axes import Axes
 from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
+from hybridsim.analysis import Comparison
 from hybridsim.analysis.compare.regularised import exponent_text, exponents
+from hybridsim.analysis.compare.rows import Row
 from hybridsim.plot import style
 from hybridsim.plot.lines import draw_line, looks
 from hybridsim.plot.work_precision import handles, headline, verdict_of
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from hybridsim.analysis import Comparison
-    from hybridsim.analysis.compare.rows import Row
 
 
 def regularisation(comparison: Comparison) -> tuple[Axes, Axes]:

@@ -6,14 +6,11 @@ import itertools
 import math
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
+from matplotlib.axis import Axis
 from matplotlib.ticker import Formatter
 
 from hybridsim.plot.style import literal
-
-if TYPE_CHECKING:
-    from matplotlib.axis import Axis
 
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 # Units that take a prefix at their start: "m" and "m/s" do; "kg" (which has one) and "1/s" do not.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import bisect
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +14,7 @@ from hybridsim.engine.system.period import forcing_period
 from hybridsim.errors import UsageError, nearest
 from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.model.checks.units import units_of
-
-if TYPE_CHECKING:
-    from hybridsim.solution import Solution
+from hybridsim.solution import Solution
 
 # Points of a whole picture, about four per horizontal pixel, and the fewest per part, so that a short slip
 # among long ones remains a curve.

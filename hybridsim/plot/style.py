@@ -6,8 +6,9 @@ import textwrap
 from collections.abc import Iterable
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
 from hybridsim.errors import UsageError
@@ -15,9 +16,6 @@ from hybridsim.files import whole_file
 from hybridsim.presentation.colours import INK as INK
 from hybridsim.presentation.colours import PALETTE as PALETTE
 from hybridsim.presentation.colours import mode_colours as mode_colours
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
 
 GREY = "#9a9a9a"
 MARK = "#c4c4c4"

@@ -6,12 +6,13 @@ import itertools
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
 from hybridsim.errors import UsageError
+from hybridsim.model import Model
 from hybridsim.model.checks.units import time_unit, units_of
 from hybridsim.plot import style
 from hybridsim.plot.scale import label_axis
@@ -24,12 +25,7 @@ from hybridsim.plot.smooth_parts import (
     unit_of,
     window_of,
 )
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from hybridsim.model import Model
-    from hybridsim.solution import Event, Solution
+from hybridsim.solution import Event, Solution
 
 _MOST_QUANTITIES = 4  # the default number of quantities, and of outputs
 _MOST_MARKS = 150  # event lines; more would merge into a grey area

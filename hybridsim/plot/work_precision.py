@@ -4,22 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
 
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import EngFormatter, FixedLocator, LogLocator, NullFormatter
 
+from hybridsim.analysis import Comparison
 from hybridsim.analysis.compare.rows import QUANTITIES, Row
 from hybridsim.errors import UsageError
 from hybridsim.plot import style
 from hybridsim.plot.lines import PALE, SIZE, Look, draw_line, looks
-
-if TYPE_CHECKING:
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-
-    from hybridsim.analysis import Comparison
 
 _MOST_TICKS = 5  # across a panel
 _TITLES = {

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from hybridsim.model.parts.component import Component
+from hybridsim.model.parts.component import Component
 
 # The palette of Okabe and Ito, distinguishable with every kind of colour vision, without its pale yellow.
 INK = "#222222"

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
+from hybridsim.model.parts.component import Component
 from hybridsim.presentation.colours import INK, mode_colours
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.component import Component
 
 # Limits of the size of the HTML: rectangles in all strips, strips, first and last rows of the table, warnings.
 _RECTANGLES, _MAX_BARS, _FIRST, _LAST, _WARNINGS = 1000, 20, 20, 5, 10

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -27,9 +27,7 @@ from hybridsim.engine.record.hermite_block import TERMS, HermiteBlock
 from hybridsim.engine.record.segments import PiecewiseDense, Segment, end_point
 from hybridsim.engine.record.series_block import SeriesBlock
 from hybridsim.engine.system.instant import Instant
-
-if TYPE_CHECKING:
-    from hybridsim.engine.system.system import System
+from hybridsim.engine.system.system import System
 
 Arrays = dict[str, np.ndarray]
 

@@ -7,19 +7,16 @@ continues.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridsim.engine.record.blocks import OccurrenceList, SegmentList
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.segments import Segment
+from hybridsim.engine.record.trajectory import Trajectory
 from hybridsim.engine.run.stepping import Flow
+from hybridsim.engine.system.system import System
 from hybridsim.model.checks.denominators import Denominator, denominators
-
-if TYPE_CHECKING:
-    from hybridsim.engine.record.trajectory import Trajectory
-    from hybridsim.engine.system.system import System
 
 _LOOKS = 64  # states of a run that are checked; a denominator rarely crosses zero twice between two of them
 _HALVINGS = 60

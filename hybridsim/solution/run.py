@@ -5,25 +5,22 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridsim.engine.native.kernels import seconds_compiling
+from hybridsim.engine.record.trajectory import Task, Trajectory
 from hybridsim.engine.run.single_call import LazyTrajectory
+from hybridsim.engine.system.system import System
 from hybridsim.engine.system.user_functions.code import PythonCode
 from hybridsim.errors import RunInterrupted
+from hybridsim.integrators.contract import Integrator
+from hybridsim.model import Model
 from hybridsim.model.checks.denominators import denominators
 from hybridsim.model.checks.doubtful import jumps_of
 from hybridsim.solution.model_trajectory import ModelTrajectory
 from hybridsim.solution.poles import end_at_pole, passed_unseen
 from hybridsim.solution.solution import Solution
-
-if TYPE_CHECKING:
-    from hybridsim.engine.record.trajectory import Task, Trajectory
-    from hybridsim.engine.system.system import System
-    from hybridsim.integrators.contract import Integrator
-    from hybridsim.model import Model
 
 
 @dataclass(frozen=True)

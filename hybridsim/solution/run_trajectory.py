@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from hybridsim.presentation.tables import Table
-    from hybridsim.solution.event import Event, ModeInterval
+from hybridsim.presentation.tables import Table
+from hybridsim.solution.event import Event, ModeInterval
 
 
 class RunTrajectory(Protocol):

@@ -11,6 +11,7 @@ import numpy as np
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
 from hybridsim.solution.event import Event
+from hybridsim.solution.explain.explanation import explain
 from hybridsim.solution.files.in_tables import InTables
 from hybridsim.solution.model_trajectory import ModelTrajectory
 from hybridsim.solution.summary import as_text, in_html
@@ -103,8 +104,6 @@ class Solution(InTables):
         >>> print(sol.explain(0).reason)
         slip+ is the only mode that is admissible just after
         """
-        from hybridsim.solution.explain.explanation import explain
-
         return explain(self, number)
 
     # -- how it went ----------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,13 +16,11 @@ from hybridsim.analysis.advise.question import Number
 from hybridsim.analysis.advise.settings import Setting
 from hybridsim.analysis.advise.uncertainty import Spread
 from hybridsim.analysis.provenance import provenance
+from hybridsim.analysis.sweep import Sweep
 from hybridsim.errors import UsageError, nearest
 from hybridsim.files import json_text, write_text
 from hybridsim.model import Model
 from hybridsim.presentation.readable import Readable
-
-if TYPE_CHECKING:
-    from hybridsim.analysis.sweep import Sweep
 
 
 @dataclass(frozen=True, eq=False)

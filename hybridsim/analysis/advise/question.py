@@ -6,16 +6,19 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hybridsim.analysis.steady.measures import Measures
+from hybridsim.analysis.steady.result import SteadyState
+from hybridsim.analysis.steady.steady_state import steady_state
 from hybridsim.analysis.time_budget import Stopwatch
+from hybridsim.engine.system.period import system_period
+from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import HybridsimError, UsageError, near, nearest
 from hybridsim.model import Model, Output
-
-if TYPE_CHECKING:
-    from hybridsim.analysis.steady import SteadyState
-    from hybridsim.solution import Solution
+from hybridsim.model.checks.units import units_of
+from hybridsim.simulate import simulate
+from hybridsim.solution import Solution
 
 OF_QUANTITY = ("amplitude", "peak", "maximum", "minimum", "mean", "energy", "harmonic")
 OF_CONTACT = ("dissipated", "stick_fraction")
@@ -124,9 +127,6 @@ class Question:
 
     def motion(self, model: Model, progress: Callable[[float], None] | None = None) -> Any:
         """Return the steady state, or the run."""
-        from hybridsim.analysis.steady import steady_state
-        from hybridsim.simulate import simulate
-
         if self.t_span is None:
             steady = steady_state(model, tol=self.accuracy, progress=progress)
             if not steady.success:
@@ -201,9 +201,6 @@ class Question:
 
 def _require_limit_cycle(model: Model, steady: SteadyState) -> None:
     """Reject the vibration of an undamped free system, because its amplitude depends on the initial state."""
-    from hybridsim.engine.system.period import system_period
-    from hybridsim.engine.system.system_cache import system_of
-
     if steady.kind != "periodic" or system_period(system_of(model)) is not None:
         return
     if max(abs(steady.multipliers), default=0.0) > 1.0 - _NEUTRAL:
@@ -317,8 +314,6 @@ def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None,
 
 
 def _names(model: Model, head: str) -> list[str]:
-    from hybridsim.model.checks.units import units_of
-
     if head in OF_CONTACT:
         return [contact.name for contact in model.contacts]
     if head == "event_time":

@@ -9,6 +9,7 @@ from typing import Any
 
 from hybridsim.analysis.compare.comparison_request import named_options, row_of_integrators
 from hybridsim.errors import UsageError
+from hybridsim.integrators import integrator_class
 
 RTOLS = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
 STEPS_PER_PERIOD = (300, 600, 1200, 2400, 4800)
@@ -114,8 +115,6 @@ def _line(
     steps: Sequence[int] | None,
     untimed_span: float | None,
 ) -> Series:
-    from hybridsim.integrators import integrator_class
-
     if "adaptive" not in integrator_class(name).lacks:
         return Series(name, "rtol", tuple(RTOLS if rtols is None else rtols), options, label)
     counts = tuple(STEPS_PER_PERIOD if steps is None else steps)
@@ -130,8 +129,6 @@ def _shown_unasked(name: str) -> list[tuple[Mapping[str, Any], str]]:
         return [({}, ""), ({"events": "native"}, f"{name}, native events")]
     if name != "rk4-dichotomy":
         return [({}, "")]
-    from hybridsim.integrators import integrator_class
-
     published: Any = integrator_class(name)
 
     def eps_v(steps: float) -> float:

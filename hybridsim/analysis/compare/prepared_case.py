@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hybridsim.analysis.compare.comparison import Comparison
 from hybridsim.analysis.compare.lines import Series
@@ -17,9 +17,8 @@ from hybridsim.analysis.compare.trajectory import trajectory_of
 from hybridsim.analysis.provenance import provenance
 from hybridsim.errors import HybridsimError, UsageError
 from hybridsim.model import Model
-
-if TYPE_CHECKING:
-    from hybridsim.solution import Solution
+from hybridsim.simulate import simulate
+from hybridsim.solution import Solution
 
 
 class _OutOfTime(Exception):
@@ -43,8 +42,6 @@ class PreparedCase:
 
     def simulate(self, integrator: str, *, model: Model | None = None, **options: Any) -> Solution:
         """Run the model, or its regularised form, with an integrator."""
-        from hybridsim.simulate import simulate
-
         return simulate(model or self.model, self.t_span, integrator=integrator, **options)
 
     def call(self, line: Series, value: float) -> Callable[[], Solution]:

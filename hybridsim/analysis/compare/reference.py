@@ -5,19 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hybridsim.analysis.compare.errors_against_reference import Errors, Yardstick
 from hybridsim.analysis.compare.resets import resets_of
 from hybridsim.analysis.compare.trajectory import as_trajectory, trajectory_of
 from hybridsim.analysis.time_budget import OutOfTime, TimeBudget
 from hybridsim.errors import HybridsimError, SimulationError, UsageError
+from hybridsim.model import Model
 from hybridsim.reference.closed_forms import find_closed_form
 from hybridsim.reference.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from hybridsim.model import Model
-    from hybridsim.solution import Solution
+from hybridsim.solution import Solution
 
 
 class _TooLong(SimulationError):

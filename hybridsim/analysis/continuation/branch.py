@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridsim.analysis.steady.motion import Motion
 from hybridsim.analysis.steady.result import SteadyState
+from hybridsim.analysis.steady.shooting import Orbit
 from hybridsim.presentation.readable import Readable
-
-if TYPE_CHECKING:
-    from hybridsim.analysis.steady.motion import Motion
-    from hybridsim.analysis.steady.shooting import Orbit
 
 _ON_THE_CIRCLE = 1e-9
 _CLEAR = 1e-7  # distance from +1; a closer multiplier is +1 up to the rounding of derivatives

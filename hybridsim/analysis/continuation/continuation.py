@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,11 +22,11 @@ from hybridsim.analysis.steady.steady_state import steady_state
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.analysis.variations.sizes import sizes
 from hybridsim.calls import refusing
+from hybridsim.engine.system.period import common_period
+from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import HybridsimError, UsageError
-
-if TYPE_CHECKING:
-    from hybridsim.model import Model
-    from hybridsim.solution import Solution
+from hybridsim.model import Model
+from hybridsim.solution import Solution
 
 _CORRECTIONS = 8
 _TOL = 1e-9  # of the states' sizes and the range; the tolerance for closing an orbit
@@ -305,8 +305,6 @@ class _Follower:
 
     def _forced(self, value: float) -> tuple[float, float]:
         """Return the forcing period and its derivative with respect to the parameter."""
-        from hybridsim.engine.system.period import common_period
-        from hybridsim.engine.system.system_cache import system_of
 
         def period(at: float) -> float:
             found = common_period(system_of(self.model.with_(**{self.parameter: at})))

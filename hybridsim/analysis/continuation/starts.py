@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridsim.analysis.continuation.branch import BranchPoint
 from hybridsim.analysis.steady.motion import point_at_end
 from hybridsim.analysis.variations.off_zero import rates_of
-
-if TYPE_CHECKING:
-    from hybridsim.analysis.continuation.branch import BranchPoint
-    from hybridsim.solution import Solution
+from hybridsim.solution import Solution
 
 
 def begun_elsewhere(point: BranchPoint) -> tuple[BranchPoint, Solution]:

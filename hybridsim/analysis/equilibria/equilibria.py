@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,11 +14,10 @@ from hybridsim import arguments
 from hybridsim.analysis.equilibria.field import INSIDE, Field, is_driven
 from hybridsim.analysis.equilibria.linearize import equilibrium_near
 from hybridsim.calls import refusing
+from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import SimulationError, UsageError
+from hybridsim.model import Model
 from hybridsim.presentation.readable import Readable, in_numbers
-
-if TYPE_CHECKING:
-    from hybridsim.model import Model
 
 _MAX_COMBINATIONS = 4096  # combinations of modes that are tried
 _ROUNDS = 30
@@ -103,8 +102,6 @@ def equilibria(
     {'f': 'stick'}
     """
     model = arguments.chosen_model(model, params)
-    from hybridsim.engine.system.system_cache import system_of
-
     system = system_of(model)
     if model.schedules:
         raise UsageError(

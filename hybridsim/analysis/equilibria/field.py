@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.sides import modes_by_state
+from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tangents import TangentTape
 from hybridsim.errors import UsageError, nearest
-
-if TYPE_CHECKING:
-    from hybridsim.engine.system.system import System
-
 
 INSIDE = 1e-12  # relative to a guard's terms: the rounding error
 

@@ -6,18 +6,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridsim import arguments
 from hybridsim.analysis.equilibria.field import Field, is_driven, modes_of
 from hybridsim.calls import refusing
+from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import SimulationError, UsageError
+from hybridsim.model import Model
 from hybridsim.presentation.readable import Readable, in_numbers
-
-if TYPE_CHECKING:
-    from hybridsim.model import Model
 
 _STEPS = 50
 _DUST = 1e-10  # of the largest state: a smaller state may be rounding
@@ -156,8 +155,6 @@ def linearize(
     (False, 0.586)
     """
     model = arguments.chosen_model(model, params)
-    from hybridsim.engine.system.system_cache import system_of
-
     system = system_of(model)
     start, _ = arguments.start_values(model, at, "at")
     x = system.start_state(start)

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from hybridsim.analysis.ladder.ladder_step import DoesNotApply, LadderStep, Scene, need_contacts
-
-if TYPE_CHECKING:
-    from hybridsim.model import Contact
+from hybridsim.model import Contact
 
 
 class Rest:

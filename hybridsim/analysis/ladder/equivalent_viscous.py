@@ -12,6 +12,9 @@ from hybridsim.analysis.ladder.describing import FirstHarmonic
 from hybridsim.analysis.ladder.forces import with_forces, with_parameters
 from hybridsim.analysis.ladder.ladder_step import DoesNotApply, LadderStep, Scene, need_stick
 from hybridsim.analysis.ladder.linear_response import LinearResponse, NotLinear
+from hybridsim.analysis.steady.steady_state import steady_state
+from hybridsim.engine.system.period import system_period
+from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import HybridsimError
 from hybridsim.expr import parse, substitute
 from hybridsim.model import Model, Output
@@ -63,9 +66,6 @@ class EquivalentViscous(LadderStep):
 
 
 def _period(model: Model) -> float:
-    from hybridsim.engine.system.period import system_period
-    from hybridsim.engine.system.system_cache import system_of
-
     period = system_period(system_of(model))
     if period is None:
         raise DoesNotApply(
@@ -76,8 +76,6 @@ def _period(model: Model) -> float:
 
 def _by_runs(viscous: Model, scene: Scene, names: list[str]) -> Response:
     """Return the response of a model that is not linear, from its steady state."""
-    from hybridsim.analysis.steady import steady_state
-
     velocities = {f"{n}_v": c.velocity for n, c in zip(names, scene.model.contacts, strict=True)}
     seen = replace(viscous, outputs=(*viscous.outputs, *(Output(n, e) for n, e in velocities.items())))
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,12 +16,7 @@ from hybridsim.arguments import known_name
 from hybridsim.errors import UsageError, nearest
 from hybridsim.expr import evaluate
 from hybridsim.expr.grammar import TIME
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from hybridsim.solution import Solution
-
+from hybridsim.solution import Solution
 
 MOST_HARMONICS = 100_000  # a segment cannot resolve a higher one
 _ROUNDING = 1e-10  # relative to a guard's largest value; a smaller value is rounding after an event

@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridsim import arguments
 from hybridsim.analysis.steady.scales import coupled_sizes, stands_still
+from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.run.headway import cost
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import SimulationError
+from hybridsim.model import Model
 from hybridsim.simulate import simulate
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from hybridsim.engine.record.segments import Segment
-    from hybridsim.model import Model
-    from hybridsim.solution import Solution
+from hybridsim.solution import Solution
 
 
 @dataclass(frozen=True)

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from hybridsim.engine.system.system import CORNER
-
-if TYPE_CHECKING:
-    from hybridsim.solution import Solution
+from hybridsim.solution import Solution
 
 _NEAR = 1e-6  # of a period: an event this close to its end may move onto it while the motion settles
 _WITHOUT_EFFECT = ("near-grazing", CORNER)

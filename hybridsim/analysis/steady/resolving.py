@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
 
 from hybridsim.analysis.steady.orbit import NODES, POINTS, TO_COEFFICIENTS, Orbit
-
-if TYPE_CHECKING:
-    from hybridsim.solution import Solution
+from hybridsim.solution import Solution
 
 _TAIL = 4  # last coefficients, which show whether the polynomial is accurate
 _ASIDE_OF_ENDS = (

@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridsim.analysis.steady.measures import Measures
 from hybridsim.analysis.steady.motion import Motion
-from hybridsim.analysis.steady.shooting import multipliers, rates_at_end
+from hybridsim.analysis.steady.orbit import Orbit as PeriodOrbit
+from hybridsim.analysis.steady.resolving import orbit_of
+from hybridsim.analysis.steady.shooting import Orbit, multipliers, rates_at_end
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.arguments import whole_number
 from hybridsim.errors import HybridsimError, UsageError
+from hybridsim.model import Model
 from hybridsim.presentation.readable import Readable
-
-if TYPE_CHECKING:
-    from hybridsim.analysis.steady.orbit import Orbit as PeriodOrbit
-    from hybridsim.analysis.steady.shooting import Orbit
-    from hybridsim.model import Model
-    from hybridsim.solution import Solution
+from hybridsim.solution import Solution
 
 _NEUTRAL = 1e-9
 _MOST_LISTED = 10_000  # harmonics per quantity in a record
@@ -109,8 +107,6 @@ class SteadyState(Readable, Measures):
 
     @cached_property
     def _orbit(self) -> PeriodOrbit:
-        from hybridsim.analysis.steady.resolving import orbit_of
-
         if not self.success:
             raise UsageError(
                 f"the motion is {self.kind}: no single period represents it ({self.message})",

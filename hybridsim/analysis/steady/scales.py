@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tangents import TangentTape
-
-if TYPE_CHECKING:
-    from hybridsim.engine.system.system import System
 
 _ROUNDINGS = 10.0  # multiple of a run's relative tolerance: relative motion below it is rounding
 _LOOSEST = 1e-10  # largest tolerance used here, because a looser one hides slow motions

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridsim.analysis.steady.motion import Motion, Point, point_at, point_at_end
+from hybridsim.analysis.steady.orbit import Orbit
 from hybridsim.analysis.steady.quiet import (
     between_events,
     event_times,
@@ -20,10 +21,7 @@ from hybridsim.analysis.steady.resolving import orbit_of
 from hybridsim.analysis.steady.scales import rounding_of
 from hybridsim.analysis.variations.off_zero import rates_of
 from hybridsim.analysis.variations.sizes import ranges
-
-if TYPE_CHECKING:
-    from hybridsim.analysis.steady.orbit import Orbit
-    from hybridsim.solution import Solution
+from hybridsim.solution import Solution
 
 CLOSER = 1e-2  # multiple of the tolerance: below it, a change that no longer shrinks has converged
 LONGEST_WORD = 12  # largest number of periods after which a motion may repeat

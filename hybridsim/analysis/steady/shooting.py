@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +12,7 @@ from hybridsim.analysis.variations.off_zero import rates_of
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.arguments import SMALLEST_RTOL
 from hybridsim.errors import HybridsimError
-
-if TYPE_CHECKING:
-    from hybridsim.solution import Solution
+from hybridsim.solution import Solution
 
 _STEPS = 12
 _LESS = 0.5  # a step that leaves a larger part of the residual is rejected

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -36,14 +36,13 @@ from hybridsim.analysis.steady.shooting import Orbit, followed_closely, shoot
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.analysis.variations.sizes import ranges
 from hybridsim.calls import refusing
+from hybridsim.engine.system.period import all_periods, common_period
+from hybridsim.engine.system.system import System
 from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import UsageError
 from hybridsim.expr import evaluate
+from hybridsim.model import Model
 from hybridsim.simulate import simulate
-
-if TYPE_CHECKING:
-    from hybridsim.engine.system.system import System
-    from hybridsim.model import Model
 
 _SETTLE = 32  # periods of the first run
 _MAX_PERIODS_PER_RUN = 512
@@ -143,9 +142,6 @@ def steady_state(
     ('periodic', ['slip+', 'slip-', 'stick', 'stick'], 2.0)
     """
     model = arguments.chosen_model(model, params)
-    from hybridsim.engine.system.period import all_periods, common_period
-    from hybridsim.engine.system.system_cache import system_of
-
     tol = arguments.number(tol, "tol")
     if not 0.0 < tol < 1.0:
         raise UsageError(

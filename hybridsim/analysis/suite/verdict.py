@@ -8,6 +8,7 @@ from enum import Enum
 
 from hybridsim.analysis.compare.rows import NOT_STARTED, STOPPED, Row
 from hybridsim.analysis.suite.scenes import Scene
+from hybridsim.integrators.registry import integrator_class
 
 # The common setting of all verdicts: tight enough to show errors of the method, loose enough for every
 # integrator; for a fixed step, the choice of its authors.
@@ -50,6 +51,4 @@ def verdict(scene: Scene, rows: Sequence[Row]) -> Verdict:
 
 
 def _lacking(integrator: str) -> set[str]:
-    from hybridsim.integrators.registry import integrator_class
-
     return set(integrator_class(integrator).lacks)

@@ -23,6 +23,7 @@ from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
 from hybridsim.model import Model
 from hybridsim.model.checks.units import units_of
+from hybridsim.simulate import simulate
 
 UP, DOWN = "up", "down"
 DIRECTION = "direction"
@@ -104,8 +105,6 @@ def bifurcation(
     >>> found["x"].shape, found.dimensions
     ((2, 2, 4), ('direction', 'F0'))
     """
-    from hybridsim.simulate import simulate
-
     refuse_unknown([simulate], options)
     base = chosen_model(model, params).validate()
     points = points_of(base, {text(parameter, "parameter"): values}, "list")

@@ -12,8 +12,11 @@ import numpy as np
 from hybridsim.analysis.steady.measures import Measures
 from hybridsim.analysis.sweep.parameters import Setter
 from hybridsim.analysis.sweep.work.job import DONE, Job, Outcome, Settings, Watch
+from hybridsim.engine.system.period import common_period
+from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import SimulationError, UsageError
 from hybridsim.model import Model
+from hybridsim.simulate import simulate
 
 if TYPE_CHECKING:
     from hybridsim.ensemble.runs import LastPeriods
@@ -56,8 +59,6 @@ class LastPeriod:
 
     def run(self, model: Model, previous: Any) -> MeasuredPeriod:
         """Run the model up to the end of the measured period."""
-        from hybridsim.simulate import simulate
-
         period = period_of(model)
         solution = simulate(model, (0.0, self.after * period), **{**self.options, "save": period})
         if not solution.success:
@@ -79,7 +80,6 @@ class LastPeriod:
 
         If the watch requests a stop, the outcomes are those of the first points, as far as they were run.
         """
-        from hybridsim.engine.system.system_cache import system_of
         from hybridsim.ensemble.runs import Ensemble, can_run_together
 
         system = system_of(job.model)
@@ -117,9 +117,6 @@ def period_of(model: Model) -> float:
     UsageError
         If the model has no periodic forcing.
     """
-    from hybridsim.engine.system.period import common_period
-    from hybridsim.engine.system.system_cache import system_of
-
     period = common_period(system_of(model))
     if period is None:
         raise UsageError(

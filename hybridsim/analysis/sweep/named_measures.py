@@ -5,18 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hybridsim.analysis.compare.comparison_request import whole
 from hybridsim.analysis.keyword_options import refuse_unknown
+from hybridsim.analysis.steady.result import SteadyState
+from hybridsim.analysis.steady.steady_state import steady_state
 from hybridsim.analysis.sweep.last_period import OF_MOTION, LastPeriod, MeasuredPeriod, period_of
 from hybridsim.analysis.sweep.work.job import Incomplete
 from hybridsim.errors import SimulationError, UsageError, nearest
 from hybridsim.model import Model
 from hybridsim.model.checks.units import time_unit, units_of
-
-if TYPE_CHECKING:
-    from hybridsim.analysis.steady import SteadyState
+from hybridsim.simulate import simulate
 
 STEADY, FINAL, AFTER = "steady", "final", "after"
 # measures of a steady state: of a quantity, of a contact, of the motion
@@ -44,8 +44,6 @@ class Steady:
 
     def run(self, model: Model, previous: SteadyState | None) -> SteadyState:
         """Find the steady state, from that of the previous point if the points form a chain."""
-        from hybridsim.analysis.steady import steady_state
-
         start = {} if previous is None else _start_of(previous)
         return steady_state(model, **{**self.options, **start})
 
@@ -76,8 +74,6 @@ class Final:
 
     def run(self, model: Model, previous: Any) -> dict[str, float]:
         """Return the final states by name; in a chain the run starts from the previous point's end."""
-        from hybridsim.simulate import simulate
-
         arguments = {"save": "nothing", **self.options}
         if previous is not None:
             arguments["x0"] = previous
@@ -103,9 +99,6 @@ def named_measure(
     """
     asked = (reading_names,) if isinstance(reading_names, str) else tuple(reading_names)
     states = [state.name for state in model.states]
-    from hybridsim.analysis.steady import steady_state
-    from hybridsim.simulate import simulate
-
     heads = {word.partition(".")[0] for word in asked}
     if heads == {FINAL}:
         if "t_span" not in options:

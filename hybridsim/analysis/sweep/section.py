@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,9 +15,7 @@ from hybridsim.errors import SimulationError, UsageError
 from hybridsim.expr import parse
 from hybridsim.model import Model, Monitor
 from hybridsim.model.free_name import free_name, names_of_model
-
-if TYPE_CHECKING:
-    from hybridsim.solution import Solution
+from hybridsim.solution import Solution
 
 LEVEL = "section"  # the monitor of a level
 REPEATS = "repeats_after"

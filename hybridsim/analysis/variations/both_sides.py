@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from hybridsim.analysis.variations.carried import Carrier
+from hybridsim.analysis.variations.directions import Carried, Directions
 from hybridsim.errors import UsageError
-
-if TYPE_CHECKING:
-    from hybridsim.analysis.variations.carried import Carrier
-    from hybridsim.analysis.variations.directions import Carried, Directions
 
 _AGREE = 1e-7  # of their sizes: derivatives on both sides that differ by less are equal
 _ROUNDING = 1e-11  # of the states' sizes, for a change of everything by its own size

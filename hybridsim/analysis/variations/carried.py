@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -49,14 +49,12 @@ from hybridsim.analysis.variations.segment_events import (
 )
 from hybridsim.analysis.variations.sizes import sizes
 from hybridsim.analysis.variations.smooth import transition
+from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.series.dual_numbers import differentiated, values_and_slopes, with_slopes
+from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tangents import TangentTape
 from hybridsim.errors import UsageError
-
-if TYPE_CHECKING:
-    from hybridsim.engine.record.segments import Segment
-    from hybridsim.engine.system.system import System
-    from hybridsim.solution import Solution
+from hybridsim.solution import Solution
 
 _ROUNDING = 1e-11  # of a run's length, for a change of its own size: a time that moves by less does not move
 _SAME = 1e-9  # of its size: a state that changes by less at an event does not jump

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridsim.analysis.variations.seeds import seeds
+from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tangents import TangentTape
-
-if TYPE_CHECKING:
-    from hybridsim.engine.system.system import System
 
 _ALIKE = 1e-7  # of its terms: a smaller change is zero
 _ROUNDING = 1e-11  # of the effect of a change of everything by its own size: a smaller one is rounding

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from hybridsim.analysis.variations.off_zero import OffZero
+from hybridsim.analysis.variations.off_zero import OffZero
 
 
 @dataclass(frozen=True)

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridsim.analysis.variations.changes import Changes, Place
 from hybridsim.analysis.variations.parameters import expression_slope
 from hybridsim.analysis.variations.rounds import component_of, guard_number, is_knot
+from hybridsim.engine.record.segments import Occurrence, Segment
 from hybridsim.errors import UsageError
 from hybridsim.expr import evaluate
-
-if TYPE_CHECKING:
-    from hybridsim.engine.record.segments import Occurrence, Segment
 
 _ALIKE = 1e-7  # relative; events at one instant are one event if the derivatives of their times agree
 

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridsim.expr import Expression, evaluate
 from hybridsim.expr.slope import slope
-
-if TYPE_CHECKING:
-    from hybridsim.model import Model
+from hybridsim.model import Model
 
 
 def value_slopes(model: Model, chosen: Sequence[str]) -> np.ndarray:

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+
+import numpy as np
 
 from hybridsim.engine.events.zeno.limits import LIMIT
 from hybridsim.errors import UsageError
+from hybridsim.model import Model
 from hybridsim.solution.solution import Solution
-
-if TYPE_CHECKING:
-    import numpy as np
-
-    from hybridsim.model import Model
 
 # A series that was followed to its last thousand roundings of time has all its derivatives in the passed
 # events.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,12 +13,10 @@ from hybridsim.analysis.variations.changes import Changes, Place
 from hybridsim.analysis.variations.off_zero import OffZero, off_zero, rates_of
 from hybridsim.engine.events.zeno.limits import LIMIT
 from hybridsim.engine.lowering.reset_keys import added
+from hybridsim.engine.record.segments import Occurrence, Segment
 from hybridsim.engine.series.dual_numbers import Dual, differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.system.instant import Instant
-
-if TYPE_CHECKING:
-    from hybridsim.engine.record.segments import Occurrence, Segment
-    from hybridsim.engine.system.system import System
+from hybridsim.engine.system.system import System
 
 _ALIKE = 1e-7  # relative; guards fire together if their delays agree
 

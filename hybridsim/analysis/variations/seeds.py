@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridsim.engine.series.dual_numbers import differentiated, values_and_slopes, with_slopes
-
-if TYPE_CHECKING:
-    from hybridsim.engine.system.instant import Instant
-    from hybridsim.engine.system.system import System
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
 
 
 def rate_slopes(system: System, at: Instant) -> np.ndarray:

@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+import numpy as np
+
+from hybridsim.engine.record.segments import Occurrence, Segment
 from hybridsim.engine.series.bounded import UNIT
-
-if TYPE_CHECKING:
-    import numpy as np
-
-    from hybridsim.engine.record.segments import Occurrence, Segment
-    from hybridsim.solution import Solution
+from hybridsim.solution import Solution
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,9 +17,7 @@ from hybridsim.arguments import flag
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
 from hybridsim.presentation.readable import Readable, aligned
-
-if TYPE_CHECKING:
-    from hybridsim.solution import Solution
+from hybridsim.solution import Solution
 
 
 @dataclass(frozen=True)

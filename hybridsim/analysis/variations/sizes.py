@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from hybridsim.solution import Solution
+from hybridsim.solution import Solution
 
 _POINTS = 513  # equally spaced, in addition to the ends of all steps
 

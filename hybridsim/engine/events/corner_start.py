@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from hybridsim.engine.events.choice.event_verdicts import EventVerdicts
 from hybridsim.engine.events.outcome import Change
-
-if TYPE_CHECKING:
-    from hybridsim.engine.events.choice.event_verdicts import EventVerdicts
 
 
 def vanishing_surfaces(resolution: EventVerdicts, cluster: tuple[int, ...]) -> set[int]:

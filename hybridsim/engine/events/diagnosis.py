@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import ast
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.events.outcome import Outcome
+from hybridsim.engine.record.trajectory import Trajectory
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
+from hybridsim.expr.grammar import WHOLE_POWERS
+from hybridsim.expr.write import write
 from hybridsim.model.laws.vanishing_load import vanishing_load
-
-if TYPE_CHECKING:
-    from hybridsim.engine.events.outcome import Outcome
-    from hybridsim.engine.record.trajectory import Trajectory
-    from hybridsim.engine.system.instant import Instant
-    from hybridsim.engine.system.system import System
+from hybridsim.model.meanings import Meanings
+from hybridsim.model.smoothing.one_sided import number_of
 
 _GROWN = 1e6  # a state this many times its initial size (or 1) is reported as growing without bound
 _FASTER = 10.0  # ratio to the initial rate that indicates a pole; a constant rate does not reach it
@@ -142,10 +144,7 @@ def _steep(
 
 def power_without_value(system: System, names: list[str], t: float, x: np.ndarray) -> str:
     """Return which root or fractional power in the rates is undefined at a state, with a remedy."""
-    from hybridsim.expr.write import write
-    from hybridsim.model.meanings import Meanings
     from hybridsim.model.smoothing.nonsmooth import roots_in
-    from hybridsim.model.smoothing.one_sided import number_of
 
     model = system.model
     if model.flow is not None:
@@ -166,11 +165,7 @@ def power_without_value(system: System, names: list[str], t: float, x: np.ndarra
 
 def _power_without_series(system: System, x: np.ndarray, ahead: np.ndarray) -> str:
     """Return which power with a named whole exponent has no Taylor series at x <= 0, with a remedy."""
-    from hybridsim.expr.grammar import WHOLE_POWERS
-    from hybridsim.expr.write import write
-    from hybridsim.model.meanings import Meanings
     from hybridsim.model.smoothing.nonsmooth import roots_in
-    from hybridsim.model.smoothing.one_sided import number_of
 
     model = system.model
     if model.flow is not None:
@@ -195,10 +190,6 @@ def _power_without_series(system: System, x: np.ndarray, ahead: np.ndarray) -> s
 
 def _division_by_zero(system: System, names: list[str], x: np.ndarray) -> str:
     """Return which denominator in the rates is zero in every mode, or an empty text."""
-    from hybridsim.expr.write import write
-    from hybridsim.model.meanings import Meanings
-    from hybridsim.model.smoothing.one_sided import number_of
-
     if system.model.flow is not None:
         return ""
     lookup = Meanings(system.model).lookup

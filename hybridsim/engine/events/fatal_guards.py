@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.system.system import System
-
-if TYPE_CHECKING:
-    from hybridsim.engine.events.outcome import Outcome
 
 
 def message_of_leaving(

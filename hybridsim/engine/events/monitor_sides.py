@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridsim.engine.events.choice.verdict import side_after
-
-if TYPE_CHECKING:
-    from hybridsim.engine.events.outcome import Outcome
-    from hybridsim.model.parts.monitor import Monitor
+from hybridsim.engine.events.outcome import Outcome
+from hybridsim.model.parts.monitor import Monitor
 
 _SIDES_BY_DIRECTION = {"up": (1,), "down": (-1,), "both": (1, -1)}
 

@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from pprint import pformat
 from typing import Any
 
+from sympy import Rational, Symbol
+
 from hybridsim.engine.lowering.impulse_rows import gap_slopes, impulses, restitutions, speed_name
 from hybridsim.engine.lowering.lower import Lowering, Program
 from hybridsim.engine.lowering.program import Assign, Item, Switch, items_for
@@ -48,8 +50,6 @@ def _printer() -> Any:
             return f"({e.p}.0/{e.q}.0)"
 
         def _print_Pow(self, e: Any, rational: bool = False) -> str:
-            from sympy import Rational
-
             base = self.parenthesize(e.base, 100)
             if e.exp.is_Integer and abs(int(e.exp)) <= 64:
                 n = int(e.exp)
@@ -203,8 +203,6 @@ class Emitter:
         return self.printer.doprint(self._placed(e))
 
     def _placed(self, e: Any) -> Any:
-        from sympy import Symbol
-
         replaced = {
             s: Symbol(self.inputs[s.name], real=True) for s in e.free_symbols if s.name in self.inputs
         }

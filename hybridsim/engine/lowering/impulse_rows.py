@@ -8,13 +8,11 @@ force k per unit of load d at the onset of slip, forward and backward, (m, m) ea
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from hybridsim.engine.lowering.lower import Lowering
 from hybridsim.expr.symbolic import to_sympy
 from hybridsim.model.parts.impact import SPEED
-
-if TYPE_CHECKING:
-    from hybridsim.engine.lowering.lower import Lowering
 
 Rows = list[tuple[str, Any]]
 

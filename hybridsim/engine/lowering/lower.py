@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import sympy as sp
 
 from hybridsim.engine.lowering.affine_modes import affine_modes
 from hybridsim.engine.lowering.clusters import clusters_of, normal_loads
@@ -19,13 +21,11 @@ from hybridsim.engine.lowering.shared_rates import refuse_changed_rates, shared_
 from hybridsim.engine.lowering.stop_coupling import StopCoupling, coupling_help, stop_couplings, without_share
 from hybridsim.engine.series.layout import SIGNAL_SLOTS, Layout
 from hybridsim.errors import ModelError, Place
+from hybridsim.expr.parse import Expression
 from hybridsim.expr.simplify import is_short, simplified, written_out
 from hybridsim.expr.symbolic import to_sympy, without_distributions
+from hybridsim.model.parts.model import Model
 from hybridsim.model.parts.switching import ATTRACTION
-
-if TYPE_CHECKING:
-    from hybridsim.expr.parse import Expression
-    from hybridsim.model.parts.model import Model
 
 
 @dataclass
@@ -56,8 +56,6 @@ class Lowering:
     """The steps from a `Model` to a `Program`, with the symbol table that they share."""
 
     def __init__(self, model: Model) -> None:
-        import sympy as sp
-
         self.sp = sp
         self.model = model
         self.components: tuple[Any, ...] = tuple(model.all_components())

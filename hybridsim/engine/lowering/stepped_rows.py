@@ -9,10 +9,9 @@ upper and lower limit of stick.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from hybridsim.engine.lowering.lower import Lowering
+from hybridsim.engine.lowering.lower import Lowering
 
 
 def stepped(lowering: Lowering) -> list[tuple[str, Any]]:

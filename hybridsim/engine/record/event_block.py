@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from copy import copy
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridsim.engine.native.kernels import Precompiled, kernel
 from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.system.instant import Instant
-
-if TYPE_CHECKING:
-    from hybridsim.engine.system.system import System
+from hybridsim.engine.system.system import System
 
 
 @kernel

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridsim.engine.record.counters import Counters
+from hybridsim.engine.run.segment_run import SegmentRun
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.instant import Instant
-
-if TYPE_CHECKING:
-    from hybridsim.engine.record.counters import Counters
-    from hybridsim.engine.run.segment_run import SegmentRun
-    from hybridsim.engine.system.system import System
+from hybridsim.engine.system.system import System
 
 # Approximate seconds for a step in Python, a step in compiled code, and an event. The cost is computed from counts, so
 # that a run ends at the same step on every machine.

@@ -5,22 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.events.outcome import Outcome
+from hybridsim.engine.events.state import HybridState
+from hybridsim.engine.native.array_layout import ArrayLayout
+from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.event_block import EventBlock
 from hybridsim.engine.record.segments import Segment, end_point
 from hybridsim.engine.run.event_loop import AT_TARGET, FULL
 from hybridsim.engine.system.instant import Instant
-
-if TYPE_CHECKING:
-    from hybridsim.engine.events.outcome import Outcome
-    from hybridsim.engine.events.state import HybridState
-    from hybridsim.engine.native.array_layout import ArrayLayout
-    from hybridsim.engine.record.counters import Counters
-    from hybridsim.engine.system.system import System
-
+from hybridsim.engine.system.system import System
 
 ARRIVED, PAUSED, BEFORE_SOMETHING = 0, 1, 2  # why a compiled call ended
 

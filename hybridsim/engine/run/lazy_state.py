@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from hybridsim.engine.events.outcome import Outcome
-    from hybridsim.engine.system.instant import Instant
-    from hybridsim.engine.system.system import System
+from hybridsim.engine.events.outcome import Outcome
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
 
 
 class LazyState:

@@ -9,7 +9,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,14 +17,12 @@ from hybridsim.engine.native.kernels import call, kernel
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.record.trajectory import Task, Trajectory
+from hybridsim.engine.run.headway import Headway
+from hybridsim.engine.run.segment_run import SegmentRun
 from hybridsim.engine.run.stepping import Flow, Method
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
-
-if TYPE_CHECKING:
-    from hybridsim.engine.run.headway import Headway
-    from hybridsim.engine.run.segment_run import SegmentRun
 
 # Chattering: this many consecutive events, between which no state moves by more than this fraction of its range.
 _EVENTS, _SHARE = 200, 1e-3

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridsim.engine.events.dissipation_check import require_dissipation
 from hybridsim.engine.system.modules import Compiled, compiled
 from hybridsim.engine.system.system import System
+from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.explicit_corners import smoothed
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.model import Model
 
 # CPU seconds to compile a function: a fixed part, and a part per character of its source. Fitted to the packaged models
 # (0.1 s each) and to two colliding discs (5.0 s, 570 000 characters); accurate to a factor of two.

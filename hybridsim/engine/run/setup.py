@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.events.start import settled_start
 from hybridsim.engine.events.state import HybridState
+from hybridsim.engine.record.trajectory import Task
+from hybridsim.engine.run.compiled_loop import CompiledLoop
 from hybridsim.engine.run.lazy_state import LazyState
+from hybridsim.engine.run.stepping import Method
 from hybridsim.engine.system.instant import Instant
-
-if TYPE_CHECKING:
-    from hybridsim.engine.events.outcome import Outcome
-    from hybridsim.engine.record.trajectory import Task
-    from hybridsim.engine.run.compiled_loop import CompiledLoop
-    from hybridsim.engine.run.stepping import Method
-    from hybridsim.engine.system.system import System
+from hybridsim.engine.system.system import System
 
 # Number of turns of the fastest angle after which a segment without events is restarted, because rounding then reaches
 # 1e-13.

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 
@@ -20,17 +20,15 @@ from hybridsim.engine.record.block_list import BlockList, SegmentBlockList
 from hybridsim.engine.record.blocks import OccurrenceList
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.limits import UNLIMITED
+from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.record.trajectory import Task, Trajectory
 from hybridsim.engine.run.compiled_loop import CompiledLoop
+from hybridsim.engine.run.kernel_run import KernelRun
 from hybridsim.engine.run.mode_loop import ModeLoop
 from hybridsim.engine.run.setup import setup_of
 from hybridsim.engine.run.stepping import Method
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.system import System
-
-if TYPE_CHECKING:
-    from hybridsim.engine.record.segments import Occurrence
-    from hybridsim.engine.run.kernel_run import KernelRun
 
 
 class LazyTrajectory(Trajectory):

@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from hybridsim.engine.series.optimise import optimised
 from hybridsim.engine.series.tape import ABS, ANGLE, EQUAL, INTEGRAL, TapeBuilder
 from hybridsim.errors import ModelError
+from hybridsim.expr import Expression
 from hybridsim.expr.symbolic import to_sympy
-
-if TYPE_CHECKING:
-    from hybridsim.expr import Expression
 
 
 @dataclass(frozen=True)
@@ -93,8 +92,6 @@ def scalar_tape(
 @lru_cache(maxsize=256)
 def is_same(first: Expression, second: Expression, vanishing: str) -> bool:
     """Return whether two expressions agree algebraically when one of their arguments is zero."""
-    import sympy as sp
-
     from hybridsim.expr.simplify import simplified
 
     names = tuple(sorted(first.names | second.names | {vanishing}))
@@ -103,8 +100,6 @@ def is_same(first: Expression, second: Expression, vanishing: str) -> bool:
 
 
 def _form(expression: Expression, names: Sequence[str], positive: str) -> Any:
-    import sympy as sp
-
     plain = {name: sp.Symbol(f"v_{name}", real=True) for name in names}
     form = to_sympy(expression, plain)
     if positive in plain:  # so that |v| is v

@@ -6,16 +6,13 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Mapping
 from fractions import Fraction
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridsim.engine.system.instant import Instant, multiple
 from hybridsim.errors import ModelError
 from hybridsim.expr import evaluate
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.inputs import Input
+from hybridsim.model.parts.inputs import Input
 
 _TWO_PI = 2.0 * math.pi
 # knots of a wave as fractions of its period, with (value, slope per period) just after each knot

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -23,14 +23,11 @@ from hybridsim.engine.system.modules import compiled
 from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.signals import Signal
 from hybridsim.model.parts.component import Corner, LoadAutomaton
+from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.explicit_corners import smoothed
 from hybridsim.model.smoothing.jumps import SIGN
 from hybridsim.model.smoothing.steps_in_time import constant_inputs
 from hybridsim.model.toml.automata import SINGLE
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.model import Model
-
 
 CORNER = "corner"  # kind of the event in which a corner changes its side
 

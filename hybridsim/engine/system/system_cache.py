@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.model import Model
+from hybridsim.model.parts.model import Model
 
 _MAX_SYSTEMS = 16  # largest number of cached systems, enough for loops over several models
 

@@ -5,13 +5,10 @@ from __future__ import annotations
 import math
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from hybridsim.engine.system.instant import Instant, multiple
+from hybridsim.engine.system.system import System
 from hybridsim.expr import evaluate
-
-if TYPE_CHECKING:
-    from hybridsim.engine.system.system import System
 
 
 @dataclass(frozen=True)

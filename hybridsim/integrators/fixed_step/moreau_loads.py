@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from hybridsim.errors import UsageError
+from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.one_sided import names_of
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.model import Model
 
 
 def refuse_loads_of_friction(model: Model, integrator: str) -> None:

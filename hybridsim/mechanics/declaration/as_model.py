@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
 
 from hybridsim.expr import parse
-from hybridsim.mechanics.declaration.system import Harmonic
+from hybridsim.mechanics.declaration.system import Harmonic, MechanicalSystem
 from hybridsim.model import Contact, Impact, Model, Parameter, State
 from hybridsim.model.free_name import free_name
-
-if TYPE_CHECKING:
-    from hybridsim.mechanics.declaration.system import MechanicalSystem
 
 
 def as_model(system: MechanicalSystem) -> Model:
@@ -18,8 +17,6 @@ def as_model(system: MechanicalSystem) -> Model:
 
     An angular frequency becomes a parameter, so that its angle stays accurate over any time.
     """
-    import numpy as np
-
     n, inverse = system.n, np.linalg.inv(system.M.toarray())
     K, C = inverse @ system.K.toarray(), inverse @ system.C.toarray()
     B, D = (

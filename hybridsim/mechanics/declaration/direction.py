@@ -5,13 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from numbers import Integral
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hybridsim.arguments import as_real, is_row
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.declared import Declared
-
+from hybridsim.model.parts.declared import Declared
 
 _MOVES = "; for coefficients that vary in time or space write an hs.Model, starting from system.to_model()"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -16,13 +16,12 @@ from hybridsim.expr.evaluate import resolve
 from hybridsim.mechanics.declaration.direction import finite, weights
 from hybridsim.mechanics.declaration.impact import MechanicalImpact
 from hybridsim.mechanics.declaration.mass import require_positive_definite
+from hybridsim.model import Model
 from hybridsim.model.laws.law import FrictionLaw
 from hybridsim.model.library import load_law
+from hybridsim.model.parts.contact import Contact
 from hybridsim.model.parts.declared import Declared, as_tuple
 from hybridsim.model.parts.frozen_map import FrozenMap
-
-if TYPE_CHECKING:
-    from hybridsim.model import Model
 
 Part = TypeVar("Part")
 
@@ -129,8 +128,6 @@ class MechanicalContact(Declared):
         ModelError
             For a parameter that the law does not have, or one without a value.
         """
-        from hybridsim.model.parts.contact import Contact
-
         checked = Contact(self.name, "v", self.normal, self.law, self.arguments).values()  # type: ignore[arg-type]  # made an expression
         known = {name: value for name, value in checked.items() if name != "N"}
         return resolve(known)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NoReturn, overload
+from typing import Any, NoReturn, overload
 
 import numpy as np
 
@@ -12,13 +12,10 @@ from hybridsim.engine.native.struct_pack import packed
 from hybridsim.errors import UsageError
 from hybridsim.mechanics.arrays import CASCADE, DONE, INCONSISTENT, LIMITED, LOST
 from hybridsim.mechanics.arrays_trajectory import ArraysTrajectory
+from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.mechanics.series_loop.node_segments import NodeSegments, instants, quantities
-from hybridsim.mechanics.series_loop.run import STATUS, new_scratch, new_state, reach_kernels
+from hybridsim.mechanics.series_loop.run import STATUS, MechanicalRun, new_scratch, new_state, reach_kernels
 from hybridsim.solution.event import Event
-
-if TYPE_CHECKING:
-    from hybridsim.mechanics.declaration.system import MechanicalSystem
-    from hybridsim.mechanics.series_loop.run import MechanicalRun
 
 _MODES = {0: "stick", 1: "slip+", -1: "slip-"}
 _GUARDS = {-1: "", 0: "velocity", 1: "upper", 2: "lower"}

@@ -5,15 +5,12 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from hybridsim.expr.grammar import TIME
 from hybridsim.expr.walk import NoValue, value_of
 from hybridsim.model.meanings import Meanings
+from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.one_sided import names_of, never_negative
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.model import Model
 
 
 @dataclass(frozen=True)

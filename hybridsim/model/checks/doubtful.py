@@ -6,7 +6,6 @@ import ast
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from hybridsim.errors import HybridsimError, Place
 from hybridsim.expr import Expression
@@ -15,13 +14,11 @@ from hybridsim.model.checks.pulses import pulse_in
 from hybridsim.model.laws.force_signs import wrong_reactions, wrong_signs
 from hybridsim.model.laws.velocity_powers import velocity_powers
 from hybridsim.model.meanings import Meanings
+from hybridsim.model.parts.component import Component, Mode
+from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.explicit_corners import smoothing_of
 from hybridsim.model.smoothing.nonsmooth import JUMPS, UNCHANGED, uses_primitives
 from hybridsim.model.smoothing.one_sided import names_of, never_negative, number_of
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.component import Component, Mode
-    from hybridsim.model.parts.model import Model
 
 
 @dataclass(frozen=True)

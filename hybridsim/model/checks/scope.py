@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 from hybridsim.errors import ExpressionError, ModelError, Place, nearest
 from hybridsim.expr import Expression, FunctionExpression, require_names
 from hybridsim.expr.grammar import TIME
 from hybridsim.model.parts.component import Component
+from hybridsim.model.parts.contact import Contact
 from hybridsim.model.parts.declared import Declared
 from hybridsim.model.parts.inputs import HeldInput
+from hybridsim.model.parts.model import Model
 from hybridsim.model.parts.quantities import Output
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.contact import Contact
-    from hybridsim.model.parts.model import Model
 
 
 class Scope:

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
-from hybridsim.expr import of_tree, rounding_of
+from hybridsim.expr import Expression, of_tree, rounding_of
 from hybridsim.expr.grammar import TIME
 from hybridsim.expr.rebuild import with_names
 from hybridsim.model.meanings import Meanings
-from hybridsim.model.parts.component import Corner
+from hybridsim.model.parts.component import Component, Corner
+from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.nonsmooth import is_clear_of_zero
 from hybridsim.model.smoothing.one_sided import names_of, never_negative, number_of
-
-if TYPE_CHECKING:
-    from hybridsim.expr import Expression
-    from hybridsim.model.parts.component import Component
-    from hybridsim.model.parts.model import Model
 
 _ULP = 2.0**-52  # relative spacing of doubles: the uncertainty of a start value that is not a whole number
 

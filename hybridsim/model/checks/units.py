@@ -5,13 +5,10 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from hybridsim.expr import Expression
-    from hybridsim.model.parts.contact import Contact
-    from hybridsim.model.parts.model import Model
-
+from hybridsim.expr import Expression
+from hybridsim.model.parts.contact import Contact
+from hybridsim.model.parts.model import Model
 
 _COUNT = 4  # multiples of 1/4 up to this count as dimensionless factors
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from hybridsim.errors import ModelError
 from hybridsim.model.checks.automata import check_automata
 from hybridsim.model.checks.contacts import check_contacts
@@ -16,9 +14,7 @@ from hybridsim.model.checks.signals import check_signals
 from hybridsim.model.checks.surfaces import check_surfaces
 from hybridsim.model.checks.values import check_values
 from hybridsim.model.checks.velocity_powers import check_velocity_powers
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.model import Model
+from hybridsim.model.parts.model import Model
 
 
 def find_errors(model: Model) -> tuple[ModelError, ...]:

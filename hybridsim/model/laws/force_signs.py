@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Iterator, Mapping
-from typing import TYPE_CHECKING
 
 from hybridsim.expr import Expression, parse
 from hybridsim.expr.grammar import TIME
 from hybridsim.model.laws.law import LOAD_RATE, NORMAL, SPEED
 from hybridsim.model.parts.contact import Contact
+from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.one_sided import number_of
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.model import Model
 
 # test speeds relative to the nominal velocity; a warning requires a wrong sign at all of them
 _SPEEDS = (

@@ -5,16 +5,13 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from hybridsim.expr.grammar import TIME
 from hybridsim.model.laws.law import NORMAL
 from hybridsim.model.meanings import Meanings
+from hybridsim.model.parts.contact import Contact
+from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.one_sided import names_of, number_of
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.contact import Contact
-    from hybridsim.model.parts.model import Model
 
 _FADED = 1e-6  # fraction of the initial load below which the steps of such a law are too small to continue
 

@@ -5,18 +5,15 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from hybridsim.errors import Place
+from hybridsim.expr import Expression
 from hybridsim.expr.grammar import WHOLE_POWERS
 from hybridsim.expr.write import write
 from hybridsim.model.meanings import Family, Meanings
+from hybridsim.model.parts.component import Component
+from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.one_sided import names_of, number_of
-
-if TYPE_CHECKING:
-    from hybridsim.expr import Expression
-    from hybridsim.model.parts.component import Component
-    from hybridsim.model.parts.model import Model
 
 
 @dataclass(frozen=True)

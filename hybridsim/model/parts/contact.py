@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 from hybridsim.errors import ModelError, nearest
 from hybridsim.expr import Expression, parse, substitute
 from hybridsim.expr.evaluate import dependency_order
 from hybridsim.model.laws.law import LOAD_RATE, NORMAL, SPEED, FrictionLaw
+from hybridsim.model.laws.law_with_states import components_of, states_of
 from hybridsim.model.parts.component import Choice, Component, Guard, LoadAutomaton, Mode, Surface
 from hybridsim.model.parts.declared import Declared
 from hybridsim.model.parts.frozen_map import FrozenMap
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.quantities import State
+from hybridsim.model.parts.quantities import State
 
 
 @dataclass(frozen=True)
@@ -118,8 +116,6 @@ class Contact(Declared):
         self, constants: Collection[str] = (), load_rate: Callable[[], Expression] | None = None
     ) -> tuple[State, ...]:
         """Return the states that the friction law adds to the model."""
-        from hybridsim.model.laws.law_with_states import states_of
-
         return states_of(self, self.values(self._varies(constants), load_rate)) if self.law.states else ()
 
     def _varies(self, constants: Collection[str]) -> bool:
@@ -131,8 +127,6 @@ class Contact(Declared):
         return {}
 
     def _components(self, varies: bool, load_rate: Callable[[], Expression] | None) -> Iterator[Component]:
-        from hybridsim.model.laws.law_with_states import components_of
-
         values = self.values(varies, load_rate)
         loaded: tuple[Guard, ...] = ()
         if varies and not self.opens:

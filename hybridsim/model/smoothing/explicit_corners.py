@@ -12,18 +12,15 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from hybridsim.expr import Expression, of_tree
 from hybridsim.model.meanings import Family
 from hybridsim.model.parts.component import Component, Corner, Guard, Mode, Surface
 from hybridsim.model.parts.frozen_map import FrozenMap
+from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.jumps import not_linear
 from hybridsim.model.smoothing.nonsmooth import MODE, Primitive, sides_of, uses_primitives
 from hybridsim.model.smoothing.rewriting import IN_EVENTS, IN_VELOCITY, Found, Here, Rewriting
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.model import Model
 
 # Largest number of corners and jumps to replace. Each event checks all components, and compiled loops store a table of
 # the combinations of modes.

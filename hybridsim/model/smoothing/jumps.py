@@ -11,7 +11,6 @@ import re
 from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import TYPE_CHECKING
 from zlib import crc32
 
 from hybridsim.expr import of_tree, parse
@@ -20,13 +19,11 @@ from hybridsim.expr.polynomial import Monomial, Polynomial, polynomial, tree_of
 from hybridsim.expr.rebuild import with_names
 from hybridsim.model.meanings import Meanings
 from hybridsim.model.parts.component import Choice, Component, Corner, Guard, Mode
+from hybridsim.model.parts.model import Model
 from hybridsim.model.parts.switching import ABOVE, BELOW, SwitchingSurface
 from hybridsim.model.smoothing.nonsmooth import sides_of
 from hybridsim.model.smoothing.one_sided import names_of
 from hybridsim.model.smoothing.steps_in_time import lasting
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.model import Model
 
 SIGN = "__sign_"  # prefix of the name of a sign; declared names cannot start with two underscores
 _WORD = re.compile(r"[A-Za-z_]\w*")

@@ -6,16 +6,13 @@ import ast
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from hybridsim.errors import Place
+from hybridsim.expr import Expression
 from hybridsim.expr.write import write
 from hybridsim.model.meanings import Meanings
+from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.one_sided import never_negative, number_of
-
-if TYPE_CHECKING:
-    from hybridsim.expr import Expression
-    from hybridsim.model.parts.model import Model
 
 # the treatments of a primitive, see Primitive.became
 COMPONENT, SURFACE, MODE, UNCHANGED, POWER, TIMED = "component", "surface", "mode", "kept", "power", "signal"

@@ -6,13 +6,13 @@ import ast
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from hybridsim.errors import ModelError, Place
 from hybridsim.expr import parse
 from hybridsim.expr.rebuild import rebuilt, with_names
 from hybridsim.expr.write import write
 from hybridsim.model.meanings import Family, Meanings
+from hybridsim.model.parts.model import Model
 from hybridsim.model.parts.switching import blend
 from hybridsim.model.smoothing.conditions import TooManyConditions, single_comparisons
 from hybridsim.model.smoothing.continuity import (
@@ -42,9 +42,6 @@ from hybridsim.model.smoothing.nonsmooth import (
 )
 from hybridsim.model.smoothing.one_sided import names_of, never_negative, number_of
 from hybridsim.model.smoothing.steps_in_time import STEP, TimeStep, lasting, step_of
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.model import Model
 
 _EITHER = parse("p*a + (1 - p)*b").tree
 IN_VELOCITY = "it is part of a relative velocity"

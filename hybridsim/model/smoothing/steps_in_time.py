@@ -10,17 +10,14 @@ from __future__ import annotations
 import ast
 from collections.abc import Set
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from hybridsim.expr import Expression, of_tree, parse, substitute
 from hybridsim.expr.grammar import TIME
 from hybridsim.expr.polynomial import difference
 from hybridsim.expr.rebuild import exchanged, with_names
 from hybridsim.model.parts.inputs import HeldInput, Input
+from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.one_sided import names_of
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.model import Model
 
 STEP = "__step_"  # prefix of the name of a signal; declared names cannot start with two underscores
 _ZERO, _ONE = ast.Constant(0), ast.Constant(1)

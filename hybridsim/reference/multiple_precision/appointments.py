@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from hybridsim.expr import evaluate
+from hybridsim.model import Model
+from hybridsim.model.parts.schedule import Schedule
 from hybridsim.reference.multiple_precision.precision import Number, Precision
 from hybridsim.reference.multiple_precision.signals import Signal
-
-if TYPE_CHECKING:
-    from hybridsim.model import Model
-    from hybridsim.model.parts.schedule import Schedule
 
 # Times are declared as doubles. 0.1*3 and 0.3 differ by one unit in the last place but are one instant.
 _SAME = 2.0**-51

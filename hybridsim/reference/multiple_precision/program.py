@@ -9,17 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from hybridsim.errors import UsageError
+from hybridsim.expr import Expression
 from hybridsim.reference.multiple_precision.expansion import Expansion, QuantitySeries, terms_of
 from hybridsim.reference.multiple_precision.holding import Holding
 from hybridsim.reference.multiple_precision.nodes import Node, in_order
 from hybridsim.reference.multiple_precision.precision import Number, Precision
 from hybridsim.reference.multiple_precision.reading import Reading
-
-if TYPE_CHECKING:
-    from hybridsim.expr import Expression
 
 # A force from a linear equation is exact to rounding; ten to the minus this is far above that.
 _LINEAR = 20

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
 
+from hybridsim.expr import Expression
+from hybridsim.model import Model
 from hybridsim.reference.multiple_precision.expansion import Expansion
 from hybridsim.reference.multiple_precision.precision import Number, Precision
 from hybridsim.reference.multiple_precision.program import Point, Program
 from hybridsim.reference.multiple_precision.reading import Reading
 from hybridsim.reference.multiple_precision.signals import Signal
-
-if TYPE_CHECKING:
-    from hybridsim.expr import Expression
-    from hybridsim.model import Model
 
 Modes = tuple[str, ...]
 """Name of the mode of each component."""

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hybridsim.errors import UsageError
+from hybridsim.expr import Expression
 from hybridsim.expr.grammar import CONSTANTS, MAX_POWER, TIME
+from hybridsim.model import Model
 from hybridsim.reference.multiple_precision.functions import Functions
 from hybridsim.reference.multiple_precision.nodes import (
     ExternalSeries,
@@ -21,11 +23,7 @@ from hybridsim.reference.multiple_precision.nodes import (
     Sum,
 )
 from hybridsim.reference.multiple_precision.precision import Number, Precision
-
-if TYPE_CHECKING:
-    from hybridsim.expr import Expression
-    from hybridsim.model import Model
-    from hybridsim.reference.multiple_precision.signals import Signal
+from hybridsim.reference.multiple_precision.signals import Signal
 
 _SMOOTH = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt")
 

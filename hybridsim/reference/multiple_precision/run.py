@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from hybridsim.errors import UsageError
+from hybridsim.expr import Expression
+from hybridsim.model import Model
+from hybridsim.model.parts.schedule import Schedule
 from hybridsim.reference.multiple_precision.appointments import Appointments
 from hybridsim.reference.multiple_precision.expansion import Expansion, QuantitySeries, rate_at, value_at
 from hybridsim.reference.multiple_precision.motion import Motion, Segment
@@ -17,11 +19,6 @@ from hybridsim.reference.multiple_precision.settling import Rules, Settled
 from hybridsim.reference.multiple_precision.sign_changes import sign_changes
 from hybridsim.reference.multiple_precision.signals import Signal
 from hybridsim.reference.trajectory import ExactEvent
-
-if TYPE_CHECKING:
-    from hybridsim.expr import Expression
-    from hybridsim.model import Model
-    from hybridsim.model.parts.schedule import Schedule
 
 _SIDES_BY_DIRECTION = {"up": (1,), "down": (-1,), "both": (1, -1)}
 # The defect at the end of a step may exceed the terms that determined the step by this factor.

@@ -39,18 +39,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from hybridsim.errors import SimulationError, UsageError
+from hybridsim.expr import Expression
 from hybridsim.reference.multiple_precision.expansion import Expansion
 from hybridsim.reference.multiple_precision.program import Point
 from hybridsim.reference.multiple_precision.programs import UNDECIDED, Modes, Programs
 from hybridsim.reference.multiple_precision.sides import Sides
 from hybridsim.reference.multiple_precision.transitions import Move, Transitions
-
-if TYPE_CHECKING:
-    from hybridsim.expr import Expression
-
 
 _MAX_JOINT_CONTACTS = 4  # contacts decided jointly; their 3^4 combinations are tried one by one
 _MAX_ROUNDS = 50  # rounds at one instant; a cascade of resets is far shorter

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hybridsim.expr import evaluate
+from hybridsim.model import Model
+from hybridsim.model.parts.inputs import Input
 from hybridsim.reference.multiple_precision.precision import Number, Precision
-
-if TYPE_CHECKING:
-    from hybridsim.model import Model
-    from hybridsim.model.parts.inputs import Input
 
 # (knot as a fraction of the period, value there, slope per period) of the piecewise linear waves
 _CORNERS = {

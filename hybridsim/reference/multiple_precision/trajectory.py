@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 from hybridsim.errors import UsageError
+from hybridsim.model import Model
 from hybridsim.model.parts.component import Corner
 from hybridsim.model.smoothing.explicit_corners import smoothed
 from hybridsim.reference.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from hybridsim.model import Model
 
 # With fewer digits, rounding comes too close to the size that counts as zero; more take ever longer.
 _MIN_DIGITS, _MAX_DIGITS = 20, 200

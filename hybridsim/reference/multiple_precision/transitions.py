@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from hybridsim.errors import SimulationError
-from hybridsim.expr import Increment
+from hybridsim.expr import Expression, Increment
 from hybridsim.reference.multiple_precision.precision import Number
 from hybridsim.reference.multiple_precision.program import Point
 from hybridsim.reference.multiple_precision.programs import Modes, Programs
-
-if TYPE_CHECKING:
-    from hybridsim.expr import Expression
 
 
 @dataclass(frozen=True)

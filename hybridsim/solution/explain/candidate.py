@@ -6,24 +6,20 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridsim.engine.events.choice.verdict import FINE, LEAVES, side_after
-from hybridsim.expr import of_tree
+from hybridsim.engine.events.outcome import Situation
+from hybridsim.engine.system.system import System
+from hybridsim.expr import Expression, of_tree
 from hybridsim.expr.rebuild import with_names
 from hybridsim.model.checks.units import rate_of, time_unit, unit_of
 from hybridsim.model.parts.switching import ATTRACTION
 from hybridsim.model.smoothing.jumps import SIGN
 from hybridsim.model.smoothing.one_sided import names_of
 from hybridsim.model.smoothing.rewriting import VARIABLE
-
-if TYPE_CHECKING:
-    from hybridsim.engine.events.outcome import Situation
-    from hybridsim.engine.system.system import System
-    from hybridsim.expr import Expression
-    from hybridsim.solution.explain.recorded_resolution import Decision, Look
+from hybridsim.solution.explain.recorded_resolution import Decision, Look
 
 _VERDICTS = {FINE: "admissible", LEAVES: "not admissible"}
 _OPEN = "a question of rounding"

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.events.outcome import Change
 from hybridsim.engine.series.bounded import UNIT
+from hybridsim.engine.system.system import System
+from hybridsim.model import Model
 from hybridsim.model.parts.impact import SPEED
 from hybridsim.model.smoothing.one_sided import number_of
-from hybridsim.solution.explain.candidate import views
-
-if TYPE_CHECKING:
-    from hybridsim.engine.events.outcome import Change
-    from hybridsim.engine.system.system import System
-    from hybridsim.model import Model
-    from hybridsim.solution.explain.candidate import GuardView
-    from hybridsim.solution.explain.stages import Stage
+from hybridsim.solution.explain.candidate import GuardView, views
+from hybridsim.solution.explain.stages import Stage
 
 _AT_LIMIT = 1e-9  # relative distance of an impulse to its limit; a closer impulse counts as at the limit
 

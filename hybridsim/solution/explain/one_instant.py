@@ -5,18 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybridsim.engine.events.outcome import Change
+from hybridsim.engine.events.resolve import EventResolution
+from hybridsim.engine.record.segments import Occurrence, Segment
 from hybridsim.engine.series.bounded import UNIT
+from hybridsim.engine.system.system import System
 from hybridsim.integrators.contract import Integrator
-
-if TYPE_CHECKING:
-    from hybridsim.engine.events.outcome import Change
-    from hybridsim.engine.events.resolve import EventResolution
-    from hybridsim.engine.record.segments import Occurrence, Segment
-    from hybridsim.engine.system.system import System
 
 LOCATED = (
     1e6  # multiple of its rounding error; a located guard is closer to zero, a guard moved by a reset is not

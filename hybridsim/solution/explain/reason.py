@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from hybridsim.engine.events.choice.verdict import FINE
-from hybridsim.solution.explain.candidate import views, way
+from hybridsim.engine.events.outcome import Change
+from hybridsim.engine.record.segments import Occurrence
+from hybridsim.engine.system.system import System
+from hybridsim.model import Model
+from hybridsim.solution.explain.candidate import GuardView, views, way
 from hybridsim.solution.explain.impact_text import errors_beside, friction, is_struck, restitution
 from hybridsim.solution.explain.one_instant import BY_RESET, changes_text, resets_before
-
-if TYPE_CHECKING:
-    from hybridsim.engine.events.outcome import Change
-    from hybridsim.engine.record.segments import Occurrence
-    from hybridsim.engine.system.system import System
-    from hybridsim.model import Model
-    from hybridsim.solution.explain.candidate import GuardView
-    from hybridsim.solution.explain.recorded_resolution import Decision, Look
-    from hybridsim.solution.explain.stages import Place
+from hybridsim.solution.explain.recorded_resolution import Decision, Look
+from hybridsim.solution.explain.stages import Place
 
 _RULE = "fewer changes of mode are preferred, then holding before slipping"
 

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridsim.engine.events.choice.verdict import FINE, UNDECIDED
+from hybridsim.engine.events.outcome import Situation
 from hybridsim.engine.events.resolve import EventResolution
-
-if TYPE_CHECKING:
-    from hybridsim.engine.events.outcome import Situation
 
 
 @dataclass(frozen=True)

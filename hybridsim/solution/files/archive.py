@@ -15,11 +15,24 @@ from typing import IO, TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridsim import __version__
 from hybridsim.calls import refusing
+from hybridsim.engine.record.blocks import OccurrenceList
+from hybridsim.engine.record.checkpoint import Checkpoint, Pace
+from hybridsim.engine.record.counters import Counters
+from hybridsim.engine.record.retention import Retention
+from hybridsim.engine.record.segments import Occurrence
+from hybridsim.engine.record.trajectory import Task, Trajectory
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.errors import HybridsimError, UsageError
 from hybridsim.files import path_text, whole_file
+from hybridsim.integrators.registry import make_integrator
+from hybridsim.model import Model
 from hybridsim.solution.files.archive_checks import check_checkpoint, check_events, check_header, check_task
 from hybridsim.solution.files.array_file import open_regular, read_arrays
+from hybridsim.solution.model_trajectory import ModelTrajectory
+from hybridsim.solution.solution import Solution
 
 if TYPE_CHECKING:
     from hybridsim.engine.record.checkpoint import Checkpoint
@@ -53,7 +66,6 @@ def of_bytes(stored: bytes) -> Solution:
 
 def _stored(solution: Solution) -> dict[str, np.ndarray]:
     """Return the arrays of a solution's archive by name."""
-    from hybridsim import __version__
     from hybridsim.solution.block_arrays import taken_apart
 
     run, trajectory = solution._run, solution._of_model.record
@@ -179,14 +191,7 @@ def _read(file: IO[bytes], name: str) -> Solution:
 
 
 def _put_together(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Solution:
-    from hybridsim.engine.record.blocks import OccurrenceList
-    from hybridsim.engine.record.counters import Counters
-    from hybridsim.engine.record.segments import Occurrence
-    from hybridsim.engine.record.trajectory import Trajectory
-    from hybridsim.engine.system.instant import Instant
     from hybridsim.solution.block_arrays import put_together
-    from hybridsim.solution.model_trajectory import ModelTrajectory
-    from hybridsim.solution.solution import Solution
 
     check_header(header)
     run = _run(header, arrays)
@@ -216,13 +221,8 @@ def _put_together(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Solu
 
 
 def _run(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Run:
-    from hybridsim.engine.record.retention import Retention
-    from hybridsim.engine.record.trajectory import Task
     from hybridsim.engine.system.system_cache import system_of
-    from hybridsim.engine.system.tolerances import Tolerances
     from hybridsim.integrators.automatic import successor_of
-    from hybridsim.integrators.registry import make_integrator
-    from hybridsim.model import Model
     from hybridsim.solution.run import Run
 
     model = Model.from_toml(header["model"])
@@ -239,9 +239,6 @@ def _run(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Run:
 
 
 def _checkpoint(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Checkpoint:
-    from hybridsim.engine.record.checkpoint import Checkpoint, Pace
-    from hybridsim.engine.system.instant import Instant
-
     paces = {
         c: Pace(
             last and Instant(*last),

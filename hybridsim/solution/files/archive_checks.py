@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -20,9 +20,7 @@ from hybridsim.engine.record.array_forms import (
 )
 from hybridsim.engine.run.headway import HEADWAY_PACE, HEADWAY_SIZE
 from hybridsim.engine.series.bounded import ORDER
-
-if TYPE_CHECKING:
-    from hybridsim.engine.system.system import System
+from hybridsim.engine.system.system import System
 
 Header = dict[str, Any]
 Arrays = dict[str, np.ndarray]

@@ -11,6 +11,7 @@ import os
 import stat
 import tokenize
 import zipfile
+from io import BytesIO
 from typing import IO
 
 import numpy as np
@@ -81,8 +82,6 @@ def _check_members(members: list[zipfile.ZipInfo], size: int) -> None:
 
 def _array(content: bytes, name: str) -> np.ndarray:
     """Return one array after checking that its shape fits the number of its bytes."""
-    from io import BytesIO
-
     head = BytesIO(content)
     version = npy.read_magic(head)
     if version == (1, 0):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.events.choice.event_verdicts import EventVerdicts
 from hybridsim.engine.events.choice.joint_choice import (
     NO_SCORE,
     NONE,
@@ -14,9 +15,6 @@ from hybridsim.engine.events.choice.joint_choice import (
     rank_candidates,
 )
 from hybridsim.engine.native.kernels import Precompiled
-
-if TYPE_CHECKING:
-    from hybridsim.engine.events.choice.event_verdicts import EventVerdicts
 
 _UNJUDGED = -2  # there is no verdict on a candidate yet
 _rank_candidates, _joint_choice, _is_settled = map(Precompiled, (rank_candidates, joint_choice, is_settled))

@@ -8,18 +8,14 @@ itself (P. Painleve, C. R. Acad. Sci. Paris 121 (1895) 112), and no rule prefers
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from hybridsim.engine.events.choice.candidates import all_verdicts
+from hybridsim.engine.events.choice.event_verdicts import EventVerdicts
 from hybridsim.engine.events.choice.joint_choice import is_below_limit
 from hybridsim.engine.events.choice.surface_intersection import is_one_motion
 from hybridsim.engine.events.choice.verdict import FINE
 from hybridsim.engine.native.kernels import Precompiled
-
-if TYPE_CHECKING:
-    from hybridsim.engine.events.choice.event_verdicts import EventVerdicts
 
 # Largest number of components at their surfaces whose other outcomes are examined; 3^5 verdicts would be too slow.
 MAX_JOINT_COMPONENTS = 4

@@ -7,24 +7,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from types import FunctionType
+from typing import Any
 
 import numpy as np
 
 from hybridsim.engine.events.diagnosis import reset_description
+from hybridsim.engine.events.outcome import Situation
 from hybridsim.engine.lowering.reset_keys import added, declared_reset, is_added
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.series.dual_numbers import differentiated, values_and_slopes, with_slopes
+from hybridsim.engine.system.system import System
 from hybridsim.expr import FunctionExpression, has_rounded_number, rounding_of
 from hybridsim.expr.walk import NoValue
+from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.one_sided import names_of
-
-if TYPE_CHECKING:
-    from types import FunctionType
-
-    from hybridsim.engine.events.outcome import Situation
-    from hybridsim.engine.system.system import System
-    from hybridsim.model.parts.model import Model
 
 Key = tuple[Any, ...]
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -25,10 +25,8 @@ from hybridsim.engine.series.vanishing_kinds import (
     ROOT,
     register_of,
 )
+from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
-
-if TYPE_CHECKING:
-    from hybridsim.engine.system.system import System
 
 _KIND = {EXP: EXPONENTIAL, SINHCOSH: HYPERBOLIC, TANGENT: HYPERBOLIC, SQRT: ROOT}
 KNOWN = 32  # misses after which machine code is read from disk (2 ms); each miss costs about 1 us

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from hybridsim.studies.he2026.measured.he2026 import Study
 from hybridsim.studies.he2026.measured.required_settings import EPS, STEPS
 from hybridsim.studies.he2026.measured.settings import SOURCE
-
-if TYPE_CHECKING:
-    from hybridsim.studies.he2026.measured.he2026 import Study
-    from hybridsim.studies.he2026.measured.verdicts import Claim
+from hybridsim.studies.he2026.measured.verdicts import Claim
 
 _PICTURES = {
     "figure 3": "figure-3",

@@ -5,21 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from hybridsim.model import Model, load
 from hybridsim.simulate import simulate
+from hybridsim.solution import Solution
 from hybridsim.studies.he2026.measured.settings import (
     DAMPING_RATIO,
     STEPS_PER_PERIOD,
     Point,
     Variant,
 )
-
-if TYPE_CHECKING:
-    from hybridsim.solution import Solution
 
 CONTACT = "f"
 # The free vibration decays by exp(-zeta wn t); exp(-30) is below rounding. Friction only adds decay.

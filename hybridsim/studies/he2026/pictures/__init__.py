@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
+from matplotlib.figure import Figure
+
+from hybridsim.studies.he2026.measured import Study
 from hybridsim.studies.he2026.measured.settings import EPS_V, STEPS_PER_PERIOD
 from hybridsim.studies.he2026.pictures.convergence import convergence
 from hybridsim.studies.he2026.pictures.deviations import deviation_maps, step_lines
@@ -17,11 +19,6 @@ from hybridsim.studies.he2026.pictures.maps import (
 from hybridsim.studies.he2026.pictures.motions import motions
 from hybridsim.studies.he2026.pictures.reduction import reduction
 from hybridsim.studies.he2026.pictures.run_times import interval_cost, stick_cost
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from hybridsim.studies.he2026.measured import Study
 
 __all__ = ["pictures"]
 

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from matplotlib.figure import Figure
 
 from hybridsim.plot import style
 from hybridsim.studies.he2026.measured.convergence import ALL_CASES, RIDGE, Curves
 from hybridsim.studies.he2026.pictures.motions import column_title
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _LINEAR = 0.01  # per cent: below it the scale is linear, to show zero and both signs
 _LINES = {"r": "-", "N": "--", "F": ":"}

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Rectangle
 
 from hybridsim.plot import style
 from hybridsim.studies.he2026.measured.deviation import EXACT, PUBLISHED, Maps
 from hybridsim.studies.he2026.measured.settings import LITERAL, MATTERING, SIGNS, ZEROED
 from hybridsim.studies.he2026.measured.step_study import EPS, STEPS, StepStudy
 from hybridsim.studies.he2026.pictures.motions import column_title
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 _COLOURS = "cividis"  # lightness is ordered in the same way for all types of colour vision
 _LOW, _HIGH = 0.3, 100.0  # per cent
@@ -30,9 +31,6 @@ def edges(centres: np.ndarray) -> np.ndarray:
 
 def deviation_maps(maps: Maps, quantity: str) -> Figure:
     """Draw Eq. 9 over r and F0/N: against the published A2 in two readings, and against the exact one."""
-    from matplotlib.colors import LogNorm
-    from matplotlib.lines import Line2D
-
     columns = (LITERAL.name, ZEROED.name, EXACT)
     figure = style.figure(10.2, 6.4)
     number = {"A": "10", "E": "11"}[quantity]
@@ -75,8 +73,6 @@ def deviation_maps(maps: Maps, quantity: str) -> Figure:
 
 
 def _regions(axes: Axes, quantity: str) -> None:
-    from matplotlib.patches import Rectangle
-
     for level, line in (("above 10 %", "-"), ("above 5 %", "--")):
         (low, high), (left, right) = PUBLISHED[quantity][level]["F0/N"], PUBLISHED[quantity][level]["r"]
         axes.add_patch(

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, LogNorm
+from matplotlib.figure import Figure
 
 from hybridsim.plot import style
 from hybridsim.studies.he2026.measured.required_settings import EPS, STEPS, RequiredSettings
@@ -13,18 +16,12 @@ from hybridsim.studies.he2026.measured.truth import MODELS, Truth
 from hybridsim.studies.he2026.pictures.deviations import edges
 from hybridsim.studies.he2026.pictures.motions import column_title, plain_log
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 _COLOURS = "cividis"
 _MOST_STOPS = 8  # larger numbers are drawn as this one
 
 
 def stick_and_stops(truth: Truth) -> Figure:
     """Draw stick fraction, stops per period and amplitude of the exact motion, with the no-stop boundary."""
-    from matplotlib.colors import BoundaryNorm, LogNorm
-
     figure = style.figure(11.0, 4.0)
     figure.suptitle(
         "The exact steady motion; white: no stops above it (closed form)", fontsize=11, x=0.01, ha="left"
@@ -139,8 +136,6 @@ def _frame(axes: Axes, truth: Truth, title: str) -> None:
 
 
 def _deviation(axes: Axes, r: np.ndarray, ratios: np.ndarray, values: np.ndarray) -> Any:
-    from matplotlib.colors import LogNorm
-
     axes.set_facecolor(style.MARK)  # nothing moves, or the model has no answer
     shown = np.clip(100.0 * values, 0.01, 1000.0)
     return axes.pcolormesh(
@@ -155,8 +150,6 @@ def _percents(bar: Any) -> None:
 
 
 def _ladder(axes: Axes, required: RequiredSettings, table: np.ndarray, ladder: tuple[float, ...]) -> Any:
-    from matplotlib.colors import BoundaryNorm
-
     steps = np.argmin(np.abs(np.log(np.nan_to_num(table, nan=1.0)[..., None] / np.array(ladder))), axis=-1)
     levels = np.where(np.isnan(table), np.nan, steps)
     norm = BoundaryNorm(np.arange(-0.5, len(ladder), 1.0).tolist(), 256)

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator
 
 from hybridsim.plot import style
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.axis import Axis
-    from matplotlib.figure import Figure
-
-    from hybridsim.studies.he2026.measured.response import Response
+from hybridsim.studies.he2026.measured.response import Response
 
 _MICRO = 1e6
 _LEAST = 1e-6  # relative to the first; smaller harmonics are rounding and are drawn at this value
@@ -30,8 +26,6 @@ def column_title(name: str) -> str:
 
 def plain_log(axis: Axis) -> None:
     """Set a logarithmic axis with ticks at 1, 2, 5, 10, 20, ..., in plain numbers."""
-    from matplotlib.ticker import LogLocator, NullLocator
-
     axis.axes.set_xscale("log")
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_minor_locator(NullLocator())

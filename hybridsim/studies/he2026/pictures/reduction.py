@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from matplotlib.figure import Figure
 
 from hybridsim.plot import style
 from hybridsim.studies.he2026.measured.reduction import (
@@ -15,9 +15,6 @@ from hybridsim.studies.he2026.measured.reduction import (
     Reduction,
 )
 from hybridsim.studies.he2026.pictures.motions import column_title
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def reduction(found: Reduction) -> Figure:

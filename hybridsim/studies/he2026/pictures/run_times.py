@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from matplotlib.figure import Figure
 
 from hybridsim.plot import style
 from hybridsim.studies.he2026.measured.convergence import CASES
 from hybridsim.studies.he2026.measured.run_times import EPS, WITH, RunTimes
 from hybridsim.studies.he2026.measured.settings import SIGNS
 from hybridsim.studies.he2026.pictures.motions import column_title, plain_log
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 def interval_cost(times: RunTimes) -> Figure:
