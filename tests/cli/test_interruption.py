@@ -17,9 +17,9 @@ from hybridsim.cli import main
 
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT between processes")
 
-# The program says on stderr when so much of its work is done; then it is interrupted from outside.
+# The program says on stderr when so much of its work is done; then a signal comes from outside, or from itself.
 _PROGRAM = """
-import signal, sys
+import os, signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)
 from hybridsim.cli.progress import Progress
 called = []
@@ -27,19 +27,22 @@ progress = Progress.__call__
 def tell(self, done, *arguments):
     if not called and done >= float(sys.argv[1]):
         called.append(print("begun", file=sys.stderr, flush=True))
+        if int(sys.argv[2]):
+            os.kill(os.getpid(), int(sys.argv[2]))
     progress(self, done, *arguments)
 Progress.__call__ = tell
 from hybridsim.cli import main
-sys.exit(main(sys.argv[2:]))
+sys.exit(main(sys.argv[3:]))
 """
 
 
-def interrupted(
-    tmp_path: Path, *argv: str, number: int = signal.SIGINT, after: float = 0.0, patience: float = 300.0
-) -> tuple[int, str]:
-    """Exit code and messages of a command that gets a signal half a second after this part of its work is done."""
+def interrupted(tmp_path: Path, *argv: str, after: float = 0.0, own: int = 0) -> tuple[int, str]:
+    """Exit code and messages of a command that is interrupted half a second after this part of its work is done.
+
+    own: a signal that it sends itself instead, at once.
+    """
     process = subprocess.Popen(
-        [sys.executable, "-c", _PROGRAM, str(after), *argv],
+        [sys.executable, "-c", _PROGRAM, str(after), str(own), *argv],
         cwd=tmp_path,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
@@ -51,9 +54,10 @@ def interrupted(
         seen.append(line)
         if line == "begun\n":
             break
-    time.sleep(0.5)
-    process.send_signal(number)
-    seen.append(process.communicate(timeout=patience)[1])
+    if not own:
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+    seen.append(process.communicate(timeout=600)[1])
     return process.returncode, "".join(seen)
 
 
@@ -97,14 +101,16 @@ def test_compare_stops_altogether(tmp_path: Path) -> None:
 
 
 def test_a_run_that_is_asked_to_end_goes_on(tmp_path: Path) -> None:
-    argv = ("run", "dfcs", "--t-end", "150T", "--integrator", "scipy-dop853", "--save", "run.hsol")
-    code, messages = interrupted(tmp_path, *argv, number=signal.SIGTERM)
+    argv = ("run", "dfcs", "--t-end", "6T", "--integrator", "scipy-dop853", "--save", "run.hsol")
+    code, messages = interrupted(tmp_path, *argv, after=0.4, own=signal.SIGTERM)
     assert code == 143, messages
     assert "'hybridsim resume run.hsol' continues the run" in messages and "Traceback" not in messages
     saved = str(tmp_path / "run.hsol")
-    assert hs.load_solution(saved).status == "interrupted"
+    partly = hs.load_solution(saved)
+    assert partly.status == "interrupted"
     assert main(["resume", saved, "--save", saved]) == 0
     finished = hs.load_solution(saved)
+    assert 0.4 < partly.t_end / finished.t_end < 0.9
     whole = hs.simulate("dfcs", (0.0, finished.t_end), integrator="scipy-dop853")
     assert (finished.t == whole.t).all() and (finished.y == whole.y).all()
 
@@ -124,7 +130,7 @@ def test_atlas_keeps_the_scenes_that_are_done(tmp_path: Path, workers: str) -> N
     """The last scene takes seconds by a method that steps from Python; of those before it, one is done for certain."""
     scenes = ("FREE-1", "FREE-2", "TANH-1e-6")
     argv = ("atlas", *scenes, "--integrators", "rk4-sign,scipy-rk23", "--quick", "--workers", workers)
-    code, messages = interrupted(tmp_path, *argv, after=0.66, patience=8.0)
+    code, messages = interrupted(tmp_path, *argv, after=0.66)
     assert code == 130, messages
     assert "Traceback" not in messages
     assert "of 3 scenes" in messages and "matrix.png" not in messages

@@ -49,7 +49,17 @@ def test_runs(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     for model, end in MODELS.items():
-        words = ["run", model, "--t-end", end, "--integrator", integrator, "--json", "--limit", "seconds=20"]
+        words = [
+            "run",
+            model,
+            "--t-end",
+            end,
+            "--integrator",
+            integrator,
+            "--json",
+            "--limit",
+            "steps=100000",
+        ]
         found = document(words, capfd, codes=(0, 1, 2))
         assert found is None or (isinstance(found, dict) and found["integrator"] == integrator)
 
@@ -199,7 +209,7 @@ def test_through_a_pipe_standard_output_holds_data_alone() -> None:
         env={**os.environ, "PYTHONPATH": paths},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
     )
     assert done.returncode == 0, done.stderr
     assert len(strict(done.stdout)) == len(hs.list_models())
@@ -243,7 +253,7 @@ def test_python_and_threads() -> None:
         env={**environment, "PYTHONPATH": paths},
         capture_output=True,
         text=True,
-        timeout=240,
+        timeout=600,
     )
     assert done.returncode == 0 and done.stdout == "data\n"
     assert "[WARNING]" in done.stderr  # it does warn here

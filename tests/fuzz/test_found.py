@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from itertools import pairwise
 
 import pytest
@@ -90,11 +89,8 @@ guards.zero = { expr = "-y", then = "above" }
 [modes.above]
 guards.zero = { expr = "y", then = "below" }
 """)
-    for _ in ("to compile what is to be compiled", "to be timed"):
-        began = time.thread_time()
-        sol = hs.simulate(model, (0.0, 1.0), integrator="exact", limits={"seconds": 1})
-        assert sol.status in ("finished", "limit")
-    assert time.thread_time() - began < 30.0
+    sol = hs.simulate(model, (0.0, 1.0), integrator="exact", limits={"steps": 1000})
+    assert sol.status in ("finished", "limit")
 
 
 def test_a_jump_of_friction_that_has_no_value_at_zero_warns_of_nothing() -> None:
@@ -127,7 +123,7 @@ def test_a_motion_that_is_not_settled_after_the_first_stretch(capsys: pytest.Cap
 @pytest.mark.parametrize(("x", "v"), [("0", "1e308"), ("-1e150", "1"), ("1", "1e150")])
 def test_a_start_that_no_double_can_square(integrator: str, x: str, v: str) -> None:
     model = rubbing_block(x=x, v=v)
-    sol = hs.simulate(model, (0.0, 1.0), integrator=integrator, limits={"steps": 1000, "seconds": 5})
+    sol = hs.simulate(model, (0.0, 1.0), integrator=integrator, limits={"steps": 1000})
     assert sol.status in ("finished", "limit", "step-failure") and sol.message
 
 
@@ -151,7 +147,7 @@ y = { start = 1, der = "1e308*u - w" }
 u = "x"
 w = "y"
 """)
-    sol = hs.simulate(model, (0.0, 1.0), limits={"seconds": 2, "steps": 5000})
+    sol = hs.simulate(model, (0.0, 1.0), limits={"steps": 5000})
     assert sol.message
 
 
@@ -164,7 +160,7 @@ r = "max(s - 3, 0)"
 s = { start = 2, der = "v" }
 v = { start = 0, der = "max(exp(-1/r**2), s - 0.5) - max(-r, min(r, v))" }
 """)
-    sol = hs.simulate(model, (0.0, 1.0), limits={"seconds": 2, "steps": 5000})
+    sol = hs.simulate(model, (0.0, 1.0), limits={"steps": 5000})
     assert sol.message
 
 
@@ -222,5 +218,5 @@ y = { start = 0, der = "(t/4 - u)*y + x" }
 [surfaces]
 u = "y**0.5"
 """)
-    sol = hs.simulate(model, (0.0, 1.0), integrator=integrator, limits={"seconds": 2, "steps": 5000})
+    sol = hs.simulate(model, (0.0, 1.0), integrator=integrator, limits={"steps": 5000})
     assert sol.message

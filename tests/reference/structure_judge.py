@@ -90,7 +90,7 @@ def run(model: hs.Model, draw: Draw, integrator: str) -> hs.Solution:
         params=draw.params,
         x0=draw.start,
         integrator=integrator,
-        limits={"seconds": 30.0, "events": 50_000},
+        limits={"steps": 1_000_000, "events": 50_000},
         **options,
     )
 

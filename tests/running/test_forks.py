@@ -18,7 +18,7 @@ from hybridsim.engine.record.trajectory import Task
 from hybridsim.engine.system import system_cache
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
-PATIENCE = 60.0
+PATIENCE = 600.0
 
 
 def ends_well(work: Callable[[], bool]) -> bool:

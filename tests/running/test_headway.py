@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from typing import Any
 
 import numpy as np
@@ -53,10 +52,9 @@ def test_events_that_come_ever_more_closely_end_the_run() -> None:
 def test_a_method_that_would_take_ages_ends() -> None:
     """x' = -1e13 (x - cos(t)): an explicit method takes some 1e12 steps for one unit of time."""
     model = hs.Model("stiff", states=[hs.State("x", 1, der="-1e13*(x - cos(t))")])
-    began = time.perf_counter()
     sol = hs.simulate(model, (0, 1), integrator="dop853")
     assert sol.status == "step-failure" and "no headway" in sol.message and "rodas5p" in sol.message
-    assert sol.stats["steps"] < 5_000_000 and time.perf_counter() - began < 120.0
+    assert sol.stats["steps"] < 5_000_000
     assert hs.simulate(model, (0, 1)).y[0, -1] == pytest.approx(math.cos(1), abs=1e-9)
 
 

@@ -160,17 +160,17 @@ def test_a_kill_in_the_middle_of_an_archive(run: hs.Solution, tmp_path: Path) ->
     run.save(path)
     before = path.read_bytes()
     process = script(KILLED, path)
-    process.communicate(timeout=120)
+    process.communicate(timeout=600)
     assert process.returncode == -signal.SIGKILL
     assert path.read_bytes() == before
     assert np.array_equal(hs.load_solution(path).y, run.y)
 
 
 WRITER = """
-import sys
+import os, sys
 import hybridsim as hs
 sol = hs.simulate(hs.Model("decay", states=[hs.State("x", float(sys.argv[2]), "-x")]), (0, 1))
-for _ in range(40):
+while not os.path.exists(sys.argv[1] + ".enough"):
     sol.save(sys.argv[1] + ".hsol")
     sol.to_csv(sys.argv[1] + ".csv", 50)
 """
@@ -179,16 +179,21 @@ for _ in range(40):
 def test_two_processes_that_write_to_one_file(tmp_path: Path) -> None:
     head = tmp_path / "r"
     writers = [script(WRITER, head, start) for start in (1, 2)]
-    archive, table, reads = tmp_path / "r.hsol", tmp_path / "r.csv", 0
-    while any(writer.poll() is None for writer in writers):
-        if archive.exists() and table.exists():  # at each instant they are whole
-            assert hs.load_solution(archive).y[0, 0] in (1.0, 2.0)
-            assert len(table.read_text().splitlines()) == 51
-            reads += 1
-        time.sleep(0.01)
+    archive, table, enough = (tmp_path / f"r.{end}" for end in ("hsol", "csv", "enough"))
+    starts, reads = set(), 0
+    try:
+        while (len(starts) < 2 or reads < 40) and all(writer.poll() is None for writer in writers):
+            if archive.exists() and table.exists():  # at each instant they are whole
+                starts.add(hs.load_solution(archive).y[0, 0])
+                assert len(table.read_text().splitlines()) == 51
+                reads += 1
+            time.sleep(0.01)
+    finally:
+        enough.touch()
     told = [writer.communicate()[1] for writer in writers]
     assert [writer.returncode for writer in writers] == [0, 0], told
-    assert reads
+    enough.unlink()
+    assert starts == {1.0, 2.0} and reads >= 40
     assert hs.load_solution(archive).success
     assert {path.name for path in tmp_path.iterdir()} == {"r.hsol", "r.csv"}
 
@@ -256,12 +261,12 @@ def test_two_sweeps_with_one_journal(tmp_path: Path) -> None:
     def slow(model: hs.Model) -> float:
         gates = vars(sys.modules[__name__])["GATES"]  # a journal serves a measure with what it reads by name
         gates[0].set()
-        assert gates[1].wait(60)
+        assert gates[1].wait(600)
         return 1.0
 
     first = threading.Thread(target=lambda: hs.sweep(DECAY, {"x": [1, 2]}, slow, journal=path, workers=1))
     first.start()
-    assert inside.wait(60)
+    assert inside.wait(600)
     with pytest.raises(hs.UsageError, match=r"sweep\.journal is in use by another sweep"):
         hs.sweep(DECAY, {"x": [1, 2]}, slow, journal=path, workers=1)
     go_on.set()

@@ -9,7 +9,6 @@ import io
 import json
 import random
 import sys
-import time
 import traceback
 import warnings
 from collections.abc import Iterator
@@ -100,16 +99,13 @@ def use(sol: hs.Solution) -> None:
         sol.explain(0)
     if sol.status in ("finished", "limit"):
         further = sol.t_end + 1e-3 * abs(sol.t_end - sol.t_start) + 1e-6
-        more = sol.resume(
-            further if sol.status == "finished" else None, limits={"seconds": 2, "steps": 20_000}
-        )
+        more = sol.resume(further if sol.status == "finished" else None, limits={"steps": 20_000})
         assert more.events is not None and more.modes is not None and len(more.t) >= 0
 
 
 def trial(path: Path, number: int) -> str:
     """What went wrong with one change; empty where it was refused by name, or made no difference."""
     what, header, arrays = changed(random.Random(f"{path.name} {number}"), *parts(path))
-    began = time.perf_counter()
     print(f"# {path.name} {number}: {what}", flush=True)  # the last line, if the process comes down
     try:
         use(archive.of_bytes(sealed(header, arrays)))
@@ -117,8 +113,7 @@ def trial(path: Path, number: int) -> str:
         pass
     except Exception:
         return f"{path.name} {number}: {what}\n{traceback.format_exc()[-1500:]}"
-    seconds = time.perf_counter() - began
-    return f"{path.name} {number}: {what} took {seconds} s" if seconds > 20 else ""
+    return ""
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ import json
 import math
 import time
 from functools import cache
-from importlib import import_module
 
 import pytest
 from plot.fake_solution import oscillator
@@ -201,9 +200,13 @@ def test_timing_goes_in_turns() -> None:
 
 
 def test_a_long_run_is_not_repeated_for_ever(monkeypatch) -> None:
-    monkeypatch.setattr(import_module("hybridsim.analysis.compare.timing"), "ENOUGH", 0.02)
-    turns = []
-    times = timed_in_turns([lambda: time.sleep(0.03), lambda: None], 3, turns.append)
+    clock, turns = [0.0], []
+    monkeypatch.setattr(time, "perf_counter", lambda: clock[0])
+
+    def long() -> None:
+        clock[0] += 3.0  # of two seconds that are enough
+
+    times = timed_in_turns([long, lambda: None], 3, turns.append)
     assert [len(spent) for spent in times] == [1, 3]
     assert turns == [0, 1] * 3
 

@@ -22,7 +22,7 @@ import sys
 from types import SimpleNamespace
 import numba
 
-module, name = sys.argv[1:]
+module, name, *whole_run = sys.argv[1:]
 found = importlib.import_module
 
 class Poorer:
@@ -49,9 +49,13 @@ def import_module(wanted, package=None):
 importlib.import_module = import_module
 import hybridsim as hs
 from hybridsim.engine.native import kernels
+from scipy.integrate import solve_ivp
 decay = hs.Model("decay", states=[hs.State("x", 1.0, "-x")])
-solution = hs.simulate(decay, (0.0, 1.0), integrator="scipy-rk45", rtol=1e-9)
-print(kernels.ENABLED, repr(float(solution.y[0, -1])))
+if whole_run:
+    end = hs.simulate(decay, (0.0, 1.0), integrator="scipy-rk45", rtol=1e-9).y[0, -1]
+else:
+    end = solve_ivp(hs.to_ivp(decay).fun, (0.0, 1.0), [1.0], rtol=1e-9, atol=1e-12).y[0, -1]
+print(kernels.ENABLED, repr(float(end)))
 """
 NEEDED = [("llvmlite.binding", "ptr"), *inner_parts._NEEDED]
 SLOWER = [
@@ -65,13 +69,19 @@ SLOWER = [
 ]
 
 
-def run(part: tuple[str, str], cache: Path) -> tuple[str, float, list[str]]:
-    """Whether the engine is compiled, the state at t = 1, and what is told of numba."""
+def run(part: tuple[str, str], cache: Path, *whole: str) -> tuple[str, float, list[str]]:
+    """Whether the engine is compiled, the state at t = 1, and what is told of numba.
+
+    The state is that of SciPy's own method on the model's rates, which takes few kernels, or of a whole run.
+    """
     # levels of optimisation change no rule, and the lowest compiles soonest
     more = {"HYBRIDSIM_CACHE": str(cache), "NUMBA_OPT": "0", "PYTHONWARNINGS": "ignore"}
     more["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
     done = subprocess.run(
-        [sys.executable, "-c", SCRIPT, *part], env={**os.environ, **more}, capture_output=True, text=True
+        [sys.executable, "-c", SCRIPT, *part, *whole],
+        env={**os.environ, **more},
+        capture_output=True,
+        text=True,
     )
     assert done.returncode == 0, done.stderr
     compiled, value = done.stdout.split()
@@ -94,6 +104,18 @@ def test_without_another_part_it_is_slower(part: tuple[str, str], tmp_path: Path
     compiled, value, told = run(part, tmp_path)
     assert compiled == "True" and value == pytest.approx(math.exp(-1.0), rel=1e-8)
     assert len(told) == 1 and part[1] in told[0]
+
+
+# the largest kernels, which a whole run takes, are callbacks for C
+@pytest.mark.parametrize(
+    "part",
+    [part if part[1] == "CFunc" else pytest.param(part, marks=pytest.mark.slow) for part in SLOWER],
+    ids="-".join,
+)
+def test_a_whole_run_without_it_is_right(part: tuple[str, str], tmp_path: Path) -> None:
+    compiled, value, told = run(part, tmp_path, "whole")
+    assert compiled == "True" and value == pytest.approx(math.exp(-1.0), rel=1e-8)
+    assert len(told) == 1
 
 
 def test_this_numba_has_all(tmp_path: Path) -> None:

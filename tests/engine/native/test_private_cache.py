@@ -66,7 +66,7 @@ class Place:
             env={**os.environ, **given, **more},
             capture_output=True,
             text=True,
-            timeout=240,
+            timeout=600,
         )
 
     def plant(self) -> None:
@@ -276,7 +276,7 @@ def as_somebody(script: str, *given: str, **more: str) -> subprocess.CompletedPr
         cwd="/",
         capture_output=True,
         text=True,
-        timeout=240,
+        timeout=600,
     )
 
 

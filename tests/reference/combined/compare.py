@@ -15,7 +15,7 @@ from .render import Renderer
 from .values import Motion
 
 POINTS = 23
-LIMITS = {"seconds": 20.0, "events": 5000}
+LIMITS = {"steps": 1_000_000, "events": 5000}
 ALLOWED = 1e-5  # error of a run at rtol 1e-9, relative to the motion, beyond which it is called different
 
 
