@@ -30,7 +30,8 @@ CHOOSERS = {
 PARTS = {
     "verdict": {f"{CHOICE}event_verdicts.py", "engine/events/compiled/resolve_surface.py"},
     "verdict_with": {"engine/events/compiled/resolve_clear.py"},
-    "decreed_zeros": {"engine/events/compiled/resolve_clear.py"},
+    "decreed_zeros": set(),
+    "zeros_of_surface": {"engine/events/compiled/resolve_clear.py"},
     "open_question": {"mechanics/series_loop/decision.py"},
     "is_release": set(),
     "kind_of_change": {f"{CHOICE}event_verdicts.py", "engine/events/compiled/guard_series.py"},

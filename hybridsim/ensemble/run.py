@@ -11,7 +11,7 @@ from hybridsim.engine.linear.motion_summary import sum_up
 from hybridsim.engine.native.kernels import call_kernel, inlined, kernel
 from hybridsim.engine.native.loop_hints import fill, put
 from hybridsim.engine.native.struct_pack import pack_at
-from hybridsim.engine.run.event_loop import AT_TARGET, FULL, LONGEST
+from hybridsim.engine.run.event_loop import AT_TARGET, FULL
 from hybridsim.engine.run.event_loop import SEGMENTS as SEGMENTS_AT
 from hybridsim.engine.system.instant import two_sum
 from hybridsim.ensemble.start import keeps_holding, plain_start
@@ -97,7 +97,7 @@ def run_ensemble(
             for k in range(own.hints.shape[0]):
                 fill(own.hints[k], 0.0)
             clock[0], clock[1], target[0], target[1] = 0.0, 0.0, runs.ends[i], 0.0
-            loop.float_slots[LONGEST] = runs.longest[i]
+            loop.longest[0] = runs.longest[i]
             at[BEGUN], at[STORED], at[RESUMED] = 1, 0, 0
         lin_at[0] = runs.tables[i]
         code = call_kernel(

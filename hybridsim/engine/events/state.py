@@ -28,6 +28,7 @@ class StateArrays(NamedTuple):
 
 _FIELDS = StateArrays._fields
 _INTEGERS = ("z", "sides", "orders")
+_View = tuple[tuple[int], np.dtype[Any], int]  # shape, dtype, and offset in bytes
 
 
 class HybridState:
@@ -44,8 +45,8 @@ class HybridState:
     sides: np.ndarray
     orders: np.ndarray
 
-    def __init__(self, memory: np.ndarray, offsets: dict[str, tuple[int, int]]) -> None:
-        self.memory, self.offsets = memory, offsets  # offsets: length and offset in bytes of each array
+    def __init__(self, memory: np.ndarray, views: dict[str, _View]) -> None:
+        self.memory, self._views = memory, views
 
     @classmethod
     def of(cls, outcome: Outcome, p: np.ndarray) -> HybridState:
@@ -54,10 +55,11 @@ class HybridState:
             outcome.x, outcome.x_error, p, outcome.guard_floors, outcome.z, outcome.sides, outcome.orders
         )
         begins = list(accumulate((filled_up(len(values)) for values in fields), initial=0))
-        offsets = {
-            name: (len(values), 8 * k) for name, values, k in zip(_FIELDS, fields, begins, strict=False)
+        views = {
+            name: ((len(values),), np.dtype(np.int64 if name in _INTEGERS else float), 8 * k)
+            for name, values, k in zip(_FIELDS, fields, begins, strict=False)
         }
-        state = cls(np.zeros(begins[-1]), offsets)
+        state = cls(np.zeros(begins[-1]), views)
         for name, values in zip(_FIELDS, fields, strict=True):
             getattr(state, name)[:] = values
         return state
@@ -66,16 +68,14 @@ class HybridState:
         """Make the view of an array when it is first read."""
         if name not in _FIELDS:
             raise AttributeError(name)
-        length, offset = self.offsets[name]
-        values: np.ndarray = np.ndarray(
-            (length,), np.int64 if name in _INTEGERS else float, self.memory, offset
-        )
+        shape, dtype, offset = self._views[name]
+        values: np.ndarray = np.ndarray(shape, dtype, self.memory, offset)
         setattr(self, name, values)
         return values
 
     def copy(self) -> HybridState:
         """Return a copy with its own memory."""
-        return HybridState(self.memory.copy(), self.offsets)
+        return HybridState(self.memory.copy(), self._views)
 
     def packed(self) -> Any:
         """Return the arrays for kernels; the pack keeps the memory alive."""
@@ -83,7 +83,10 @@ class HybridState:
 
     def outcome(self) -> Outcome:
         """Return the state as an `Outcome` that shares the memory."""
+        memory = self.memory
+        x, x_error, p, floors, z, sides, orders = [
+            np.ndarray(shape, dtype, memory, offset) for shape, dtype, offset in self._views.values()
+        ]
         return Outcome(
-            self.x, self.p, self.z, self.sides, self.orders, _NO_MONITORS, _NO_MONITORS, self.x_error,
-            self.floors, _NO_MONITOR_FLOORS,
-        )  # fmt: skip
+            x, p, z, sides, orders, _NO_MONITORS, _NO_MONITORS, x_error, floors, _NO_MONITOR_FLOORS
+        )

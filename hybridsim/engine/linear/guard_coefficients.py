@@ -89,8 +89,10 @@ def linear_series(lin: Any, k: int, g: int, first: int, work: Any) -> None:
 
 @kernel
 def _exact_series(lin: Any, k: int, g: int, first: int, work: Any) -> None:
+    value, bound = 0.0, 0.0  # the wide bound of the first coefficient has been tried
     for order in range(first, ORDER + 1):
-        value, bound = rough_coefficient(lin, k, g, order, work)
+        if order > first:
+            value, bound = rough_coefficient(lin, k, g, order, work)
         if not abs(value) > bound:
             value, bound = linear_coefficient(lin, k, g, order, work.x_after, work.slopes, work)
         work.judged[0, g, order], work.judged[1, g, order] = value, bound

@@ -14,7 +14,7 @@ from hybridsim.engine.linear.form import ANGLE, GROWTH, TIME
 from hybridsim.engine.linear.guards import FARTHEST
 from hybridsim.engine.native.constants import BOUND_TERMS
 from hybridsim.engine.native.kernels import allocating_kernel, call_noinline, inlined, kernel
-from hybridsim.engine.native.loop_hints import short_loop
+from hybridsim.engine.native.loop_hints import index, short_loop
 from hybridsim.engine.native.simd_products import product, times
 from hybridsim.engine.native.simd_vectors import WIDTH, load, splat, store
 from hybridsim.engine.roots.certify import (
@@ -62,7 +62,7 @@ def functions_of_time(lin: Any, s: float, p: Any, factors: Any, w: Any) -> None:
         first = lin.term_start[a]
         for i in range(first, lin.term_start[a + 1]):
             short_loop()
-            source, weight = lin.sources[i], lin.weights[i]
+            source, weight = index(lin.sources[i]), lin.weights[i]
             term = weight * p[source]
             angle += term
             if lin.phases[0] <= source < lin.phases[1]:
@@ -85,7 +85,7 @@ def functions_of_time(lin: Any, s: float, p: Any, factors: Any, w: Any) -> None:
         product, row = 1.0, lin.factors[m]
         for i in range(row.shape[0]):
             short_loop()
-            product *= factors[row[i], 0]
+            product *= factors[index(row[i]), 0]
         w[m] = product
 
 
@@ -111,7 +111,7 @@ def errors_of_time(lin: Any, s_error: float, factors: Any, w_error: Any) -> None
         product, error, row = 1.0, 0.0, lin.factors[m]
         for i in range(row.shape[0]):
             short_loop()
-            factor = factors[row[i]]
+            factor = factors[index(row[i])]
             v, e = factor[0], factor[1]
             error = error * (abs(v) + e) + abs(product) * e
             product *= v
@@ -147,10 +147,10 @@ def moved(lin: Any, k: int, c: Any, d: float, out: Any) -> None:
                 out[j] = c[j] * complex(size * math.cos(angle), size * math.sin(angle))
         else:
             call_noinline(_move_block, (lin, k, j, end, c, d, out))
-        j = end
-    while j < out.shape[0]:  # clear old values
+        j = index(end)
+    while j < out.shape[0]:  # zeros; LLVM would call a function to write them as such
         short_loop()
-        out[j] = 0.0
+        out[j] = c[j]
         j += 1
 
 
@@ -311,15 +311,10 @@ def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, scrat
     point to point: its Taylor polynomial less the largest remainder is a lower bound, so that no zero is
     passed over. Once the polynomial is accurate to rounding up to the zero, its zero is the result.
     """
+    k, g, i = index(k), index(g), index(i)
     side, order, floor = state.sides[g], state.orders[g], state.floors[g]
-    c, v, start, hint, terms, lower = (
-        scratch.c,
-        scratch.v,
-        scratch.starts[i],
-        scratch.hints[k, g],
-        scratch.terms[0],
-        scratch.terms[1],
-    )
+    c, v, start, hint = scratch.c, scratch.v, scratch.starts[i], scratch.hints[k, g]
+    terms, lower = scratch.terms[0], scratch.terms[1]
     size, rest = start[BOUND_TERMS], start[BOUND_TERMS + 1]
     if not size < math.inf:
         return OPEN, 0.0

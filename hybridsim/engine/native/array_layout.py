@@ -6,7 +6,6 @@ import ctypes
 import math
 from collections import namedtuple
 from collections.abc import Sequence
-from functools import lru_cache
 from itertools import islice
 from typing import Any
 
@@ -33,11 +32,6 @@ def _lay_out(entries: Any, steps: Any, owners: Any, skipped: Any, blocks: Any, t
         table[k, 0] += blocks[owners[k]].ctypes.data
     address: int = table.ctypes.data
     return address
-
-
-@lru_cache(64)
-def _whole_numbers(numbers: tuple[int, ...]) -> np.ndarray:
-    return np.array(numbers, dtype=np.int64)
 
 
 class ArrayLayout:
@@ -97,15 +91,15 @@ class ArrayLayout:
         if len(self._returned) < _RETURNED:
             self._returned.append(block)
 
-    def packed(self, blocks: tuple[np.ndarray, ...], skipped: Sequence[int] | None = None) -> list[Any]:
+    def packed(self, blocks: tuple[np.ndarray, ...], skipped: np.ndarray | None = None) -> list[Any]:
         """Pack the arrays of each named tuple for kernels; skipped: rows to omit at the start of each array."""
         packs: list[Any] = []
+        rows = self._from_the_first if skipped is None else skipped
         if not ENABLED:
-            arrays = iter(zip(self.rows(blocks), skipped or self._from_the_first, strict=True))
+            arrays = iter(zip(self.rows(blocks), rows, strict=True))
             for kind, count in self._kinds:
                 packs.append(kind(*(a[k:] for a, k in islice(arrays, count))))
             return packs
-        rows = self._from_the_first if skipped is None else _whole_numbers(tuple(skipped))
         table = np.empty_like(self._entries)
         address = _lay_out(self._entries, self._steps, self._owners, rows, blocks, table)
         for form, size in self._types:

@@ -9,6 +9,8 @@ from typing import Any
 
 from hybridsim.engine.native.kernels import ENABLED, inlined
 
+_MAX_INDEX = (1 << 31) - 1
+
 if ENABLED:
     from llvmlite import ir
     from numba import types
@@ -35,6 +37,12 @@ else:
 
     def short_loop() -> None:
         """Do nothing."""
+
+
+@inlined
+def index(i: int) -> int:
+    """Return an index that is not negative as one that LLVM knows not to be: it is not counted from the end."""
+    return i & _MAX_INDEX
 
 
 @inlined

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
+from functools import lru_cache
 from time import perf_counter
 from typing import Any
 
@@ -22,7 +23,6 @@ from hybridsim.engine.record.checkpoint import damaged
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.trajectory import Trajectory
 from hybridsim.engine.run.event_loop import (
-    LONGEST,
     MIN_STEPS_IN_PART,
     ORIGIN_AT,
     PHASES_AT,
@@ -93,6 +93,12 @@ def _layout(
     )
 
 
+@lru_cache(64)
+def _skipped_rows(first: int, steps: int, count: int) -> np.ndarray:
+    """Return the used rows of each array of the record, of which a method has `count`; last steps begin with 0."""
+    return np.array([first, first, first, first + 1, first, first] + [steps] * count, dtype=np.int64)
+
+
 class CallArrays:
     """The arrays of one call of a compiled loop; later calls reuse them.
 
@@ -109,8 +115,8 @@ class CallArrays:
         self.work = work_space(system, len(lin.kinds), len(lin.factors))
         self.call: LoopCall = packed(
             LoopCall(
-                int_slots=np.zeros(9, dtype=np.int64),
-                float_slots=np.zeros(8),
+                int_slots=np.zeros(4, dtype=np.int64),
+                longest=np.zeros(1),
                 times=np.zeros(4),
                 rates=np.zeros(layout.phases),
                 scale=np.empty(system.n),
@@ -137,8 +143,8 @@ class CompiledLoop:
         self.kernels, self.system = kernels, kernels.system
         self.tape_cache, layout = tape_cache_of(self.system), self.system.layout
         self.kernel_run: KernelRun | None = None  # a call made beforehand, which `advance` takes first
-        self.array_layout: ArrayLayout | None = None
-        self._layout_for = (0, 0)
+        self.array_layout: ArrayLayout  # of `memory`
+        self._layouts: dict[tuple[int, int], ArrayLayout] = {}  # those met so far, also by copies
         self.steps = MAX_SEGMENTS  # largest number of steps in one call
         if kernels.is_continued:
             beside = (MAX_SEGMENTS + 1) * (layout.size + 1) + ALIGNED
@@ -148,26 +154,14 @@ class CompiledLoop:
     def fresh_copy(self) -> CompiledLoop:
         """Return a copy for another run; this object must not have been used."""
         other: CompiledLoop = object.__new__(type(self))
-        vars(other).update(vars(self))
+        other.__dict__ = vars(self).copy()
         other.kernels = self.kernels.fresh_copy()
         return other
 
     def renew(self) -> None:
-        """Write to new arrays from now on; committed blocks keep the former ones."""
+        """Write to new arrays from now on, allocated when needed; committed blocks keep the former ones."""
         self.used = (0, 0)  # used rows of steps, and of segments
-        self.memory: tuple[np.ndarray, ...] | None = (
-            None  # with the layout of the record; allocated on first use
-        )
-
-    def _allocate(self) -> None:
-        """Allocate the arrays that the kernels write."""
-        if self._layout_for != (self.steps, self.kernels.columns):
-            self._layout_for = self.steps, self.kernels.columns
-            self.array_layout = _layout(
-                self.system, self.steps, self.kernels.rows, self.kernels.keeps_starts, *self.kernels.fields()
-            )
-        assert self.array_layout is not None
-        self.memory = self.array_layout.blank()
+        self.memory: tuple[np.ndarray, ...] | None = None
 
     @property
     def place(self) -> tuple[np.ndarray, ...]:
@@ -204,10 +198,14 @@ class CompiledLoop:
             return None
         lin, spare = found
         if self.memory is None:
-            self._allocate()
-        assert self.array_layout is not None and self.memory is not None
+            key = self.steps, kernels.columns
+            if key not in self._layouts:
+                kind = kernels.rows, kernels.keeps_starts, *kernels.fields()
+                self._layouts[key] = _layout(self.system, self.steps, *kind)
+            self.array_layout = self._layouts[key]
+            self.memory = self.array_layout.blank()
         steps, first = self.used
-        skipped = (first, first, first, first + 1, first, first, *(steps,) * len(kernels.rows._fields))
+        skipped = _skipped_rows(first, steps, len(kernels.rows._fields))
         record, rows = self.array_layout.packed(self.memory, skipped)
         try:
             arrays = spare.pop()
@@ -221,10 +219,12 @@ class CompiledLoop:
         arrays.state.memory[:] = state.memory
         times = call.times
         (times[0], times[1]), (times[2], times[3]) = target, origin
-        call.float_slots[LONGEST] = kernels.longest
+        call.longest[0] = kernels.longest
         if arrays.rates is not self.system.rates:
             arrays.rates = call.rates[:] = self.system.rates
-        model = replaced(arrays.model, tapes=tapes, lin=lin)
+        model = arrays.model
+        if model.tapes is not tapes or model.lin is not lin:
+            model = replaced(model, tapes=tapes, lin=lin)
         began = perf_counter()
         code = _event_loop(model, call, arrays.as_packed, arrays.work, record, opaque(own), opaque(rows))
         seconds = perf_counter() - began
@@ -232,8 +232,8 @@ class CompiledLoop:
             tape_cache.look()
         result = kernels.end(own, tapes, lin)
         end, clock, counts = arrays.state.copy(), times[2:].tolist(), call.int_slots.tolist()
+        tape_cache.surround(arrays.state.z)
         spare.append(arrays)
-        tape_cache.surround(end.z)
         # modes without tables may have ended the call
         has_news = counts[SEGMENTS] > 0 and len(tape_cache.tapes.modes) != len(tapes.modes)
         return KernelRun(

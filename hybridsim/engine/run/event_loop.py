@@ -33,7 +33,7 @@ from hybridsim.engine.native.kernels import (
     kernel,
     kernel_address,
 )
-from hybridsim.engine.native.loop_hints import put
+from hybridsim.engine.native.loop_hints import index, put, short_loop
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.series.interpreter import advance
 from hybridsim.engine.system.instant import phase_of
@@ -43,10 +43,8 @@ AT_TARGET, STOPPED, FULL = 0, 1, 2  # why a call ended
 # Least number of steps in a part of a segment; with less space the next call takes the segment.
 MIN_STEPS_IN_PART = 64
 FOLLOWED = 3  # returned by a segment kernel that has followed a segment
-# Indices of `LoopCall.int_slots`: what the loop tells a segment kernel, and what the kernel answers
-ORIGIN_AT, PHASES_AT, MODE_ROW, STEPS, SEGMENTS, IS_REJECTED, IS_AHEAD, TAKEN, FIRED = range(9)
-# The same of `LoopCall.float_slots`
-LONGEST, BOUND, END, EVENT_AT, EVENT_ERROR, SLOPE, BEND, LAST_STEP = range(8)
+# Indices of `LoopCall.int_slots`; the last two count what is committed
+ORIGIN_AT, PHASES_AT, STEPS, SEGMENTS = range(4)
 
 
 class LoopModel(NamedTuple):
@@ -61,8 +59,8 @@ class LoopModel(NamedTuple):
 class LoopCall(NamedTuple):
     """The arrays of one call of the event loop, for all methods."""
 
-    int_slots: np.ndarray  # (9,) integers at ORIGIN_AT, ...
-    float_slots: np.ndarray  # (8,) numbers at LONGEST, ...
+    int_slots: np.ndarray  # (4,) integers at ORIGIN_AT, ...
+    longest: np.ndarray  # (1,) longest segment
     times: np.ndarray  # (4,) target, and clock: the origin of the segment, which is advanced
     rates: np.ndarray  # (R,) rates of the angles
     scale: np.ndarray  # (n,) largest states on the segment
@@ -80,6 +78,38 @@ class LoopRecord(NamedTuple):
     jumps: (
         np.ndarray
     )  # (., 2, n) states before and after the end, or (., 3, n), preceded by the state at the start
+
+
+class SegmentStart(NamedTuple):
+    """What a segment kernel is told of a segment, by value: numbers in memory would be read again at each use."""
+
+    mode_row: int  # row of its modes in the tapes
+    bound: float  # local time at which it ends at the latest
+    step: int  # row of its first step in the record
+    number: int  # its row in the record
+    is_ahead: bool  # whether p is as the kernel left it, with the origin of this segment
+    is_rejected: bool  # whether the last segment of this kernel is not committed
+
+
+class SegmentEnd(NamedTuple):
+    """What a segment kernel answers. Unless `outcome` is FOLLOWED, only that counts; `at` and the rest need a guard."""
+
+    outcome: int
+    s: float  # local time of the end
+    fired: int  # the guard, or -1
+    steps: int  # number of steps
+    at: float  # local time of the end if p has the origin of this segment, 0 if that of the next
+    error: float  # error bound of this time
+    slope: float  # first two Taylor coefficients of the guard
+    bend: float
+    last_step: float  # length of the last step
+    is_ahead: bool  # whether p has the origin of the next segment
+
+
+@inlined
+def not_followed(outcome: int) -> SegmentEnd:
+    """Return the answer of a segment kernel that has followed no segment."""
+    return SegmentEnd(outcome, 0.0, -1, 0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
 
 
 @inlined
@@ -101,65 +131,70 @@ def event_loop(
     advanced by the call, like the clock. work: `EventScratch`. record: `LoopRecord`. own, rows: packs of the method,
     for its arrays and its record. A segment with more steps than fit is committed in parts.
     """
-    automata, tapes, ints, floats = model.automata, model.tapes, call.int_slots, call.float_slots
+    automata, tapes, ints = model.automata, model.tapes, call.int_slots
     target, clock, pace, scale, rates = call.times[:2], call.times[2:], call.pace, call.scale, call.rates
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     y, jumps, place = work.y, record.jumps, (ints[ORIGIN_AT], ints[PHASES_AT])
     before, after = jumps.shape[1] - 2, jumps.shape[1] - 1
     pace[0], pace[1], pace[2] = math.inf, math.inf, 0.0
-    ints[STEPS] = ints[SEGMENTS] = ints[IS_AHEAD] = ints[IS_REJECTED] = 0
-    k = find_modes(tapes, z)
+    ints[STEPS] = ints[SEGMENTS] = step = i = 0
+    is_ahead, is_rejected, k = False, False, find_modes(tapes, z)
     while True:
-        i, bound = ints[SEGMENTS], (target[0] - clock[0]) + (target[1] - clock[1])
+        bound = (target[0] - clock[0]) + (target[1] - clock[1])
         if not bound > 0.0:
             return AT_TARGET
         if k < 0:
             return STOPPED
+        k = index(k)
         if i >= record.fires.shape[0]:
             return FULL
-        if ints[IS_AHEAD] == 0:
+        if not is_ahead:
             set_origin(place, rates, clock[0], clock[1], p)
-        ints[MODE_ROW], floats[BOUND] = k, bound
         record.clocks[i, 0], record.clocks[i, 1] = clock[0], clock[1]
         put(z, record.modes[i])
         put(p, record.vectors[i])
         put(x, jumps[i, 0])
-        outcome = segment(model, call, state, work, own, rows)
-        if outcome != FOLLOWED:
-            return outcome
-        fired, s, steps = ints[FIRED], floats[END], ints[TAKEN]
-        record.last_steps[i], record.fires[i] = ints[STEPS] + steps, fired
+        start = SegmentStart(k, bound, step, i, is_ahead, is_rejected)
+        end = segment(start, model, call, state, work, own, rows)
+        if end.outcome != FOLLOWED:
+            return end.outcome
+        fired, s, step_after = end.fired, end.s, step + end.steps
+        record.last_steps[i], record.fires[i] = step_after, fired
         put(y, jumps[i, before])
-        put(y, jumps[i, after])
         if fired < 0:
+            put(y, jumps[i, after])
             put(y, x)
             for j in range(x.shape[0]):
+                short_loop()
                 x_error[j] = 4.0 * UNIT * scale[j] + x_error[j]
-            ints[STEPS], ints[SEGMENTS] = ints[STEPS] + steps, i + 1
+            ints[STEPS], ints[SEGMENTS] = step_after, i + 1
             if not s < bound:
                 clock[0], clock[1] = target[0], target[1]
                 return AT_TARGET
             # a segment that is too long is divided: it goes on in the same modes, where active guards are positive
             clock[0], clock[1] = moved_on(clock[0], clock[1], s)
             for g in range(state.sides.shape[0]):
+                short_loop()
                 state.sides[g], state.orders[g], state.floors[g] = 1, 0, 0.0
             return FULL
-        at, error, slope, bend = floats[EVENT_AT], floats[EVENT_ERROR], floats[SLOPE], floats[BEND]
+        fired = index(fired)
+        at, error, slope, bend, is_ahead = end.at, end.error, end.slope, end.bend, end.is_ahead
         state_errors(automata, error, y, scale, x_error, z, work.slopes, work.y_error)
-        work.float_slots[SPREAD], work.int_slots[ROW] = spread(steps, STAGES), k
+        work.float_slots[SPREAD], work.int_slots[ROW] = spread(end.steps, STAGES), k
         is_rejected = is_crowded(s, clock, pace) or (
-            is_shallow(slope, bend, floats[LAST_STEP])
+            is_shallow(slope, bend, end.last_step)
             and is_hidden(model, fired, slope, bend, at, error, state, work)
         )
         if is_rejected or not resolve(model, at, error, fired, state, work):
-            ints[IS_REJECTED], ints[IS_AHEAD] = 1, 0  # the kernel of the segment returns STOPPED
+            is_rejected, is_ahead = True, False  # the kernel of the segment returns STOPPED
             continue
         put(work.x_after, jumps[i, after])
         clock[0], clock[1] = moved_on(clock[0], clock[1], s)
-        ints[STEPS], ints[SEGMENTS] = ints[STEPS] + steps, i + 1
+        step, i = step_after, i + 1
+        ints[STEPS], ints[SEGMENTS] = step, i
         k = work.int_slots[ROW] if work.int_slots[ROW] != k else find_modes(tapes, z)
-        if automata.hold[automata.owner[fired]] < 0:
-            ints[IS_AHEAD] = 0  # the event may have changed p
+        if automata.hold[index(automata.owner[fired])] < 0:
+            is_ahead = False  # the event may have changed p
 
 
 @kernel

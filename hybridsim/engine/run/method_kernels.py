@@ -24,26 +24,26 @@ NOT_LINEAR = no_tables()  # for kernels without tables of linear modes
 class MethodKernels(ABC):
     """What a method adds to the compiled event loop of one run, in which no segment is longer than `longest`.
 
-    ``segment(model, call, state, work, own, rows)`` is an `inlined` kernel that returns an integer. `loop` is a plain
-    function that passes it to `event_loop`; both are compiled together. The arguments of a segment are the packs
-    `LoopModel`, `LoopCall`, `StateArrays`, `EventScratch`, and two of the method: `arrays` and the arrays of `fields`.
-    It follows one segment from local time 0, in the modes of row ``call.int_slots[MODE_ROW]`` of the tapes:
+    ``segment(start, model, call, state, work, own, rows)`` is an `inlined` kernel from `SegmentStart` to `SegmentEnd`.
+    `loop` is a plain function that passes it to `event_loop`; both are compiled together. The other arguments of a
+    segment are the packs `LoopModel`, `LoopCall`, `StateArrays`, `EventScratch`, and two of the method: `arrays` and
+    the arrays of `fields`. It follows one segment from local time 0, in the modes of row ``start.mode_row`` of the
+    tapes:
 
     1. The segment begins in ``state``, which the kernel must not change. It ends at the latest at local time
-       ``call.float_slots[BOUND]``. If it would be longer than LONGEST, return STOPPED.
-    2. It ends at the first zero of an active guard. If zeros are not certain, or any number is not finite, return
-       STOPPED; the general loop then takes the segment. Return FULL if the arrays are full.
-    3. Otherwise write the end: local time END, guard FIRED or -1, number of steps TAKEN, the states in ``work.y``, the
-       largest states in ``call.scale``. At BOUND no guard may be zero within rounding; see
-       `hybridsim.engine.events.compiled.at_end`. An END before BOUND without a guard divides the segment.
-    4. For a guard write also the rates in ``work.slopes``, the error of the time EVENT_ERROR, the local time EVENT_AT,
-       the first two Taylor coefficients SLOPE and BEND of the guard there, and the length LAST_STEP of the last step.
-       BEND = 0 if the guard is certain to become negative. Return FOLLOWED.
-    5. Write steps from row ``call.int_slots[STEPS]`` of the record on, and other data in row SEGMENTS.
-    6. A kernel may set the origin of the next segment in ``state.p`` and give EVENT_AT = 0. It then sets IS_AHEAD. If
-       IS_AHEAD is set at the next start, nothing has changed p since.
-    7. If IS_REJECTED is set, the last segment is not committed: restore what the kernel remembers of it, and return
-       STOPPED.
+       ``start.bound``. If it would be longer than ``call.longest``, return ``not_followed(STOPPED)``.
+    2. It ends at the first zero of an active guard. If zeros are not certain, or any number is not finite, the outcome
+       is STOPPED; the general loop then takes the segment. It is FULL if the arrays are full.
+    3. Otherwise it is FOLLOWED. Write the states at the end to ``work.y``, the largest states to ``call.scale``. At
+       the bound no guard may be zero within rounding; see `hybridsim.engine.events.compiled.at_end`. An end before
+       the bound without a guard divides the segment.
+    4. For a guard write also the rates to ``work.slopes``. Its ``bend`` is 0 if the guard is certain to become
+       negative.
+    5. Write steps from row ``start.step`` of the record on, and other data in row ``start.number``.
+    6. A kernel may set the origin of the next segment in ``state.p`` and return ``at = 0`` and ``is_ahead``. If
+       ``start.is_ahead`` is set then, nothing has changed p since.
+    7. If ``start.is_rejected`` is set, the last segment is not committed: restore what the kernel remembers of it, and
+       the outcome is STOPPED.
     """
 
     loop: ClassVar[Callable[..., int]]
@@ -64,7 +64,7 @@ class MethodKernels(ABC):
         if not self.remembers:
             return self
         other: MethodKernels = object.__new__(type(self))
-        vars(other).update(vars(self))
+        other.__dict__ = vars(self).copy()
         return other
 
     @abstractmethod

@@ -78,7 +78,9 @@ class ClosedFormKernels(MethodKernels):
     def begin(self, own: Any, tapes: Tapes) -> Any:
         """Write the last zeros of guards in this run to the arrays."""
         known = len(self.hints)
-        own.hints[:known], own.hints[known:] = self.hints, 0.0
+        own.hints[known:] = 0.0
+        if known:
+            own.hints[:known] = self.hints
         return own
 
     def end(self, own: Any, tapes: Tapes, lin: Any) -> Any:

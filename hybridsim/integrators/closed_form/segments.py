@@ -26,29 +26,19 @@ from hybridsim.engine.linear.motion import (
 )
 from hybridsim.engine.native.constants import BOUND_TERMS
 from hybridsim.engine.native.kernels import call, call_noinline, inline_always, inlined
-from hybridsim.engine.native.loop_hints import put
+from hybridsim.engine.native.loop_hints import index, put
 from hybridsim.engine.native.simd_products import dot
 from hybridsim.engine.roots.first_exit import FOUND, OPEN
 from hybridsim.engine.run.event_loop import (
-    BEND,
-    BOUND,
-    END,
-    EVENT_AT,
-    EVENT_ERROR,
-    FIRED,
     FOLLOWED,
     FULL,
-    IS_AHEAD,
-    IS_REJECTED,
-    LONGEST,
-    MODE_ROW,
     ORIGIN_AT,
     PHASES_AT,
-    SEGMENTS,
     STOPPED,
-    TAKEN,
+    SegmentEnd,
     any_holding,
     event_loop,
+    not_followed,
     set_origin,
 )
 
@@ -88,11 +78,11 @@ def first_exit_of(lin: Any, tapes: Any, k: int, bound: float, state: Any, own: A
     stay positive for long.
     """
     c, starts, hints, sides, orders = own.c, own.starts, own.hints, state.sides, state.orders
-    first, last = tapes.active_start[k], tapes.active_start[k + 1]
+    first, last = index(tapes.active_start[k]), tapes.active_start[k + 1]
     lead, soonest, horizon, known, until = first, math.inf, bound, _NO_GUARD, bound
     for i in range(first, last):
-        g = tapes.active[i]
-        start = starts[i - first]
+        g = index(tapes.active[i])
+        start = starts[index(i - first)]
         if lin.waves[k, g] >= 0 and orders[g] == 0 and sides[g] > 0:
             outcome, at = first_zero_of_wave(lin, k, g, c, until)
             if outcome != OPEN:
@@ -116,10 +106,10 @@ def first_exit_of(lin: Any, tapes: Any, k: int, bound: float, state: Any, own: A
         fired, s = (known, until) if until <= horizon else (_NO_GUARD, min(horizon, bound))
         for j in range(first, last):
             i = lead if j == first else (j - 1 if j <= lead else j)
-            if starts[i - first, BOUND_TERMS] == _DONE:
+            if starts[index(i - first), BOUND_TERMS] == _DONE:
                 continue
-            g = tapes.active[i]
-            outcome, at = first_zero(lin, k, g, i - first, s, state, own)
+            g = index(tapes.active[i])
+            outcome, at = call_noinline(first_zero, (lin, k, g, i - first, s, state, own))
             if outcome == OPEN:
                 return _OPEN, at
             if outcome == FOUND:
@@ -131,36 +121,38 @@ def first_exit_of(lin: Any, tapes: Any, k: int, bound: float, state: Any, own: A
 
 
 @inlined
-def stopped(hints: Any, k: int, former: Any) -> int:
+def stopped(hints: Any, k: int, former: Any) -> SegmentEnd:
     """Restore the initial guesses of zeros for the current segment, because the segment is not committed."""
     put(former, hints[k])
-    return STOPPED
+    return not_followed(STOPPED)
 
 
 @inlined
-def closed_form_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, rows: Any) -> int:
+def closed_form_segment(
+    start: Any, model: Any, loop: Any, state: Any, work: Any, own: Any, rows: Any
+) -> SegmentEnd:
     """Follow one segment in closed form; see `hybridsim.engine.run.method_kernels.MethodKernels`.
 
     The result is FULL also after POINTS evaluations of guards; the rest of the run then begins in another call.
     """
-    ints, floats, lin = loop.int_slots, loop.float_slots, model.lin
-    hints, former, k = own.hints, own.former, ints[MODE_ROW]
-    if ints[IS_REJECTED] != 0:
+    ints, lin, hints, former = loop.int_slots, model.lin, own.hints, own.former
+    k, bound, _, number, is_ahead, is_rejected = start
+    if is_rejected:
         return stopped(hints, k, former)
-    if ints[SEGMENTS] == 0:
+    if number == 0:
         own.points[0] = 0
     if own.points[0] > POINTS:
-        return FULL
-    automata, tapes, functions, bound = model.automata, model.tapes, called_by(work), floats[BOUND]
+        return not_followed(FULL)
+    automata, tapes, functions = model.automata, model.tapes, called_by(work)
     target, clock = loop.times[:2], loop.times[2:]
     x, z, p, c, v, y, y1 = state.x, state.z, state.p, own.c, own.v, work.y, work.x_after
-    if ints[IS_AHEAD] == 0:
+    if not is_ahead:
         functions_of_time(lin, 0.0, p, work.factors, work.w)
     put(hints[k], former)
     to_modal(lin, k, x, work.w, c)
     until = min(bound, lin.lasting[k])
     fired, s = first_exit_of(lin, tapes, k, until, state, own)
-    if fired == _OPEN or s > floats[LONGEST]:
+    if fired == _OPEN or s > loop.longest[0]:
         return stopped(hints, k, former)
     moved(lin, k, c, s, v)
     states_of(lin, k, v, y)
@@ -175,17 +167,15 @@ def closed_form_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, 
             return stopped(hints, k, former)
     if fired < 0 and until == bound:
         time = max(abs(target[0]), abs(clock[0]))
-        if may_vanish_linear(lin, tapes, k, s, time, v, own.sizes, own.terms[0]):
+        if call_noinline(may_vanish_linear, (lin, tapes, k, s, time, v, own.sizes, own.terms[0])):
             return stopped(hints, k, former)
-    number = ints[SEGMENTS]
     rows.ends[number], rows.rows[number] = s, k
     put(c, rows.coordinates[number])
-    floats[END], ints[FIRED], ints[TAKEN], ints[IS_AHEAD] = s, fired, 1, 0
+    s_error = 2.0 * 2.0**-52 * s
     if fired >= 0:
         # the event is resolved at the origin of the next segment, to which these functions of time belong
         high, low = moved_on(clock[0], clock[1], s)
         set_origin((ints[ORIGIN_AT], ints[PHASES_AT]), loop.rates, high, low, p)
-        s_error = 2.0 * 2.0**-52 * s
         functions_of_time(lin, 0.0, p, work.factors, work.w)
         value = dot(lin.series, (k, fired, 0), (y, work.w))
         slope = dot(lin.series, (k, fired, 1), (y, work.w))
@@ -193,8 +183,7 @@ def closed_form_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, 
             s_error = abs(value / slope)
         errors_of_time(lin, s_error, work.factors, work.w_error)
         slopes_of(lin, k, y, work.w, work.slopes)
-        floats[EVENT_AT], floats[EVENT_ERROR], floats[BEND], ints[IS_AHEAD] = 0.0, s_error, 0.0, 1
-    return FOLLOWED
+    return SegmentEnd(FOLLOWED, s, fired, 1, 0.0, s_error, 0.0, 0.0, 0.0, fired >= 0)
 
 
 def closed_form_loop(model: Any, call: Any, state: Any, work: Any, record: Any, own: Any, rows: Any) -> int:

@@ -19,28 +19,16 @@ from hybridsim.engine.record.hermite import fit_in_time, holds_between
 from hybridsim.engine.roots.dense_guards import first_guard, first_linear_guard
 from hybridsim.engine.roots.first_exit import FOUND, OPEN
 from hybridsim.engine.run.event_loop import (
-    BEND,
-    BOUND,
-    END,
-    EVENT_AT,
-    EVENT_ERROR,
-    FIRED,
     FOLLOWED,
     FULL,
-    IS_REJECTED,
-    LAST_STEP,
-    LONGEST,
     MIN_STEPS_IN_PART,
-    MODE_ROW,
-    SEGMENTS,
-    SLOPE,
-    STEPS,
     STOPPED,
-    TAKEN,
+    SegmentEnd,
     any_holding,
     any_projecting,
     event_loop,
     load_constants,
+    not_followed,
 )
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.series.interpreter import advance, expand
@@ -251,14 +239,16 @@ def is_zero(model: Any, fired: int, s: float, scale: Any, state: Any, work: Any)
 
 
 @inlined
-def runge_kutta_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, rows: Any) -> int:
+def runge_kutta_segment(
+    start: Any, model: Any, loop: Any, state: Any, work: Any, own: Any, rows: Any
+) -> SegmentEnd:
     """Follow one segment by Runge-Kutta steps; see `hybridsim.engine.run.method_kernels.MethodKernels`.
 
     own: `hybridsim.integrators.runge_kutta.compiled_loop.RungeKuttaArrays`.
     """
-    ints, floats = loop.int_slots, loop.float_slots
-    if ints[IS_REJECTED] != 0:
-        return STOPPED
+    k, bound, first_step, number, _, is_rejected = start
+    if is_rejected:
+        return not_followed(STOPPED)
     automata, tapes, inputs, functions = model.automata, model.tapes, model.inputs, called_by(work)
     settings, parts, codes, first = own.settings, own.parts, own.codes, own.first_step
     tableau, hermite, atol = settings.tableau, settings.hermite, settings.atol
@@ -266,13 +256,12 @@ def runge_kutta_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, 
     leading = (orders[0], sizes[0], sizes[1], orders[1], sizes[2])
     error_order, order = settings.orders[0], settings.orders[1]
     rtol, max_step = settings.control[0], settings.control[1]
-    x, z, p, k, bound, longest = state.x, state.z, state.p, ints[MODE_ROW], floats[BOUND], floats[LONGEST]
+    x, z, p, longest = state.x, state.z, state.p, loop.longest[0]
     W, left, right = own.W, own.left, own.right
     scale, slopes, y, y1 = loop.scale, work.slopes, work.y, work.x_after
     side_now, order_now, floor_now = own.sides, own.orders, own.floors
     steps, series = rows.steps, rows.series
     n, terms, tolerances = x.shape[0], left.shape[1], (rtol, atol)
-    first_step = ints[STEPS]
     n_steps = first_step
     guard_rows = parts.rows[parts.start[k] : parts.start[k + 1]]
     step_rows = parts.step_rows[parts.step_start[k] : parts.step_start[k + 1]]
@@ -310,18 +299,18 @@ def runge_kutta_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, 
         for j in range(terms):
             left[i, j] = own.first[i, j]
     if not (is_finite(left) and h > 0.0):
-        return STOPPED
+        return not_followed(STOPPED)
     while fired < 0 and s < bound:
         if n_steps >= steps.shape[0]:
-            if ints[SEGMENTS] > 0 or n_steps < MIN_STEPS_IN_PART:
-                return FULL
+            if number > 0 or n_steps < MIN_STEPS_IN_PART:
+                return not_followed(FULL)
             first[0] = h  # the next call continues with it
             break
         # the rest would be too short for another step
         is_last = h * LAST_STEP_FACTOR >= bound - s - SMALLEST * 2.0**-52 * bound
         d = bound - s if is_last else on_the_grid(s, h)
         if s > longest or not 0.0 < d < tried:
-            return STOPPED
+            return not_followed(STOPPED)
         tried = d
         for i in range(n):
             own.dx[i] = left[i, 1]
@@ -334,18 +323,10 @@ def runge_kutta_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, 
         if not (
             error <= 1.0
             and series_of(
-                ends_code,
-                step_rows,
-                step_guards,
-                flow_registers,
-                s + d,
-                y1,
-                guard_registers,
-                W,
-                right,
+                ends_code, step_rows, step_guards, flow_registers, s + d, y1, guard_registers, W, right,
                 own.guards_right,
             )
-        ):
+        ):  # fmt: skip
             own.counts[1] += 1
             h = min(h, _HALF * d) if error <= 1.0 else h
             continue
@@ -364,7 +345,7 @@ def runge_kutta_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, 
         else:
             outcome, g, at = OPEN, -1, 0.0
         if outcome == OPEN:
-            return STOPPED
+            return not_followed(STOPPED)
         if outcome == FOUND:
             place = 0
             while own.numbers[place] != g:
@@ -374,19 +355,9 @@ def runge_kutta_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, 
                 s, at, d, state, is_holding, scale, own, work,
             )  # fmt: skip
             if code == LOST:
-                return STOPPED
+                return not_followed(STOPPED)
             if code != REJECTED and not holds_between(
-                functions.flow,
-                hermite.middle,
-                s,
-                at,
-                left,
-                right,
-                p,
-                z,
-                tolerances,
-                own.ahead,
-                slopes,
+                functions.flow, hermite.middle, s, at, left, right, p, z, tolerances, own.ahead, slopes
             ):
                 code = REJECTED
             if code == REJECTED:
@@ -419,20 +390,18 @@ def runge_kutta_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, 
         call(functions.project, s, y, p, z, y1)
         put(y1, y)
     if fired >= 0 and not is_sure and not is_zero(model, fired, s, scale, state, work):
-        return STOPPED
+        return not_followed(STOPPED)
     if fired >= 0 or s >= bound:
         call(functions.flow, s, y, p, z, slopes)
+    s_error = 2.0 * 2.0**-52 * s
     if fired >= 0:
-        floats[EVENT_AT], floats[EVENT_ERROR] = s, 2.0 * 2.0**-52 * s
         if slope != 0.0 and abs(value / slope) < math.inf:
-            floats[EVENT_ERROR] = max(floats[EVENT_ERROR], abs(value / slope))
-        floats[SLOPE], floats[BEND], floats[LAST_STEP] = slope, bend, d
+            s_error = max(s_error, abs(value / slope))
     elif s >= bound:
         latest = max(abs(loop.times[0]), abs(loop.times[2]))
         if may_vanish(model, k, s, latest, n_steps - first_step, scale, slopes, state, work):
-            return STOPPED
-    floats[END], ints[FIRED], ints[TAKEN] = s, fired, n_steps - first_step
-    return FOLLOWED
+            return not_followed(STOPPED)
+    return SegmentEnd(FOLLOWED, s, fired, n_steps - first_step, s, s_error, slope, bend, d, False)
 
 
 def runge_kutta_loop(model: Any, call: Any, state: Any, work: Any, record: Any, own: Any, rows: Any) -> int:

@@ -25,28 +25,16 @@ from hybridsim.engine.roots.earliest_exit import earliest_exit, parts_for_exit
 from hybridsim.engine.roots.first_exit import FOUND, NEVER, OPEN
 from hybridsim.engine.roots.vanishing_terms import may_end, where_it_ends
 from hybridsim.engine.run.event_loop import (
-    BEND,
-    BOUND,
-    END,
-    EVENT_AT,
-    EVENT_ERROR,
-    FIRED,
     FOLLOWED,
     FULL,
-    IS_REJECTED,
-    LAST_STEP,
-    LONGEST,
     MIN_STEPS_IN_PART,
-    MODE_ROW,
-    SEGMENTS,
-    SLOPE,
-    STEPS,
     STOPPED,
-    TAKEN,
+    SegmentEnd,
     any_holding,
     any_projecting,
     event_loop,
     load_constants,
+    not_followed,
 )
 from hybridsim.engine.series.interpreter import SLACK, expand, reach, sum_sizes
 from hybridsim.engine.series.vanishing_kinds import KINDS, power_of, register_of
@@ -93,30 +81,26 @@ def series_at(
 
 
 @inlined
-def taylor_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, rows: Any) -> int:
+def taylor_segment(
+    start: Any, model: Any, loop: Any, state: Any, work: Any, own: Any, rows: Any
+) -> SegmentEnd:
     """Follow one segment by Taylor steps; see `hybridsim.engine.run.method_kernels.MethodKernels`.
 
     own: `hybridsim.integrators.taylor.compiled_loop.TaylorArrays`.
     """
-    ints, floats = loop.int_slots, loop.float_slots
-    if ints[IS_REJECTED] != 0:
-        return STOPPED
-    automata, tapes, inputs, codes, functions = (
-        model.automata,
-        model.tapes,
-        model.inputs,
-        own.codes,
-        called_by(work),
-    )
+    k, bound, first_step, number, _, is_rejected = start
+    if is_rejected:
+        return not_followed(STOPPED)
+    automata, tapes, inputs = model.automata, model.tapes, model.inputs
+    codes, functions = own.codes, called_by(work)
     control, atol, order = own.settings.control, own.settings.atol, own.V.shape[1] - 1
     rtol, max_step = control[0], control[1]
-    x, z, p, k, bound, longest = state.x, state.z, state.p, ints[MODE_ROW], floats[BOUND], floats[LONGEST]
+    x, z, p, longest = state.x, state.z, state.p, loop.longest[0]
     V, guard_series, ahead = own.V, own.guard_series, own.ahead
     powers, totals = own.sizes[: order + 1], own.sizes[order + 1 :]
     y, scale = work.y, loop.scale
     side_now, order_now, floor_now = own.sides, own.orders, own.floors
     steps, series, n = rows.steps, rows.series, x.shape[0]
-    first_step = ints[STEPS]
     n_steps = first_step
     tape = tapes.optimised[tapes.optimised_start[k] : tapes.optimised_start[k + 1]]
     high = tapes.high[tapes.high_start[k] : tapes.high_start[k + 1]]
@@ -144,28 +128,17 @@ def taylor_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, rows:
     fill(own.largest, 0.0)
     while fired < 0 and s < bound:
         if n_steps >= steps.shape[0]:
-            if ints[SEGMENTS] > 0 or n_steps < MIN_STEPS_IN_PART:
-                return FULL
+            if number > 0 or n_steps < MIN_STEPS_IN_PART:
+                return not_followed(FULL)
             break
         if s > longest:
-            return STOPPED
+            return not_followed(STOPPED)
         coefficients = series[n_steps]
         is_known = n_steps > first_step and not is_projected
         series_at(
-            code,
-            is_known,
-            tape,
-            high,
-            flow_registers,
-            order,
-            s,
-            y,
-            guard_registers,
-            fading,
-            V,
-            guard_series,
+            code, is_known, tape, high, flow_registers, order, s, y, guard_registers, fading, V, guard_series,
             coefficients,
-        )
+        )  # fmt: skip
         for i in range(count):
             own.largest[i] = max(own.largest[i], abs(guard_series[i, 0]))
         left = bound - s
@@ -175,21 +148,12 @@ def taylor_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, rows:
         )  # fmt: skip
         short = short + 1 if h < STANDSTILL * s else 0
         if not h > 0.0 or short >= IN_A_ROW:
-            return STOPPED
+            return not_followed(STOPPED)
         outcome, g, d = earliest_exit(
-            tapes,
-            k,
-            order,
-            h,
-            guard_series,
-            numbers,
-            powers,
-            totals,
-            parts_for_exit(own),
-            codes.bernstein,
+            tapes, k, order, h, guard_series, numbers, powers, totals, parts_for_exit(own), codes.bernstein
         )
         if outcome == OPEN:
-            return STOPPED
+            return not_followed(STOPPED)
         for i in range(fading.shape[0]):
             u, kind, power = guard_series[count + i], fading[i] % KINDS, power_of(fading[i])
             if sizes_code == 0:
@@ -210,23 +174,14 @@ def taylor_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, rows:
             if outcome == NEVER and d < left:
                 d = on_the_grid(s, d)
             if trials > _TRIALS or not d > 0.0:
-                return STOPPED
+                return not_followed(STOPPED)
             look, passes = first_look, True
             while passes and look <= len(BETWEEN):
                 e = d if look == len(BETWEEN) else BETWEEN[look] * d
                 look_ahead(
-                    ahead_code,
-                    tape,
-                    flow_registers,
-                    order,
-                    s,
-                    e,
-                    guard_registers,
-                    coefficients,
-                    guard_series,
-                    constants,
-                    ahead,
-                )
+                    ahead_code, tape, flow_registers, order, s, e, guard_registers, coefficients, guard_series,
+                    constants, ahead,
+                )  # fmt: skip
                 passes, look = flow_holds(ahead, order, n, e, y, rtol, atol), look + 1
             if passes and (
                 keeps_up(guard_series, numbers, order, ahead, rtol, values, sums)
@@ -252,14 +207,14 @@ def taylor_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, rows:
     if holds:
         call(functions.project, s, y, p, z, work.x_after)
         put(work.x_after, y)
+    s_error, slope, bend = 2.0 * 2.0**-52 * s, 0.0, 0.0
     if fired < 0:
         latest = max(abs(loop.times[0]), abs(loop.times[2]))
         if s >= bound and not is_clear(values, own.largest, s, latest):
             taken = n_steps - first_step
             if call_noinline(may_vanish, (model, k, s, latest, taken, scale, rates_now, state, work)):
-                return STOPPED
+                return not_followed(STOPPED)
     else:
-        s_error, slope, bend = 2.0 * 2.0**-52 * s, 0.0, 0.0
         if holds:
             values_at(values_code, tape, flow_registers, s, y, guard_registers, constants, values, rates_now)
         for i in range(count):
@@ -271,10 +226,8 @@ def taylor_segment(model: Any, loop: Any, state: Any, work: Any, own: Any, rows:
                 if slope != 0.0 and math.isfinite(values[i] / slope):
                     s_error = max(s_error, abs(values[i] / slope))
         put(rates_now, work.slopes)
-        floats[EVENT_AT], floats[EVENT_ERROR], floats[LAST_STEP] = s, s_error, steps[n_steps - 1, 1]
-        floats[SLOPE], floats[BEND] = slope, bend
-    floats[END], ints[FIRED], ints[TAKEN] = s, fired, n_steps - first_step
-    return FOLLOWED
+    last_step = steps[n_steps - 1, 1]
+    return SegmentEnd(FOLLOWED, s, fired, n_steps - first_step, s, s_error, slope, bend, last_step, False)
 
 
 def taylor_loop(model: Any, call: Any, state: Any, work: Any, record: Any, own: Any, rows: Any) -> int:

@@ -14,6 +14,7 @@ import numpy as np
 
 from hybridsim.engine.linear.guard_coefficients import linear_coefficient, linear_series
 from hybridsim.engine.native.kernels import inlined, kernel
+from hybridsim.engine.native.loop_hints import index
 from hybridsim.engine.series.bounded import ORDER
 
 FINE, UNDECIDED, LEAVES = 1, 0, -1  # verdicts on a guard or a candidate
@@ -86,7 +87,7 @@ def kind_of_change(automata: Any, event: Any, z: Any, members: Any) -> int:
     """Return whether components changed their modes, and whether every change is a release; corners do not count."""
     kind = UNCHANGED
     for i in range(members.shape[0]):
-        c = members[i]
+        c = index(members[i])
         if z[c] == event.before[c] or automata.is_corner[c]:
             continue
         if not is_release(automata, event, z, c):
@@ -99,11 +100,20 @@ def kind_of_change(automata: Any, event: Any, z: Any, members: Any) -> int:
 def is_smooth(automata: Any, event: Any, z: Any, members: Any, jumps: Any) -> bool:
     """Return whether no unknown jumps at a release; jumps: of each surface on release to above and to below."""
     for i in range(members.shape[0]):
-        c = members[i]
+        c = index(members[i])
         jump = 2 * automata.surface[c] + (0 if z[c] == automata.above[c] else 1)
         if z[c] != event.before[c] and not automata.is_corner[c] and jumps[jump] != 0.0:
             return False
     return True
+
+
+@inlined
+def zeros_of_surface(automata: Any, event: Any, z: Any, c: int, continuous: bool) -> int:
+    """Return the zeros that the event decrees for the surface of a component beside it; see `decreed_zeros`."""
+    if not event.on_surface[c] or z[c] == automata.hold[c]:
+        return 0
+    is_rate_zero = continuous and is_release(automata, event, z, c)
+    return (2 if is_rate_zero else 1) + (1 if automata.is_unilateral[c] else 0)
 
 
 @inlined
@@ -117,12 +127,11 @@ def decreed_zeros(automata: Any, event: Any, z: Any, c: int, j: int, g: int, con
     too; this adds one zero. Another guard that was located at zero is zero while its mode continues. Guards of a
     holding mode are limits of its unknown; a jump of another unknown may have moved it off the limit.
     """
-    is_holding = z[c] == automata.hold[c]
-    if j == 0 and event.on_surface[c] and not is_holding:
-        is_rate_zero = continuous and is_release(automata, event, z, c)
-        return (2 if is_rate_zero else 1) + (1 if automata.is_unilateral[c] else 0)
+    zeros = zeros_of_surface(automata, event, z, c, continuous) if j == 0 else 0
+    if zeros > 0:
+        return zeros
     is_located = event.is_zero[g] and z[c] == event.now[c]
-    return 1 if is_located and (continuous or not is_holding) else 0
+    return 1 if is_located and (continuous or z[c] != automata.hold[c]) else 0
 
 
 @inlined
@@ -154,11 +163,12 @@ def verdict(
     sides, orders, floors = event.all_sides[row], event.all_orders[row], event.all_floors[row]
     found = FINE
     for i in range(members.shape[0]):
-        c = members[i]
+        c = index(members[i])
         for j in range(automata.guards_of.shape[2]):
             g = automata.guards_of[c, z[c], j]
             if g < 0:
                 continue
+            g = index(g)
             zeros = decreed_zeros(automata, event, z, c, j, g, continuous)
             if lin is not None:
                 linear_series(lin, k, g, zeros, event)
@@ -170,7 +180,7 @@ def verdict(
                 return LEAVES
             orders[g], floors[g] = order if order <= ORDER else 0, 0.0
             if order > 0:
-                floors[g] = value_of(lin, k, g, event)[1]
+                floors[g] = bounds[0] if zeros == 0 else value_of(lin, k, g, event)[1]
     return found
 
 

@@ -9,6 +9,7 @@ from hybridsim.engine.events.compiled.resolve_ordinary import resolve_event
 from hybridsim.engine.events.compiled.scratch import AT, AT_ERROR, FIRED, NOBODY, RESOLVE, SERIES
 from hybridsim.engine.events.zeno.accumulation import CLOSING_IN
 from hybridsim.engine.native.kernels import call_kernel, inlined, kernel, kernel_address
+from hybridsim.engine.native.loop_hints import index, short_loop
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.instant import two_sum
 
@@ -38,13 +39,15 @@ def state_errors(
 ) -> None:
     """Write error bounds of the states at an event: from rounding, earlier errors and the event time."""
     for i in range(y.shape[0]):
+        short_loop()
         out[i] = 4.0 * UNIT * scale[i] + x_error[i] + s_error * abs(slopes[i])
     for c in range(z.shape[0]):
         if automata.hold[c] >= 0 and z[c] == automata.hold[c]:
             for j in range(automata.pin.shape[1]):
+                short_loop()
                 i = automata.pin[c, j]
                 if i >= 0:
-                    out[i] = UNIT * abs(y[i])
+                    out[index(i)] = UNIT * abs(y[index(i)])
 
 
 @inlined

@@ -51,7 +51,7 @@ def may_vanish(
     return False
 
 
-@inlined
+@kernel
 def may_vanish_linear(
     lin: Any, tapes: Any, k: int, s: float, time: float, v: Any, sizes: Any, terms: Any
 ) -> bool:

@@ -28,7 +28,7 @@ from hybridsim.engine.events.compiled.scratch import (
 from hybridsim.engine.linear.guard_coefficients import has_tables, linear_series, measure_point
 from hybridsim.engine.linear.motion import errors_of_time, functions_of_time
 from hybridsim.engine.native.kernels import call, inline_always, inlined
-from hybridsim.engine.native.loop_hints import fill, put
+from hybridsim.engine.native.loop_hints import put, short_loop
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.programs.modes_index import find_modes
 
@@ -70,6 +70,7 @@ def take_choice(
 ) -> bool:
     """Apply the declared transition of the guard and its reset; return False if surfaces may move."""
     for d in range(z.shape[0]):
+        short_loop()
         if automata.hold[d] >= 0 and not automata.is_corner[automata.owner[fired]]:
             return False
     c, n, count = automata.owner[fired], x.shape[0], z.shape[0]
@@ -88,12 +89,15 @@ def take_choice(
         out = work.out
         put(at.x, out)
         for i in range(n_discrete):
+            short_loop()
             out[n + i] = at.p[discrete_at + i]
         asked[count] = reset
         call(functions.reset, at.s, at.x, at.p, asked, out)
         for i in range(n):
+            short_loop()
             x[i] = out[i]
         for i in range(n_discrete):
+            short_loop()
             p[discrete_at + i] = out[n + i]
         for i in range(automata.reset_start[reset], automata.reset_start[reset + 1]):
             slot = automata.reset_slot[i]
@@ -118,7 +122,6 @@ def resolve_ordinary(
     x, x_error, z, p = work.x_after, work.slopes, work.trial, work.p_after
     put(at.x, x)
     put(at.x_error, x_error)
-    fill(work.on_surface, False)
     k = find_modes(tapes, at.z)
     if k < 0:
         return -1
@@ -176,8 +179,10 @@ def resolve_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, 
     if has_tables(lin) and resolve_clear(automata, tapes, lin, state, work, fired):
         return 1
     c = automata.owner[fired]
-    put(state.z, work.now)
-    put(state.z, work.before)
+    for d in range(state.z.shape[0]):
+        short_loop()
+        work.now[d] = work.before[d] = state.z[d]
+        work.on_surface[d] = False
     work.is_zero[fired] = True
     work.released_to[c] = automata.place[fired] if automata.hold[c] == state.z[c] else NO_SIDE
     row = resolve_ordinary(automata, tapes, inputs, lin, state, work, fired)

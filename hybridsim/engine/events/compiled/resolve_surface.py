@@ -17,7 +17,7 @@ from hybridsim.engine.events.compiled.guard_series import guard_series, is_conti
 from hybridsim.engine.events.compiled.scratch import ROW, called_by, located
 from hybridsim.engine.linear.guard_coefficients import measure_point
 from hybridsim.engine.native.kernels import call, call_noinline, inline_always, inlined
-from hybridsim.engine.native.loop_hints import fill, put
+from hybridsim.engine.native.loop_hints import put, short_loop
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.programs.modes_index import find_modes
 
@@ -35,9 +35,9 @@ def row_verdict(
     automata: Any, lin: Any, k: int, z: Any, members: Any, continuous: bool, row: int, work: Any
 ) -> int:
     """Return the verdict on the modes in row k of the tapes; the sides of other guards are positive."""
-    fill(work.all_sides[row], 1)
-    fill(work.all_orders[row], 0)
-    fill(work.all_floors[row], 0.0)
+    for g in range(work.all_sides.shape[1]):
+        short_loop()
+        work.all_sides[row, g], work.all_orders[row, g], work.all_floors[row, g] = 1, 0, 0.0
     return call_noinline(verdict, (automata, lin, k, work, z, members, continuous, False, row))
 
 
