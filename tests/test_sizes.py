@@ -28,7 +28,7 @@ FILES = {
     "arguments.py": 389,
     "engine/events/zeno/accumulation.py": 388,
     "engine/linear/modal.py": 365,
-    "engine/linear/motion.py": 375,
+    "engine/linear/motion.py": 370,
     "engine/linear/tables.py": 325,
     "engine/lowering/emit.py": 366,
     "engine/lowering/held_states.py": 305,
@@ -44,7 +44,7 @@ FILES = {
     "engine/system/system.py": 501,
     "integrators/fixed_step/moreau_kernels.py": 413,
     "integrators/fixed_step/run.py": 426,
-    "integrators/runge_kutta/segments.py": 440,
+    "integrators/runge_kutta/segments.py": 409,
     "mechanics/declaration/system.py": 352,
     "mechanics/series_loop/expansion.py": 312,
     "mechanics/series_loop/steps.py": 350,
@@ -56,8 +56,8 @@ FILES = {
 }
 FUNCTIONS = {
     "analysis/advise/advise.py::advise": 93,
-    "integrators/runge_kutta/segments.py::runge_kutta_segment": 178,
-    "integrators/taylor/segments.py::taylor_segment": 178,
+    "integrators/runge_kutta/segments.py::runge_kutta_segment": 159,
+    "integrators/taylor/segments.py::taylor_segment": 143,
     "mechanics/simulate.py::simulate_mechanical": 81,
     "testing/catalogue/coincidences.py::scenes": 105,
     "testing/catalogue/events.py::monitored": 120,
