@@ -38,7 +38,7 @@ def without_a_name(value: Any) -> UsageError:
 
 
 def cannot_be(what: str, value: Any, remedy: str) -> UsageError:
-    """Return the error for a wrong value; `what` is the name of an argument, or a phrase that contains it."""
+    """Return the error for a wrong value; `what` names the argument, or is a phrase with its name."""
     return UsageError(f"{f'`{what}`' if what.isidentifier() else what} cannot be {value!r}", remedy=remedy)
 
 
@@ -86,7 +86,7 @@ def text(value: Any, what: str) -> str:
 
 
 def known_name(value: Any, known: Sequence[str], what: str, kind: str) -> str:
-    """Return a name if it is known, or raise an error that begins with `what` ("The run has no contact")."""
+    """Return a name if it is known, or raise an error that begins with the text `what`."""
     if not isinstance(value, str) or value not in known:
         raise UsageError(f"{what} {value!r}", remedy=nearest(str(value), known, kind=kind))
     return value
@@ -155,7 +155,7 @@ def as_times(t: Any) -> np.ndarray:
 
 
 def chosen_model(model: Any, params: Any) -> Model:
-    """Return the model itself, or load it by name or path; `params` changes its parameters."""
+    """Return the model, which may be given by name or path; `params` changes its parameters."""
     if not isinstance(model, Model):
         model = load(model)
     if params is None:
@@ -175,7 +175,7 @@ def time_span(t_span: Any) -> tuple[float, float]:
 
 
 def two_numbers(value: Any, what: str, remedy: str, but: str = "") -> tuple[float, float]:
-    """Return two finite numbers; `but` is appended to the remedy for infinite numbers."""
+    """Return two finite numbers; `but` is added to the remedy for infinite numbers."""
     if not is_row(value):
         raise cannot_be(what, value, remedy)
     ends = [number(t, f"a value of `{what}`", remedy) for t in value]
@@ -333,7 +333,7 @@ def retention_of(save: Any, system: System) -> Retention:
         if length is None:
             raise UsageError(
                 f"`save` is 'last-period', but model '{system.model.name}' has no forcing period",
-                remedy="use a length of time: save=1.5 stores the last 1.5 units of t",
+                remedy="use a length of time: save=1.5 stores the last 1.5 time units",
             )
         return Retention(length, length)
     remedy = "use 'all', 'events', 'last-period', 'nothing', or a length of time"

@@ -115,7 +115,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 
 def _ranges(model: Model, pairs: list[tuple[str, str]]) -> dict[str, tuple[float, float]]:
-    """Return the range of each uncertain parameter; the limits of a range may be expressions."""
+    """Return the range of each uncertain parameter; the ends of a range may be expressions."""
     found = {}
     for name, text in pairs:
         low, colon, high = text.partition(":")

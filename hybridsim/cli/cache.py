@@ -46,7 +46,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 
 def _warm() -> None:
-    """Compile all kernels by a short run of the reference model with each integrator."""
+    """Compile all kernels by a short run of a reference model with each integrator."""
     from hybridsim.engine.system.period import forcing_period
 
     model = hybridsim.load("dfcs")

@@ -60,7 +60,7 @@ def add_out(parser: argparse.ArgumentParser, default: str) -> None:
 
 
 def add_plot(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add the option that writes a picture; `what` says in the help text what is plotted."""
+    """Add the option that writes a picture; `what` is the plotted quantity in the help text."""
     parser.add_argument(
         "--plot",
         metavar="FILE",
@@ -80,5 +80,5 @@ def check_plot(args: argparse.Namespace) -> None:
 
 
 def add_json(parser: argparse.ArgumentParser, what: str, instead: str = "the table") -> None:
-    """Add the option that prints JSON; its help says that `what` is printed instead of `instead`."""
+    """Add the option that prints JSON; in its help, `what` is printed instead of `instead`."""
     parser.add_argument("--json", action="store_true", help=f"print {what} as JSON instead of {instead}")

@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         action="append",
         default=[],
-        help="explain the N-th event, counted from 0; repeat the option for more events",
+        help="explain event number N, counted from 0; repeat the option for more events",
     )
     options.add_json(parser, "the result", "the summary")
 
@@ -100,7 +100,7 @@ def limits(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def as_far_as_it_came(run: Callable[[], Solution]) -> Solution:
-    """Run a simulation and return its solution; after Ctrl-C, the solution is the part computed so far."""
+    """Run a simulation and return its solution; after Ctrl-C, return the part computed so far."""
     try:
         return run()
     except RunInterrupted as stopped:
@@ -111,7 +111,7 @@ def as_far_as_it_came(run: Callable[[], Solution]) -> Solution:
 def deliver(
     solution: Solution, args: argparse.Namespace, session: Session, already_reported: Container[str] = ()
 ) -> int:
-    """Write the files, print the summary and return the exit code, without repeating reported warnings."""
+    """Write the files, print the summary and return the exit code."""
     explanations, unexplained = _explanations(solution, args.explain)
     try:  # write files first: printing fails if the reader of the pipe, such as `head`, has gone
         if solution.t.size:  # a run that stopped before its first step has nothing to write
@@ -146,7 +146,7 @@ def deliver(
 
 
 def _explanations(solution: Solution, numbers: Sequence[int]) -> tuple[list[Explanation], UsageError | None]:
-    """Return the explanations of events, and the first error, which is raised after the output is written."""
+    """Return the explanations of events as text, and the first error, to raise after the output."""
     found, fault = [], None
     for number in numbers:
         try:
@@ -188,7 +188,7 @@ def _shares(solution: Solution) -> dict[str, dict[str, float]]:
 
 
 def _final(solution: Solution) -> list[tuple[str, float]]:
-    """Return name and value of every state at the end of the run; empty if the run did not start.
+    """Return the name and value of each state at the end of the run, or nothing if no run was started.
 
     Those of discrete states follow, where something of the run is kept.
     """

@@ -18,14 +18,14 @@ TRIAL = ".hybridsim-"  # prefix of the temporary folder that tests whether a fol
 
 
 class _Data:
-    """The stream for data while stdout is redirected to stderr, or None if data go to `sys.stdout`."""
+    """The stream for data while stdout is redirected to stderr, otherwise None."""
 
     stream: TextIO | None = None
 
 
 @contextmanager
 def only_data_on_stdout() -> Iterator[None]:
-    """Redirect the output of libraries, in Python or C, to stderr, so that stdout contains only data."""
+    """Redirect all output of libraries to stderr, so that stdout contains only data."""
     real = sys.stdout
     if real is None:  # the process has no standard output
         yield
@@ -63,7 +63,7 @@ def complain(message: str) -> None:
 
 
 def say(text: str = "") -> None:
-    """Print text to stdout without the control characters that titles, units and names may contain."""
+    """Print text to stdout without control characters, which names and units may contain."""
     print(printable(text), file=_Data.stream)
 
 
@@ -110,7 +110,7 @@ def require_apart(path: Path, option: str, others: Mapping[str, Path]) -> None:
 
 
 def _takes_files(folder: Path) -> bool:
-    """Return whether files can be created in a folder, by trying it, because access rights can mislead."""
+    """Return whether files can be created in a folder, by creating one."""
     try:
         with tempfile.TemporaryDirectory(dir=folder, prefix=TRIAL):
             return True

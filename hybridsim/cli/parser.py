@@ -38,7 +38,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def _join_negative_values(line: Sequence[str]) -> list[str]:
-    """Write `--t-end -5T` as `--t-end=-5T`; otherwise argparse reads `-5T` as an option."""
+    """Write `--t-end -5T` as `--t-end=-5T`, because argparse would read `-5T` as an option."""
     joined: list[str] = []
     for word in line:
         if re.match(r"-\.?\d", word) and joined and re.fullmatch(r"--[a-z][a-z0-9-]*", joined[-1]):

@@ -40,7 +40,7 @@ def add_to(commands: Any) -> None:
         type=values.positive,
         help="absolute tolerance of every state (default: rtol * 1e-3 * the state's nominal size)",
     )
-    parser.add_argument("--max-step", metavar="TIME", type=values.positive, help="longest step")
+    parser.add_argument("--max-step", metavar="TIME", type=values.positive, help="largest step size")
     parser.add_argument(
         "--option",
         metavar="NAME=VALUE",
@@ -52,7 +52,7 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--keep",
         metavar="WHAT",
-        help="parts of the run to store, without any effect on the run itself. all (default): everything. events: the "
+        help="parts of the run to store; the run does not change. all (default): everything. events: the "
         "events, but no states between them. last-period, or a number: the last period, or the last units of time. "
         "nothing: only the final state. --plot, --csv and --npz need all, last-period or a number; --explain needs all",
     )

@@ -1,4 +1,4 @@
-"""This module holds the state of one run of the program: written files, and requests to stop."""
+"""This module contains the state of one run of the program: written files, and requests to stop."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SOON = 0.05  # seconds until a lost interruption is repeated
 
 
 class Session:
-    """The state that a command shares with the function that runs the command."""
+    """The state that a command shares with the function that calls the command."""
 
     def __init__(self) -> None:
         self.written: list[Path] = []
@@ -86,7 +86,7 @@ class Session:
             self._gently = False
 
     def stop_if_asked(self) -> None:
-        """Raise KeyboardInterrupt if a signal was received, even if another exception replaced it."""
+        """Raise KeyboardInterrupt if a signal was received, even if another exception came later."""
         if self.interrupted:
             raise KeyboardInterrupt
 

@@ -51,7 +51,7 @@ def add_to(commands: Any) -> None:
         metavar="NAME=VALUES",
         nargs="+",
         type=values.assignment,
-        help="a parameter, or a state for its initial value, and the values to use",
+        help="a parameter, or a state for its initial value, with the values to use",
     )
     parser.add_argument(
         "--measure",
@@ -130,7 +130,7 @@ def _fill(
     folder: Path,
     is_new: bool,
 ) -> int:
-    """Run the sweep and write its results to a folder that this process has locked."""
+    """Run the sweep and write its results to a folder, which is locked for other processes."""
     journal = folder / "sweep.journal"
     if journal.exists():
         complain(f"continuing from {journal}")
@@ -180,7 +180,7 @@ def _write(result: Sweep, over: str | None, folder: Path, session: Session) -> N
     session.wrote(folder / "sweep.png")
     if left := not_drawn(result, arrays=not is_map(result, over)):
         complain(
-            f"In the tables but not in the picture: {', '.join(left)}. Choose quantities with --measure."
+            f"Results in the tables but not in the picture: {', '.join(left)}. Choose quantities with --measure."
         )
 
 

@@ -136,7 +136,7 @@ def changed_model(args: argparse.Namespace) -> Model:
 
 @contextmanager
 def blaming_the_command_line() -> Iterator[None]:
-    """Convert an error of the model into a usage error, because a change by the command line caused it."""
+    """Convert an error of a model into a usage error if the command line caused it."""
     try:
         yield
     except ModelError as error:

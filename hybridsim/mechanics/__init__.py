@@ -1,1 +1,1 @@
-"""This package runs mechanical systems with many dry contacts, given as matrices, contact directions and laws."""
+"""This package simulates mechanical systems with many dry contacts, given as matrices and friction laws."""

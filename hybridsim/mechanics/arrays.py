@@ -30,7 +30,7 @@ EXPAND, STEP_LENGTH, JOINT_CHOICE, BERNSTEIN = range(4)
 
 
 class State(NamedTuple):
-    """The state of a run; P1 = order + 1, n coordinates, m contacts, nn nodes."""
+    """The state of a run with n coordinates, m contacts and nn nodes; P1 is the order plus one."""
 
     x: np.ndarray  # (2, n) positions and velocities at the origin of the present step
     series: np.ndarray  # (P1, n) series of each coordinate, padded to whole vectors
@@ -57,7 +57,7 @@ class State(NamedTuple):
 
 
 class Scratch(NamedTuple):
-    """Scratch arrays: the present patch, its series, and polynomials.
+    """Scratch arrays: the current patch of nodes, its Taylor series, and polynomials.
 
     Rows of Q, R, F and sums have equal lengths, in whole vectors. lane, lane_ptr, place, V: registers of the
     tapes, see `expansion`. band_rows, W, band_first: coefficients of `banded_series` for each eight

@@ -1,4 +1,4 @@
-"""This module holds the common parts of the trajectories of mechanical systems: names, columns, and what is refused."""
+"""This module contains the common parts of the trajectories of mechanical systems."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hybridsim.solution.event import ModeInterval
 
 
 class ArraysTrajectory(ABC):
-    """The base of a `hybridsim.solution.run_trajectory.RunTrajectory` of a mechanical system.
+    """The base class of a `hybridsim.solution.run_trajectory.RunTrajectory` of a mechanical system.
 
     Parameters
     ----------
@@ -55,12 +55,12 @@ class ArraysTrajectory(ABC):
     @property
     @abstractmethod
     def own_times(self) -> np.ndarray:
-        """Return times (m,) of the run itself."""
+        """Return the times (m,) at which the run stored its states."""
 
     @property
     @abstractmethod
     def quantities(self) -> tuple[str, ...]:
-        """Return the names of the quantities in addition to the states."""
+        """Return the names of the quantities other than the states."""
 
     @property
     @abstractmethod
@@ -69,11 +69,11 @@ class ArraysTrajectory(ABC):
 
     @abstractmethod
     def states(self, times: np.ndarray, side: str) -> np.ndarray:
-        """Return states (k, 2n)."""
+        """Return the states (k, 2n) at given times."""
 
     @abstractmethod
     def values(self, name: str, times: np.ndarray, side: str) -> np.ndarray:
-        """Return a state or a quantity (k,)."""
+        """Return the values (k,) of a state or another quantity at given times."""
 
     @property
     @abstractmethod
@@ -86,13 +86,13 @@ class ArraysTrajectory(ABC):
 
     @abstractmethod
     def mode_names(self, component: int) -> dict[int, str]:
-        """Return the names of the modes of a component by number."""
+        """Return the names of the modes of a component, in the order of the mode numbers."""
 
     # -- what they have in common ---------------------------------------------------------------------------
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Return the names of the positions, then of the velocities."""
+        """Return the names of the positions, followed by the names of the velocities."""
         return (*self.model.names, *self.model.velocities)
 
     @property
@@ -110,7 +110,7 @@ class ArraysTrajectory(ABC):
         return self._column(name, self.own_times)
 
     def _column(self, name: str, times: np.ndarray) -> np.ndarray:
-        """Return a quantity at times of which the first of two equal ones is just before an event."""
+        """Return a quantity at times; of two equal times, the first one is just before an event."""
         self.require_states()
         before = self._are_before(times)
         values = self.values(name, times, "+")
@@ -127,13 +127,13 @@ class ArraysTrajectory(ABC):
         return when[(components == self.event_names.index(component)) & (kind in (None, "transition"))]
 
     def event_states(self, component: str, kind: str | None, side: str) -> np.ndarray:
-        """Return the states (m, 2n) at these events."""
+        """Return the states (m, 2n) at the events of one contact or impact."""
         self.require_states()
         return self.states(self.event_times(component, kind), side)
 
     @cached_property
     def modes(self) -> dict[str, tuple[ModeInterval, ...]]:
-        """Return the modes of each contact and impact in order."""
+        """Return the modes of each contact and impact over the run, in order."""
         found = ByName[tuple[ModeInterval, ...]]()
         when, components, changes = self.changes
         for k, part in enumerate(self.components):
@@ -148,7 +148,7 @@ class ArraysTrajectory(ABC):
         return found
 
     def table(self, times: np.ndarray | None) -> Table:
-        """Return states, forces, relative velocities and modes as columns."""
+        """Return states, forces, relative velocities and modes over time, as the columns of a table."""
         t = self.own_times if times is None else times
         before = self._are_before(t)
         columns = {name: self._column(name, t) for name in (*self.names, *self.quantities)}
@@ -163,9 +163,9 @@ class ArraysTrajectory(ABC):
         return Table(t, columns, modes, {}, about)
 
     def require_states(self) -> None:
-        """Refuse a run that stored no states."""
+        """Raise an error if the run stored no states."""
         if self.save != "all":
             raise UsageError(
                 f"the run was made with save={self.save!r}, which keeps no states between the ends",
-                remedy="run it with save='all'",
+                remedy="simulate it with save='all'",
             )

@@ -1,4 +1,4 @@
-"""This module keeps the former names of the results of mechanical systems, whose class is `Solution`.
+"""This module keeps former class names of the results of mechanical systems, which are now `Solution`.
 
 They are deprecated and will go in version 0.2.
 """
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 else:
 
     class _Former(type):
-        """The class of a former name, of which those solutions are instances that once had it."""
+        """The class of a former name; `isinstance` accepts the solutions that formerly had this class."""
 
         trajectory: ClassVar[type]
 

@@ -16,7 +16,7 @@ _CHOICES = np.array([[float(comb(i, k)) for k in range(TERMS)] for i in range(TE
 
 @inlined
 def value_and_slope(series: Any, d: float) -> tuple[float, float]:
-    """Return a polynomial and its derivative at d (Horner)."""
+    """Return the value and the derivative of a polynomial at d, by Horner's method."""
     value, slope = series[series.shape[0] - 1], 0.0
     for k in range(series.shape[0] - 2, -1, -1):
         slope = slope * d + value
@@ -26,7 +26,7 @@ def value_and_slope(series: Any, d: float) -> tuple[float, float]:
 
 @inlined
 def state_at(series: Any, x: int, d: float) -> tuple[float, float]:
-    """Return the polynomial in a column and its derivative at d (Horner)."""
+    """Return the value and the derivative at d of the polynomial in one column, by Horner's method."""
     value, slope = series[series.shape[0] - 1, x], 0.0
     for k in range(series.shape[0] - 2, -1, -1):
         slope = slope * d + value
@@ -36,7 +36,7 @@ def state_at(series: Any, x: int, d: float) -> tuple[float, float]:
 
 @inlined
 def states_at(series: Any, x: int, d: Any) -> tuple[Any, Any]:
-    """Return the polynomials and derivatives in eight columns, each at its own distance d."""
+    """Return the values and derivatives of the polynomials in eight columns, each at its own distance d."""
     wide = series.shape[1]
     value, slope = load(series, (series.shape[0] - 1) * wide + x), splat(0.0)
     for k in range(series.shape[0] - 2, -1, -1):
@@ -47,7 +47,7 @@ def states_at(series: Any, x: int, d: Any) -> tuple[Any, Any]:
 
 @kernel
 def shift(series: Any, x: int, d: float, top: int, out: Any) -> None:
-    """Compute coefficients 0..top of the polynomial in column x about d: sum_i series_i C(i, k) d**(i - k).
+    """Shift the polynomial in column x by d, and store coefficients 0..top of the result.
 
     out: an array of 3 TERMS numbers. Behind the result it caches the powers d**(last - m) at TERMS + m, and d last.
     """

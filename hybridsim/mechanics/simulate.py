@@ -1,4 +1,4 @@
-"""This module runs `hs.simulate` for mechanical systems: it checks the arguments and runs the kernels."""
+"""This module runs `hs.simulate` for mechanical systems: it checks the arguments and calls the kernels."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def simulate_mechanical(
     progress: Callable[[float], None] | None = None,
     **refused: Any,
 ) -> Solution:
-    """Run a `MechanicalSystem`; see `hybridsim.simulate.simulate` for the arguments.
+    """Simulate a `MechanicalSystem`; `hybridsim.simulate.simulate` describes the arguments.
 
     Raises
     ------
@@ -59,12 +59,12 @@ def simulate_mechanical(
     if name not in ("auto", "taylor", "moreau"):
         integrator_class(name)  # refuses unknown integrators
         raise UsageError(
-            f"{name} does not run a MechanicalSystem",
-            remedy=f"choose taylor, or simulate system.to_model() with {name} {_INDEPENDENT}",
+            f"{name} cannot simulate a MechanicalSystem",
+            remedy=f"use integrator='taylor', or simulate system.to_model() with {name} {_INDEPENDENT}",
         )
     if system.impacts and name != "moreau":
         raise UsageError(
-            f"{name} does not run a MechanicalSystem with impacts",
+            f"{name} cannot simulate a MechanicalSystem with impacts",
             remedy=f'use integrator="moreau", step=..., or simulate to_model() of a small system {_INDEPENDENT}',
         )
     method: Any = None
@@ -75,7 +75,7 @@ def simulate_mechanical(
         arguments.refuse_unused(method, rtol=rtol, atol=atol)
     for argument, value in refused.items():
         if argument in _OF_MOREAU:
-            raise UsageError(f"{argument} is an option of moreau", remedy='choose integrator="moreau"')
+            raise UsageError(f"{argument} is an option of moreau", remedy='use integrator="moreau"')
         if argument not in _OF_MODELS:
             taken = (*(simulate_mechanical.__kwdefaults__ or ()), *_OF_MOREAU)
             raise UsageError(
@@ -92,7 +92,7 @@ def simulate_mechanical(
         )
     if not (isinstance(save, str) and save in ("all", "events", "nothing")):
         raise UsageError(
-            f"save is {save!r}", remedy="for a MechanicalSystem give 'all', 'events' or 'nothing'"
+            f"save is {save!r}", remedy="for a MechanicalSystem use 'all', 'events' or 'nothing'"
         )
     start, relative = _start(system, x0), arguments.relative_tolerance(rtol)
     absolute = _absolute(system, atol, relative, start)
@@ -138,13 +138,13 @@ def _start(system: MechanicalSystem, x0: Any) -> np.ndarray:
         start = arguments.numbers(x0, "x0", f"give {len(names)} numbers: positions, then velocities")
     if start.shape != (len(names),) or not np.isfinite(start).all():
         raise UsageError(
-            f"x0 is {x0!r}", remedy=f"give {len(names)} finite numbers: positions, then velocities"
+            f"x0 is {x0!r}", remedy=f"use {len(names)} finite numbers: positions, then velocities"
         )
     return start
 
 
 def _absolute(system: MechanicalSystem, atol: Any, rtol: float, start: np.ndarray) -> np.ndarray:
-    """Return atol (2n,): a number, one for each state, or rtol * 1e-3 * |x0| (1 if that is zero)."""
+    """Return the absolute tolerances (2n,), by default rtol * 1e-3 * |x0|, or 1 where x0 is zero."""
     if atol is None:
         return 1e-3 * rtol * np.where(start == 0.0, 1.0, abs(start))
     remedy = f"give a number >= 0, or {len(start)} of them"

@@ -1,4 +1,4 @@
-"""This module draws an advice: the errors of the rungs, or a map of the simplest adequate rung."""
+"""This module draws the result of `advise`: errors of simplified models, or a map of the adequate ones."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _COLOURS = {
 
 
 def advice(found: Advice, axes: Axes | None = None) -> Axes:
-    """Draw an advice: the ladder of one scene, or the map of a region of two parameters.
+    """Draw the result of `advise`: the simplified models of one scene, or the map of a parameter region.
 
     In the ladder a stem leads from the tolerance to the error of each rung. An adequate rung has a filled
     marker on the left, and an arrow marks an error beyond the axis. The error and the cost are written next
@@ -72,13 +72,13 @@ def _ladder(found: Advice, axes: Axes) -> None:
 
 
 def _window(errors: Iterable[float], tol: float) -> tuple[float, float]:
-    """Return the ends of the axis, which contain the tolerance and all errors near enough to compare."""
+    """Return the ends of the error axis, between which the tolerance and all comparable errors lie."""
     near = [e for e in errors if tol / _FAR <= e <= tol * _FAR]
     return min([tol / _NEAR, *near]) / _MARGIN, max([tol * _NEAR, *near]) * _MARGIN
 
 
 def _draw(axes: Axes, k: int, step: Step, tol: float, ends: tuple[float, float]) -> None:
-    """Draw a stem from the tolerance to the error, filled if adequate; an arrow marks an error beyond an end."""
+    """Draw a stem from the tolerance to the error, filled if adequate; an arrow marks a far error."""
     low, high = ends
     colour = style.PALETTE[0] if step.is_adequate else style.PALETTE[1]
     at = min(max(step.error, low), high)
@@ -89,7 +89,7 @@ def _draw(axes: Axes, k: int, step: Step, tol: float, ends: tuple[float, float])
 
 
 def _beside(axes: Axes, y: float, text: str, colour: str) -> None:
-    """Write text to the right of the axes, at the height of a rung."""
+    """Write text to the right of the axes, at the height of one simplified model."""
     axes.text(
         1.03, y, text, transform=axes.get_yaxis_transform(), va="center", fontsize=8, color=colour
     )  # fmt: skip
@@ -105,7 +105,7 @@ def _map(found: Advice, axes: Axes) -> None:
     if len(region.axes) != 2 or region.mode != "grid":
         raise UsageError(
             f"a map needs two parameters, but the region has {len(region.axes)}",
-            remedy="read advice.region instead",
+            remedy="use the table advice.region instead of a map",
         )
     names = [step.name for step in found.ladder]
     numbers = np.full(region.status.shape, len(names), dtype=float)

@@ -15,7 +15,7 @@ _TITLES = {"sequence": "sequence of modes changes"}
 
 
 def branch(result: Branch, name: str | None = None, *, axes: Axes | None = None) -> Axes:
-    """Draw the amplitude of a quantity, by default the first state, over the parameter.
+    """Draw the amplitude of a quantity (by default, of the first state) over the parameter.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def branch(result: Branch, name: str | None = None, *, axes: Axes | None = None)
 
 
 def _beside(mask: np.ndarray) -> np.ndarray:
-    """Return the mask with the neighbours of its points, so that the parts of a line meet."""
+    """Return a mask extended by neighbouring points, so that the parts of a line join."""
     wider = mask.copy()
     wider[1:] |= mask[:-1]
     return wider

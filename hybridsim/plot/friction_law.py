@@ -27,7 +27,7 @@ def friction_law(
     mean: float = 0.0,
     integrator: str = "auto",
 ) -> list[Axes]:
-    """Draw a friction law, in one axes, or in two if it has states.
+    """Draw a friction law in one axes, or in two if the law has states.
 
     A set-valued law is drawn as its curve, with the range of forces at rest. Any other law is driven by the
     velocity mean + speed*cos(speed/amplitude*t) and drawn over the second period. A law with states is also
@@ -42,11 +42,11 @@ def friction_law(
     found = load_law(law) if isinstance(law, str) else law
     if speed is None:
         raise UsageError(
-            f"friction_law({found.name!r}) needs a speed", remedy="give speed=, the largest velocity to draw"
+            f"friction_law({found.name!r}) needs a speed", remedy="use speed=, the largest velocity to draw"
         )
     if not speed > 0 or not amplitude > 0:
         raise UsageError(
-            f"speed and amplitude cannot be {speed!r} and {amplitude!r}", remedy="give numbers above zero"
+            f"speed and amplitude cannot be {speed!r} and {amplitude!r}", remedy="use numbers above zero"
         )
     law_arguments = {name: parse(value) for name, value in (arguments or {}).items()}
     contact = Contact("f", parse("v"), parse(normal), found, law_arguments)
@@ -75,7 +75,7 @@ def _curve(axes: Axes, contact: Contact, speed: float) -> None:
 
 
 def slip_force(contact: Contact, speed: float, *, backward: bool = False) -> float:
-    """Return the magnitude of the slip force of a contact with numerical values, including its tables."""
+    """Return the magnitude of the slip force of a contact at a given speed."""
     names = {table.name: table.value(speed) for table in contact.law.tables}
     slip = (contact.law.slip_backward if backward else None) or contact.law.slip
     values = {name: evaluate(e, {}) for name, e in contact.values().items() if name not in names}

@@ -18,7 +18,7 @@ def friction_loop(
     t_span: tuple[float, float] | None = None,
     axes: Axes | None = None,
 ) -> Axes:
-    """Draw an output against a state.
+    """Draw an output over a state; the enclosed area is the energy loss of the friction.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""This module chooses the look of lines in comparisons: hue, marker and dashes."""
+"""This module chooses the hue, the marker and the dashes of each line in comparisons."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Look:
     dashes: str
 
     def handle(self, label: str, size: float = SIZE) -> Line2D:
-        """Return the legend entry of the line."""
+        """Return the legend entry of a line with this look."""
         return Line2D(
             [], [], color=self.colour, marker=self.marker, linestyle=self.dashes, markersize=size, linewidth=1.1,
             label=label,
@@ -53,7 +53,7 @@ class Look:
 
 
 def looks(rows: Iterable[Row]) -> dict[str, Look]:
-    """Return the look of each label, in the order of the rows.
+    """Return the look of each label, in the order of the rows of the comparison.
 
     Methods of one family share a hue and differ in lightness and marker. Several lines of one method (our
     events and its own, published and refined) or of one regularised form differ in their dashes.
@@ -86,7 +86,7 @@ def _hue(name: str) -> str:
 
 
 def _shade(hue: str, place: int, count: int) -> str:
-    """Return one of `count` shades of a hue, dark first."""
+    """Return one of `count` shades of a colour; the first shade is the darkest."""
     if count == 1:
         return hue
     part = place / (count - 1)
@@ -98,7 +98,7 @@ def draw_line(
     panel: Axes, look: Look, points: Sequence[tuple[float, float]], spreads: Sequence[tuple[float, float]],
     verdicts: Sequence[bool | None], size: float = SIZE, cold: Sequence[bool] = (),
 ) -> None:  # fmt: skip
-    """Draw the settings of a line at their (time, error), with the spread of the times.
+    """Draw the points (time, error) of a line, with the spread of the measured times.
 
     A point is filled if the modes are right, hollow if they are wrong, and half filled if there are no modes
     to compare. A cold point was timed only in its first run, which warms up; it is drawn pale, without the

@@ -26,7 +26,7 @@ _VISIBLE = 1e-3  # of the range: a smaller part is a point, a smaller jump is no
 def draw_orbit(
     solution: Solution, across: str, up: str, t_span: tuple[float, float] | None, axes: Axes | None
 ) -> Axes:
-    """Draw `up` against `across` in the colours of the modes, with thick held parts and dashed jumps.
+    """Draw `up` over `across` in the colours of the modes, with thick held parts and dashed jumps.
 
     The colours show the modes of the components that belong to the quantities, such as a contact whose force
     or velocity is drawn. If there is no such component, or several, the colour shows the mode of the first
@@ -93,7 +93,7 @@ def draw_orbit(
 
 
 def _concerned(solution: Solution, drawn: set[str]) -> list[str]:
-    """Return the components that belong to the drawn quantities, or all if there are none."""
+    """Return the components that affect the drawn quantities, or all components if there are none."""
     forces = [contact.name for contact in solution.model.contacts if contact.name in drawn]
     moved = [contact.name for contact in solution.model.contacts if drawn & contact.velocity.names]
     return forces or moved or [component.name for component in solution.components]
@@ -102,7 +102,7 @@ def _concerned(solution: Solution, drawn: set[str]) -> list[str]:
 def _stretches(
     smooth_parts: Sequence[SmoothPart], across: str, up: str, surfaces: Mapping[str, str], least: Points
 ) -> tuple[list[tuple[str, Points]], list[tuple[Points, Points]]]:
-    """Return the continuous intervals of one mode, merged over other events, and the jumps between them."""
+    """Return the intervals of constant mode, and the jumps between them."""
     stretches: list[tuple[str, list[Points]]] = []
     jumps = []
     for smooth_part in smooth_parts:

@@ -18,7 +18,7 @@ _TAKES_PREFIX = re.compile(r"(m|s|N|V|A|W|J|Pa|Hz|rad|g|C|F|H|K|Nm|N m)(?![A-Za-
 
 
 class Scaled(Formatter):
-    """Formats ticks in units of `factor`, with as many decimals as their spacing needs; the data are unchanged."""
+    """Formats tick labels in units of `factor`, with as many decimals as the tick spacing requires."""
 
     def __init__(self, factor: float) -> None:
         self.factor = factor

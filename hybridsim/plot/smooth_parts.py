@@ -29,7 +29,7 @@ _WHOLE = 1e-9
 
 @dataclass(frozen=True)
 class SmoothPart:
-    """A smooth part of a run: times (k,), the values of each quantity (k,), and the mode of each component in it."""
+    """A smooth part of a run: its times (k,), the values (k,) of each quantity, and the modes."""
 
     t: NDArray[np.float64]
     values: Mapping[str, NDArray[np.float64]]
@@ -38,7 +38,7 @@ class SmoothPart:
 
 @dataclass(frozen=True)
 class Window:
-    """The part of a run to draw, and a note for the title."""
+    """The part of a run to draw, with a note for the title."""
 
     t0: float
     t1: float
@@ -46,11 +46,11 @@ class Window:
 
 
 def refuse_arrays(solution: Any) -> None:
-    """Refuse objects other than solutions, and solutions of a `MechanicalSystem`, which have no units."""
+    """Raise an error for objects that are not solutions, and for solutions of a `MechanicalSystem`."""
     if not hasattr(solution, "model"):
         raise UsageError(
             f"{type(solution).__name__} {getattr(solution, 'name', '')}".rstrip() + " cannot be drawn",
-            remedy="give the result of a run: hs.simulate(model, (t0, t1))",
+            remedy="use the result of a run: hs.simulate(model, (t0, t1))",
         )
     if isinstance(solution.model, MechanicalSystem):
         raise UsageError(
@@ -60,13 +60,13 @@ def refuse_arrays(solution: Any) -> None:
 
 
 def window_of(solution: Solution, t_span: tuple[float, float] | None) -> Window:
-    """Return the part to draw: `t_span` if given, else all, or the end of a run with many periods or events."""
+    """Return the part of a run to draw: `t_span` if given, otherwise all or the last periods or events."""
     start, end = sorted((solution.t_start, solution.t_end))
     if t_span is not None:
         t0, t1 = sorted(map(float, t_span))
         if not (t1 > start and t0 < end):
             raise UsageError(
-                f"t_span = ({t0:g}, {t1:g}) is outside of the run",
+                f"t_span = ({t0:g}, {t1:g}) is outside the run",
                 remedy=f"the run covers t = {start:g} to {end:g}",
             )
         return Window(max(t0, start), min(t1, end))
@@ -83,7 +83,7 @@ def window_of(solution: Solution, t_span: tuple[float, float] | None) -> Window:
 
 
 def _last_events(solution: Solution, start: float, end: float) -> Window:
-    """Return all, or the last of very many events that are spread over the run, as in a limit cycle."""
+    """Return the whole run, or its last events if very many events are spread over it."""
     times = np.array([event.t for event in solution.events if event.kind == "transition"])
     if len(times) <= _MAX_EVENTS:
         return Window(start, end)
@@ -95,13 +95,13 @@ def _last_events(solution: Solution, start: float, end: float) -> Window:
 
 
 def _short(periods: float) -> str:
-    """Return a number of periods as text: whole if it is whole to rounding, else with one decimal."""
+    """Return a number of periods as text, with one decimal unless it is a whole number."""
     whole = round(periods)
     return f"{whole}" if abs(periods - whole) < _WHOLE * periods else f"{periods:.1f}"
 
 
 def unit_of(solution: Solution, name: str) -> str:
-    """Return the unit of a quantity, empty if none is declared; raise `UsageError` for an unknown name."""
+    """Return the unit of a quantity, or an empty text if none is declared."""
     units = units_of(solution.model)
     if name not in units:
         try:
@@ -121,7 +121,7 @@ def extent(smooth_parts: Sequence[SmoothPart], name: str) -> tuple[float, float]
 
 
 def smooth_parts_of(solution: Solution, names: Sequence[str], window: Window) -> list[SmoothPart]:
-    """Return the smooth parts of a window in order of time; at an event one ends at x- and the next begins at x+."""
+    """Return the smooth parts of a window in order of time, split at the events."""
     inner = {e.t for e in solution.events if e.kind != "near-grazing" and window.t0 < e.t < window.t1}
     cuts = np.array([window.t0, *sorted(inner), window.t1])
     lengths = np.diff(cuts)

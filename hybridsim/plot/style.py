@@ -26,7 +26,7 @@ _LETTERS = 13.0  # of a title per inch: the default font at 10 points has about 
 
 
 def dress(axes: Axes) -> None:
-    """Style the frame and the grid so that they stay behind the data."""
+    """Style the frame and the grid of axes so that they stay behind the data."""
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_color(GREY)
     axes.tick_params(color=GREY, labelsize=9)
@@ -35,12 +35,12 @@ def dress(axes: Axes) -> None:
 
 
 def literal(text: str) -> str:
-    """Return text for matplotlib, with dollar signs escaped so that it is not read as mathematics."""
+    """Return text in which dollar signs are escaped, so that matplotlib does not read it as mathematics."""
     return text.replace("$", r"\$")
 
 
 def head(axes: Axes, *parts: str) -> None:
-    """Set the title of axes: each non-empty part on its own lines, wrapped at the width of the axes' column."""
+    """Set the title of axes: each part begins a new line and is wrapped at the width of the axes."""
     whole, left = _figure_of(axes), axes.get_position().x0
     beside = [other.get_position().x0 for other in whole.axes]
     right = min((x0 for x0 in beside if x0 > axes.get_position().x1), default=1.0)
@@ -50,12 +50,12 @@ def head(axes: Axes, *parts: str) -> None:
 
 
 def figure(width: float, height: float) -> Figure:
-    """Return a figure (size in inches) without a window or global state."""
+    """Return a new figure of the given size in inches, without a window or global state."""
     return Figure(figsize=(width, height), layout="constrained")
 
 
 def save(picture: Any, path: str | Path, dpi: float = _DPI) -> Path:
-    """Write a picture to a file.
+    """Write a picture to a file of type .png, .pdf or .svg.
 
     Parameters
     ----------
@@ -84,4 +84,4 @@ def _figure_of(picture: Any) -> Figure:
         for part in picture:
             if part is not None:
                 return _figure_of(part)
-    raise UsageError(f"{type(picture).__name__} is not a picture", remedy="give a figure or axes")
+    raise UsageError(f"{type(picture).__name__} is not a picture", remedy="use a figure or axes")

@@ -1,4 +1,4 @@
-"""This module draws readings of a sweep as lines over one parameter, one line for each value of the other."""
+"""This module draws results of a sweep as lines over one parameter, one line for each value of the other."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _WIDTH, _HEIGHT, _MORE = 7.2, 2.0, 1.1  # inches of a panel, and of the space ab
 def sweep_lines(
     result: Sweep, *names: str, over: str | None = None, axes: tuple[Axes, ...] | None = None
 ) -> tuple[Axes, ...]:
-    """Draw readings over one parameter, a panel each; arrays are drawn as dots.
+    """Draw results of a sweep over one parameter, with a panel for each; arrays are drawn as dots.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def sweep_lines(
         axes = tuple(figure.subplots(len(found), 1, sharex=True, squeeze=False)[:, 0])
         style.head(axes[0], title_of(result))
     if len(axes) != len(found):
-        raise UsageError(f"{len(axes)} axes for {len(found)} readings", remedy="give an axes for each")
+        raise UsageError(f"{len(axes)} axes for {len(found)} results", remedy="use one axes per result")
     others = [name for name in dimensions if name != across]
     for panel, name in zip(axes, found, strict=True):
         _draw(panel, result, name, across, others[0] if others else None, dimensions)

@@ -1,4 +1,4 @@
-"""This module draws readings of a sweep over two parameters as maps."""
+"""This module draws results of a sweep over two parameters as maps."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _NOTHING = "#d8d8d8"  # not a colour of the scale
 
 
 def sweep_map(result: Sweep, *names: str, axes: tuple[Axes, ...] | None = None) -> tuple[Axes, ...]:
-    """Draw readings over two parameters, a map each: the first parameter is vertical, the second horizontal.
+    """Draw results of a sweep over two parameters as maps: the first is vertical, the second horizontal.
 
     Points without a result are grey.
 
@@ -57,7 +57,7 @@ def sweep_map(result: Sweep, *names: str, axes: tuple[Axes, ...] | None = None) 
             empty.remove()
         axes = tuple(panels[: len(found)])
     if len(axes) != len(found):
-        raise UsageError(f"{len(axes)} axes for {len(found)} readings", remedy="give an axes for each")
+        raise UsageError(f"{len(axes)} axes for {len(found)} results", remedy="use one axes per result")
     for panel, name in zip(axes, found, strict=True):
         _draw(panel, result, name)
     return axes

@@ -10,7 +10,7 @@ from hybridsim.plot.sweep_map import sweep_map
 
 
 def sweep(result: Sweep, *names: str, over: str | None = None) -> tuple[Axes, ...]:
-    """Draw readings of a sweep, by default up to six numerical ones.
+    """Draw results of a sweep; by default up to six numerical results.
 
     A parameter of texts, such as the direction of `hs.bifurcation`, is not an axis: its readings are separate
     lines. Arrays at each point are drawn as dots, as in a bifurcation diagram.
@@ -26,6 +26,6 @@ def sweep(result: Sweep, *names: str, over: str | None = None) -> tuple[Axes, ..
 
 
 def is_map(result: Sweep, over: str | None) -> bool:
-    """Return whether the picture has both parameters as axes."""
+    """Return whether the picture of a sweep is a map over both parameters."""
     has_texts = any(values.dtype.kind != "f" for values in result.axes.values())
     return over is None and len(result.axes) == 2 and result.mode == "grid" and not has_texts

@@ -1,4 +1,4 @@
-"""This module selects the readings of a sweep that can be drawn, with their units and missing values."""
+"""This module selects the results of a sweep that can be drawn, with their units and missing values."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ NO_RESULT = "no result"
 
 
 def chosen_names(result: Sweep, names: Sequence[str], arrays: bool) -> tuple[str, ...]:
-    """Return the requested readings, else the most common ones; arrays only if they can be drawn.
+    """Return the names of the requested results of a sweep, by default the most common ones.
 
     Raises
     ------
@@ -38,13 +38,13 @@ def chosen_names(result: Sweep, names: Sequence[str], arrays: bool) -> tuple[str
     found = tuple(names) or _first_asked_for(drawable)
     if not found:
         raise UsageError(
-            "the sweep has no reading that can be drawn", remedy="see its status for the reasons"
+            "the sweep has no reading that can be drawn", remedy="the status of each point gives the reason"
         )
     return found
 
 
 def _first_asked_for(drawable: Sequence[str]) -> tuple[str, ...]:
-    """Return the readings that fit on a page: first one of each common kind, then further ones."""
+    """Return the names of up to six results: first one of each common kind, then others."""
 
     def rank(name: str) -> tuple[int, int]:
         kind = name.partition(".")[0]
@@ -56,7 +56,7 @@ def _first_asked_for(drawable: Sequence[str]) -> tuple[str, ...]:
 
 
 def not_drawn(result: Sweep, arrays: bool) -> tuple[str, ...]:
-    """Return the readings that can be drawn but are drawn only on request."""
+    """Return the names of the results of a sweep that are drawn only on request."""
     drawable = [name for name in result.values if _drawable(result, name, arrays)]
     return tuple(name for name in drawable if name not in _first_asked_for(drawable))
 
@@ -67,29 +67,29 @@ def _drawable(result: Sweep, name: str, arrays: bool) -> bool:
 
 
 def numbers_of(result: Sweep, name: str) -> np.ndarray:
-    """Return a reading as real numbers, with the modulus of complex ones."""
+    """Return the values of one result of a sweep as real numbers; complex numbers become their modulus."""
     values = result[name]
     return np.abs(values) if np.iscomplexobj(values) else values
 
 
 def range_of(values: np.ndarray) -> tuple[float, float]:
-    """Return the least and largest number, or (0, 0) without any."""
+    """Return the least and the largest finite number, or (0, 0) if there are none."""
     finite = values[np.isfinite(values)]
     return (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
 
 
 def label_of(result: Sweep, name: str) -> str:
-    """Return the name of a reading as an axis label."""
+    """Return the name of a result of a sweep as an axis label."""
     return f"|{name}|" if np.iscomplexobj(result[name]) else name
 
 
 def positions(values: np.ndarray) -> np.ndarray:
-    """Return the positions of a parameter's values along an axis; texts are placed one after the other."""
+    """Return the axis positions of the values of a parameter; values that are texts get whole numbers."""
     return values if values.dtype.kind == "f" else np.arange(float(len(values)))
 
 
 def label_parameter(axis: Axis, result: Sweep, name: str) -> None:
-    """Label an axis with a parameter and its unit, or with its texts."""
+    """Label an axis with the name and unit of a parameter, or with its text values."""
     values = result.axes[name]
     if values.dtype.kind == "f":
         label_axis(axis, name, result.units.get(name, ""), *range_of(values))
@@ -99,7 +99,7 @@ def label_parameter(axis: Axis, result: Sweep, name: str) -> None:
 
 
 def setting(result: Sweep, name: str, value: object) -> str:
-    """Return one value of a parameter as text: "N = 40 N"."""
+    """Return a parameter with one value as text, such as "N = 40 N"."""
     number = f"{value:.6g}" if isinstance(value, float) else str(value)
     return literal(f"{name} = {number} {result.units.get(name, '')}".rstrip())
 

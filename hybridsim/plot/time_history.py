@@ -35,7 +35,7 @@ _ROW, _STRIP = 1.75, 0.34  # inches
 
 @dataclass(frozen=True)
 class TimeHistoryAxes:
-    """The axes of a time history: one per quantity, and the strip of modes (None without components)."""
+    """The axes of a time history: one for each quantity, and one for the modes (None without components)."""
 
     quantities: tuple[Axes, ...]
     modes: Axes | None
@@ -88,7 +88,7 @@ def time_history(
 
 
 def _unasked(model: Model) -> list[str]:
-    """Return the default quantities: the first declared ones, and the outputs."""
+    """Return the quantities that are drawn by default: the first declared states, and the outputs."""
     names = list(units_of(model))[:_MOST_QUANTITIES]
     outputs = [output.name for output in model.outputs][:_MOST_QUANTITIES]
     return list(dict.fromkeys([*names, *outputs]))
@@ -99,7 +99,7 @@ def _axes(quantities: int, components: int, axes: Sequence[Axes] | None) -> Time
     if axes is not None:
         all_axes = tuple(axes)
         if len(all_axes) != count:
-            raise UsageError(f"{len(all_axes)} axes for {quantities} quantities", remedy=f"give {count} axes")
+            raise UsageError(f"{len(all_axes)} axes for {quantities} quantities", remedy=f"use {count} axes")
         return TimeHistoryAxes(all_axes[:quantities], all_axes[quantities] if components else None)
     heights = [_ROW] * quantities + [0.1 + _STRIP * components] * bool(components)
     figure = style.figure(9.0, 0.7 + sum(heights))
@@ -110,7 +110,7 @@ def _axes(quantities: int, components: int, axes: Sequence[Axes] | None) -> Time
 
 
 def _draw(axis: Axes, smooth_parts: Sequence[SmoothPart], name: str) -> None:
-    """Draw the curve as one line, interrupted at jumps, which are a second, dashed line."""
+    """Draw a curve as one line that is interrupted at jumps; the jumps are a second, dashed line."""
     low, high = extent(smooth_parts, name)
     t, y, jump_t, jump_y = [smooth_parts[0].t], [smooth_parts[0].values[name]], [], []
     for before, after in itertools.pairwise(smooth_parts):
@@ -128,7 +128,7 @@ def _draw(axis: Axes, smooth_parts: Sequence[SmoothPart], name: str) -> None:
 
 
 def _mark(axis: Axes, events: Sequence[Event]) -> None:
-    """Draw a thin line at each event of a kind with few enough events, and a triangle at the top for monitors."""
+    """Draw a thin line at each event, unless there are too many, and a triangle at the top for monitors."""
     kinds = Counter(event.kind for event in events)
     for event in events:
         if kinds[event.kind] <= _MOST_MARKS:
@@ -148,7 +148,7 @@ def _mark(axis: Axes, events: Sequence[Event]) -> None:
 
 
 def _strip(axis: Axes, solution: Solution, window: Window) -> None:
-    """Draw one row per component with coloured modes; the legend names the modes that occur."""
+    """Draw one row per component with its modes as colours; the legend names the modes that occur."""
     colours = style.mode_colours(solution.components)
     components = list(solution.modes)
     seen: dict[str, None] = {}

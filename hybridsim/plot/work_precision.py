@@ -49,7 +49,7 @@ def work_precision(comparison: Comparison, axes: Sequence[Axes] | None = None) -
         panels = tuple(axes)
     if len(panels) != len(quantities):
         raise UsageError(
-            f"{len(panels)} axes for {len(quantities)} kinds of error", remedy=f"give {len(quantities)} axes"
+            f"{len(panels)} axes for {len(quantities)} kinds of error", remedy=f"use {len(quantities)} axes"
         )
     chosen = looks(comparison.rows)
     for panel, quantity in zip(panels, quantities, strict=True):
@@ -68,7 +68,7 @@ def work_precision(comparison: Comparison, axes: Sequence[Axes] | None = None) -
 
 
 def headline(comparison: Comparison) -> str:
-    """Return model, length of the run and reference as two lines."""
+    """Return the title of a comparison: model, length of the run and reference."""
     t0, t1 = comparison.t_span
     long = f"{(t1 - t0) / comparison.period:.4g} periods" if comparison.period else f"t = {t0:g} to {t1:g}"
     return style.literal(f"{comparison.title}, {long}\nReference: {comparison.reference}")
@@ -116,17 +116,17 @@ def _point(comparison: Comparison, row: Row, quantity: str) -> tuple[float, floa
 
 
 def is_cold(row: Row) -> bool:
-    """Return whether a run was timed only while it warmed up."""
+    """Return whether a run was timed only once, while it still warmed up."""
     return row.cost is not None and row.cost.repetitions == 0
 
 
 def verdict_of(row: Row) -> bool | None:
-    """Return whether the modes of a run are right; None if it has no modes."""
+    """Return whether the mode sequence of a run is right, or None if the run has no modes."""
     return row.errors.sequence.right if row.errors and row.errors.sequence is not None else None
 
 
 def label_ticks(panel: Axes) -> None:
-    """Set as many tick labels of wall times ("20 ms") as are readable, and decades of the error."""
+    """Set few enough tick labels of wall times to be readable, and one tick per decade of the error."""
     low, high = panel.get_xlim()
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     for steps in ((1, 2, 3, 4, 6, 8), (1, 2, 5), (1, 3), (1,)):
@@ -144,7 +144,7 @@ def label_ticks(panel: Axes) -> None:
 def handles(
     rows: Iterable[Row], comparisons: Sequence[Comparison], chosen: dict[str, Look], size: float = SIZE
 ) -> list[Artist]:
-    """Return the legend: an entry per line, and entries for hollow, half filled and grey marks if they occur."""
+    """Return the legend entries of the lines, and of the hollow, half filled and grey marks that occur."""
     rows = list(rows)
     found: list[Artist] = []
     for label, look in chosen.items():

@@ -1,1 +1,1 @@
-"""This folder reproduces published studies, each in its own subfolder."""
+"""This package reproduces published studies; each study has its own subfolder."""

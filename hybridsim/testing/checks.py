@@ -11,7 +11,7 @@ from hybridsim.testing.scene import Check
 
 
 def at_times(times: Sequence[float]) -> str:
-    """Return times in words; of many, only the first three."""
+    """Return times as text; a long list shows only the first three times."""
     if not times:
         return "never"
     shown = [repr(float(t)) for t in times[:3]]
@@ -50,7 +50,7 @@ def exact_stick(component: str, held: Mapping[str, float], rest: tuple[str, ...]
 
 
 def amplitude(name: str, t0: float, t1: float) -> Callable[[Any], float]:
-    """Return a function for the amplitude (max - min)/2 on [t0, t1]; extremes must be at events or ends."""
+    """Return a function that computes (max - min)/2 on [t0, t1] from the values at events and ends."""
 
     def quantity(solution: Any) -> float:
         row = [state.name for state in solution.model.states].index(name)

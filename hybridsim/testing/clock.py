@@ -1,4 +1,4 @@
-"""Limits of the processor time of a run, so that other load on the machine does not change a verdict."""
+"""Limits on the processor time of a run; unlike wall time, it is not affected by other processes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _LATER = 1e-3  # seconds
 
 
 class Endless(Exception):
-    """A run that exceeds its time limit."""
+    """Raised if a run exceeds its time limit."""
 
 
 @contextmanager
@@ -86,5 +86,5 @@ class ProcessorTime:
             self._began = now
         elif now - self._began >= self.seconds:
             raise LimitReached(
-                f"{now - self._began:.3g} s of processor time used, {self.seconds:g} s allowed"
+                f"{now - self._began:.3g} s of processor time are used, {self.seconds:g} s allowed"
             )

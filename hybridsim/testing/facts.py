@@ -16,7 +16,7 @@ States = tuple[tuple[float, tuple[float | None, ...]], ...]
 
 
 def recomputed(name: str, rename: Mapping[str, str] | None = None) -> tuple[Events, States]:
-    """Return events and states of truths.json for a `Truth`, with other component names on request."""
+    """Return the events and states of a case in truths.json as a `Truth`; components can be renamed."""
     truth, other = TRUTHS[name], rename or {}
     events = tuple((float(t), f"{other.get(c, c)}:{mode}") for t, c, mode in truth["events"])
     return events, tuple((float(row[0]), tuple(row[1:])) for row in truth["states"])

@@ -43,17 +43,17 @@ class Measured:
 
     @property
     def wrong(self) -> tuple[str, ...]:
-        """All errors except numeric ones."""
+        """All errors of the run except numerical errors of times and states."""
         return (*self.ending, *self.sequence, *self.checks)
 
 
 def label(event: Any) -> str:
-    """Return component:mode for a transition, otherwise the name of the monitor or schedule."""
+    """Return component:mode as the label of a transition, otherwise the name of the monitor or schedule."""
     return f"{event.component}:{event.target}" if event.kind == "transition" else event.component
 
 
 def load(scene: Scene) -> Any:
-    """Return the model of a scene."""
+    """Return the model that a scene names."""
     path = SCENES / f"{scene.file}.toml"
     return hs.load(str(path) if path.exists() else scene.file)
 
@@ -95,7 +95,7 @@ def run(
 
 
 def measure(scene: Scene, solution: Any, lacks: Container[str] = ()) -> Measured:
-    """Compare a solution with the truth, without checks of capabilities that the integrator lacks."""
+    """Compare a solution with the truth, and skip checks that need a missing capability of the integrator."""
     wrong, time_error, state_error = ending(scene, solution), 0.0, 0.0
     sequence: list[str] = []
     if not wrong and scene.truth.events is not None:
@@ -121,7 +121,7 @@ def measure(scene: Scene, solution: Any, lacks: Container[str] = ()) -> Measured
 
 
 def ending(scene: Scene, solution: Any) -> list[str]:
-    """Return errors of the end of the run: status, message and time."""
+    """Return the errors in the status, the message and the time of the end of a run."""
     truth, wrong = scene.truth, []
     if truth.status is not None and solution.status != truth.status:
         wrong.append(
@@ -140,7 +140,7 @@ def ending(scene: Scene, solution: Any) -> list[str]:
 
 
 def counted(scene: Scene, solution: Any) -> list[tuple[float, str]]:
-    """Return the events that the truth lists."""
+    """Return the events of a run that the truth lists."""
     kinds = ("transition", "monitor", "scheduled") if scene.count_scheduled else ("transition", "monitor")
     first, last = scene.span
     return [
@@ -153,7 +153,7 @@ def counted(scene: Scene, solution: Any) -> list[tuple[float, str]]:
 
 
 def compare_events(scene: Scene, solution: Any) -> tuple[list[str], float]:
-    """Return a difference of the event sequence, and the largest error of the event times."""
+    """Return the first difference of the event sequence, and the largest error of the event times."""
     found, expected = counted(scene, solution), list(scene.truth.events or ())
     position, error = 0, 0.0
     for t, group in groupby(expected, key=lambda event: event[0]):

@@ -1,4 +1,4 @@
-"""Scenes: a model, a run, its known answer, and the class of trouble that it represents."""
+"""Scenes: a model, a run of the model, its known answer, and the class of difficulty."""
 
 from __future__ import annotations
 
@@ -129,4 +129,4 @@ class Scene:
     def __post_init__(self) -> None:
         unknown = set(self.needs) - set(VOCABULARY)
         if unknown:
-            raise ValueError(f"scene {self.name} needs {sorted(unknown)}, unknown capabilities")
+            raise ValueError(f"scene {self.name} needs {sorted(unknown)}, which are unknown capabilities")

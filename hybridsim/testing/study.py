@@ -42,7 +42,7 @@ LONGEST = 60  # seconds of processor time per run of a scene; the longest run ta
 
 @dataclass(frozen=True)
 class Setting:
-    """One run of a study: options, an error that counts as zero, and the required decrease of the error."""
+    """One run of a study: its options, the error regarded as zero, and the required decrease of the error."""
 
     text: str
     options: Mapping[str, Any]
@@ -66,7 +66,7 @@ class Study:
     failure: tuple[str, Exception] | None = None
 
     def faults(self) -> list[str]:
-        """Return all errors as sentences; slow convergence is reported only if nothing else is wrong."""
+        """Return all errors as sentences; slow convergence is reported only if there is no other error."""
         wrong = [f"{setting.text}: {sentence}" for setting, run in self.done for sentence in run.wrong]
         if self.failure is not None:
             text, error = self.failure
@@ -122,7 +122,7 @@ def adaptive(rtol: float, scene: Scene) -> Setting:
 
 
 def fixed_step(steps: float, options: Mapping[str, Any], scene: Scene) -> Setting:
-    """Return the setting for one step size."""
+    """Return the setting for one fixed step size."""
     return Setting(f"unit/{steps:g}", options, max(scene.floor, FIXED_STEP_FLOOR), FIXED_STEP_FALL)
 
 
@@ -143,7 +143,7 @@ def carry_out(
     seconds: float = LONGEST,
     **options: Any,
 ) -> Study:
-    """Run a scene at all useful settings; `seconds` of processor time limit each run."""
+    """Run a scene at all useful settings; `seconds` limits the processor time of each run."""
     done: list[tuple[Setting, measuring.Measured]] = []
     waiting = list(settings)
     while waiting:
@@ -171,13 +171,13 @@ def carry_out(
 
 
 def cut_short(tolerances: tuple[float, float], last: Setting) -> tuple[float, float]:
-    """Return the allowed errors of a study that ends with this setting."""
+    """Return the allowed errors of a study whose last setting is the given one."""
     allowed = CUT_SHORT * last.options.get("rtol", 0.0)
     return max(tolerances[0], allowed), max(tolerances[1], allowed)
 
 
 def within(measured: measuring.Measured, tolerances: tuple[float, float]) -> bool:
-    """Return whether both errors are within their tolerances."""
+    """Return whether the errors of times and of states are both within their tolerances."""
     return measured.time_error <= tolerances[0] and measured.state_error <= tolerances[1]
 
 

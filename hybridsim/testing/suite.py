@@ -46,12 +46,12 @@ class Outcome:
 
     @property
     def failed(self) -> bool:
-        """Whether the verdict is neither right nor lacking."""
+        """Whether the verdict is neither that the run is right nor that a capability is missing."""
         return self.verdict not in (RIGHT, LACKS)
 
 
 def outcome(method: str | type[Integrator], scene: Scene, **options: Any) -> Outcome:
-    """Run one scene with one integrator at all settings, and return the verdict.
+    """Run one scene with one integrator at all settings, and return the verdict with its reason.
 
     Parameters
     ----------
@@ -72,6 +72,6 @@ def outcome(method: str | type[Integrator], scene: Scene, **options: Any) -> Out
 
 
 def conformance_failures(method: str | type[Integrator], scenes: Iterable[Scene] = SCENES) -> list[str]:
-    """Return the errors of an integrator as sentences; stated limitations are not errors."""
+    """Return the failures of an integrator as sentences; stated limitations are not failures."""
     outcomes = [outcome(method, scene) for scene in scenes]
     return [f"{one.scene}: {reason}" for one in outcomes if one.failed for reason in one.reasons]

@@ -69,7 +69,7 @@ def refusal(error: Exception) -> str:
 
 
 def one_line(text: str) -> str:
-    """Return a message on one line, without the folders of files."""
+    """Return a message on one line, in which paths are shortened to file names."""
     return re.sub(r"\s+", " ", re.sub(r"\S*/([\w.-]+\.toml)", r"\1", text)).strip()
 
 

@@ -152,7 +152,7 @@ def test_nothing_global_is_touched() -> None:
     [
         (lambda: time_history(oscillator(2), ["y"]), "has no quantity 'y'"),
         (lambda: time_history(oscillator(2), ["x"], axes=[]), "0 axes"),
-        (lambda: time_history(oscillator(2), t_span=(5, 6)), "outside of the run"),
+        (lambda: time_history(oscillator(2), t_span=(5, 6)), "outside the run"),
         (lambda: friction_loop(ball()), "no outputs"),
         (lambda: phase_portrait(oscillator(2), "x", "w"), "has no quantity 'w'"),
         (lambda: save(phase_portrait(ball()), "picture.jpg"), "picture.jpg"),

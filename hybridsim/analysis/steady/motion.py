@@ -149,7 +149,7 @@ class Motion:
         return replace(point, x=x)
 
     def run(self, start: Point | None, duration: float, is_carried: bool = False, **options: Any) -> Solution:
-        """Run from a point for a duration; without a point, from the model's initial state at time 0.
+        """Run from a point for a duration; the default point is the model's initial state at time 0.
 
         is_carried: derivatives will be carried along the run, so that their cost counts too.
         """
@@ -198,7 +198,7 @@ class Motion:
         )
 
     def carry(self, solution: Solution) -> None:
-        """Add the cost of carrying derivatives along a run to the cost so far."""
+        """Add the cost of computing derivatives along a run to the cost so far."""
         self._spend(_cost_of_carrying(solution))
 
     def _spend(self, seconds: float, ahead: float = 0.0) -> None:

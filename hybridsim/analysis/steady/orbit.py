@@ -1,4 +1,4 @@
-"""This module represents part of a run by polynomials on short intervals, none of them across an event.
+"""This module represents a part of a run by polynomials on short intervals between events.
 
 Integrals are sums over the points, and extrema are zeros of polynomials, so that no time grid is needed.
 """
@@ -31,7 +31,7 @@ _AT_ENDS = legendre.legvander(np.array([-1.0, 1.0]), POINTS - 1)
 
 @dataclass(frozen=True)
 class Orbit:
-    """Quantities over part of a run.
+    """Quantities over a part of a run, sampled on short intervals.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class Orbit:
         return self.names.index(name)
 
     def of(self, name: str) -> np.ndarray:
-        """Return the values (K, POINTS) of one quantity."""
+        """Return the values (K, POINTS) of one quantity at the Gauss points."""
         return self.values[:, :, self.column(name)]
 
     def _series(self, name: str) -> np.ndarray:
@@ -80,7 +80,7 @@ class Orbit:
         return self.of(name) @ TO_COEFFICIENTS.T
 
     def integral(self, values: np.ndarray) -> float:
-        """Return the integral over this part of the run, from values at the Gauss points (K, POINTS)."""
+        """Return the integral over this part of the run, from the values (K, POINTS) at the Gauss points."""
         return float((values @ WEIGHTS) @ (0.5 * self.lengths))
 
     def harmonic(self, name: str, frequency: float) -> complex:
@@ -112,7 +112,7 @@ class Orbit:
 
     @cached_property
     def turns(self) -> Turns:
-        """The extrema inside the pieces: points at which the slope of a quantity changes its sign."""
+        """The extrema inside the pieces, at which the slope of a quantity changes its sign."""
         found = [self._turns_of(*block) for block in self._blocks()]
         return Turns(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
@@ -156,7 +156,7 @@ class Orbit:
 def _zeros(
     series: np.ndarray, low: np.ndarray, high: np.ndarray, at_low: np.ndarray, at_high: np.ndarray
 ) -> np.ndarray:
-    """Return the zeros (m,) of Legendre series (m, degree + 1), each between two points with known values."""
+    """Return the zeros (m,) of Legendre series, each between two points with known values."""
     slope = series @ legendre.legder(np.eye(series.shape[1])).T
     at = low + (high - low) * at_low / (at_low - at_high)
     for _ in range(_STEPS):

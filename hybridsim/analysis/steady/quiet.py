@@ -20,7 +20,7 @@ def event_times(solution: Solution) -> np.ndarray:
 
 
 def is_event_near(solution: Solution, times: np.ndarray, t: float, period: float) -> bool:
-    """Return whether one of the `event_times` other than a near-grazing or a corner is close to time t."""
+    """Return whether an event is close to time t; near-grazings and corners do not count."""
     first, end = np.searchsorted(times, [t - _NEAR * period, t + _NEAR * period])
     occurrences = solution._of_model.record.occurrences
     return any(occurrences[k].kind not in _WITHOUT_EFFECT for k in range(int(first), int(end)))

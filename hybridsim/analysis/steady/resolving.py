@@ -35,7 +35,7 @@ _ROUNDINGS = 4.0  # multiple of the measured rounding
 
 
 def _misfits() -> tuple[np.ndarray, np.ndarray]:
-    """Return the sample points of an interval, and the weights that measure misfits of a polynomial.
+    """Return the sample points of an interval, and weights that measure the error of a polynomial.
 
     Misfits are the last coefficients, and the errors of the polynomial near the ends. Only the latter show a
     feature that begins behind the last Gauss point.
@@ -78,7 +78,7 @@ class Sampler:
         self.names = (*system.names, *(() if states_only else others))
 
     def __call__(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
-        """Return values (k, Q) at local times (k,) in the segments with the given numbers (k,)."""
+        """Return the values (k, Q) of all quantities at local times in given segments."""
         x = self.segments.states(index, s)
         if self.states_only:
             return x
@@ -104,7 +104,7 @@ class Sampler:
 
 
 class _Intervals(NamedTuple):
-    """Time intervals (k,), each inside one segment."""
+    """Time intervals, each of which lies inside one segment."""
 
     segments: np.ndarray
     begins: np.ndarray
@@ -200,7 +200,7 @@ def _resolved(
 
 
 def _sampled(sample: Sampler, intervals: _Intervals) -> tuple[np.ndarray, np.ndarray]:
-    """Return values (K, POINTS, Q) on intervals, and the largest misfit (K, Q) of each polynomial."""
+    """Return the values (K, POINTS, Q) on intervals, and the largest error of each polynomial."""
     count = len(intervals.begins)
     values, misfits = np.empty((count, POINTS, len(sample.names))), np.empty((count, len(sample.names)))
     block = max(1, _VALUES_PER_BATCH // (len(_SAMPLE_POINTS) * len(sample.names)))
@@ -216,7 +216,7 @@ def _sampled(sample: Sampler, intervals: _Intervals) -> tuple[np.ndarray, np.nda
 
 
 def _rounding(sample: Sampler, steps: _Intervals) -> np.ndarray:
-    """Return the misfit (Q,) that rounding causes, measured on very short intervals.
+    """Return the polynomial error (Q,) that rounding causes, measured on very short intervals.
 
     For a difference of large terms, such as an energy balance, the misfit may consist of rounding on every
     interval.

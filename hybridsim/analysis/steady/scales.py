@@ -40,7 +40,7 @@ def rounding_of(sizes: np.ndarray, rtol: float) -> np.ndarray:
 
 
 def stands_still(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, rtol: float) -> bool:
-    """Return whether all rates at x can be explained by errors of the states within the tolerance."""
+    """Return whether state errors within the tolerance explain all rates at x, so that nothing moves."""
     if not system.has_tape or not system.n:
         return True
     f, A = _rates(system, x, p, z)

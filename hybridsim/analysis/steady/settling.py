@@ -1,4 +1,4 @@
-"""This module follows a motion until it repeats after some forcing periods or section passages."""
+"""This module follows a motion until it repeats after some forcing periods or Poincare section passages."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LONGEST_WORD = 12  # largest number of periods after which a motion may repeat
 
 @dataclass(frozen=True)
 class Passings:
-    """The states of a motion at consecutive passages of a section.
+    """The states of a motion at consecutive passages of a Poincare section.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ class Passings:
         return next((m for m in found if self._error(m, CLOSER * tolerance) <= tolerance), None)
 
     def _error(self, multiple: int, rounding: float) -> float:
-        """Return the estimated distance of the last passage from the limit, by extrapolating the changes."""
+        """Return the estimated distance of the last passage from the limit, by extrapolation."""
         residual = self.residual(multiple)
         back = (len(self.values) - 1) // (2 * multiple)
         if back == 0:
@@ -87,13 +87,13 @@ class Passings:
         return multiple * left / rate
 
     def _change(self, back: int, multiple: int) -> float:
-        """Return the change over `multiple` passages, `back * multiple` passages before the last one."""
+        """Return the change of the states over `multiple` passages, by default the last ones."""
         return relative(
             self.values[-1 - back * multiple] - self.values[-1 - (back + 1) * multiple], self.scale
         )
 
     def drifting(self) -> int | None:
-        """Return the number of a state that drifts by equal amounts per quarter of the passages, or None."""
+        """Return the index of a state that drifts by equal amounts per quarter of the passages, or None."""
         quarter = (len(self.values) - 1) // 4
         if quarter < 2:
             return None
@@ -114,7 +114,7 @@ _ABOUT = 10.0
 
 
 def relative(change: np.ndarray, scale: np.ndarray) -> float:
-    """Return the largest entry of a change relative to its scale, without entries that have no scale."""
+    """Return the largest relative entry of a change; entries that have no scale are ignored."""
     parts = np.abs(change)[scale > 0.0] / scale[scale > 0.0]
     return float(parts.max(initial=0.0))
 
@@ -162,7 +162,7 @@ def forced_passings(motion: Motion, start: Point | None, period: float, count: i
 def free_passings(
     motion: Motion, start: Point | None, duration: float, largest: np.ndarray, **limits: Any
 ) -> Passings:
-    """Return the passages of the most mobile state through the middle of its range, late in a run.
+    """Return the passages of the fastest state through the middle of its range, late in a run.
 
     A state that only grows, such as the angle of a shaft, passes there once; it is used if there is no other.
     largest (n,): the largest scale of each state so far, updated here. A motion that has decayed relative to
@@ -204,7 +204,7 @@ def free_passings(
 def _without_events(
     late: Solution, orbit: Orbit, times: np.ndarray, j: int, may_be_passed: np.ndarray
 ) -> tuple[np.ndarray, int]:
-    """Return the times (K,) at which the flow passes a section without events, and the state of the section.
+    """Return the times at which the flow passes a Poincare section without events, and the section's state.
 
     times, j: a first section, which is kept if no event is there. Otherwise the section moves to the middle
     of the longest event-free interval of a period. It becomes a level of the state that moves fastest there,
@@ -243,7 +243,7 @@ def _drifts_steadily(solution: Solution, moves: np.ndarray, steady: float) -> np
 
 
 def died_out(low: np.ndarray, high: np.ndarray, largest: np.ndarray) -> bool:
-    """Return whether the states (n,), between low and high, vary so little that the motion has decayed."""
+    """Return whether the states vary so little between `low` and `high` that the motion has decayed."""
     return bool((high - low <= _DIED_OUT * largest).all())
 
 

@@ -109,7 +109,7 @@ def followed_closely(motion: Motion, start: Orbit, scale: np.ndarray, is_free: b
 def _newton(
     matrix: np.ndarray, change: np.ndarray, scale: np.ndarray, section: int | None, rates: np.ndarray | None
 ) -> tuple[np.ndarray, float]:
-    """Return the Newton step of start and period."""
+    """Return the Newton correction of the start and the period."""
     count = len(change)
     unit = np.where(scale > 0.0, scale, 1.0)
     A = np.eye(count) - matrix * unit[None, :] / unit[:, None]
@@ -135,7 +135,7 @@ def rates_at_end(solution: Solution) -> np.ndarray:
 
 
 def multipliers(matrix: np.ndarray, rates: np.ndarray | None) -> np.ndarray:
-    """Return the Floquet multipliers, largest first; of an unforced orbit without the trivial multiplier 1.
+    """Return the Floquet multipliers, largest first; for an unforced orbit without the trivial multiplier 1.
 
     rates (n,): dx/dt at the end of the orbit, for a motion without forcing. If another multiplier is about 1
     as well, as on closed orbits of a conservative system, both are accurate only to the square root of

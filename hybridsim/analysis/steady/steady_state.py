@@ -181,7 +181,7 @@ def steady_state(
 
 
 class _Search:
-    """Follow a motion until its kind is known."""
+    """Follows a motion until its kind is known."""
 
     def __init__(
         self,
@@ -223,7 +223,7 @@ class _Search:
             passings = self._follow(passings)
 
     def _not_below_rounding(self, passings: Passings) -> Passings:
-        """Return the passages with scales of at least the size of rounding errors.
+        """Return the passages with scales that are not below rounding errors.
 
         A state that has decayed relative to its former size has no scale of its own. A discrete state that
         settles on zero gets its size from the other states: from the effect over one period of a change of
@@ -240,7 +240,7 @@ class _Search:
         return replace(passings, scale=scale)
 
     def _over_a_period(self, start: Point) -> np.ndarray:
-        """Return d(end of one forcing period)/d(its start), (n + d, n + d), or zeros if it is unknown."""
+        """Return the Jacobian of the period map, (n + d, n + d), or zeros if it is unknown."""
         try:
             return derivatives(self.motion.run(start, self.period or 0.0), ()).by_start
         except UsageError:
@@ -276,7 +276,7 @@ class _Search:
         return passings
 
     def _passed(self, start: Point | None) -> Passings:
-        """Return the motion over a duration; the first call chooses the duration by its cost."""
+        """Return the motion over a duration, which the first call chooses by the cost."""
         is_free_to_choose = start is None and self.least > 0.0 and "limits" not in self.motion.options
         if is_free_to_choose and self.duration == self.least:
             try:
@@ -358,7 +358,7 @@ class _Search:
         return bool((high - low <= rounding).all())
 
     def _shortest(self, orbit: Orbit) -> Orbit:
-        """Return the orbit with its shortest period, of which the period found is a multiple."""
+        """Return the orbit with its shortest period, if the found period is a multiple of it."""
         for divisor in range(1, orbit.multiple):
             if orbit.multiple % divisor:
                 continue
@@ -451,7 +451,7 @@ def _check_period(model: Model, period: float, own: float | None) -> None:
 
 
 def _refuse_what_ends(system: System, has_period: bool) -> None:
-    """Reject models with impacts, and with events or inputs that change the model permanently."""
+    """Reject models with impacts, and models with events or inputs that change them permanently."""
     model = system.model
     if system.is_unilateral.any():
         raise UsageError(

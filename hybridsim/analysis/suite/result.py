@@ -80,7 +80,7 @@ class SuiteComparison(Readable):
         return tuple(dict.fromkeys(label for result in self.results for label in result.comparison.labels))
 
     def verdicts(self) -> dict[str, dict[str, Verdict]]:
-        """Return scene -> line -> verdict at a common tolerance."""
+        """Return the verdict for each scene and line at a common tolerance."""
         return {
             result.scene.name: {
                 label: verdict(result.scene, [row for row in result.comparison.rows if row.label == label])
@@ -90,7 +90,7 @@ class SuiteComparison(Readable):
         }
 
     def cheapest(self, accuracies: Sequence[float] = ACCURACIES) -> dict[str, dict[float, Row | None]]:
-        """Return scene -> accuracy -> cheapest row within the accuracy, or None."""
+        """Return the cheapest row for each scene and accuracy, or None."""
         accuracies = positives(accuracies, "accuracies") or ()
         return {
             result.scene.name: {accuracy: result.cheapest(accuracy) for accuracy in accuracies}

@@ -125,7 +125,7 @@ def _prepared_case(scene: Scene) -> PreparedCase:
 
 
 def _reference(case: PreparedCase, seconds: float, step: Callable[[str], None]) -> Reference:
-    """Return a reference that is independent of the engine, or if that is too slow one from two runs."""
+    """Return an exact reference if it can be computed in time, otherwise a reference from two runs."""
     limit = Budget(seconds)
 
     def watch(_: float) -> None:

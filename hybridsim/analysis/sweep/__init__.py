@@ -1,4 +1,4 @@
-"""This package measures a model over grids and lists of parameter values, on threads or any executor."""
+"""This package measures a model at many values of its parameters, on threads or on any executor."""
 
 from hybridsim.analysis.sweep.bifurcation import bifurcation
 from hybridsim.analysis.sweep.frequency_response import frequency_response

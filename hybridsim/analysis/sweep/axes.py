@@ -77,12 +77,12 @@ class Points:
 
     @cached_property
     def _parsed(self) -> list[list[Expression]]:
-        """The values of a grid as expressions, each parsed once and used for many points."""
+        """The values of a grid as expressions, each of which is parsed once for many points."""
         return [[parse(setting) for setting in axis.settings] for axis in self.axes]
 
 
 def points_of(model: Model, values: Any, mode: Any) -> Points:
-    """Return the points that the arguments of a sweep describe.
+    """Return the points of a sweep, given by its arguments.
 
     Raises
     ------
@@ -198,7 +198,7 @@ def _dependencies(declared: Mapping[str, Expression], name: str) -> dict[str, Ex
 
 
 def _number(name: str, dependencies: Mapping[str, Expression]) -> float:
-    """Return the value of a parameter, or NaN for a missing value, which is an error of this point only."""
+    """Return the value of a parameter, or NaN for a missing value, which fails this point only."""
     try:
         return resolve(dependencies)[name]
     except ExpressionError:

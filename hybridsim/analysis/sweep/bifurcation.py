@@ -30,7 +30,7 @@ DIRECTION = "direction"
 
 
 class _Branches:
-    """The values of one parameter in rising and in falling order, as two branches."""
+    """The values of one parameter in rising order as one branch, and in falling order as another."""
 
     def __init__(self, points: Points, count: int) -> None:
         rows = points.settings(range(count))
@@ -44,7 +44,7 @@ class _Branches:
         return len(self._rising), 2
 
     def settings(self, numbers: range) -> list[Settings]:
-        """Return the settings; even numbers belong to the rising branch, odd ones to the falling branch."""
+        """Return the settings of points; even numbers belong to the rising branch, odd ones to the other."""
         return [self._rising[-1 - k // 2 if k % 2 else k // 2] for k in numbers]
 
 
@@ -144,5 +144,5 @@ def bifurcation(
 
 
 def _turned(array: np.ndarray) -> np.ndarray:
-    """Reorder (step, branch, ...) to (branch, value, ...), so that both branches are in rising order."""
+    """Reorder results from (step, branch, ...) to (branch, value, ...), so that both branches rise."""
     return np.stack([array[:, 0], array[::-1, 1]])

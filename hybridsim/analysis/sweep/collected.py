@@ -11,7 +11,7 @@ from hybridsim.analysis.sweep.work.job import NOT_RUN, Outcome
 
 
 class Collected:
-    """Arrays of readings and statuses, which are independent of the order of arrival.
+    """Arrays of results and statuses, which do not depend on the order of arrival.
 
     A reading that a point does not have is NaN, or an empty text. The end of an array that is shorter than
     another point's is filled in the same way.
@@ -44,7 +44,7 @@ class Collected:
     def values(
         self, shape: tuple[int, ...], nothing: Mapping[str, float | str] | None = None
     ) -> dict[str, np.ndarray]:
-        """Return the arrays by name; the entries of points without a result come from `nothing`."""
+        """Return the arrays by name; `nothing` contains the values for points without a result."""
         for name, value in (nothing or {}).items():
             if name not in self._arrays:
                 self._arrays[name] = np.full(len(self.status), value, dtype=_kind(value))
@@ -52,7 +52,7 @@ class Collected:
         return {name: self._arrays[name].reshape(*shape, *self._arrays[name].shape[1:]) for name in names}
 
     def _enlarged(self, old: np.ndarray | None, value: Reading) -> np.ndarray:
-        """Return an array that is large enough for some values, with the content of the old array."""
+        """Return an array that is large enough for new values, with the content of the old array."""
         total, kind = len(self.status), _kind(value)
         long = np.ndim(value) == 1
         length = np.size(value) if long else None

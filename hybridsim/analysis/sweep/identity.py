@@ -53,7 +53,7 @@ def identity(value: Any) -> str:
 
 
 class _Describer:
-    """Computes the texts, also of values that contain one another."""
+    """Computes the identifying texts, also of values that contain one another."""
 
     def __init__(self) -> None:
         self._around: list[int] = []  # the values in progress: a value may contain itself
@@ -167,7 +167,7 @@ def _is_library(name: str) -> bool:
 
 
 def _of_module(name: str) -> str:
-    """Return the identity of a module: the version of a library, or a hash of another module's file."""
+    """Return the identity of a module: the version of a library, or a hash of any other module's file."""
     module = sys.modules.get(name)
     if _is_library(name) or not (file := getattr(module, "__file__", None)) or not Path(file).is_file():
         return f"{name} {getattr(sys.modules.get(name.partition('.')[0]), '__version__', '')}"
@@ -175,7 +175,7 @@ def _of_module(name: str) -> str:
 
 
 def _read_by(function: FunctionType) -> list[Any]:
-    """Return the values other than its arguments that a function depends on."""
+    """Return the values that a function reads in addition to its arguments."""
     code = function.__code__
     cells = [cell.cell_contents for cell in function.__closure__ or () if cell != _EMPTY]
     found = {n: function.__globals__[n] for n in sorted(_names(code)) if n in function.__globals__}
@@ -183,6 +183,6 @@ def _read_by(function: FunctionType) -> list[Any]:
 
 
 def _names(code: CodeType) -> set[str]:
-    """Return the names that a code object looks up, including those in nested code."""
+    """Return the names that a code object uses, including names in nested code."""
     inner = (part for part in code.co_consts if isinstance(part, CodeType))
     return set(code.co_names).union(*map(_names, inner))

@@ -1,4 +1,4 @@
-"""This module records the results of a sweep in a file as they arrive, so that the sweep can be resumed.
+"""This module writes the results of a sweep to a file as they arrive, so that the sweep can be resumed.
 
 Each piece of work is one line of JSON; an incomplete last line, cut off by a kill, is ignored. Numbers are
 written with all digits, so that a sweep in parts equals a sweep in one bit for bit.
@@ -64,7 +64,7 @@ class Journal:
             raise
 
     def _opened(self) -> IO[bytes]:
-        """Open the file and lock it against other sweeps."""
+        """Open the file and lock it, so that no other sweep can write to it."""
         while True:
             try:
                 is_other = os.path.exists(self.path) and not stat.S_ISREG(os.stat(self.path).st_mode)
@@ -155,7 +155,7 @@ def _as_line(content: Any) -> bytes:
 
 
 def _piece(line: Any) -> tuple[list[int], list[Outcome]]:
-    """Read one line: the indices of its points, and their outcomes.
+    """Read one line of the journal: the indices of some points, and their outcomes.
 
     Raises
     ------
@@ -173,12 +173,12 @@ def _piece(line: Any) -> tuple[list[int], list[Outcome]]:
 def _outcome(row: Any) -> Outcome:
     is_pair = isinstance(row, list) and len(row) == 2
     if not (is_pair and isinstance(row[0], str) and isinstance(row[1], dict)):
-        raise ValueError("a result is not a status with readings")
+        raise ValueError("a result is not a status with values")
     return Outcome(row[0], {name: _read_back(value) for name, value in row[1].items()} or None)
 
 
 def _written(value: Reading) -> Any:
-    """Convert a reading to JSON: numbers and texts stay as they are, other values get a type tag."""
+    """Convert a value to JSON: numbers and texts are unchanged, other values get a type tag."""
     if isinstance(value, np.ndarray):
         parts = [value.real.tolist(), value.imag.tolist()] if value.dtype.kind == "c" else [value.tolist()]
         return {"array": parts}
@@ -202,7 +202,7 @@ def _read_back(value: Any) -> Reading:
             both.real = [_number(number) for number in real]
             both.imag = [_number(number) for number in imaginary]
             return both
-    raise ValueError("a reading is not a number, array or text")
+    raise ValueError("a value is not a number, array or text")
 
 
 def _number(value: Any) -> float:

@@ -46,7 +46,7 @@ class MeasuredPeriod(Measures):
 
 @dataclass(frozen=True)
 class LastPeriod:
-    """A measure that reads the forcing period after the first `after` periods."""
+    """A measure of the forcing period that follows the first `after` periods."""
 
     reading_names: tuple[str, ...]
     after: int
@@ -54,7 +54,7 @@ class LastPeriod:
     read_one: Callable[[Any, str], Any]
 
     def nothing(self) -> dict[str, float | str]:
-        """Return the readings of a point that has no result."""
+        """Return the values stored for a point that has no result."""
         return {word: "" if word == "word" else math.nan for word in self.reading_names}
 
     def run(self, model: Model, previous: Any) -> MeasuredPeriod:
@@ -66,7 +66,7 @@ class LastPeriod:
         return MeasuredPeriod(solution, period)
 
     def read(self, result: MeasuredPeriod) -> dict[str, Any]:
-        """Return the readings in the order of their names."""
+        """Return the values in the order of their names."""
         return {word: self.read_one(result, word) for word in self.reading_names}
 
     def together(
@@ -76,7 +76,7 @@ class LastPeriod:
         alone: Callable[[Settings], Outcome],
         watch: Watch,
     ) -> list[Outcome] | None:
-        """Run all points in compiled code, except those for `alone`; return None if no point can run so.
+        """Run all points in compiled code except those in `alone`; return None if no point can run so.
 
         If the watch requests a stop, the outcomes are those of the first points, as far as they were run.
         """
@@ -132,7 +132,7 @@ def _outcome(found: dict[str, Any]) -> Outcome:
 
 
 def _reader(word: str, system: Any) -> Callable[[LastPeriods], np.ndarray] | None:
-    """Return a function that computes a reading from sums over the last periods (m,), or None."""
+    """Return a function that computes one value from sums over the last periods, or None."""
     head, _, rest = word.partition(".")
     if head == "period":
         return lambda last: last.periods

@@ -16,7 +16,7 @@ from hybridsim.model import Model
 
 @dataclass(frozen=True)
 class UserFunction:
-    """A measure defined by a user's function of the model and, in a chain, of the previous point's result."""
+    """A measure defined by a user's function of the model and, with `warm_start`, of the previous result."""
 
     function: Callable[..., Any]
     options: Mapping[str, Any]
@@ -29,7 +29,7 @@ class UserFunction:
         return self.function(model, **self.options)
 
     def read(self, result: Any) -> Any:
-        """Return the result as it is."""
+        """Return the result unchanged."""
         return result
 
 

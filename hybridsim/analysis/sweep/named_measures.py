@@ -39,16 +39,16 @@ class Steady:
     options: Mapping[str, Any]
 
     def nothing(self) -> dict[str, float | str]:
-        """Return the readings of a point that has no result."""
+        """Return the values stored for a point that has no result."""
         return {word: "" if word in _TEXTS else math.nan for word in self.reading_names}
 
     def run(self, model: Model, previous: SteadyState | None) -> SteadyState:
-        """Find the steady state, from that of the previous point if the points form a chain."""
+        """Find the steady state; with `warm_start`, begin at the steady state of the previous point."""
         start = {} if previous is None else _start_of(previous)
         return steady_state(model, **{**self.options, **start})
 
     def read(self, result: SteadyState) -> dict[str, Any]:
-        """Return the readings in the order of their names."""
+        """Return the values in the order of their names."""
         if not result.success:
             known = {
                 name: getattr(result, name) for name in self.reading_names if name in ("kind", "residual")
@@ -57,7 +57,7 @@ class Steady:
         return {word: _reading(result, word) for word in self.reading_names}
 
     def blank(self, result: SteadyState) -> tuple[str, ...]:
-        """Return the readings that a result does not have, such as the period of an equilibrium."""
+        """Return the values that a result does not have, such as the period of an equilibrium, as NaN."""
         return ("period",) if result.kind == "equilibrium" else ()
 
 
@@ -69,11 +69,11 @@ class Final:
     options: Mapping[str, Any]
 
     def nothing(self) -> dict[str, float | str]:
-        """Return the readings of a point that has no result."""
+        """Return the values stored for a point that has no result."""
         return {f"{FINAL}.{name}": math.nan for name in self.names}
 
     def run(self, model: Model, previous: Any) -> dict[str, float]:
-        """Return the final states by name; in a chain the run starts from the previous point's end."""
+        """Return the final states by name; with `warm_start`, the run begins at the previous end."""
         arguments = {"save": "nothing", **self.options}
         if previous is not None:
             arguments["x0"] = previous
@@ -83,14 +83,14 @@ class Final:
         return dict(zip(solution.names, solution.y[:, -1].tolist(), strict=True))
 
     def read(self, result: dict[str, float]) -> dict[str, float]:
-        """Return the requested states."""
+        """Return the requested final states."""
         return {f"{FINAL}.{name}": result[name] for name in self.names}
 
 
 def named_measure(
     reading_names: str | Sequence[str], model: Model, options: Mapping[str, Any]
 ) -> Steady | Final | LastPeriod:
-    """Return a measure given by its name, "steady" or "final", or by the names of its readings.
+    """Return a measure by its name, "steady" or "final", or by the names of its values.
 
     Raises
     ------
@@ -111,7 +111,7 @@ def named_measure(
     if FINAL in heads:
         raise UsageError(
             f"`measure` cannot be {reading_names!r}",
-            remedy="use two sweeps: one for readings of steady states, and one for ends of runs",
+            remedy="use two sweeps: one for values of steady states, and one for ends of runs",
         )
     if AFTER in options:
         refuse_unknown([simulate], {name: value for name, value in options.items() if name != AFTER})
@@ -131,7 +131,7 @@ def named_measure(
         if AFTER in options and word in _OF_MOTION and word not in OF_MOTION:
             raise UsageError(
                 f"{word} belongs to a steady state, but `after` measures one period of an ordinary run",
-                remedy=f"remove {word} or `after`; the reading 'residual' measures how far a run is from "
+                remedy=f"remove {word} or `after`; the value 'residual' measures how far a run is from "
                 "repeating",
             )
         if (f"{stem}.1" if is_harmonic else word) not in known:
@@ -154,7 +154,7 @@ def _last_period(reading_names: tuple[str, ...], model: Model, options: dict[str
 
 
 def units_of_readings(reading_names: Iterable[str], model: Model) -> dict[str, str]:
-    """Return the units of named readings that are declared in the model."""
+    """Return the units of named values that are declared in the model."""
     known, time = units_of(model), time_unit(model)
     units = {}
     for word in reading_names:
@@ -169,7 +169,7 @@ def units_of_readings(reading_names: Iterable[str], model: Model) -> dict[str, s
 
 
 def _known(model: Model, of_motion: Sequence[str]) -> list[str]:
-    """Return the names of all readings of a steady state, with the first harmonic of each quantity."""
+    """Return the names of all values of a steady state, with the first harmonic of each quantity."""
     discrete = {d.name for d in model.discrete}
     quantities = [name for name in units_of(model) if name not in discrete]
     contacts = [contact.name for contact in model.contacts]

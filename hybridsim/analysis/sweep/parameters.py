@@ -37,7 +37,7 @@ class Setter:
         self._known: dict[Expression, float] = {}
 
     def values(self, points: Sequence[Settings]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return parameters (N, P), initial states (N, n), and the numbers (m,) of the valid points."""
+        """Return parameters, initial states, and the indices of the valid points, as arrays."""
         parameters = np.tile(self._base, (len(points), 1))
         starts = np.tile(self._start, (len(points), 1))
         if not self._is_plain:

@@ -1,4 +1,4 @@
-"""This module converts the result of a measure to named readings: numbers, texts and arrays."""
+"""This module converts the result of a measure to named values: numbers, texts and arrays."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ VALUE = "value"  # the name of a reading without one
 
 
 def readings(found: Any) -> dict[str, Reading]:
-    """Return readings by name from a number, an array (k,), or a mapping of numbers, arrays and texts.
+    """Return named values from a number, an array (k,), or a mapping of numbers, arrays and texts.
 
     Raises
     ------
@@ -31,7 +31,7 @@ def readings(found: Any) -> dict[str, Reading]:
 
 
 def not_numbers(found: Mapping[str, Reading]) -> list[str]:
-    """Return the names of the readings that are NaN or contain NaN."""
+    """Return the names of the values that are NaN or contain NaN."""
     return [name for name, value in found.items() if _is_nan(value)]
 
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Sweep(Readable):
-    """The readings of a measure over values of parameters.
+    """The results of a measure at many values of parameters.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class Sweep(Readable):
         return self.status != DONE
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """Return a reading by its name."""
+        """Return the array of results with a given name."""
         if name not in self.values:
             raise UsageError(
                 f"the sweep has no {name!r}", remedy=nearest(str(name), self.values, kind="readings")
@@ -94,11 +94,11 @@ class Sweep(Readable):
         return "\n".join([heading(self), *statuses(self)])
 
     def table(self) -> str:
-        """Return the extremes of each reading, and the counts of statuses, as text."""
+        """Return the extremes of each result, and the counts of statuses, as text."""
         return table(self)
 
     def columns(self) -> dict[str, np.ndarray]:
-        """Return axes, readings and status as columns, one row per point; arrays become ``name[0]``, ..."""
+        """Return axes, results and status as columns, one row per point; arrays become ``name[0]``, ..."""
         if self.mode == "grid":
             grids = np.meshgrid(*self.axes.values(), indexing="ij")
             found = {name: grid.ravel() for name, grid in zip(self.axes, grids, strict=True)}
@@ -146,7 +146,7 @@ class Sweep(Readable):
         return text
 
     def to_xarray(self) -> xr.Dataset:
-        """Return an xarray data set over the axes, with the readings, their units and the status."""
+        """Return an xarray data set over the axes, with the results, their units and the status."""
         xarray = library("xarray")
         where = self.dimensions
         variables = {
@@ -162,7 +162,7 @@ class Sweep(Readable):
         )
 
     def plot(self, *names: str, over: str | None = None) -> Any:
-        """Draw readings as lines over one parameter or as maps over two; see `hybridsim.plot.sweep`.
+        """Draw results as lines over one parameter or as maps over two; see `hybridsim.plot.sweep`.
 
         Returns the axes; ``hybridsim.plot.save`` writes them to a file.
         """
@@ -183,7 +183,7 @@ class Sweep(Readable):
 
 
 def _plain(value: Any) -> Any:
-    """Return a number with all its digits, or a text unchanged."""
+    """Return a number with all its digits, or return a text unchanged."""
     return value if isinstance(value, str) else repr(value.item() if hasattr(value, "item") else value)
 
 

@@ -28,7 +28,7 @@ _EMPTY_FREE = 5  # intervals without any passage after which the search ends, wi
 
 
 class Passings(NamedTuple):
-    """States (k, n) at the section, the largest size (n,) of each state, and the end of the run."""
+    """States (k, n) at a Poincare section, the largest size (n,) of each state, and the end of the run."""
 
     states: np.ndarray
     sizes: np.ndarray
@@ -56,13 +56,13 @@ class Section:
     options: Mapping[str, Any]
 
     def run(self, model: Model, previous: Passings | None) -> Passings:
-        """Return the samples at one point; in a chain the run starts from the previous point's end."""
+        """Return the samples at one point; with `warm_start`, the run begins at the previous end."""
         motion = Motion(model, dict(self.options), dict(self.first))
         start = None if previous is None else previous.end
         return self._passed(motion, start) if self.level else self._strobed(motion, start)
 
     def read(self, result: Passings) -> dict[str, Any]:
-        """Return the samples of each state, and their least period in samples (0 if they do not repeat)."""
+        """Return the samples of each state, and after how many samples they repeat (0 if they do not)."""
         columns = {f"state {k}": column for k, column in enumerate(result.states.T)}
         return {**columns, REPEATS: repeats_after(result.states, self.tol * result.sizes)}
 
@@ -93,9 +93,7 @@ class Section:
                     "it, or a contact sticks there"
                 )
             length *= 2.0
-        raise SimulationError(
-            f"the section was crossed {len(found)} times, but {passages} crossings are needed"
-        )
+        raise SimulationError(f"the section was crossed {len(found)} times, but {passages} are needed")
 
 
 def with_section(model: Model, section: str | None) -> tuple[Model, str]:
@@ -122,7 +120,7 @@ def with_section(model: Model, section: str | None) -> tuple[Model, str]:
 
 
 def repeats_after(states: np.ndarray, tols: np.ndarray) -> int:
-    """Return the least period of samples (k, n) within the tolerances, as a number of samples, or 0."""
+    """Return after how many samples (k, n) the motion repeats within the tolerances, or 0."""
     for n in range(1, len(states) // 2 + 1):
         if (np.abs(states[n:] - states[:-n]) <= tols).all():
             return n

@@ -1,4 +1,4 @@
-"""This module measures a model over grids and lists of parameter values, on threads or any executor."""
+"""This module defines `sweep`, which measures a model at many values of its parameters."""
 
 from __future__ import annotations
 

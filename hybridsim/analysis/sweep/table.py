@@ -1,4 +1,4 @@
-"""This module writes a sweep as text: extremes of its readings, and counts of statuses."""
+"""This module writes a sweep as text: extremes of its results, and counts of statuses."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SHOWN = 5  # number of statuses that are shown
 
 
 def heading(sweep: Sweep) -> str:
-    """Return model, axes and readings in one line."""
+    """Return the model, the axes and the names of the results in one line."""
     shape = " x ".join(f"{len(values)} {name}" for name, values in sweep.axes.items())
     return f"Sweep of {sweep.model.name} over {shape}: {', '.join(sweep.values) or 'nothing'}"
 
@@ -30,7 +30,7 @@ def statuses(sweep: Sweep) -> list[str]:
 
 
 def table(sweep: Sweep) -> str:
-    """Return the extremes of each reading and the points at which they occur; for texts, the counts."""
+    """Return the extremes of each result and the points at which they occur; for texts, the counts."""
     rows: list[tuple[str, ...]] = []
     for name, values in sweep.values.items():
         unit = sweep.units.get(name, "")
@@ -51,7 +51,7 @@ def table(sweep: Sweep) -> str:
 
 
 def _where(sweep: Sweep, k: int, shape: tuple[int, ...]) -> str:
-    """Return the parameters of the point that contains the k-th number of a reading."""
+    """Return the parameters of the point at which the k-th value of a result was computed."""
     place = np.unravel_index(k, shape)
     if sweep.mode == "list":
         return ", ".join(_set(name, settings[place[0]]) for name, settings in sweep.axes.items())

@@ -1,4 +1,4 @@
-"""This module compares derivatives on both sides of a guard or surface on which a run lies exactly."""
+"""This module compares the derivatives on the two sides of a guard or surface that a run touches."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _ROUNDING = 1e-11  # of the states' sizes, for a change of everything by its own
 def agreed(
     carrier: Carrier, directions: Directions, carried: Carried
 ) -> tuple[np.ndarray, np.ndarray, list[tuple[str, np.ndarray]]]:
-    """Return derivatives (n + d, M) of the end and (E, M) of event times, and why some of them are NaN.
+    """Return derivatives at the end (n + d, M) and of event times (E, M), and why some of them are NaN.
 
     carried: the derivatives on the side of the run, with the functions that are exactly at zero. Each
     direction that moves one of these off zero is carried forward and backward, on its own side. The last part
@@ -51,6 +51,6 @@ def agreed(
 
 
 def _agreeing(one: np.ndarray, other: np.ndarray, least: np.ndarray, lost: np.ndarray) -> np.ndarray:
-    """Return the derivatives where the forward and backward ones agree, and NaN elsewhere."""
+    """Return the derivatives at which forward and backward directions agree, and NaN elsewhere."""
     apart = np.abs(one - other) > _AGREE * (np.abs(one) + np.abs(other)) + least
     return np.where(apart | lost, np.nan, 0.5 * (one + other))

@@ -1,4 +1,4 @@
-"""This module carries derivatives along a run, by saltation matrices at events.
+"""This module computes derivatives along a run, with saltation matrices at events.
 
 At an event whose time changes by dt, a change dx of the state before it becomes
 
@@ -83,7 +83,7 @@ class Carrier:
         self._scale = np.where(largest > 0.0, largest, 1.0)
 
     def carry(self, directions: Directions, *, sided: bool = False) -> Carried:
-        """Carry M directions of change from the start of the run to its end.
+        """Compute the derivatives along M directions of change from the start of the run to its end.
 
         sided : whether a direction that moves a function off zero is followed on its side, not on that of the run.
         """
@@ -128,14 +128,14 @@ class Carrier:
         return bool(segment.start.minus(end) >= -time_rounding(self.solution))
 
     def _moves(self, shift: np.ndarray) -> np.ndarray:
-        """Return a mask (M,) of the directions that shift a time, given the derivatives of the time."""
+        """Return a mask (M,) of the directions that shift a time with the given derivatives."""
         length = self.solution.t_end - self.solution.t_start
         return np.asarray(np.abs(shift) * self._changes.own > _ROUNDING * length)
 
     def _at_end(
         self, last: Last, behind: Segment, Y: np.ndarray, Yd: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the derivatives at an event exactly at the end, which a change may shift beyond the end."""
+        """Return the derivatives at an event exactly at the end, which may move beyond the end."""
         before, system = last.segment, self.system
         moves = self._moves(last.shift)
         jumps = bool(
@@ -153,7 +153,7 @@ class Carrier:
         return np.where(is_later, last.Y, Y), np.where(is_later, last.Yd, Yd)
 
     def _note(self, off: list[OffZero]) -> np.ndarray | float:
-        """Record functions that are exactly zero; return their addition to the derivatives of the states."""
+        """Store functions that are exactly zero; return their contribution to the derivatives."""
         self._off += off
         if not self._sided:
             return 0.0
@@ -167,7 +167,7 @@ class Carrier:
         return np.concatenate([self._scale, np.where(discrete > 0.0, discrete, 1.0)])[:, None]
 
     def own_sizes(self, directions: Directions) -> np.ndarray:
-        """Return the steps (M,) along the directions that first change a quantity by its own size."""
+        """Return the lengths (M,) along the directions that change some quantity by its own size."""
         system = self.system
         constants = np.abs(np.concatenate([system.discrete_start, list(system.values.values())]))
         scale = np.concatenate([self._scale, np.where(constants > 0.0, constants, 1.0)])
@@ -227,7 +227,7 @@ class Carrier:
     def _over(
         self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, begin: float, end: float
     ) -> np.ndarray:
-        """Carry the derivatives over a segment from one local time to another."""
+        """Continue the derivatives over a segment from one local time to another."""
         if end <= begin or not self.system.n:
             return Y
         tape, directions = (
@@ -308,7 +308,7 @@ class Carrier:
         return rates_of(self.system, float(segment.s[0]), segment.x[0], segment.p, segment.z)
 
     def _settled(self, rounds: Rounds, following: Segment, x: np.ndarray, before: np.ndarray) -> np.ndarray:
-        """Return the derivatives of the states just after an instant; record functions at zero.
+        """Return the derivatives of the states just after an instant, and store functions at zero.
 
         x, before : states and rates (n,) before the instant.
         """

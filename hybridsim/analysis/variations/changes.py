@@ -21,7 +21,7 @@ _TANGENTIAL = (
 
 @dataclass(frozen=True)
 class Place:
-    """A point of the run with derivatives: local time, its origin, states, run-time vector, modes.
+    """A point of the run, at which derivatives are computed: time, states, run-time vector and modes.
 
     Y, Yd : derivatives of the states (n, M) and discrete states (d, M); shift : of the time (M,).
     large : sizes (n, M) of the terms of the sums Y.
@@ -55,11 +55,11 @@ class Changed:
 
     @property
     def moves(self) -> np.ndarray:
-        """A mask (M,) of the directions along which the function changes."""
+        """A mask (M,) of the directions in which the function changes."""
         return np.asarray(np.abs(self.by) > _ALIKE * self.sizes)
 
     def along(self, rates: np.ndarray) -> float:
-        """Return the rate of the function for rates (n,) of the states, or 0 if the terms cancel."""
+        """Return the rate of the function for given rates of the states, or 0 if the terms cancel."""
         terms = np.append(self.row * rates, self.by_time)
         return float(terms.sum()) if abs(terms.sum()) > _TANGENTIAL * np.abs(terms).sum() else 0.0
 
@@ -82,7 +82,7 @@ class Changes:
         self._scale, self.own = scale, own
 
     def flow(self, at: Place) -> tuple[np.ndarray, np.ndarray]:
-        """Return the rates (n,) of the states, and their derivatives by all inputs of the formulas."""
+        """Return the rates (n,) of the states, and their derivatives by all arguments of the rates."""
         found = TangentTape(self.system, at.z)(
             np.array([at.s]), at.x[None, :], at.p, seeds(self.system, at.origin, self.rates)
         )
@@ -95,7 +95,7 @@ class Changes:
         monitors: tuple[int, ...] = (),
         surfaces: tuple[int, ...] = (),
     ) -> list[Changed]:
-        """Return values and derivatives of the guards, monitors and surfaces with these numbers."""
+        """Return values and derivatives of the guards, monitors and surfaces with the given numbers."""
         system, n = self.system, self.system.n
         tape = TangentTape(system, at.z, guards, monitors, surfaces)
         found = tape(np.array([at.s]), at.x[None, :], at.p, seeds(system, at.origin, self.rates))

@@ -21,7 +21,7 @@ class Directions:
     parameters: np.ndarray
 
     def both_ways(self, chosen: np.ndarray) -> Directions:
-        """Return some of the directions, and after them the same directions with opposite sign."""
+        """Return some of the directions, followed by the opposite directions."""
         rows = self.x[:, chosen], self.discrete[:, chosen], self.parameters[:, chosen]
         return Directions(*(np.concatenate([row, -row], axis=1) for row in rows))
 

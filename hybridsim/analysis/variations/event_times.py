@@ -42,7 +42,7 @@ class EventTimes:
         Y: np.ndarray,
         Yd: np.ndarray,
     ) -> np.ndarray:
-        """Return the derivatives (M,) of the common time of all located events at local time s."""
+        """Return the derivatives (M,) of the time at which all located events at local time `s` happen."""
         width = self._changes.G.shape[1]
         if not happened:
             return np.zeros(width)
@@ -81,7 +81,7 @@ class EventTimes:
     def recorded(
         self, segment: Segment, one: Occurrence, s: float, x: np.ndarray, Y: np.ndarray, Yd: np.ndarray
     ) -> np.ndarray:
-        """Return the derivatives (M,) of a recorded monitor time; NaN if the monitor only touches zero."""
+        """Return the derivatives (M,) of a recorded monitor's time; NaN if the monitor only touches zero."""
         shift = self._located(segment, one, s, x, Y, Yd, is_first=False)
         return np.full(self._changes.G.shape[1], np.nan) if shift is None else shift.values
 
@@ -95,7 +95,7 @@ class EventTimes:
         Yd: np.ndarray,
         is_first: bool,
     ) -> Shift | None:
-        """Return the derivatives of the time of an event; None if another event caused it."""
+        """Return the derivatives of the time of an event, or None if another event caused it."""
         system = self.system
         is_monitor = one.kind == "monitor"
         if is_monitor:
@@ -122,7 +122,7 @@ class EventTimes:
         return Shift(-found.by / rate, found.sizes / abs(rate))
 
     def scheduled(self, one: Occurrence) -> list[np.ndarray]:
-        """Return the derivatives (M,) of a scheduled time, one array per possible schedule entry."""
+        """Return the derivatives (M,) of a scheduled time, for each schedule that may have caused it."""
         width = self._changes.G.shape[1]
         declared = next((c for c in self.system.model.schedules if c.name == one.component), None)
         if declared is None:

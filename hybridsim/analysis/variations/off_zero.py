@@ -1,4 +1,4 @@
-"""This module handles runs exactly on a guard or surface, where a small change leads to the other side.
+"""This module handles runs exactly on a guard or surface, which a small change moves to one side.
 
 A change to the side of the run leaves the run as it is. A change to the other side is followed for the time
 tau until it returns, which is of first order. The rates differ there, so that the states change by (f_there -
@@ -38,7 +38,7 @@ class OffZero(NamedTuple):
 
 
 def rates_of(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Return the rates dx/dt (n,), with held states moving along their constraints."""
+    """Return the rates dx/dt (n,), where held states move along their constraints."""
     rates = system.flow(s, x, p, z)
     if not system.holds(z):
         return rates
@@ -54,20 +54,20 @@ def differ(one: np.ndarray, other: np.ndarray) -> bool:
 
 
 def off_zero(changes: Changes, at: Place) -> tuple[np.ndarray, list[OffZero]]:
-    """Return derivatives (n, M) after held states have returned to their surfaces; list functions at zero."""
+    """Return the derivatives after held states have returned to their surfaces; list functions at zero."""
     sides = _Sides(changes, at)
     off = sides.surfaces()
     return sides.at.Y, off + sides.guards()
 
 
 def limits_reached(changes: Changes, at: Place, components: Sequence[int]) -> list[OffZero]:
-    """Return force limits that are reached exactly when a component begins to hold or passes its surface."""
+    """Return the force limits that are reached exactly when a component changes its mode."""
     sides = _Sides(changes, at)
     return [one for c in components for one in sides.limits(c)]
 
 
 def monitors_reached(changes: Changes, at: Place, later: Place) -> list[OffZero]:
-    """Return monitors at zero at the start of a run that would fire if the run started on one side of zero.
+    """Return the monitors at zero at the start that would fire after a small change of the start.
 
     later : a later place; it gives the side if the rate at the start is zero.
     """
@@ -87,7 +87,7 @@ def monitors_reached(changes: Changes, at: Place, later: Place) -> list[OffZero]
 
 
 class _Sides:
-    """Computes the effects of both sides of the functions at zero, at one place."""
+    """Computes the effects of small changes to both sides of the functions at zero."""
 
     def __init__(self, changes: Changes, at: Place) -> None:
         self.changes, self.system, self.at, self.before = changes, changes.system, at, at
@@ -97,7 +97,7 @@ class _Sides:
         self.here = self._rates(at.z)
 
     def guards(self) -> list[OffZero]:
-        """Return the guards at zero that do not fire here, but would fire on one side with an effect."""
+        """Return the guards at zero that do not fire, but would fire with an effect after a small change."""
         guards_here = [
             (c, i, g)
             for c, automaton in enumerate(self.system.automata)
@@ -119,7 +119,7 @@ class _Sides:
         return off
 
     def surfaces(self) -> list[OffZero]:
-        """Return the surfaces on whose two sides the rates differ.
+        """Return the surfaces at zero on whose two sides the rates differ.
 
         A change off a held surface returns at once, by an impulse of the force that holds it.
         """
@@ -207,7 +207,7 @@ class _Sides:
         return off
 
     def _freed(self, c: int, one: Changed, other: int) -> list[OffZero]:
-        """Return a component that would not hold any longer, because of the impulse of component c."""
+        """Return a component that would stop holding because of the impulse of component `c`."""
         automaton, off = self.system.automata[c], []
         numbers = self.system.automata[other].guards[self.system.automata[other].hold]
         for mode, mask in ((automaton.above, one.by > 0.0), (automaton.below, one.by < 0.0)):
@@ -241,7 +241,7 @@ class _Sides:
         return [self.off(name, one, other, there, 0.0)]
 
     def limits(self, c: int) -> list[OffZero]:
-        """Return the force limits that a component reaches exactly, if it holds or is about to hold."""
+        """Return the force limits that a holding component, or a component about to hold, reaches exactly."""
         automaton, off = self.system.automata[c], []
         z = self._with(c, automaton.hold)
         numbers = automaton.guards[automaton.hold]
@@ -261,7 +261,7 @@ class _Sides:
         return off
 
     def off(self, name: str, one: Changed, other: np.ndarray, there: np.ndarray, speed: float) -> OffZero:
-        """Describe a function at zero by its rate on the other side; if the rate is 0, it does not return."""
+        """Describe a function at zero by its rate on the other side of zero."""
         other = other & one.moves
         t = self.at.origin + self.at.s
         if speed == 0.0:
@@ -282,7 +282,7 @@ class _Sides:
         return z
 
     def _is_smooth(self, z: np.ndarray) -> bool:
-        """Return whether the rates and their derivatives are equal in modes z and in the run's modes."""
+        """Return whether the rates and their derivatives are equal in the modes `z` and in the run's own."""
         one, other = (self.changes.flow(replace(self.at, z=modes)) for modes in (z, self.at.z))
         return not any(differ(a, b) for a, b in zip(one, other, strict=True))
 
@@ -293,7 +293,7 @@ def _are_opposite(one: np.ndarray, other: np.ndarray) -> bool:
 
 
 def beyond(off: Sequence[OffZero], width: int) -> tuple[np.ndarray, np.ndarray | float]:
-    """Return the mask (M,) of lost directions at one place, and the addition to the states' derivatives.
+    """Return the mask (M,) of directions without derivatives, and a contribution to the derivatives.
 
     A direction to the other side of several functions at once is lost, because the order of return matters.
     """

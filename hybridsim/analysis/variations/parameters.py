@@ -1,4 +1,4 @@
-"""This module computes derivatives of parameter values and initial values by some parameters."""
+"""This module computes derivatives of parameter values and initial values by chosen parameters."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hybridsim.model import Model
 
 
 def value_slopes(model: Model, chosen: Sequence[str]) -> np.ndarray:
-    """Return derivatives (P, C) of all parameters by the C chosen parameters."""
+    """Return the derivatives (P, C) of all parameters by the C chosen parameters."""
     names = [p.name for p in model.parameters]
     slopes = {name: np.zeros(len(chosen)) for name in names}
     values = model.parameter_values()
@@ -35,7 +35,7 @@ def value_slopes(model: Model, chosen: Sequence[str]) -> np.ndarray:
 
 
 def start_slopes(expressions: Sequence[Expression], model: Model, by_parameter: np.ndarray) -> np.ndarray:
-    """Return derivatives of initial values by the chosen parameters, (number of expressions, C)."""
+    """Return the derivatives of initial values by the chosen parameters, one row per expression."""
     slopes = {p.name: row for p, row in zip(model.parameters, by_parameter, strict=True)}
     values = model.parameter_values()
     rows = [expression_slope(e, values, slopes, by_parameter.shape[1]) for e in expressions]

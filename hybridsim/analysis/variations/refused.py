@@ -17,7 +17,7 @@ _ROUNDINGS = 4096.0
 
 
 def refuse_limits(solution: Solution) -> None:
-    """Reject a run in which events accumulate before the accumulation is resolved to rounding."""
+    """Reject a run in which accumulating events were not followed down to rounding errors."""
     components = {component.name: component for component in solution.components}
     before = solution.t_start
     for event in solution.events:
@@ -35,7 +35,7 @@ def refuse_limits(solution: Solution) -> None:
         if event.guard == LIMIT and LIMIT not in names:
             if event.t - before > _ROUNDINGS * math.ulp(event.t):
                 raise UsageError(
-                    f"events accumulate at t = {event.t:.9g} and were not resolved to rounding, so the "
+                    f"events accumulate at t = {event.t:.9g} and were not resolved to rounding error, so the "
                     "run has "
                     "no derivatives",
                     remedy="use finite differences between runs",

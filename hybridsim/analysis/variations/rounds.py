@@ -22,7 +22,7 @@ _ALIKE = 1e-7  # relative; guards fire together if their delays agree
 
 
 def is_knot(system: System, instant: Instant) -> bool:
-    """Return whether an input has a knot at an instant, within rounding."""
+    """Return whether an input has a knot at an instant, except for rounding."""
     slack = 4.0 * math.ulp(float(instant))
     for signal in system.signals:
         knot = signal.next_knot(instant.plus(-slack), True)
@@ -92,7 +92,7 @@ class Rounds:
         self._run(happened, segment.p, float(segment.s[-1]), float(segment.origin))
 
     def at_appointment(self, instant: Instant, happened: Sequence[Occurrence]) -> None:
-        """Apply the resets of events that were due at an instant, with inputs on their next pieces."""
+        """Apply the resets of scheduled events, with inputs on their next pieces."""
         self._run(happened, self.system.vector(instant, self.d), 0.0, float(instant))
 
     def _run(self, happened: Sequence[Occurrence], p: np.ndarray, s: float, origin: float) -> None:
@@ -111,7 +111,7 @@ class Rounds:
             pending = [one for one in pending if not any(one is other for other in fired)]
 
     def _has_fired(self, one: Occurrence, p: np.ndarray, s: float, origin: float) -> bool:
-        """Return whether a guard or monitor is at or below zero, so that it fired itself."""
+        """Return whether a guard or monitor is at or below zero, so that it has fired."""
         system = self.system
         if one.kind == "monitor":
             chosen: tuple[tuple[int, ...], tuple[int, ...]] = (
@@ -145,7 +145,7 @@ class Rounds:
         return has_fired
 
     def _delay(self, p: np.ndarray, s: float, origin: float, fired: Sequence[Occurrence]) -> None:
-        """Shift the state to the time at which the guards of a round fire after a small change of the start.
+        """Shift the state to the time at which the guards fire after a small change of the start.
 
         They must fire together, and no other event may happen before that.
         """
@@ -166,7 +166,7 @@ class Rounds:
         self.shift = self.shift + later
 
     def _reading(self) -> np.ndarray:
-        """Return the modes in which the states are evaluated without constraints that begin later."""
+        """Return the modes in which the states are evaluated, without constraints that begin later."""
         z = self.z.copy()
         for c, mode in self._loose:
             z[c] = mode
@@ -178,7 +178,7 @@ class Rounds:
         return values
 
     def _apply(self, fired: Sequence[Occurrence], p: np.ndarray, s: float, origin: float) -> None:
-        """Apply all resets of one round to the state before it; adding resets are summed."""
+        """Apply all resets of one round to the state before the round; additive resets are summed."""
         system, n = self.system, self.system.n
         values = self._with_discrete(p)
         x, lifted = self._lifted(values, origin)
@@ -246,7 +246,7 @@ def lifted_vector(
 
 
 def is_recorded(system: System, one: Occurrence) -> bool:
-    """Return whether an event is a monitor without a reset, which changes nothing."""
+    """Return whether an event is a monitor event that changes nothing."""
     if one.kind != "monitor":
         return False
     key = "monitor", system.monitor_names.index(one.component)
@@ -254,7 +254,7 @@ def is_recorded(system: System, one: Occurrence) -> bool:
 
 
 def component_of(system: System, one: Occurrence) -> tuple[int, Any]:
-    """Return number and automaton of the component of a transition."""
+    """Return the index and the automaton of the component of a transition."""
     c = [a.name for a in system.automata].index(one.component)
     return c, system.automata[c]
 

@@ -1,4 +1,4 @@
-"""This module builds derivative matrices of all inputs of the formulas: states, time, parameters."""
+"""This module builds the derivatives of all arguments of the formulas: states, time, parameters."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def rate_slopes(system: System, at: Instant) -> np.ndarray:
 
 
 def seeds(system: System, origin: float, rates: np.ndarray) -> np.ndarray:
-    """Return the derivatives of all inputs of the formulas by states, local time and parameters.
+    """Return the derivatives of all arguments of the formulas by states, local time and parameters.
 
     rates: the result of `rate_slopes`.
     """

@@ -1,4 +1,4 @@
-"""This module lists the segments of a run with the events between them."""
+"""This module lists the segments of a run together with the events between the segments."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Last(NamedTuple):
 
 
 def segment_events_of(solution: Solution) -> Iterator[SegmentEvents]:
-    """Yield the segments, each with the events before the next segment that changed modes or states."""
+    """Yield the segments, each with the events at its end that changed modes or states."""
     waiting = [o for o in solution._of_model.record.occurrences if o.kind != "near-grazing"]
     at, segments = 0, list(solution._segments)
     for segment, following in zip(segments, [*segments[1:], None], strict=True):
@@ -54,7 +54,7 @@ def segment_events_of(solution: Solution) -> Iterator[SegmentEvents]:
 
 
 def time_rounding(solution: Solution) -> float:
-    """Return a bound of the rounding error of event times, which grow as sums of steps; see `add_steps`."""
+    """Return a bound of the rounding errors of event times, which are sums of steps."""
     steps, length = solution.stats["steps"], abs(solution.t_end - solution.t_start)
     rounding = UNIT * (16.0 * steps + solution._run.method.rounding) * length
     return rounding + 4.0 * math.ulp(max(abs(solution.t_end), abs(solution.t_start)))

@@ -118,7 +118,7 @@ def sensitivities(
 def derivatives(
     solution: Solution, parameters: Sequence[str] | None = None, *, starts_follow: bool = True
 ) -> Sensitivities:
-    """Return the derivatives of a run; on a guard or surface, those on the run's own side of it."""
+    """Return the derivatives of a run; on a guard or surface, the derivatives on the run's own side."""
     return _found(solution, parameters, starts_follow, _own_side)
 
 
@@ -188,8 +188,8 @@ def _found(
 def _refuse(solution: Solution) -> None:
     if solution._save != "all":
         raise UsageError(
-            f"the run was made with save={solution._save!r}, but derivatives need all of it",
-            remedy="run it with save='all'",
+            f"the run was made with save={solution._save!r}, but derivatives need all of the run",
+            remedy="simulate it with save='all'",
         )
     if solution.t_end <= solution.t_start:
         raise UsageError("`solution` does not run forward in time", remedy="use a run with t1 > t0")

@@ -37,7 +37,7 @@ _MAX_RADIANS = 2**17  # additional radians that are followed; more take minutes
 
 
 class Collocation(NamedTuple):
-    """A collocation rule: nodes c_i on (0, 1), weights b_j, and integrals a_ij of the Lagrange polynomials.
+    """A collocation rule: nodes c_i in (0, 1), weights b_j, and integrals a_ij of the Lagrange polynomials.
 
     coefficients : maps values at the nodes to Legendre coefficients.
     """
@@ -109,7 +109,7 @@ def transition(slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: 
 
 
 def _work(slopes: Slopes, begins: np.ndarray, ends: np.ndarray) -> tuple[float, float]:
-    """Return the e-folds by which the fastest change decays, and the radians or e-folds of all changes."""
+    """Return the number of e-folds by which the fastest change decays, and the work for all changes."""
     middle, lengths = 0.5 * (begins + ends), ends - begins
     found = slopes(middle)
     A = found[:, :, : found.shape[1]]
@@ -163,7 +163,7 @@ def stiff_transition(
 def _transitions(
     slopes: Slopes, begins: np.ndarray, ends: np.ndarray, scale: np.ndarray, constants: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the derivatives (K, n, n + q) over each piece, and a measure (K,) of how well it is resolved."""
+    """Return the derivatives over each piece, and a measure of how well each piece is resolved."""
     lengths = ends - begins
     rates = _rates(GAUSS, slopes, begins, lengths)
     moved = lengths[:, None, None] * np.einsum("i,kiab->kab", GAUSS.b, rates)

@@ -1,4 +1,4 @@
-"""Run backward in time inside modes and through transversal crossings. Any other event has no unique past."""
+"""Run backward in time inside modes and through transversal crossings; other events have no unique past."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hybridsim.engine.system.system import System
 
 
 def held(system: System, z: np.ndarray) -> str:
-    """Return why a state held at a surface has no unique past, or an empty text if no component is held."""
+    """Return why a state held at a surface has no unique past, or an empty text if no state is held."""
     names = [a.name for a, m in zip(system.automata, z, strict=True) if a.has_surface and m == a.hold]
     return (
         f"{', '.join(names)} is in a holding mode, which several motions can enter: the past is not unique"
@@ -30,7 +30,7 @@ def message_on_direction(t0: float, t1: float) -> str:
 
 
 def entered_here(system: System, z: np.ndarray, fired: tuple[int, ...]) -> str:
-    """Return why a guard of a component without a surface cannot be crossed backward, or an empty text."""
+    """Return why a component without a surface cannot cross a guard backward in time, or an empty text."""
     for g in fired:
         automaton = system.automata[int(system.owner[g])]
         if not (automaton.has_surface or automaton.is_corner):
@@ -60,7 +60,7 @@ def has_no_past(
 
 @dataclass(frozen=True)
 class Entry:
-    """A guard of another mode; the present mode may have begun when this guard reached zero."""
+    """A guard of another mode, through which the present mode may have begun."""
 
     z: np.ndarray  # modes (C,) in which the guard is evaluated
     guard: int  # its number
@@ -85,7 +85,7 @@ def entries(system: System, z: np.ndarray) -> tuple[Entry, ...]:
 
 
 def cross_backward(system: System, at: Situation, fired: tuple[int, ...]) -> Outcome:
-    """Cross a surface backward if the motion came through it; otherwise the status is ``backward-nonunique``.
+    """Cross a surface backward in time if the motion came through it, else end as ``backward-nonunique``.
 
     The past is unique if the motion enters from the other side, leaves on this side, and cannot have been held in
     between. For a force with a limit that is a passage of the velocity through zero.

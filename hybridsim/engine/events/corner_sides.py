@@ -1,4 +1,4 @@
-"""Choose the sides of corners and of load automata just after an instant, before any other mode is chosen.
+"""Choose the sides of corners and loads just after an instant, before any other mode is chosen.
 
 Each is a component whose mode follows from the state alone: a corner (`abs`, `min`, a piece of a table), a step in
 time, or the load of a contact that opens. A value beyond its error bound decides the side. At zero, the first
@@ -28,7 +28,7 @@ _ROUNDS_PER_MODE = 4  # orders of a series: each order settles at least one more
 def sides_along(
     resolution: EventVerdicts, z: np.ndarray, x: np.ndarray, has_flow: bool = True
 ) -> tuple[np.ndarray, dict[int, int]]:
-    """Return the modes z with each corner and load on its side along the flow, and the guards that are zero.
+    """Return the modes `z` with each corner and load on its side along the flow, and the guards at zero.
 
     A guard that was located at zero is zero on both sides, whatever rounding makes of its value. With has_flow=False
     only values decide, because the modes of surfaces are not known yet.
@@ -59,13 +59,13 @@ def sides_along(
 
 
 def _way_back(automaton: Automaton, mode: int, to: int) -> int:
-    """Return the guard of a mode that leads back to the previous mode."""
+    """Return the guard through which a mode leads back to the previous mode."""
     ways = zip(automaton.guards[mode], automaton.targets[mode], strict=True)
     return next(g for g, targets in ways if to in targets)
 
 
 def take_corners(resolution: EventResolution) -> bool:
-    """Set the corners and loads of an event to their sides. Return whether any side changed."""
+    """Set the corners and loads of an event to their sides; return whether any side changed."""
     at, system = resolution.at, resolution.system
     if not system.led:
         return False
@@ -91,7 +91,7 @@ def take_corners(resolution: EventResolution) -> bool:
 
 
 def _guard_towards(automaton: Automaton, mode: int, target: int) -> str:
-    """Return the name of the guard that leads from one mode to another, directly or over other modes."""
+    """Return the name of the guard that leads from one mode to another, directly or through other modes."""
     for name, targets in zip(automaton.guard_names[mode], automaton.targets[mode], strict=True):
         if (targets[0] > mode) == (target > mode):
             return name

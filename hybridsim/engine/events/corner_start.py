@@ -1,4 +1,4 @@
-"""Find surfaces that are zero within rounding although no event was located at them."""
+"""Find surfaces that are zero within rounding although no event was located at the surfaces."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def vanishing_surfaces(resolution: EventVerdicts, cluster: tuple[int, ...]) -> s
 
 
 def past_zero(resolution: EventVerdicts, cluster: tuple[int, ...]) -> set[int]:
-    """Return the components of a cluster that are past their surfaces without a crossing.
+    """Return the components of a cluster whose surfaces have changed sign without a located crossing.
 
     A step that is repeated to end at an event may end past a surface that it did not cross before, because of its
     error. That surface was crossed first.
@@ -39,7 +39,7 @@ def past_zero(resolution: EventVerdicts, cluster: tuple[int, ...]) -> set[int]:
 
 
 def cross(resolution: EventVerdicts, components: set[int]) -> None:
-    """Move components to the other side of their surfaces, before the located event."""
+    """Move components to the other side of their surfaces, before the located event is resolved."""
     at = resolution.at
     resolution.fired[:] = False
     for c in sorted(components):

@@ -25,7 +25,7 @@ _NEAR, _FARTHEST = 60, 1e-5  # halvings of the probe, and its longest reach as a
 
 @np.errstate(over="ignore", invalid="ignore")  # overflow and nan are what it looks for
 def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Instant, p: np.ndarray) -> str:
-    """Return why no step succeeds from where a run stopped, or an empty text if no reason is found.
+    """Return why no step succeeds at the point where a run stopped, or an empty text.
 
     The search goes along the tangent at the last state. It looks for the first of the rates, then of the active guards,
     that is not a number.
@@ -75,14 +75,14 @@ def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Ins
 
 
 def advice_on_sizes(system: System) -> str:
-    """Return a remedy if steps collapse without another cause: the tolerance is below rounding error."""
+    """Return a remedy if steps become too small because the tolerance is below the rounding error."""
     is_sized = all(state.nominal is not None for state in system.model.states)
     return "pass a larger atol or rtol" if is_sized else "declare `nominal` sizes or pass atol"
 
 
 @np.errstate(over="ignore", invalid="ignore", divide="ignore")  # nan is what it looks for
 def rates_without_value(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> str:
-    """Return which rates are not numbers in the modes z, and why, or an empty text if all are finite."""
+    """Return which rates are not numbers in the modes `z`, and why, or an empty text."""
     names = [system.names[i] for i in np.flatnonzero(~np.isfinite(system.flow(s, x, p, z)))]
     if not names:
         return ""
@@ -92,12 +92,12 @@ def rates_without_value(system: System, s: float, x: np.ndarray, p: np.ndarray, 
 
 
 def _cause(system: System, names: list[str], t: float, x: np.ndarray) -> str:
-    """Return why the rates of some states are not numbers, or an empty text if no reason is found."""
+    """Return why the rates of some states are not numbers, or an empty text if the reason is unknown."""
     return power_without_value(system, names, t, x) or _division_by_zero(system, names, x)
 
 
 def _of_function(system: System, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> str:
-    """Return a message on non-finite rates that a Python function returned; it is empty for expressions."""
+    """Return a message on a Python function that returned non-finite rates, or an empty text."""
     from hybridsim.engine.system.user_functions.code import PythonCode
 
     return system.code.flow_without_value(s, x, p, z) if isinstance(system.code, PythonCode) else ""
@@ -164,7 +164,7 @@ def power_without_value(system: System, names: list[str], t: float, x: np.ndarra
 
 
 def _power_without_series(system: System, x: np.ndarray, ahead: np.ndarray) -> str:
-    """Return which power with a named whole exponent has no Taylor series at x <= 0, with a remedy."""
+    """Return which power has no Taylor series at x <= 0, with a remedy."""
     from hybridsim.model.smoothing.nonsmooth import roots_in
 
     model = system.model
@@ -204,7 +204,7 @@ def _division_by_zero(system: System, names: list[str], x: np.ndarray) -> str:
 
 
 def _sentence(system: System, head: str, names: list[str], x: np.ndarray, z: np.ndarray) -> str:
-    """Return a sentence that names quantities that are not numbers, with the state and the modes."""
+    """Return a sentence on quantities that are not numbers, with the state and the modes."""
     state = ", ".join(f"{n} = {v:.6g}" for n, v in zip(system.names, x, strict=True))
     modes = ", ".join(f"{a.name} {a.modes[m]}" for a, m in zip(system.declared, z, strict=False))
     where = f", {modes}" if modes else ""
@@ -212,7 +212,7 @@ def _sentence(system: System, head: str, names: list[str], x: np.ndarray, z: np.
 
 
 def reset_description(system: System, key: tuple[object, ...]) -> str:
-    """Return the name of the reset with this key, for messages."""
+    """Return the name of a reset for messages, given its key."""
     model = system.model
     if key[0] == "limit":
         return f"the limit of {system.automata[int(str(key[1]))].name}"

@@ -1,4 +1,4 @@
-"""Refuse contacts whose force drives their relative velocity instead of opposing it, usually a sign error."""
+"""Reject contacts whose force drives their relative velocity, which usually is a sign error."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _MAX_ACCEPTED_STARTS = 64  # starts that a system remembers to have been looked 
 def require_dissipation(
     system: System, t0: float, x: np.ndarray, discrete: np.ndarray, z: np.ndarray
 ) -> None:
-    """Raise ModelError for a contact whose force drives its own relative velocity instead of opposing it."""
+    """Raise ModelError for a contact whose force drives its own relative velocity."""
     start = (t0, x.tobytes(), discrete.tobytes(), z.tobytes())
     if start in system.opposed:
         return

@@ -1,4 +1,4 @@
-"""Find the messages of fatal guards: guards whose zero ends a run because the model declares no further mode."""
+"""Find the messages of fatal guards, at whose zero a run ends because no further mode is declared."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hybridsim.engine.system.system import System
 def message_of_leaving(
     system: System, z: np.ndarray, leaving: Iterable[int], sides: np.ndarray
 ) -> str | None:
-    """Return the message of the first fatal guard through which one of these components leaves its mode."""
+    """Return the message of the first fatal guard through which one of some components leaves its mode."""
     for c in leaving:
         automaton, mode = system.automata[c], int(z[c])
         for guard, message in zip(automaton.guards[mode], automaton.fatal[mode]):
@@ -23,13 +23,13 @@ def message_of_leaving(
 
 
 def is_only_fatal(system: System, outcome: Outcome) -> bool:
-    """Return whether an event could not be resolved because of a fatal guard alone."""
+    """Return whether the only reason why an event could not be resolved is a fatal guard."""
     messages = (message for a in system.automata for row in a.fatal for message in row)
     return bool(outcome.status) and any(message and message == outcome.message for message in messages)
 
 
 def message_of_located(system: System, z: np.ndarray, located: Iterable[int]) -> str | None:
-    """Return the message of a fatal guard that was located at zero in the modes z before the event."""
+    """Return the message of a fatal guard that is zero in the modes `z` before the event."""
     for automaton, mode in zip(system.automata, z.tolist()):
         if mode >= 0:
             for guard, message in zip(automaton.guards[mode], automaton.fatal[mode]):

@@ -1,4 +1,4 @@
-"""Find the modes in which resets read the state, and the automata that leave their modes in any case."""
+"""Find the modes in which resets read the state, and the automata that certainly leave their modes."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _MAX_FLOWS = 3**4  # combinations of modes examined at most; each costs a Taylor
 
 
 def as_read_by_conditions(system: System, at: Situation, jumped: bool = False) -> Situation:
-    """Return a situation in which conditions and resets read the states without projection.
+    """Return the state before an event as conditions and resets read it, without projection.
 
     At a start some components have no mode yet. They are read in the mode of the side of their surface, or in the
     holding mode if they are at rest on it. At a start and after a jump no state is evaluated from a surface.
@@ -55,7 +55,7 @@ def as_read_by_conditions(system: System, at: Situation, jumped: bool = False) -
 
 
 def certainly_leaving(resolution: EventResolution) -> set[int]:
-    """Return the automata with a guard that is negative just after, in every mode of the surfaces at zero.
+    """Return the automata with a guard that becomes negative in every mode of the surfaces at zero.
 
     The sides of their guards are set accordingly. If these surfaces have too many combinations of modes, only values of
     guards without forces are used.
@@ -102,7 +102,7 @@ def _modes_on_sides(resolution: EventResolution) -> tuple[np.ndarray, list[int]]
 
 
 def _negative(resolution: EventResolution, owners: list[int], z: np.ndarray, order: int = ORDER) -> set[int]:
-    """Return the guards of some components that become negative in the modes z, by terms up to an order."""
+    """Return the guards that become negative in the modes `z`, by their Taylor terms up to an order."""
     series = resolution.series_of(z)
     side_of = side_after if resolution.forward else side_before
     numbers = [g for c in owners for g in resolution.system.automata[c].guards[z[c]]]
@@ -112,7 +112,7 @@ def _negative(resolution: EventResolution, owners: list[int], z: np.ndarray, ord
 
 @per_structure
 def _without_forces(system: System) -> list[list[bool]]:
-    """Return for each guard number and mode whether the guard is independent of all surface forces there."""
+    """Return for each guard and mode whether the guard is independent of all surface forces."""
     meanings, components = Meanings(system.model), system.model.all_components()
     found: list[list[bool]] = [[] for _ in range(system.guard_count)]
     for automaton, component in zip(system.automata, components, strict=True):

@@ -1,4 +1,4 @@
-"""Detect whether a jump of an input or a corner moves a surface and so releases its component.
+"""Detect whether a jump of an input or of a corner moves a surface, and so releases its component.
 
 For a closed gap the rate counts as well: a floor that jumps in speed strikes the body on it, or leaves it.
 """
@@ -18,7 +18,7 @@ _JOINED = 3.0  # ulps within which times count as equal, as in `hybridsim.engine
 
 
 def surfaces_jump(system: System, instant: Instant, at: Situation, forward: bool) -> bool:
-    """Return whether surfaces, or rates of closed gaps, jump beyond rounding when the pieces of inputs change.
+    """Return whether surfaces or rates of closed gaps jump when the inputs change their pieces.
 
     Times that are equal within rounding count as one, at the last of them. The pieces before are those before all of
     them.
@@ -38,7 +38,7 @@ def vectors_jump(system: System, at: Situation, before: np.ndarray, s_error: flo
 
 
 def gaps_jump(system: System, at: Situation, before: np.ndarray, after: np.ndarray) -> bool:
-    """Return whether the rates of closed gaps differ beyond rounding between the sides of corners."""
+    """Return whether the rates of closed gaps differ between the two sides of corners."""
     closed = any(
         system.automata[c].is_unilateral and at.z[c] == system.automata[c].hold for c in system.surface_of
     )

@@ -1,4 +1,4 @@
-"""Decide which monitors fire at an instant: a monitor fires if it leaves its side of zero."""
+"""Decide which monitors fire at an instant: a monitor fires if its function leaves its side of zero."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SIDES_BY_DIRECTION = {"up": (1,), "down": (-1,), "both": (1, -1)}
 
 @dataclass
 class MonitorSides:
-    """Sides of the monitors at one instant. Each monitor fires there at most once.
+    """The sides of the monitors at one instant, at which each monitor fires at most once.
 
     Parameters
     ----------
@@ -38,14 +38,14 @@ class MonitorSides:
 
     @classmethod
     def of(cls, monitors: Sequence[Monitor], before: np.ndarray) -> MonitorSides:
-        """Return the sides for monitors whose motion before the instant is unknown."""
+        """Return the sides of monitors whose motion before the instant is unknown."""
         return cls(monitors, before, np.zeros_like(before), np.zeros(len(before), dtype=np.bool_))
 
     @classmethod
     def located(
         cls, monitors: Sequence[Monitor], before: np.ndarray, series: Any, stopping: Sequence[int]
     ) -> MonitorSides:
-        """Return the sides with directions from Taylor series just before the instant.
+        """Return the sides of monitors, with directions from Taylor series just before the instant.
 
         stopping: monitors that were located to change their sides there.
         """
@@ -60,7 +60,7 @@ class MonitorSides:
         return found
 
     def fire(self, outcome: Outcome | None, action: str = "") -> list[int]:
-        """Mark and return the monitors, of one action or of any, that fire at this instant.
+        """Mark and return the monitors that fire at this instant, of one action or of all actions.
 
         The state after the event decides. With outcome=None, or an outcome that failed, the motion before it decides.
         """
@@ -83,6 +83,6 @@ class MonitorSides:
         return -before
 
     def restore_hidden_sides(self, outcome: Outcome) -> None:
-        """Keep the sides of monitors for which rounding hides whether they are at zero."""
+        """Restore the sides of monitors for which rounding hides whether their functions are zero."""
         hidden = self.is_open & (outcome.monitor_sides == 0)
         outcome.monitor_sides[hidden] = self.before[hidden]

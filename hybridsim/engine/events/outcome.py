@@ -1,4 +1,4 @@
-"""The inputs and the results of resolving an event."""
+"""The input and the result of resolving an event."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _STATE = (
 
 @dataclass
 class Situation:
-    """The state before an event, and the uncertainty of its instant."""
+    """The state before an event, with the error bounds of the state and of the time."""
 
     s: float  # local time
     x: np.ndarray  # states (n,)
@@ -29,7 +29,7 @@ class Situation:
 
 @dataclass(frozen=True)
 class Change:
-    """One transition of one component."""
+    """One transition of one component: its modes before and after."""
 
     component: int
     guard: str

@@ -1,4 +1,4 @@
-"""Resolve an event: repeat transitions, resets and joint decisions until every mode is admissible just after it."""
+"""Resolve an event: repeat transitions, resets and joint choices until all modes are admissible."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class EventResolution(ClusterChoice):
     # -- the rounds -----------------------------------------------------------------------------------------
 
     def run(self, fired: Iterable[int] | Mapping[int, int], resets: Iterable[tuple[object, ...]]) -> Outcome:
-        """Resolve the event with these guards located at zero, in order of time, and these resets that are due."""
+        """Resolve the event with the guards located at zero, in time order, and the resets that are due."""
         located = {int(g) for g in fired}
         lost = message_of_located(self.system, self.at.z, located)
         self.rank = dict(fired) if isinstance(fired, Mapping) else {int(g): k for k, g in enumerate(fired)}
@@ -98,12 +98,12 @@ class EventResolution(ClusterChoice):
         return self._stop(*self._cascade())
 
     def _begins_round(self) -> bool:
-        """Count a round of transitions or decisions. Return False if the limit at one instant is exceeded."""
+        """Count a round of transitions or choices; return False if there are too many at one instant."""
         self.rounds += 1
         return self.rounds <= self.most_rounds
 
     def _cascade(self) -> tuple[str, str]:
-        """Return status and message for transitions that repeat without end."""
+        """Return the status and the message for transitions that repeat without end."""
         names = ", ".join(
             f"{a.name}: {a.modes[m]}" for a, m in zip(self.system.automata, self.at.z, strict=True)
         )
@@ -117,7 +117,7 @@ class EventResolution(ClusterChoice):
         )
 
     def _past_corners(self, open_: set[int]) -> set[int]:
-        """Set corners to their sides. Return the other components whose guards still fire after this change.
+        """Set corners to their sides; return the other components whose guards still fire after that.
 
         A zero that was located by a series past a corner, where the guard turns back, does not fire.
         """
@@ -147,7 +147,7 @@ class EventResolution(ClusterChoice):
         return None
 
     def take_sides(self, open_: set[int]) -> None:
-        """Set every component with a surface to the mode of its side.
+        """Set each component with a surface to the mode on the surface's side.
 
         open_: the components to be decided on their surfaces. A component that a reset moved off its surface is
         removed, and one that came to its surface is added.
@@ -177,7 +177,7 @@ class EventResolution(ClusterChoice):
         return {c for c, a in enumerate(self.system.automata) if a.has_surface and c in self.scope}
 
     def _at_surfaces(self, components: set[int]) -> set[int]:
-        """Return the components whose surfaces are zero; a guard on the load of a sliding contact does not count."""
+        """Return the components whose surfaces are zero."""
         fired = {(c, j) for c, j, _ in self.fired_guards()}
         holds = [self.system.automata[c].hold for c in range(len(self.at.z))]
         return {
@@ -194,7 +194,7 @@ class EventResolution(ClusterChoice):
     # -- transitions by declared choices --------------------------------------------------------------------
 
     def _transitions(self, components: set[int], resets: list[tuple[object, ...]]) -> tuple[str, str] | None:
-        """Take the declared choices of some components and apply resets, all evaluated at the state before."""
+        """Take the declared transitions of some components, with resets that read the state before."""
         at, system = self.at, self.system
         x_plus, p_plus, z_plus = at.x.copy(), at.p.copy(), at.z.copy()
         x_error = at.x_error.copy()
@@ -229,7 +229,7 @@ class EventResolution(ClusterChoice):
         return None
 
     def _place(self, component: int) -> int:
-        """Return the position of a component's first guard in the order in which guards reached zero."""
+        """Return the position of a component's first guard in the time order of the guards."""
         numbers = self.system.automata[component].guards[self.at.z[component]]
         return min((self.rank.get(g, len(self.rank)) for g in numbers), default=len(self.rank))
 

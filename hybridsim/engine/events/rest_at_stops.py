@@ -1,4 +1,4 @@
-"""Let friction along a gap stick exactly when the contact is closed, if the gap is zero without velocity."""
+"""Let friction along a closed gap stick exactly if the gap is closed without velocity."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from hybridsim.engine.system.system import System
 
 
 def with_tied(system: System, members: list[int]) -> list[int]:
-    """Return components that are decided together, with the contacts along the gaps among them."""
+    """Return the components that are decided together, with the friction contacts along their gaps."""
     tied = {along for gap, along, is_one in system.stop_couplings if is_one and gap in members}
     return sorted(tied.union(members))
 
 
 def together(system: System, members: list[int], candidates: np.ndarray) -> np.ndarray:
-    """Return the candidates (k, members) in which a gap and a contact along it both hold, or neither.
+    """Return the candidates in which a gap and the friction along it are both held, or neither is held.
 
     If their velocities differ (a stop beside a belt), candidates in which both hold are removed.
     """

@@ -24,7 +24,7 @@ _MAX_CACHED_STARTS = 64
 
 
 def settled_start(system: System, task: Task, origin: Instant, due: tuple[int, ...]) -> Outcome:
-    """Return the outcome just after the start of the run, with the schedules due then applied."""
+    """Return the outcome just after the start of the run, after schedules that are due at the start."""
     key = task.beginning
     known = system.starts.get(key)
     if known is None:
@@ -57,7 +57,7 @@ def start_errors(system: System, x0: np.ndarray) -> np.ndarray:
 
 
 def _contradictions(system: System, task: Task, p: np.ndarray, z: np.ndarray) -> Iterator[str]:
-    """Yield a warning for each requested mode that the initial state rules out."""
+    """Yield a warning for each requested mode that contradicts the initial state."""
     if not any(task.z0[c] >= 0 for c in system.surface_of):
         return
     x, free = task.x0, z.copy()

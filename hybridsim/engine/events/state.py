@@ -1,4 +1,4 @@
-"""The state of a hybrid system at an instant, in one block of memory that compiled loops advance."""
+"""The state of a hybrid system at an instant, in one block of memory for compiled loops."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _NO_MONITORS, _NO_MONITOR_FLOORS = np.zeros(0, dtype=np.int64), np.zeros(0)  # c
 
 
 class StateArrays(NamedTuple):
-    """The arrays of a `HybridState`, as kernels receive them."""
+    """The arrays of a `HybridState` for kernels."""
 
     x: np.ndarray  # states (n,)
     x_error: np.ndarray  # error bounds (n,)
@@ -32,7 +32,7 @@ _View = tuple[tuple[int], np.dtype[Any], int]  # shape, dtype, and offset in byt
 
 
 class HybridState:
-    """A state in one block of memory; one copy suffices for all arrays of `StateArrays`, which are its attributes.
+    """A state in one block of memory, with the arrays of `StateArrays` as attributes.
 
     Each array is padded with zeros. Integers lie in the same block as doubles.
     """
@@ -50,7 +50,7 @@ class HybridState:
 
     @classmethod
     def of(cls, outcome: Outcome, p: np.ndarray) -> HybridState:
-        """Return the state of an outcome with the run-time vector p."""
+        """Return the state of an outcome with the run-time vector `p`."""
         fields = StateArrays(
             outcome.x, outcome.x_error, p, outcome.guard_floors, outcome.z, outcome.sides, outcome.orders
         )
@@ -65,7 +65,7 @@ class HybridState:
         return state
 
     def __getattr__(self, name: str) -> np.ndarray:
-        """Make the view of an array when it is first read."""
+        """Create the view of an array when the attribute is first read."""
         if name not in _FIELDS:
             raise AttributeError(name)
         shape, dtype, offset = self._views[name]
@@ -78,11 +78,11 @@ class HybridState:
         return HybridState(self.memory.copy(), self._views)
 
     def packed(self) -> Any:
-        """Return the arrays for kernels; the pack keeps the memory alive."""
+        """Return the arrays packed for kernels; the pack keeps the memory alive."""
         return packed(StateArrays(*(getattr(self, name) for name in _FIELDS)))
 
     def outcome(self) -> Outcome:
-        """Return the state as an `Outcome` that shares the memory."""
+        """Return the state as an `Outcome` that shares its memory."""
         memory = self.memory
         x, x_error, p, floors, z, sides, orders = [
             np.ndarray(shape, dtype, memory, offset) for shape, dtype, offset in self._views.values()

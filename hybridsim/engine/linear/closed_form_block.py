@@ -20,7 +20,7 @@ from hybridsim.engine.system.system import System
 def closed_form_states(
     project: Any, pinned: bool, lin: Any, index: Any, s: Any, record: Any, scratch: Any, out: Any
 ) -> None:
-    """Compute states out (m, n) at local times s (m,) in the segments with the given numbers; see `ClosedFormBlock`.
+    """Compute states (m, n) at local times s (m,) in the segments with the given numbers.
 
     scratch: scratch arrays for modal coordinates, states, values of atoms, functions of time, and terms near a
     start.
@@ -48,7 +48,7 @@ def closed_form_states(
 
 @dataclass(frozen=True)
 class ClosedFormBlock(SegmentBlock):
-    """N consecutive segments that start at local time 0; see `hybridsim.engine.record.blocks.SegmentBlock`.
+    """Consecutive segments in closed form; each of them starts at local time 0.
 
     Parameters
     ----------
@@ -71,12 +71,12 @@ class ClosedFormBlock(SegmentBlock):
 
     @cached_property
     def spans(self) -> np.ndarray:
-        """Return the local times of start and end (N, 2)."""
+        """Return the local times (N, 2) at which the segments start and end."""
         return np.stack([np.zeros(len(self)), self.ends], axis=1)
 
     @property
     def last(self) -> np.ndarray:
-        """Return the states x- at the end of the last segment."""
+        """Return the states just before the end of the last segment."""
         return self.jumps[-1, 1]
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
@@ -107,7 +107,7 @@ class ClosedFormBlock(SegmentBlock):
         )
 
     def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return start and end, the states there, the run-time vector and the modes of a segment."""
+        """Return the times and states at both ends of a segment, its run-time vector and its modes."""
         return np.array([0.0, self.ends[i]]), self.jumps[i, :2], self.vectors[i], self.modes[i]
 
     def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -116,12 +116,12 @@ class ClosedFormBlock(SegmentBlock):
         return index, self.spans.ravel(), self.jumps[:, :2].reshape(len(index), -1)
 
     def since(self, first: int) -> ClosedFormBlock:
-        """Return the block of the segments from the given one on."""
+        """Return the block of the segments from a given number on."""
         rows = (self.rows, self.ends, self.coordinates, self.origins, self.modes, self.vectors, self.jumps)
         return ClosedFormBlock(self.system, self.tables, *(r[first:] for r in rows))
 
     def motion(self, i: int) -> tuple[np.ndarray, np.ndarray, Dense]:
-        """Return start and end, the states there, and dense output of a segment."""
+        """Return the times and states at both ends of a segment, and its dense output."""
 
         def dense(s: np.ndarray) -> np.ndarray:
             return self.states(np.full(len(s), i), np.asarray(s, dtype=float))

@@ -1,4 +1,4 @@
-"""Linear forms of the registers of a tape over states and functions of time; they show which modes are linear.
+"""This module computes linear forms of a model's quantities in states and functions of time.
 
 A register that depends on time alone is a polynomial over atoms: local time, sines and cosines of angles that
 grow linearly, exponentials of linear time, and values that are constant in a segment. Derivatives of such
@@ -47,16 +47,16 @@ _HIGHEST = 8  # largest degree of a monomial; the closure under derivatives woul
 
 
 class NotLinear(StepFailure):
-    """This error reports a rate or a guard that is not a linear form, and names the nonlinear operation."""
+    """Raised if a rate or a guard is not linear in the states; the text names the nonlinear operation."""
 
 
 class DividesByZero(NotLinear):
-    """This error reports a division by zero, as for forces that several holding modes cannot distinguish."""
+    """Raised for a division by zero, which occurs if several modes determine the same force."""
 
 
 @dataclass(frozen=True)
 class Atom:
-    """Local time, a value, or an angle or exponent: rate*s + offset + sum of weight*p[source]."""
+    """A basic function of time: local time, a constant, or an angle or exponent that is linear in time."""
 
     kind: int
     rate: float
@@ -65,19 +65,19 @@ class Atom:
 
 
 class Atoms:
-    """The numbered atoms found so far; number 0 is local time."""
+    """The basic functions of time found so far, with numbers; number 0 is local time."""
 
     def __init__(self) -> None:
         self.known: list[Atom] = [Atom(TIME, 1.0, 0.0, ())]
 
     def number(self, atom: Atom) -> int:
-        """Return the number of an atom; a new atom gets the next number."""
+        """Return the number of a basic function of time; a new one gets the next number."""
         if atom not in self.known:
             self.known.append(atom)
         return self.known.index(atom)
 
     def derivative(self, monomial: Monomial) -> Form:
-        """Return d/dt of a monomial."""
+        """Return the derivative of a monomial with respect to time."""
         result: Form = {}
         for i, (a, part) in enumerate(monomial):
             rest, atom = monomial[:i] + monomial[i + 1 :], self.known[a]
@@ -91,7 +91,7 @@ class Atoms:
         return result
 
     def closure(self, monomials: Iterable[Monomial]) -> list[Monomial]:
-        """Return these monomials and all monomials that occur in their derivatives."""
+        """Return some monomials, and all monomials that occur in their derivatives."""
         found: list[Monomial] = []
         waiting = sorted(set(monomials))
         while waiting:
@@ -109,7 +109,7 @@ def _accumulate(form: Form, key: Key, weight: float) -> None:
 
 
 class LinearReader:
-    """Linear forms of the registers of one tape at given values of the parameters.
+    """Computes the linear forms of the registers of one tape, for given values of the parameters.
 
     constants: (register, value); parameters: (register, source in p); varying: sources that differ from
     segment to segment; p: the run-time vector, from which only the other sources are read, as numbers or as
@@ -141,7 +141,7 @@ class LinearReader:
                 self.forms[register] = math.nan if p is None else p[source]
 
     def read(self, rows: Iterable[tuple[int, ...]]) -> None:
-        """Process rows of the tape; for a result that is not a linear form, store the reason."""
+        """Process rows of the tape; for a nonlinear result, store the reason."""
         for op, a, b, c, out in rows:
             if op == COPY:
                 self.forms[out] = self.forms[a]
@@ -193,7 +193,7 @@ class LinearReader:
         raise NotLinear(_IN_THE_WAY.get(op, _OTHER))
 
     def _of_form(self, op: int, form: Form) -> tuple[Read, ...]:
-        """Apply an operation to one operand that is a form and not a number."""
+        """Apply an operation to one operand that is a linear form and not a number."""
         if op == NEG:
             return ({key: -weight for key, weight in form.items()},)
         if op == SINCOS:
@@ -204,7 +204,7 @@ class LinearReader:
         raise NotLinear(_IN_THE_WAY.get(op, _OTHER))
 
     def _evaluated(self, op: int, b: int, c: int, *values: float) -> tuple[Read, ...]:
-        """Apply an operation to numbers; b and c are flags if there is one operand."""
+        """Apply an operation to numbers."""
         if op == NEG:
             return (-values[0],)
         if self.is_open and any(map(math.isnan, values)):
@@ -234,7 +234,7 @@ def _form(read: Read) -> Form:
 
 
 def _plain(form: Form) -> Read:
-    """Convert a form that is a single number to that number."""
+    """Convert a linear form that is a single number to this number."""
     if not form:
         return 0.0
     return form[_ONE] if len(form) == 1 and _ONE in form else form
@@ -267,7 +267,7 @@ def _product(a: Form, b: Form) -> Form:
 
 
 def _linear_atom(kind: int, form: Form, atoms: Atoms) -> Atom:
-    """Return the atom of an angle or an exponent, which must be linear in time and free of states."""
+    """Return the basic function of an angle or exponent, which must be linear in time and free of states."""
     rate, offset, terms = 0.0, 0.0, []
     for key, weight in form.items():
         if key == _ONE:

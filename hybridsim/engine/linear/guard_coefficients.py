@@ -1,4 +1,4 @@
-"""Compute Taylor coefficients of guards in linear modes, with bounds of their errors, as far as a verdict needs them.
+"""Compute Taylor coefficients of guards in linear modes, with error bounds, as far as needed.
 
 The point is y = (x_after, w): the states after an event, and the functions of time.
 """
@@ -20,7 +20,7 @@ _IN_UNITS = 0.125 / UNIT
 def linear_coefficient(
     lin: Any, k: int, g: int, order: int, x: Any, x_error: Any, work: Any
 ) -> tuple[float, float]:
-    """Return a Taylor coefficient of a guard in the modes of row k at y = (x, w), with its error bound."""
+    """Return a Taylor coefficient of a guard in the modes of row `k`, with its error bound."""
     w, w_error, sizes, w_sizes, bound = work.w, work.w_error, work.sizes, work.w_sizes, 0.0
     for m in range(x.shape[0]):
         short_loop()
@@ -38,13 +38,13 @@ def linear_coefficient(
 
 @inlined
 def has_tables(lin: Any) -> bool:
-    """Return whether there are tables of linear modes."""
+    """Return whether the compiled loop has tables of linear modes."""
     return lin.counts.shape[0] > 0
 
 
 @inlined
 def measure_point(lin: Any, work: Any) -> None:
-    """Store the size of y = (x_after, w), by which rounding errors of coefficients are bounded."""
+    """Store the sizes of the states and functions of time, which bound rounding errors of coefficients."""
     if not has_tables(lin):
         return
     size = 0.0
@@ -60,13 +60,13 @@ def measure_point(lin: Any, work: Any) -> None:
 
 @inlined
 def rough_coefficient(lin: Any, k: int, g: int, order: int, work: Any) -> tuple[float, float]:
-    """Return a Taylor coefficient of a guard in row k at y = (x_after, w), with a wide bound that costs little."""
+    """Return a Taylor coefficient of a guard with a wide error bound that is fast to compute."""
     return dot(lin.series, (k, g, order), (work.x_after, work.w)), lin.largest[k, g, order] * work.size[0]
 
 
 @inlined
 def rough_side(lin: Any, k: int, g: int, order: int, work: Any) -> int:
-    """Return the sign of a Taylor coefficient of a guard in row k at y = (x_after, w), or 0 if it is uncertain."""
+    """Return the sign of a Taylor coefficient of a guard, or 0 if the sign is uncertain."""
     value, bound = rough_coefficient(lin, k, g, order, work)
     if not abs(value) > bound:
         return 0
@@ -75,7 +75,7 @@ def rough_side(lin: Any, k: int, g: int, order: int, work: Any) -> int:
 
 @inlined
 def linear_series(lin: Any, k: int, g: int, first: int, work: Any) -> None:
-    """Write the coefficients of a guard with bounds to `judged`, from order `first` to the first beyond its bound.
+    """Write the Taylor coefficients of a guard to `judged`, from order `first` to the first certain one.
 
     Nothing is written if there are no tables of linear modes. k: row of the modes. The point is y = (x_after, w); see
     `measure_point`.

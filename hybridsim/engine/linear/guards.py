@@ -1,4 +1,4 @@
-"""Guards of linear modes as series: Taylor coefficients in states and in modal coordinates, with error bounds."""
+"""Guards of linear modes as Taylor series in states and in modal coordinates, with error bounds."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def modal_guards(
     turning: Any,
     waves: Any,
 ) -> None:
-    """Compute the series of Re(gamma c) with gamma = row basis along c' = B c, with bounds, ranges and undamped waves.
+    """Compute the Taylor series of guards in modal coordinates, with bounds and undamped oscillations.
 
     flows: `hybridsim.engine.linear.modal.Modals` with |B**BOUND_TERMS|; gamma (J,) is scratch space. The
     other arrays are described in `hybridsim.engine.linear.tables` and are initialised for guards that are
@@ -119,7 +119,7 @@ def modal_guards(
 
 @kernel
 def _wave(gamma: Any, count: int, values: Any, upper: Any) -> int:
-    """Return the oscillating coordinate if Re(gamma c) is a constant plus one undamped wave, else -1."""
+    """Return the oscillating coordinate if a guard is a constant plus one undamped oscillation, else -1."""
     found = -1
     for j in range(count):
         if gamma[j] == 0.0:

@@ -1,4 +1,4 @@
-"""Templates that map a model's tape to the matrices of its linear modes, read once for all similar parameter values."""
+"""Templates of the matrices of linear modes, which are valid for all similar parameter values."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _lock = SharedLock()
 
 
 class MatrixTemplate:
-    """Matrices of some mode vectors (K, components), as entries whose values are registers of a recipe.
+    """The matrices of some linear modes: their entries are registers of a recorded computation.
 
     begun: a template of the first of these vectors, at values for which it holds; the other vectors are added to
     it.
@@ -50,7 +50,7 @@ class MatrixTemplate:
         motion = [(place[m], atoms.derivative(m)) for m in monomials]  # the same in all modes
 
         def entries(rows: Iterable[tuple[int, Form]]) -> Entries:
-            """Return positions of matrix entries in row-major order, and registers of their values."""
+            """Return the row-major positions of the matrix entries, and the registers of their values."""
             found = [(row * size + place[k], numbers.place(w)) for row, form in rows for k, w in form.items()]
             return np.array(found, dtype=np.int64).reshape(-1, 2).T.copy()
 
@@ -99,7 +99,7 @@ class MatrixTemplate:
         return {(), *(m for mode in read for m in mode.monomials())}
 
     def matrices(self, registers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return A (K, m, m) of the flows y' = A y, and rows (K, G, m) of the guards as functions of y.
+        """Return A (K, m, m) of the flows y' = A y, and the rows (K, G, m) of the guards.
 
         registers: (R,), or (points, R) for as many of each.
         """
@@ -110,12 +110,12 @@ class MatrixTemplate:
         return A, rows
 
     def atoms(self, registers: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the atoms and monomials as arrays; registers as for `matrices`."""
+        """Return the basic functions of time and their monomials as arrays."""
         return self._fixed | {name: registers[..., positions] for name, positions in self._computed.items()}
 
 
 def _factors(monomials: Sequence[Sequence[int]], one: int) -> np.ndarray:
-    """Return the factors of each monomial, padded with ones."""
+    """Return the factors of each monomial, padded with ones to equal length."""
     factors = np.full((len(monomials), max(map(len, monomials))), one, dtype=np.int64)
     for row, monomial in zip(factors, monomials, strict=True):
         row[: len(monomial)] = monomial
@@ -126,7 +126,7 @@ templates_of = per_structure(lambda system: dict[bytes, list[MatrixTemplate]]())
 
 
 def template_of(system: System, met: np.ndarray, p: np.ndarray) -> tuple[MatrixTemplate, np.ndarray]:
-    """Return the template of these mode vectors that is valid at parameters p, and its registers at p."""
+    """Return the matrix template of some modes that is valid at the parameters `p`, and its registers."""
     cached = templates_of(system)
     inputs = p[: system.layout.parameters]
     with _lock:
@@ -154,7 +154,7 @@ def _with_values(template: MatrixTemplate, inputs: np.ndarray) -> tuple[MatrixTe
 def _that_holds(
     templates: Iterable[MatrixTemplate], inputs: np.ndarray
 ) -> tuple[MatrixTemplate, np.ndarray] | None:
-    """Return the first template that is valid at these inputs, and its registers at these inputs."""
+    """Return the first template that is valid for the given inputs, and its registers."""
     return next(
         (found for template in templates if (found := _with_values(template, inputs)) is not None), None
     )
@@ -163,7 +163,7 @@ def _that_holds(
 def _begun(
     cached: dict[bytes, list[MatrixTemplate]], met: np.ndarray, inputs: np.ndarray
 ) -> MatrixTemplate | None:
-    """Return the template of the longest cached list with which this list of mode vectors begins."""
+    """Return the template of the longest cached list of modes with which the given list begins."""
     whole = met.tobytes()
     for key in sorted((key for key in cached if whole.startswith(key)), key=len, reverse=True):
         found = _that_holds(cached[key], inputs)

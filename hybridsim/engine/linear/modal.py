@@ -29,7 +29,7 @@ _SWEEPS = 8  # most sweeps of balancing
 
 @dataclass(frozen=True)
 class Modal:
-    """The system x' = A x in coordinates c = inverse x, x = Re(basis c), c' = B c with B upper triangular in blocks.
+    """The system x' = A x in modal coordinates c: x = Re(basis c), c' = B c, with block triangular B.
 
     Of a block and its conjugate one is stored, with twice its basis. |exp(B s)| <= exp(growth s) for s >= 0.
     """
@@ -43,7 +43,7 @@ class Modal:
     speeds: np.ndarray  # (J,) |B| of the block of each coordinate
 
     def power(self, exponent: int) -> np.ndarray:
-        """Return |B**exponent| (J,) of the block of each coordinate."""
+        """Return the norm of the power B**exponent, separately for the block of each coordinate."""
         with np.errstate(over="ignore"):  # an infinite bound decides nothing
             result, first = self.speeds**exponent, 0
         while first < len(result):
@@ -58,7 +58,7 @@ class Modal:
 
 @dataclass(frozen=True)
 class _Cluster:
-    """Eigenvalues that share a block, by the indices of the eigenvalues with imaginary part >= 0."""
+    """A cluster of eigenvalues that share a block, by the indices of those with imaginary part >= 0."""
 
     members: tuple[int, ...]
     folded: bool  # True for real eigenvalues
@@ -97,7 +97,7 @@ def modal(A: np.ndarray, horizon: float = math.inf) -> Modal:
 def modals(
     A: np.ndarray, horizon: float = math.inf, exponent: int = 1, multiple: int = 1, least: int = 0
 ) -> Modals:
-    """Return the forms of many matrices (K, m, m), with J padded to a multiple and at least `least`."""
+    """Return the block diagonal forms of many matrices (K, m, m), padded to a common size."""
     scales = np.ones(A.shape[:2])
     _balance(np.abs(A), _SLOWEST / horizon, scales)
     balanced = A * scales[:, None, :] / scales[:, :, None]
@@ -141,7 +141,7 @@ def modals(
 
 
 def _inverses(vectors: np.ndarray) -> np.ndarray:
-    """Return inverses (K, m, m), infinite for singular matrices; each result is independent of the others."""
+    """Return inverses of matrices (K, m, m); the inverse of a singular matrix is infinite."""
     try:
         return np.linalg.inv(vectors)
     except np.linalg.LinAlgError:  # one of them is singular
@@ -154,7 +154,7 @@ def _inverses(vectors: np.ndarray) -> np.ndarray:
 def _diagonal(
     values: Any, vectors: Any, inverses: Any, scales: Any, chosen: Any, exponent: int, out: Any
 ) -> None:
-    """Write a block for each eigenvalue; LAPACK returns conjugate pairs in a row."""
+    """Write one block for each eigenvalue."""
     for k in range(values.shape[0]):
         if not chosen[k]:
             continue
@@ -220,7 +220,7 @@ def _schur_values(A: np.ndarray) -> np.ndarray:
 
 
 def _partners(values: np.ndarray) -> list[int]:
-    """Return the index of each eigenvalue's conjugate, its own for a real one; pairs from LAPACK are exact."""
+    """Return the index of the complex conjugate of each eigenvalue; a real eigenvalue is its own."""
     partners = list(range(len(values)))
     for i, value in enumerate(values):
         if value.imag > 0.0:
@@ -230,7 +230,7 @@ def _partners(values: np.ndarray) -> list[int]:
 
 @kernel
 def _balance(sizes: Any, slowest: float, scales: Any) -> None:
-    """Write powers of two to scales (k, m) that make rows and columns of D^-1 A D about equally large.
+    """Write powers of two to `scales` that make the rows and columns of D^-1 A D about equally large.
 
     The method is that of E. E. Osborne, J. ACM 7 (1960) 338. sizes (k, m, m), the absolute values of A, are
     overwritten.
@@ -277,7 +277,7 @@ def _balance(sizes: Any, slowest: float, scales: Any) -> None:
 
 
 def _columns(clusters: list[_Cluster], blocks: list[_Block]) -> np.ndarray:
-    """Return the whole basis: real and imaginary parts of the blocks that differ from their conjugates."""
+    """Return the whole basis, with real and imaginary parts of the blocks of complex pairs."""
     parts = [
         b.vectors if c.folded else np.concatenate([b.vectors.real, b.vectors.imag], axis=1)
         for c, b in zip(clusters, blocks, strict=True)
@@ -291,7 +291,7 @@ def _condition(clusters: list[_Cluster], blocks: list[_Block]) -> float:
 
 
 def _combined(clusters: list[_Cluster], values: np.ndarray) -> list[_Cluster]:
-    """Merge the two closest clusters into one, or fold one that is closest to its own conjugate."""
+    """Merge the two closest clusters of eigenvalues, or a cluster with its own complex conjugate."""
     best, pair = np.inf, (0, 0)
     for i, a in enumerate(clusters):
         upper = values[list(a.members)]
@@ -310,7 +310,7 @@ def _combined(clusters: list[_Cluster], values: np.ndarray) -> list[_Cluster]:
 
 
 def _block(A: np.ndarray, cluster: _Cluster, values: np.ndarray, partners: list[int]) -> _Block:
-    """Return the triangular block of a cluster, or an empty one if it cannot be separated from the others."""
+    """Return the triangular block of a cluster, or an empty block if it cannot be separated."""
     from scipy.linalg import rsf2csf, schur
 
     members = list(cluster.members)

@@ -1,4 +1,4 @@
-"""Decide whether the modes of a system are linear; return their rates and guards as linear forms."""
+"""Decide whether the modes of a system are linear, and return their rates and guards as linear forms."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MAX_CACHED = 64  # most cached answers per structure, one for each set of param
 
 
 class LinearMode:
-    """Linear forms of the rates and active guards of one mode vector; NotLinear gives the reason if there are none.
+    """Linear forms of the rates and active guards in one combination of modes.
 
     p: the run-time vector, or None for any values.
     """
@@ -39,7 +39,7 @@ class LinearMode:
 
 
 def _reader(system: System, atoms: Atoms, z: np.ndarray, p: Sequence[float] | None) -> LinearReader:
-    """Return the forms of all registers in one mode vector."""
+    """Return the linear forms of all registers in one combination of modes."""
     tape, layout = system.code.data["tape"], system.layout
     varying = range(layout.discrete_at, layout.size)
     parameters = [(r, s) for r, s in tape["parameters"] if s != layout.pin_at]
@@ -58,21 +58,21 @@ def _named(reader: LinearReader, register: int, title: str) -> Form:
 
 
 class NoMode:
-    """A placeholder for a mode vector without a motion: its rates are NaN."""
+    """Replaces a combination of modes that has no motion because its rates are NaN."""
 
     def __init__(self, system: System) -> None:
         self.rates: list[Form] = [{(): math.nan} for _ in system.names]
         self.guards: dict[int, Form] = {}
 
     def monomials(self) -> set[Monomial]:
-        """Return no functions of time."""
+        """Return no functions of time, because there is no motion."""
         return set()
 
 
 def modes_of(
     system: System, atoms: Atoms, met: np.ndarray, p: Sequence[float] | None, first: int = 0
 ) -> list[LinearMode | NoMode]:
-    """Return the linear form of each mode vector in `met` (K, components), or why it is not linear.
+    """Return the linear forms of each combination of modes, or why the combination is not linear.
 
     Some of the vectors may only be neighbours of those that the run entered. first: number of vectors to
     skip.
@@ -89,7 +89,7 @@ def modes_of(
 
 
 def single_changes(system: System) -> np.ndarray:
-    """Return mode vectors: the first mode of each component, and all changes of one component from it."""
+    """Return the first mode of each component, and all combinations that differ in one component."""
     first = np.zeros(len(system.automata), dtype=np.int64)
     vectors = [first]
     for c, automaton in enumerate(system.automata):
@@ -107,7 +107,7 @@ def is_always_linear(system: System) -> bool:
 
 @per_structure
 def holds_constants(system: System) -> bool:
-    """Return whether each surface is linear in one state with constant coefficients; held values are then numbers.
+    """Return whether each surface fixes one state at a constant value while the surface is held.
 
     On another surface the held state follows other states or time, and is not one of the modal coordinates.
     """
@@ -124,7 +124,7 @@ def holds_constants(system: System) -> bool:
 
 
 def what_is_not_linear(system: System) -> str | None:
-    """Return the reason why a model is not linear in each of its modes, or None if it is.
+    """Return the reason why a model is not linear in each of its modes, or None if it is linear.
 
     Each mode of each component is checked once; other combinations of modes are checked when they are
     entered. Most models are linear at all values of their parameters or at none; the others are checked for
@@ -199,7 +199,7 @@ _is_linear_beside_corners = per_structure(_linear_beside_corners_at, most=_MAX_C
 
 
 def refuse_nonlinear(system: System) -> None:
-    """Refuse a model with a mode that is not linear."""
+    """Raise an error for a model with a mode that is not linear."""
     reason = what_is_not_linear(system)
     if reason is not None:
         raise UsageError(

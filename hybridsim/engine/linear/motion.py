@@ -1,4 +1,4 @@
-"""Linear modes in compiled code: functions of time, block exponentials, series of guards, first zeros of guards.
+"""Linear modes in compiled code: functions of time, exponentials, guards and their first zeros.
 
 The arrays are those of `hybridsim.engine.linear.tables`.
 """
@@ -41,13 +41,13 @@ _BACK, _BACKWARD = 1.0 / FARTHEST, 4.0
 
 @inlined
 def size_of(z: complex) -> float:
-    """Return a bound of a complex modulus, at most 1.5 times too large and cheaper than a square root."""
+    """Return an upper bound of a complex modulus, at most 1.5 times too large, without a square root."""
     return abs(z.real) + abs(z.imag)
 
 
 @inlined
 def functions_of_time(lin: Any, s: float, p: Any, factors: Any, w: Any) -> None:
-    """Compute the monomials w at local time s.
+    """Compute the monomials of the functions of time at local time `s`.
 
     factors: scratch space for values of atoms, (2 A + 1, 2), with a one at its end. The second column holds a
     bound of the error of each argument, without the error of s.
@@ -91,7 +91,7 @@ def functions_of_time(lin: Any, s: float, p: Any, factors: Any, w: Any) -> None:
 
 @inlined
 def errors_of_time(lin: Any, s_error: float, factors: Any, w_error: Any) -> None:
-    """Bound the errors of the last call of `functions_of_time`, for a local time with error s_error."""
+    """Compute error bounds for the last call of `functions_of_time`, given the error of the local time."""
     for a in range(lin.kinds.shape[0]):
         kind, value, other = lin.kinds[a], factors[2 * a], factors[2 * a + 1]
         if kind == TIME:
@@ -122,7 +122,7 @@ def errors_of_time(lin: Any, s_error: float, factors: Any, w_error: Any) -> None
 
 @inlined
 def to_modal(lin: Any, k: int, x: Any, w: Any, c: Any) -> None:
-    """Compute the modal coordinates of y = (x, w)."""
+    """Compute the modal coordinates of the states and functions of time."""
     for q in range(lin.inverse.shape[1]):
         short_loop()
         a, b, d, e = times(lin.inverse, (k, q), (x, w))
@@ -156,7 +156,7 @@ def moved(lin: Any, k: int, c: Any, d: float, out: Any) -> None:
 
 @allocating_kernel
 def _move_block(lin: Any, k: int, first: int, end: int, c: Any, d: float, out: Any) -> None:
-    """Advance a block of several coordinates by exp(mean d) times a series; NaN if it needs too many parts."""
+    """Advance a block of coordinates by an exponential and a Taylor series; return NaN if too long."""
     size = end - first
     mean = 0.0 + 0.0j
     for j in range(first, end):
@@ -197,13 +197,13 @@ def _move_block(lin: Any, k: int, first: int, end: int, c: Any, d: float, out: A
 
 @inlined
 def states_of(lin: Any, k: int, c: Any, x: Any) -> None:
-    """Compute the states at modal coordinates c."""
+    """Compute the states from the modal coordinates `c`."""
     product(lin.states, k, (c,), x)
 
 
 @kernel
 def states_near_start(lin: Any, k: int, x: Any, w: Any, s: float, terms: Any, out: Any) -> None:
-    """Compute states a short time s after y = (x, w), each with small relative error, by summing the Taylor series.
+    """Compute states a short time after a start, each with a small relative error, by a Taylor series.
 
     Modal coordinates give a state with an error relative to the largest state, and a state that grows from
     zero is smaller than this error at first. terms (2, n + M): scratch space. See `LinearTables.near`.
@@ -233,13 +233,13 @@ def states_near_start(lin: Any, k: int, x: Any, w: Any, s: float, terms: Any, ou
 
 @inlined
 def slopes_of(lin: Any, k: int, x: Any, w: Any, out: Any) -> None:
-    """Compute the rates of the states at y = (x, w)."""
+    """Compute the rates of the states from the states and functions of time."""
     product(lin.slopes, k, (x, w), out)
 
 
 @inlined
 def state_sizes(lin: Any, k: int, before: Any, after: Any, larger: Any, scale: Any) -> None:
-    """Compute the sizes of the terms of each state, from modal coordinates before and after at the ends of a segment.
+    """Compute the sizes of the terms of each state at both ends of a segment.
 
     larger: scratch space for the sizes of the coordinates.
     """
@@ -251,7 +251,7 @@ def state_sizes(lin: Any, k: int, before: Any, after: Any, larger: Any, scale: A
 
 @inlined
 def guard_terms(lin: Any, k: int, g: int, c: Any, terms: Any) -> tuple[float, float]:
-    """Write the Taylor coefficients of a guard at c to `terms`; return bounds of the guard and of the remainder.
+    """Write the Taylor coefficients of a guard to `terms`; return bounds of the guard and of the remainder.
 
     The bound of the first omitted coefficient holds from here on as long as no block grows: |gamma| |B**m|
     |c|/m!, block by block.
@@ -276,7 +276,7 @@ def guard_terms(lin: Any, k: int, g: int, c: Any, terms: Any) -> tuple[float, fl
 
 @inlined
 def first_zero_of_wave(lin: Any, k: int, g: int, c: Any, bound: float) -> tuple[int, float]:
-    """Find the first zero of a guard a + r cos(omega s + phase); OPEN if it is nearly a double zero."""
+    """Find the first zero of a guard a + r cos(omega s + phase), or OPEN if it is nearly a double zero."""
     j, terms = lin.waves[k, g], lin.terms
     level, size = 0.0, 0.0
     for i in range(lin.counts[k]):
@@ -302,7 +302,7 @@ def first_zero_of_wave(lin: Any, k: int, g: int, c: Any, bound: float) -> tuple[
 
 @kernel
 def first_zero(lin: Any, k: int, g: int, i: int, bound: float, state: Any, scratch: Any) -> tuple[int, float]:
-    """Find when a guard first becomes negative on (0, bound]: (NEVER, bound), (FOUND, s), or (OPEN, s).
+    """Find the first time in (0, bound] at which a guard becomes negative; return NEVER, FOUND or OPEN.
 
     OPEN means that rounding leaves the zero undecided. The guard is positive just after 0; its first `orders`
     coefficients are set to zero, with an uncertainty `floors`. Row i of `starts` holds its Taylor

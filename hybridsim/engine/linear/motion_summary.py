@@ -1,4 +1,4 @@
-"""Summary of the states over closed-form segments: extremes, integrals, time in holding modes."""
+"""Summary of the states over closed-form segments: extremes, integrals and times in holding modes."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _state_and_slope(lin: Any, k: int, i: int, v: Any) -> tuple[float, float]:
 def _turn(
     lin: Any, k: int, i: int, c: Any, low: float, high: float, at_low: float, at_high: float, v: Any
 ) -> float:
-    """Return a state's value at the zero of its rate between two times at which the rate has different signs."""
+    """Return the value of a state at the zero of its rate between two times."""
     value, same_end = 0.0, 0
     for _ in range(_ITERATIONS):
         s = low - at_low * (high - low) / (at_high - at_low)
@@ -71,7 +71,7 @@ def _turn(
 
 @inlined
 def _bend(lin: Any, k: int, i: int, v: Any, is_shrinking: bool) -> tuple[float, float]:
-    """Return bounds of a state and its third derivative from modal coordinates v on, at least to the next node."""
+    """Return bounds of a state and its third derivative up to the next node."""
     size = bend = 0.0
     for j in range(lin.counts[k]):
         b = abs(lin.basis[k, i, j])
@@ -90,7 +90,7 @@ def _bend(lin: Any, k: int, i: int, v: Any, is_shrinking: bool) -> tuple[float, 
 
 @inlined
 def _is_shrinking(lin: Any, k: int) -> bool:
-    """Return whether no modal coordinate grows, so that bounds made from the coordinates stay valid."""
+    """Return whether no modal coordinate grows, so that bounds from the coordinates stay valid."""
     for j in range(lin.counts[k]):
         if lin.values[k, j].real > 0.0:
             return False
@@ -113,7 +113,7 @@ def _between(
     v: Any,
     extremes: Any,
 ) -> None:
-    """Extend a state's extremes by its extremes between two times at which the state's rates are known.
+    """Extend the extremes of a state by its extremes between two times.
 
     The rate x' has two zeros in an interval of length h only if |x'| is at most max |x'''| h**2/2 at both of
     its ends. Such an interval is halved until a possible extremum in it is below rounding.
@@ -143,7 +143,7 @@ def sum_up(
     lin: Any, hold: Any, record: Any, first: int, last: int, begin: float, nodes: Any, weights: Any, scratch: Any,
     out: Any,
 ) -> bool:  # fmt: skip
-    """Add segments first to last - 1 of a record to a `MotionSummary`, from local time `begin` in the first segment on.
+    """Add some segments of a record to a `MotionSummary`, from local time `begin` in the first one on.
 
     record: ends, rows, modes, coordinates, jumps as written by `hybridsim.integrators.closed_form.segments`;
     hold: holding mode of each component. scratch: v (J,); slopes and bounds of third derivatives (3, n). Return

@@ -1,4 +1,4 @@
-"""Record arithmetic on numbers while it runs, so that compiled code can repeat it with other numbers.
+"""Record the arithmetic of a computation, so that compiled code can repeat it with other numbers.
 
 The operations may depend on the numbers: whether one is zero, or whether two are equal. Such comparisons are
 recorded with their results, and a recipe holds for other numbers if all comparisons have the same results.
@@ -20,7 +20,7 @@ _PLAIN = {ADD: operator.add, SUB: operator.sub, MUL: operator.mul}  # equal resu
 
 
 def computed(op: int, values: Sequence[float], b: int, c: int) -> tuple[float, float]:
-    """Apply an operation of the tape to numbers; return two results, the second one mostly 0."""
+    """Apply an operation of the tape to numbers, and return its two results."""
     if op in _PLAIN:
         return _PLAIN[op](values[0], values[1]), 0.0
     V = np.zeros((4, 1))
@@ -30,7 +30,7 @@ def computed(op: int, values: Sequence[float], b: int, c: int) -> tuple[float, f
 
 
 class Numbers:
-    """The registers of a recipe under construction: inputs first, then constants and results in order."""
+    """The registers of a recorded computation: inputs first, then constants and results in order."""
 
     def __init__(self, inputs: Sequence[float]) -> None:
         self.values = list(inputs)
@@ -40,7 +40,7 @@ class Numbers:
         self.inputs = [Traced(value, self, i) for i, value in enumerate(self.values)]
 
     def place(self, value: float) -> int:
-        """Return the register of a number; a number that was not computed here is a constant."""
+        """Return the register of a number; a number that was not computed here becomes a constant."""
         if isinstance(value, Traced):
             return value.register
         name = float(value).hex()  # distinguishes 0.0 and -0.0
@@ -50,7 +50,7 @@ class Numbers:
         return self._constants[name]
 
     def operation(self, op: int, values: Sequence[float], b: int = 0, c: int = 0) -> tuple[Traced, Traced]:
-        """Record an operation of the tape on numbers; b and c are flags if there is one operand."""
+        """Record an operation of the tape on numbers."""
         operand_registers, out = [self.place(value) for value in values], len(self.values)
         self.rows.append(
             (op, operand_registers[0], operand_registers[1] if len(operand_registers) > 1 else b, c, out)
@@ -67,14 +67,14 @@ class Numbers:
 
 
 class Traced(float):
-    """A float that knows its register in the recipe."""
+    """A float that stores its register in the recorded computation."""
 
     __slots__ = ("numbers", "register")
     numbers: Numbers
     register: int
 
     def __new__(cls, value: float, numbers: Numbers, register: int) -> Traced:
-        """Return the number in a register."""
+        """Return a traced float with the number of a register."""
         self = super().__new__(cls, value)
         self.numbers, self.register = numbers, register
         return self
@@ -122,7 +122,7 @@ _NOTHING = np.empty((0, 1)), np.empty((0, 5), dtype=np.int64), np.empty((0, 3), 
 
 
 class Recipe:
-    """Recorded operations, to repeat with other inputs; `begun`: an earlier recipe of the same numbers."""
+    """A recorded computation, to be repeated with other inputs."""
 
     def __init__(self, numbers: Numbers, begun: Recipe | None = None) -> None:
         self._inputs = len(numbers.inputs)
@@ -135,7 +135,7 @@ class Recipe:
         self._left, self._right, self._found = compared[:, 0], compared[:, 1], compared[:, 2] != 0
 
     def values(self, inputs: Any) -> np.ndarray | None:
-        """Return all registers for the given inputs, or None if a comparison has another result."""
+        """Return all registers for the given inputs, or None if a comparison gives another result."""
         V = self._start.copy()
         V[: self._inputs, 0] = inputs
         advance(self._rows, V, 0)
@@ -144,7 +144,7 @@ class Recipe:
         return registers if same.all() else None
 
     def values_at(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return all registers (points, R) at many inputs, and where (points,) all comparisons agree."""
+        """Return all registers for many inputs, and for which inputs all comparisons agree."""
         found = np.empty((len(inputs), len(self._start)))
         _replay(self._rows, self._start[:, 0].copy(), inputs, np.empty_like(self._start), found)
         same = (found[:, self._left] == found[:, self._right]) == self._found
@@ -152,14 +152,14 @@ class Recipe:
 
 
 def _gone_on_with(known: np.ndarray, written: Sequence[Any]) -> np.ndarray:
-    """Return the recorded rows as an array (entries, width) that starts with the given entries."""
+    """Return recorded rows as an array that begins with existing entries."""
     new = np.array(written[len(known) :], dtype=known.dtype).reshape(-1, known.shape[1])
     return np.concatenate([known, new])
 
 
 @kernel
 def _replay(rows: Any, start: Any, inputs: Any, V: Any, out: Any) -> None:
-    """Carry out the operations for each row of inputs; V (R, 1): scratch space."""
+    """Repeat the recorded operations for each row of inputs."""
     for i in range(inputs.shape[0]):
         for r in range(start.shape[0]):
             V[r, 0] = start[r]

@@ -1,4 +1,4 @@
-"""Compute small entries of an invariant subspace's basis, which rounding hides, from its large entries.
+"""Compute small entries of the basis of an invariant subspace from its large entries.
 
 A basis has an absolute error relative to its largest entry. A state with weak or no coupling to a growing
 motion has an entry of the size of this error, and the growth amplifies it. The equation of the subspace gives
@@ -14,7 +14,7 @@ _CLOSE = 1e-14  # largest change of a row relative to the largest row; a larger 
 
 
 def with_small_rows(A: np.ndarray, V: np.ndarray, T: np.ndarray) -> np.ndarray:
-    """Correct the small rows of V (m, k) in A V = V T by A_ff V_f - V_f T = -A_fc V_c, recursively."""
+    """Correct the small rows of V in A V = V T, recursively, because rounding hides them."""
     V, sizes = V.astype(complex), np.abs(V).max(axis=1, initial=0.0)
     largest = sizes.max(initial=0.0)
     small = sizes < _SMALL * largest
@@ -33,7 +33,7 @@ def with_small_rows(A: np.ndarray, V: np.ndarray, T: np.ndarray) -> np.ndarray:
 
 
 def _solved(A: np.ndarray, T: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """Return X of A X - X T = -known, or NaN if there is no solution."""
+    """Return the solution X of A X - X T = -known, or NaN if there is none."""
     from scipy.linalg import solve_sylvester
 
     try:

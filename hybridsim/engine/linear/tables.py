@@ -1,4 +1,4 @@
-"""Linear modes as arrays for compiled loops: functions of time, series of guards, block diagonal flows."""
+"""Linear modes as arrays for compiled loops: functions of time, guards, and block diagonal flows."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _lock = SharedLock()
 
 
 class LinearTables(NamedTuple):
-    """Arrays with one row per mode vector, in the order of registration; y = (states, monomials) has n + M entries.
+    """Arrays of linear modes for compiled loops, with one row per combination of modes.
 
     Shapes: K mode vectors, A atoms, M monomials, G guards, J modal coordinates (even). Rows over y are padded
     with zeros behind states and monomials. Blocks of rows are made by `hybridsim.engine.native.simd_products`.
@@ -94,7 +94,7 @@ def no_tables() -> LinearTables:
 
 
 class _Rows:
-    """The fields that have a row per mode vector, with spare rows, because the tables of a run grow many times.
+    """The fields with one row per combination of modes, with spare rows for later modes.
 
     Existing rows do not change, so that earlier tables are views of the same memory.
     """
@@ -108,7 +108,7 @@ class _Rows:
         return {name: field[:count] for name, field in self._fields.items()}
 
     def gone_on_with(self, first: int, new: dict[str, np.ndarray]) -> _Rows:
-        """Return the first rows followed by new ones, which use the spare rows if these are free."""
+        """Return the first rows followed by new rows, which use the spare rows if they are free."""
         count = first + len(new["counts"])
         with _lock:
             rows = self
@@ -129,7 +129,7 @@ def _extended(field: np.ndarray, count: int) -> np.ndarray:
 
 
 class Made(NamedTuple):
-    """Tables of some mode vectors at one set of values, and the matrices (K, m, m), (K, G, m) that define them."""
+    """Tables of linear modes at one set of parameter values, and the matrices that define them."""
 
     tables: LinearTables
     flows: np.ndarray
@@ -140,7 +140,7 @@ class Made(NamedTuple):
 def linear_tables(
     system: System, met: np.ndarray, p: np.ndarray, horizon: float, begun: Made | None = None
 ) -> Made | None:
-    """Return tables of the mode vectors (K, components) entered so far; `horizon`: length of a segment.
+    """Return tables of the combinations of modes entered so far; `horizon` is the length of a segment.
 
     begun: tables of the first of these vectors, which are reused as far as they agree. Return None if each
     mode has a rate or a guard with a coefficient that is not finite, or is too large to be squared.
@@ -161,7 +161,7 @@ def linear_tables(
 def _gone_on_with(
     begun: Made, A: np.ndarray, guards: np.ndarray, is_finite: np.ndarray, n: int, horizon: float
 ) -> _Rows | None:
-    """Extend existing rows by the rows of further matrices; return None if the first matrices differ."""
+    """Extend existing rows by rows of further matrices; return None if the first matrices differ."""
     first, widest = len(begun.flows), begun.tables.values.shape[1]
     if not (np.array_equal(begun.flows, A[:first]) and np.array_equal(begun.guards, guards[:first])):
         return None
@@ -170,7 +170,7 @@ def _gone_on_with(
 
 
 def leave_out(A: np.ndarray, guards: np.ndarray, n: int) -> np.ndarray:
-    """Return a mask (..., K) of modes with usable coefficients; give the other modes a guard of -1.
+    """Return a mask of modes with usable coefficients; the guards of the other modes become -1.
 
     A (..., K, m, m), guards (..., K, G, m). Two surfaces that cannot be held together give modes with
     non-finite numbers, which runs have only as neighbours. `unknown` stops a run that is in such a mode.
@@ -183,7 +183,7 @@ def leave_out(A: np.ndarray, guards: np.ndarray, n: int) -> np.ndarray:
 
 
 def unknown(fields: dict[str, np.ndarray], is_finite: np.ndarray) -> dict[str, np.ndarray]:
-    """Set the motion of omitted modes to NaN in the fields of `of_matrices`.
+    """Set the motion of omitted modes to NaN.
 
     A compiled loop then stops there, and no state counts as resting there.
     """
@@ -193,14 +193,14 @@ def unknown(fields: dict[str, np.ndarray], is_finite: np.ndarray) -> dict[str, n
 
 
 def angles_of(system: System) -> np.ndarray:
-    """Return the range of p with angles that are rounded: the first place, and the one after the last."""
+    """Return the range of rounded angles in the run-time vector: the first place, and one after the last."""
     return np.array([system.layout.phases_at, system.layout.signals_at], dtype=np.int64)
 
 
 def of_matrices(
     A: np.ndarray, rows: np.ndarray, n: int, horizon: float, least: int = 0
 ) -> dict[str, np.ndarray]:
-    """Return the fields of the tables that have a row per mode vector, by name, from A (K, m, m) and rows (K, G, m).
+    """Return the table fields with one row per combination of modes, from the matrices of flows and guards.
 
     least: smallest J.
     """
@@ -257,7 +257,7 @@ def of_matrices(
 
 
 def _lasting(rates: np.ndarray, ends: np.ndarray, count: int) -> float:
-    """Return for how long a motion can be computed before numbers overflow or blocks lose accuracy.
+    """Return how long a motion can be computed before numbers overflow or blocks lose accuracy.
 
     Coordinates of one block have errors relative to the largest of them. If one grows faster than the others,
     such as a load that is still very small, the rounding error grows as fast.
@@ -275,14 +275,14 @@ def _lasting(rates: np.ndarray, ends: np.ndarray, count: int) -> float:
 
 
 def horizon_class(horizon: float) -> float:
-    """Return the order of magnitude of a horizon, for which tables are made."""
+    """Return the order of magnitude of a segment length, for which tables are computed."""
     return 16.0 ** math.ceil(math.log(horizon, 16.0)) if horizon > 0.0 else math.inf
 
 
 def tables_of(
     system: System, modes: np.ndarray, p: np.ndarray, horizon: float
 ) -> tuple[LinearTables, deque[Any]] | None:
-    """Return tables of these mode vectors (K, components), and reusable scratch arrays for them.
+    """Return tables of some combinations of modes, and reusable scratch arrays for them.
 
     The tables are made once for each set of parameter values and each order of magnitude of the horizon, the
     longest possible segment. The scratch arrays serve all tables of one shape. Return None if there are no

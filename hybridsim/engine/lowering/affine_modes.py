@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 def affine_modes(
     lowering: Lowering, der: list[Any], definitions: dict[Any, Any], surfaces: dict[int, Any]
 ) -> dict[str, tuple[bool, ...]]:
-    """Return which modes have a flow linear in the states, including the solved unknowns."""
+    """Return the modes in which the flow is linear in the states, including the solved unknowns."""
     free = set(lowering.states) | {
         lowering.symbols[n] for c in lowering.components for m in c.modes for n in m.set
     }

@@ -1,4 +1,4 @@
-"""Data for joint solves: groups of contacts that act on each other, and loads from normal forces."""
+"""This module groups contacts that act on each other, and finds loads from normal forces."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def normal_loads(
     lowering: Lowering, unknown: dict[int, Any], definitions: dict[Any, Any]
 ) -> dict[tuple[int, int], dict[str, Any]]:
-    """Return derivatives of slip forces by normal forces; keys are (contact, impact) and the contact's mode.
+    """Return the derivatives of slip forces with respect to normal forces, by contact, impact and mode.
 
     A normal force that only the contact's guards use has an entry without modes.
     """
@@ -52,7 +52,7 @@ def normal_loads(
 def clusters_of(
     order: list[int], effect: dict[tuple[int, int], Any], loads: Container[tuple[int, int]]
 ) -> list[list[int]]:
-    """Group the components whose unknowns act on each other's surface or load each other."""
+    """Group the components that affect each other's surfaces or loads."""
 
     def act(c: int, d: int) -> bool:
         return effect[c, d] != 0 or (c, d) in loads

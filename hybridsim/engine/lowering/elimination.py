@@ -1,4 +1,4 @@
-"""Solve the linear equations of a program by elimination: return items that set the unknowns."""
+"""This module solves the linear equations of a program by elimination."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def eliminated(
     prefix: str = "",
     label: Callable[[Row], str] = str,
 ) -> list[Item]:
-    """Return the items of a Gaussian elimination without pivoting, for matrices with non-zero leading minors.
+    """Return the program items of a Gaussian elimination without pivoting.
 
     The effects of forces on accelerations are definite, and the effects of relays that hold their surfaces
     have positive principal minors.

@@ -1,4 +1,4 @@
-"""Convert a lowered program to the text of a Python module: functions to compile, and the tape as data."""
+"""This module converts a lowered program to the text of a Python module."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def _printer() -> Any:
     from sympy.printing.pycode import PythonCodePrinter
 
     class Printer(PythonCodePrinter):
-        """Print plain Python with `math` names, numbers with all digits, and powers that stay real."""
+        """Prints SymPy expressions as plain Python, with all digits, and with powers that stay real."""
 
         def __init__(self) -> None:
             super().__init__({"fully_qualified_modules": False, "standard": "python3"})
@@ -87,7 +87,7 @@ def _printer() -> Any:
 
 
 class Emitter:
-    """Write the module of one program."""
+    """Writes the generated module of one program as text."""
 
     def __init__(self, program: Program, lowering: Lowering) -> None:
         self.program = program
@@ -96,7 +96,7 @@ class Emitter:
         self.inputs = self._inputs()
 
     def _inputs(self) -> dict[str, str]:
-        """Map each external name of the program to the place from which it is read."""
+        """Return the place from which each external name of the program is read."""
         program, layout = self.program, self.program.layout
         where = {"s": "t", "origin": f"p[{layout.origin_at}]", "pin": f"p[{layout.pin_at}]"}
         where |= {user(q.name): f"p[{i}]" for i, q in enumerate(program.model.parameters)}
@@ -143,7 +143,7 @@ class Emitter:
         return [(f"out[{k}]", e) for k, (_, e) in enumerate(self.quantities())]
 
     def quantities(self) -> list[tuple[str, Any]]:
-        """Return every named quantity that is not a state: inputs, definitions, mode variables and outputs."""
+        """Return the names of all quantities that are not states: inputs, definitions, variables, outputs."""
         model, lowering = self.program.model, self.lowering
         forces = reported_forces(lowering, lowering.stop_couplings)
         result: dict[str, Any] = {i.name: user(i.name) for i in model.inputs}
@@ -167,7 +167,7 @@ class Emitter:
         return rows
 
     def _prelude(self, expressions: Iterable[Any]) -> list[str]:
-        """Return lines that compute everything on which the given names and expressions depend."""
+        """Return lines that compute all values on which the given names and expressions depend."""
         names: set[str] = set()
         for e in expressions:
             names |= {e} if isinstance(e, str) else {s.name for s in e.free_symbols}
@@ -214,7 +214,7 @@ class Emitter:
         return "\n".join([*lines, "    return 0"])
 
     def _tangent(self) -> str:
-        """Return the text of the function for J dx, the rate of a small change dx of the states."""
+        """Return the text of a function that computes J dx, the product of the Jacobian and a vector."""
         program, n = self.program, len(self.program.model.states)
         lines = ["def tangent(t, x, p, z, out):"]
         moving = {f"raw_{i}": f"x[{n + i}]" for i in range(n)}
@@ -247,7 +247,7 @@ class Emitter:
         return found
 
     def _choose(self) -> str:
-        """Return the function that chooses a branch; component, mode and guard index follow the modes z."""
+        """Return the text of the function that chooses the branch of a guard."""
         count = len(self.program.components)
         lines = ["def choose(t, x, p, z, out):", "    out[0] = -1.0"]
         for (c, m, g), conditions in self.program.conditions.items():
@@ -270,7 +270,7 @@ class Emitter:
         return "\n".join([*lines, "    return 0"])
 
     def _reset(self) -> str:
-        """Return the function that writes the values of a reset to out, first states, then discrete states.
+        """Return the text of the function that writes the values of a reset, states before discrete states.
 
         The number of the reset follows the modes.
         """

@@ -1,4 +1,4 @@
-"""Choose how holding modes keep constraints at zero: solve each for one state, or project the states."""
+"""Choose how holding modes keep constraints: solve a constraint for one state, or project the states."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Held = tuple[int, int]
 
 
 class HeldStates:
-    """The states that are determined by held surfaces, and the program items that evaluate them.
+    """The states that held surfaces determine, and the program items that compute them.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class HeldStates:
         self._lengths: dict[Held, Any] = {c: lowering.sp.Integer(0) for c in self.projected}
 
     def by_component(self, states: dict[Held, Any]) -> dict[int, tuple[int, ...]]:
-        """Collect the states of each component's constraints; a constraint has one state or a tuple."""
+        """Return the states of each component's constraints, by component."""
         found: dict[int, tuple[int, ...]] = {}
         for (c, _), i in states.items():
             found[c] = tuple(sorted({*found.get(c, ()), *(i if isinstance(i, tuple) else (i,))}))
@@ -67,7 +67,7 @@ class HeldStates:
     # -- which ----------------------------------------------------------------------------------------------
 
     def _linear_in(self, c: Held) -> list[int]:
-        """Return states in which a constraint is linear with a coefficient free of states, simplest first.
+        """Return the states in which a constraint is linear with a state-free coefficient, simplest first.
 
         For the rate of a gap, velocities come before positions.
         """
@@ -83,7 +83,7 @@ class HeldStates:
         return tuple(i for i, x in enumerate(self.states) if x in self.surfaces[c].free_symbols)
 
     def _without_choice(self, choices: dict[Held, list[int]]) -> set[Held]:
-        """Return the constraints to project: nonlinear ones, and those coupled to them by shared states."""
+        """Return the constraints that need projection: nonlinear ones, and others with common states."""
         found = {c for c, states in choices.items() if not states}
         for c in found:
             surface = self.lowering.components[c[0]].surface
@@ -102,12 +102,12 @@ class HeldStates:
         return found
 
     def _chosen(self, choices: dict[Held, list[int]], free: set[Held]) -> dict[Held, int] | None:
-        """Choose a distinct state for each constraint that is not projected; None if only cycles remain."""
+        """Choose a different state for each constraint without projection, or None if that is impossible."""
         pinned = {c: found for c, found in choices.items() if c not in free}
         return self._match(list(pinned), pinned, {})
 
     def _refuse_dependent(self, linear: list[Held]) -> None:
-        """Refuse surfaces that are linearly dependent."""
+        """Raise an error for surfaces that are linearly dependent."""
         sp = self.lowering.sp
         slopes = sp.Matrix([[sp.diff(self.surfaces[c], x) for x in self.states] for c in linear])
         if not slopes.free_symbols & set(self.states) and slopes.rank() < len(linear):
@@ -156,7 +156,7 @@ class HeldStates:
         return None
 
     def _may_share(self, one: Held, other: Held) -> bool:
-        """Return whether two constraints may determine one state: they never hold together, or are equal."""
+        """Return whether two constraints may determine the same state: equal, or never held together."""
         rates = {one, other}
         tied = any(rates == {(tie.gap, 1), (tie.along, 0)} for tie in self.lowering.stop_couplings)
         return tied or self._exclude(one[0], other[0])
@@ -194,7 +194,7 @@ class HeldStates:
     # -- how ------------------------------------------------------------------------------------------------
 
     def items(self) -> list[Item]:
-        """Return the states to use: a held state follows from its constraint, other states are integrated."""
+        """Return program items that compute held states from constraints, and copy the integrated states."""
         sp = self.lowering.sp
         moved = {i for states in self.projected.values() for i in states}
         items: list[Item] = self._projection(sorted(moved)) if moved else []
@@ -227,7 +227,7 @@ class HeldStates:
         )
 
     def _projection(self, moved: list[int]) -> list[Item]:
-        """Return items that project the states onto nonlinear surfaces, by a few Newton corrections."""
+        """Return program items that project the states onto nonlinear surfaces by Newton corrections."""
         sp, states = self.lowering.sp, self.states
         items: list[Item] = []
         order = list(self.projected)
@@ -291,15 +291,15 @@ class HeldStates:
 
 
 def _label(c: Held) -> str:
-    """Return a constraint's label in names of the program."""
+    """Return the label of a constraint in names of the program."""
     return f"{c[0]}" if c[1] == 0 else f"{c[0]}r"
 
 
 def _raw(sp: Any, i: int) -> Any:
-    """Return the symbol of a state as it is integrated."""
+    """Return the symbol of the integrated value of a state."""
     return sp.Symbol(f"raw_{i}", real=True)
 
 
 def _where_pinned(sp: Any, value: Any, raw: Any) -> Any:
-    """Return an expression: its value if held states are evaluated, or the integrated state otherwise."""
+    """Return an expression that selects the evaluated or the integrated value of a held state."""
     return sp.Piecewise((value, sp.Symbol("pin", real=True) > 0), (raw, True))

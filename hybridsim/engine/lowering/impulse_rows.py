@@ -1,4 +1,4 @@
-"""Functions of a generated module for impacts: effects of impulses, derivatives of gaps, and restitutions.
+"""This module writes functions of a generated module for impacts: impulses, gaps and restitutions.
 
 For m surfaces in the order of the module and n states the output contains, one after the other: d(u_k)/dx (m,
 n) with u_k the rate of a gap or a relative velocity; d(rates)/d(unknown_k) (m, n); and the growth of friction
@@ -18,19 +18,19 @@ Rows = list[tuple[str, Any]]
 
 
 def speed_name(k: int) -> str:
-    """Return the name in the program of the approach speed at surface k."""
+    """Return the program's name of the approach speed at surface `k`."""
     return f"speed_{k}"
 
 
 def impulses(lowering: Lowering) -> Rows:
-    """Return the rows of the function ``impulses``; there are none without unilateral contacts."""
+    """Return the text of the function ``impulses``, or nothing without unilateral contacts."""
     if not _unilateral(lowering):
         return []
     return [(f"out[{i}]", value) for i, value in enumerate(_values(lowering))]
 
 
 def gap_slopes(lowering: Lowering) -> Rows:
-    """Return the rows of the function ``gap_slopes``: d(gap)/dx (m, n) of the surfaces, set for gaps only."""
+    """Return the text of the function ``gap_slopes``, which computes d(gap)/dx for all gaps."""
     n = len(lowering.states)
     gaps = [(k, lowering.inlined(lowering.components[c].surface.function)) for k, c in _unilateral(lowering)]
     return [
@@ -42,7 +42,7 @@ def gap_slopes(lowering: Lowering) -> Rows:
 
 
 def restitutions(lowering: Lowering) -> Rows:
-    """Return the rows of the function ``restitutions``, one per impact; approach speeds follow the states."""
+    """Return the text of the function ``restitutions``, which computes one value per impact."""
     rows = []
     for k, c in _unilateral(lowering):
         names = {**lowering.symbols, SPEED: lowering.sp.Symbol(speed_name(k), real=True)}
@@ -71,7 +71,7 @@ def _values(lowering: Lowering) -> Iterator[Any]:
 
 
 def _onset(lowering: Lowering, c: int, backward: bool) -> Any:
-    """Return the friction force when slip begins, as a function of load: stick limit minus drop."""
+    """Return the friction force at the onset of slip, as a function of the load."""
     component = lowering.components[c]
     surface = component.surface
     if surface.unique or surface.is_unilateral:

@@ -1,4 +1,4 @@
-"""Convert a declared model to a program: angles in local time, held states, solved unknowns of holding modes."""
+"""This module converts a declared model to a program with held states and solved unknowns."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from hybridsim.model.parts.switching import ATTRACTION
 
 @dataclass
 class Program:
-    """The lowered model: items in order, and the names of its results."""
+    """The lowered model: program items in order, and the names of the results."""
 
     model: Model
     components: tuple[Any, ...]
@@ -53,7 +53,7 @@ class Program:
 
 
 class Lowering:
-    """The steps from a `Model` to a `Program`, with the symbol table that they share."""
+    """The steps that convert a `Model` to a `Program`, with the symbols that they share."""
 
     def __init__(self, model: Model) -> None:
         self.sp = sp
@@ -85,7 +85,7 @@ class Lowering:
         self.angles = self._defined_angles()
 
     def _defined_angles(self) -> dict[Any, Any]:
-        """Write out definitions that grow linearly in time, such as theta = omega*t, for sines and cosines of them."""
+        """Substitute definitions that grow linearly in time, as theta = omega*t, in sines and cosines."""
         waiting = {self.symbols[n]: to_sympy(e, self.symbols) for n, e in self.model.definitions}
         found: dict[Any, Any] = {}
         while True:
@@ -96,14 +96,14 @@ class Lowering:
             found |= grow
 
     def _rate(self, e: Any) -> Any:
-        """Return de/dt if it depends on parameters alone and is not zero, else None."""
+        """Return de/dt if it is not zero and depends on parameters only, else None."""
         if self.t not in e.free_symbols:
             return None
         rate = self.sp.diff(e, self.t)
         return None if rate == 0 or rate.free_symbols - self.parameters else rate
 
     def convert(self, expression: Expression) -> Any:
-        """Return a declared expression in SymPy, with angles that grow in time written in local time."""
+        """Return a declared expression in SymPy, with angles that grow in time relative to the local time."""
         sp = self.sp
         value = to_sympy(expression, self.symbols)
         if value.has(sp.I, sp.nan, sp.zoo, sp.oo):
@@ -136,7 +136,7 @@ class Lowering:
         return e
 
     def signal(self, index: int) -> Any:
-        """Return the current piece of an input as an expression of local time."""
+        """Return the current piece of an input as an expression in local time."""
         sp = self.sp
         kind = self.model.inputs[index].kind
         c = [sp.Symbol(f"signal_{index}_{j}", real=True) for j in range(SIGNAL_SLOTS)]
@@ -148,7 +148,7 @@ class Lowering:
         return c[5] + c[3] * sp.sin(c[0] + d * (c[1] + d * c[2]))
 
     def lower(self) -> Program:
-        """Run all steps."""
+        """Run all steps, and return the program."""
         model, sp = self.model, self.sp
         self.definitions = definitions = {self.symbols[n]: self.convert(e) for n, e in model.definitions}
         # substituting a cycle of definitions would not end
@@ -198,7 +198,7 @@ class Lowering:
     def _gap_rates(
         self, surfaces: dict[int, Any], der: list[Any], definitions: dict[Any, Any]
     ) -> dict[int, Any]:
-        """Return the rates of the gaps of unilateral contacts, by component, in states, t and parameters."""
+        """Return the rates of the gaps of unilateral contacts, by component, as functions of the states."""
         found: dict[int, Any] = {}
         for c, s in surfaces.items():
             if not self.components[c].surface.is_unilateral:
@@ -221,7 +221,7 @@ class Lowering:
         return self.inline(self.convert(expression), self.definitions)
 
     def _rate_in_time(self, s: Any) -> Any:
-        """Return the rate of an expression at constant states."""
+        """Return the rate of an expression in time at constant states."""
         return self.sp.diff(s, self.s) + self.sp.diff(s, self.t)
 
     def inline(self, e: Any, definitions: dict[Any, Any]) -> Any:
@@ -248,7 +248,7 @@ class Lowering:
         return [n for n in e.free_symbols - allowed if n.name.startswith("v_")]
 
     def title(self, c: int, plural: bool = False) -> str:
-        """Return the term for a surface's function in messages, such as 'gap' or 'relative velocity'."""
+        """Return the term for the function of a surface in messages, such as 'gap' or 'relative velocity'."""
         one, many = "relative velocity", "relative velocities"
         if self.components[c].surface.unique:
             one, many = "switching function", "switching functions"
@@ -257,11 +257,11 @@ class Lowering:
         return many if plural else one
 
     def written(self, c: int) -> str:
-        """Return a surface's function as declared."""
+        """Return the function of a surface as it was declared."""
         return " ".join(str(self.components[c].surface.function.text).split())
 
     def place(self, c: int) -> Place | None:
-        """Return the place where a surface's function is declared."""
+        """Return the place in the model at which the function of a surface is declared."""
         component = self.components[c]
         return component.surface.function.place or component.place
 
@@ -277,7 +277,7 @@ class Lowering:
     def _unknowns(
         self, surfaces: dict[int, Any], der: list[Any], definitions: dict[Any, Any]
     ) -> tuple[list[Item], list[list[int]]]:
-        """Return the values of the unknowns in each mode; holding modes jointly keep ds/dt = 0."""
+        """Return the values of the unknown forces in each mode; holding modes keep their surfaces at zero."""
         sp = self.sp
         order = list(surfaces)
         unknown = {c: self.symbols[self.components[c].surface.unknown] for c in order}
@@ -331,7 +331,7 @@ class Lowering:
         return items, clusters
 
     def _blends(self) -> dict[Any, Any]:
-        """Return the variables that surfaces set, as expressions of the unknowns that hold in all modes."""
+        """Return the variables that surfaces set, as expressions of the unknowns, valid in all modes."""
         found: dict[Any, Any] = {}
         for component in self.components:
             if component.surface and component.surface.unique:
@@ -397,7 +397,7 @@ class Lowering:
         return items + eliminated(cluster, unknown, matrix, right)
 
     def in_modes(self, c: int, name: str, in_hold: Any, otherwise: Any = None, without: Any = None) -> Switch:
-        """Return an item that sets a name to one value in the holding mode and a second one in other modes.
+        """Return an item that sets a name to one value in the holding mode, and to another in other modes.
 
         otherwise : value by mode; without it, the unknown's declared value. without : values substituted in
             declared values.
@@ -479,7 +479,7 @@ class Lowering:
         return items, conditions
 
     def _count_phases(self) -> None:
-        """Register the frequencies that occur only in resets and outputs, before the phases are counted."""
+        """Register the frequencies that occur only in resets and outputs, before the phases are numbered."""
         choices = [c for k in self.components for m in k.modes for g in m.guards for c in g.then]
         choices += [k.limit for k in self.components if k.limit]
         for part in (*choices, *self.model.monitors, *self.model.schedules):
@@ -490,7 +490,7 @@ class Lowering:
                 self.convert(e)
 
     def _jump(self, c: int) -> tuple[int, Any, Any]:
-        """Return the jumps of the unknown on release, simplified so that equal limits give an exact zero."""
+        """Return the jumps of an unknown on release, simplified so that equal limits give exactly zero."""
         sp = self.sp
         surface = self.components[c].surface
 

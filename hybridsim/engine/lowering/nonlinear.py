@@ -1,4 +1,4 @@
-"""Errors for forces and relays that enter the rates nonlinearly, with the remedy."""
+"""This module creates the errors for forces and relays that enter the rates nonlinearly."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def refuse_powers(lowering: Lowering, unknown: dict[int, Any], rates: list[Any]) -> None:
-    """Refuse rates nonlinear in a surface's name, because Filippov's rates lie between those of the sides."""
+    """Raise an error if a rate is nonlinear in a surface's name, because Filippov's rates would differ."""
     for c, u in unknown.items():
         for x, rate in zip(lowering.states, rates, strict=True):
             component = lowering.components[c]
@@ -27,7 +27,7 @@ def refuse_powers(lowering: Lowering, unknown: dict[int, Any], rates: list[Any])
 
 
 def nonlinear(lowering: Lowering, c: int, d: int, others: set[Any]) -> ModelError:
-    """Return the error for an unknown that acts on a surface through a power or a product with others."""
+    """Return the error for an unknown that acts on a surface through a power or a product of unknowns."""
     unknown = lowering.symbols[lowering.components[d].surface.unknown]
     name, component = declared_name(unknown), lowering.components[c]
     if not component.surface.unique:

@@ -1,4 +1,4 @@
-"""Linearise products of unknowns in the rate of a surface, by the known values of all factors but one.
+"""This module linearises products of unknowns in the rate of a surface.
 
 An unknown is known beforehand, also in sliding, if no other unknown acts on its surface. If at most one of
 the other factors holds its surface, the others have the values that their modes declare, and the rate is
@@ -28,7 +28,7 @@ class Products:
         self.known: set[tuple[int, int]] = set()  # (surface, unknown with a known value in its rate)
 
     def linear(self, c: int, totals: dict[int, Any], row: dict[int, Any]) -> tuple[dict[int, Any], Any]:
-        """Return the effects of all unknowns on the rate of surface c, and the rest of this rate.
+        """Return the effects of all unknowns on the rate of surface `c`, and the rest of the rate.
 
         totals : the rates of all surfaces as functions of the unknowns. row : the derivatives of this rate by
             the unknowns.
@@ -65,13 +65,13 @@ class Products:
         return found
 
     def not_together(self, c: int, pull: Any) -> Any:
-        """Return how strongly surface c attracts; this is negative while a factor of its unknown holds."""
+        """Return how strongly surface `c` attracts, negative while a factor of its unknown holds."""
         for d in sorted({e for pair in self.pairs if c in pair for e in pair} - {c}):
             pull = pull * (1 - self._holds(d)) - self._holds(d)
         return pull
 
     def diagonal(self, c: int, entry: Any) -> Any:
-        """Return the effect of unknown c on its own surface, plus 1 if c and a factor of c both hold."""
+        """Return the effect of unknown `c` on its own surface, plus 1 if `c` and a factor both hold."""
         return entry + sum(
             self._holds(c) * self._holds(d)
             for d in sorted({e for p in self.pairs if c in p for e in p} - {c})

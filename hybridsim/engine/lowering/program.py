@@ -1,4 +1,4 @@
-"""A model as an ordered program of assignments, some of which depend on the mode of a component."""
+"""This module defines a program: an ordered list of assignments, some of which depend on modes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Item = Assign | Switch
 
 
 def changed(item: Item, change: Callable[[Any], Any]) -> Item:
-    """Return an item with a change applied to each of its expressions."""
+    """Return a program item with a function applied to each of its expressions."""
     if isinstance(item, Assign):
         return Assign(item.name, change(item.expression))
     branches = (tuple(Assign(a.name, change(a.expression)) for a in branch) for branch in item.branches)
@@ -37,14 +37,14 @@ def changed(item: Item, change: Callable[[Any], Any]) -> Item:
 
 
 def assigned(item: Item) -> set[str]:
-    """Return the names that an item sets."""
+    """Return the names that a program item sets."""
     if isinstance(item, Assign):
         return {item.name}
     return {a.name for branch in item.branches for a in branch}
 
 
 def used(item: Item) -> set[str]:
-    """Return the names that an item reads, in any mode, and does not set itself."""
+    """Return the names that a program item reads in any mode and does not set itself."""
     if isinstance(item, Assign):
         return {s.name for s in item.expression.free_symbols}
     names: set[str] = set()
@@ -57,7 +57,7 @@ def used(item: Item) -> set[str]:
 
 
 def ordered(items: Iterable[Item]) -> list[Item]:
-    """Sort the items so that each name is set before it is read; raise an error that names any cycle."""
+    """Sort program items so that each name is set before it is read; raise an error for a cycle."""
     waiting = list(items)
     pending: dict[str, int] = {}
     for item in waiting:
@@ -81,7 +81,7 @@ def ordered(items: Iterable[Item]) -> list[Item]:
 
 
 def items_for(items: list[Item], names: Iterable[str]) -> list[Item]:
-    """Return the items that compute the given names, in order."""
+    """Return the program items that compute the given names, in order."""
     open_names = set(names)
     selected: list[Item] = []
     for item in reversed(items):

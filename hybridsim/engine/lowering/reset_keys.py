@@ -1,4 +1,4 @@
-"""Resets of a model with their keys, which identify a reset and the parts of it that add to a variable."""
+"""This module assigns a key to each reset of a model, and to the part of it that adds amounts."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def amounts_of(reset: Mapping[str, Expression]) -> dict[str, Expression]:
 
 
 def resets_of(model: Any) -> list[tuple[tuple[Any, ...], Mapping[str, Expression]]]:
-    """Return (key, reset) of every reset of a model: of choices, limits, monitors and schedules, in this order.
+    """Return the key and the declaration of every reset of a model, in a fixed order.
 
     After them come the amounts of the resets that add, with keys from `added`.
     """

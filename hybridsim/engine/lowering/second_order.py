@@ -1,4 +1,4 @@
-"""Relays that act on the second derivative of their function; they hold if function and rate are zero.
+"""This module handles relays that act on the second derivative of their function.
 
 If du/dt = k w for the functions u and w of two relays and a number k, a motion that stays at u = 0 also stays
 at w = 0. There dw/dt = a + b U + c W with both relays anywhere between -1 and 1. Filippov's rates hold both
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Partner:
-    """The relay whose surface is the rate of another relay's function: du/dt = factor * w.
+    """The relay whose surface is the rate of another relay's function, du/dt = factor * w.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ class Partner:
     factor: Any
 
     def share(self, c: int, d: int, sp: Any) -> Any:
-        """Return a matrix entry of the condition that relay c and its partner slide with the same weight."""
+        """Return a matrix entry of the condition that relay `c` and its partner slide with one weight."""
         if d == c:
             return sp.Integer(1)
         return -sp.sign(self.factor) if d == self.component else sp.Integer(0)
@@ -44,7 +44,7 @@ class Partner:
 def partners(
     lowering: Lowering, surfaces: dict[int, Any], rate: dict[int, Any], effect: dict[tuple[int, int], Any]
 ) -> dict[int, Partner]:
-    """Return the partners of the relays that do not act on the rate of their own function.
+    """Return the partners of the relays that do not affect the rate of their own function.
 
     A relay without action and without a partner can never be held. rate : rate of each surface's function
     without any relay. effect : effect of each relay (second) on each such rate (first).
@@ -66,7 +66,7 @@ def partners(
 
 
 def attraction(lowering: Lowering, c: int, partner: Partner, effect: dict[tuple[int, int], Any]) -> Item:
-    """Return how strongly relay c attracts by the second derivative while its partner holds."""
+    """Return how strongly relay `c` attracts by the second derivative while its partner holds."""
     sp, other = lowering.sp, lowering.components[partner.component]
     name = user(ATTRACTION + lowering.components[c].surface.unknown)
     pull = -partner.factor * effect[partner.component, c]

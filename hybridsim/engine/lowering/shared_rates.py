@@ -1,4 +1,4 @@
-"""Compute a rate during sliding from the condition ds/dt = 0 of the surface instead of from its forces.
+"""This module computes rates during sliding from the condition ds/dt = 0 instead of from forces.
 
 While s(x) = 0 is held, the one rate on which the relay acts follows from the others, f_k = -(ds/dt + sum of
 g_i f_i over i != k)/g_k with g the gradient of s. A sum of forces would carry their rounding errors: a
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def shared_rates(lowering: Lowering, i: int, der: list[Any], held: HeldStates) -> Iterator[tuple[int, Any]]:
-    """Yield each relay that determines the rate of state `i` while the relay slides, with this rate.
+    """Yield each relay that determines the rate of state `i` while the relay slides, with the rate.
 
     The relay's held state must be evaluated from its surface and must be another state. Of the rates in ds/dt
     the relay must act only on this one, and the derivative of s by this state must not depend on states.
@@ -39,7 +39,7 @@ def shared_rates(lowering: Lowering, i: int, der: list[Any], held: HeldStates) -
 
 
 def refuse_changed_rates(lowering: Lowering, surfaces: dict[int, Any]) -> None:
-    """Refuse modes that change a rate in ds/dt of a surface, since the holding force uses the declared rate."""
+    """Reject modes that change a rate in ds/dt, because holding forces use the declared rate."""
     for c, s in surfaces.items():
         for x, state in zip(lowering.states, lowering.model.states, strict=True):
             changing = [d for d in lowering.components if any(state.name in m.der for m in d.modes)]

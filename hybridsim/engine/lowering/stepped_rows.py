@@ -1,4 +1,4 @@
-"""The function of a generated module for time stepping with impacts: rates, effects and loads of contacts.
+"""This module writes the function of a generated module for time stepping with impacts.
 
 For m surfaces in the order of the module and n states the output contains, one after the other: u_k (m,), the
 rate of a gap or a relative velocity; d(u_k)/dx (m, n); d(rates)/d(unknown_k) (m, n); and the growth of
@@ -15,7 +15,7 @@ from hybridsim.engine.lowering.lower import Lowering
 
 
 def stepped(lowering: Lowering) -> list[tuple[str, Any]]:
-    """Return the rows of the function ``stepped``; there are none without unilateral contacts."""
+    """Return the text of the function ``stepped``, or nothing without unilateral contacts."""
     if not any(lowering.components[c].surface.is_unilateral for c in lowering.unknown):
         return []
     return [(f"out[{i}]", value) for i, value in enumerate(_values(lowering))]
@@ -37,7 +37,7 @@ def _values(lowering: Lowering) -> Iterator[Any]:
 
 
 def _bound(lowering: Lowering, c: int, bound: int) -> Any:
-    """Return a friction force as a function of normal forces: slip above, slip below, upper or lower limit of stick.
+    """Return a friction force or a stick limit as a function of the normal forces.
 
     A guard of stick is the distance to its limit: without the force itself it is the limit.
     """

@@ -1,4 +1,4 @@
-"""Friction along a gap: a contact whose relative velocity is proportional to the rate of a gap.
+"""This module finds friction along a gap: contacts whose velocity is proportional to the gap's rate.
 
 An example is a sliding block that meets a stop. Both contacts would then hold one velocity. If both
 velocities are zero together (the rate of the gap is a*v), the share of the friction in a push is not
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class StopCoupling(NamedTuple):
-    """A gap of a unilateral contact and a friction contact along it, given by their component numbers."""
+    """A gap of a unilateral contact and a friction contact along the gap, by their component numbers."""
 
     gap: int
     along: int
@@ -31,7 +31,7 @@ class StopCoupling(NamedTuple):
 def stop_couplings(
     lowering: Lowering, surfaces: dict[int, Any], gap_rates: dict[int, Any]
 ) -> list[StopCoupling]:
-    """Return all pairs of a gap and a contact whose velocities are proportional."""
+    """Return all pairs of a gap and a contact whose velocity is proportional to the rate of the gap."""
     sp, found = lowering.sp, []
     for p, rate in gap_rates.items():
         for c, velocity in surfaces.items():
@@ -52,7 +52,7 @@ def stop_couplings(
 def without_share(
     lowering: Lowering, pairs: list[StopCoupling], c: int, d: int, entry: Any, of_held: Any
 ) -> tuple[list[Item], Any]:
-    """Return items and value of a matrix entry of contact c: `of_held` while a gap along c is closed."""
+    """Return a matrix entry of contact `c` that differs while a gap along the contact is closed."""
     items: list[Item] = []
     for tie in pairs:
         if tie.along == c:
@@ -68,7 +68,7 @@ def without_share(
 def coupling_help(
     lowering: Lowering, pairs: list[StopCoupling], p: int, effect: dict[tuple[int, int], Any]
 ) -> tuple[list[Item], Any]:
-    """Return the pull of sticking friction that keeps a gap closed, and the items that compute this pull."""
+    """Return the pull of sticking friction that keeps a gap closed, and the items that compute it."""
     sp, total = lowering.sp, lowering.sp.Integer(0)
     items: list[Item] = []
     for tie in pairs:
@@ -96,7 +96,7 @@ def coupling_help(
 
 
 def reported_forces(lowering: Lowering, pairs: list[StopCoupling]) -> dict[Any, Any]:
-    """Return the forces to report by name; a stop cannot pull, so its pull is reported as friction."""
+    """Return the forces to report, by name; the pull of a closed stop is reported as friction."""
     sp, found = lowering.sp, {}
     for tie in pairs:
         if tie.is_one:

@@ -1,4 +1,4 @@
-"""This folder compiles the kernels, caches them on disk and passes arrays to them.
+"""This package compiles the kernels, stores them in a disk cache, and passes arrays to them.
 
 Only this folder and `system/user_functions` import numba or llvmlite. Read `kernels` first, then
 `cache`.

@@ -1,4 +1,4 @@
-"""Arrays that kernels write for one call lie in a few blocks of memory, and packs of them are made quickly."""
+"""This module stores the arrays that kernels write in a few blocks of memory."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _MAX_FREE_BLOCKS = 4  # most free blocks in a pool
 
 @kernel
 def _lay_out(entries: Any, steps: Any, owners: Any, skipped: Any, blocks: Any, table: Any) -> int:
-    """Fill the table of arrays that lie in some blocks and return its address; see `ArrayLayout`."""
+    """Fill the table of the arrays in some blocks, and return the address of the table."""
     for k in range(entries.shape[0]):
         for i in range(entries.shape[1]):
             table[k, i] = entries[k, i] + skipped[k] * steps[k, i]
@@ -35,7 +35,7 @@ def _lay_out(entries: Any, steps: Any, owners: Any, skipped: Any, blocks: Any, t
 
 
 class ArrayLayout:
-    """A layout of arrays of rows that lie one behind the other in a few blocks of memory.
+    """A layout of arrays that follow each other in a few blocks of memory.
 
     Offsets are computed once; a new block is a single allocation, and packing all arrays takes a few
     additions. A block is freed with the last array in it, so arrays with different lifetimes belong in
@@ -75,7 +75,7 @@ class ArrayLayout:
         self._from_the_first = np.zeros(len(fields), dtype=np.int64)
 
     def blank(self) -> tuple[np.ndarray, ...]:
-        """Return uninitialised blocks that nothing else uses."""
+        """Return new uninitialised blocks."""
         try:
             first = self._returned.pop()
         except IndexError:  # another thread may take the last one after a test
@@ -87,12 +87,12 @@ class ArrayLayout:
         return np.empty(self._sizes[k], dtype=np.uint8) if pool is None else pool.block()
 
     def take_back(self, block: np.ndarray) -> None:
-        """Return an unused first block to the layout, which uses it again for the next call."""
+        """Return an unused block to the layout, which uses it for the next call."""
         if len(self._returned) < _RETURNED:
             self._returned.append(block)
 
     def packed(self, blocks: tuple[np.ndarray, ...], skipped: np.ndarray | None = None) -> list[Any]:
-        """Pack the arrays of each named tuple for kernels; skipped: rows to omit at the start of each array."""
+        """Return packs of the arrays of each named tuple; `skipped` rows are omitted at the start."""
         packs: list[Any] = []
         rows = self._from_the_first if skipped is None else skipped
         if not ENABLED:
@@ -108,7 +108,7 @@ class ArrayLayout:
         return packs
 
     def rows(self, blocks: tuple[np.ndarray | None, ...]) -> Any:
-        """Return the arrays, with None for arrays in missing blocks."""
+        """Return the arrays, with None for the arrays of missing blocks."""
         return self._kind(
             *[
                 None if blocks[k] is None else np.ndarray(shape, dtype, blocks[k], offset)
@@ -117,7 +117,7 @@ class ArrayLayout:
         )
 
     def row(self, blocks: tuple[np.ndarray, ...], name: str, i: int) -> np.ndarray:
-        """Return a copy of row i of the array with this name."""
+        """Return a copy of row `i` of the array with the given name."""
         shape, dtype, k, offset = self._specs[self._kind._fields.index(name)]
         return np.ndarray(shape, dtype, blocks[k], offset)[i].copy()
 
@@ -138,7 +138,7 @@ class BufferPool:
         self._kind = _buffer_type(size, self._free)
 
     def block(self) -> np.ndarray:
-        """Return a block; its contents are undefined."""
+        """Return a block with undefined contents."""
         try:
             memory = self._free.pop()
         except IndexError:
@@ -149,7 +149,7 @@ class BufferPool:
 
 
 def _buffer_type(size: int, free: list[bytearray]) -> Any:
-    """Return a buffer type of a size in bytes whose instances return their memory to the pool when deleted."""
+    """Return a buffer type of a given size; its instances return their memory to the pool."""
 
     class PooledBuffer(ctypes.c_char * size):  # type: ignore[misc]  # the size is known at run time
         memory: bytearray

@@ -1,4 +1,4 @@
-"""The cache on disk has one folder for generated model modules and one for the engine's compiled kernels.
+"""This module manages the disk cache: folders for generated modules and for compiled kernels.
 
 Files in the cache are executed. The folder must therefore be private to this user (see
 `hybridsim.engine.native.private_folder`). Without such a folder nothing is cached, and each process compiles
@@ -27,7 +27,7 @@ _DIGEST = hashlib.sha256().digest_size
 
 
 def chosen_root() -> Path | None:
-    """Return the folder chosen for the cache: ``$HYBRIDSIM_CACHE``, else hybridsim's folder in the user's cache folder.
+    """Return the folder of the cache: ``$HYBRIDSIM_CACHE``, or a folder in the user's cache folder.
 
     Return None if the user has no home folder.
     """
@@ -44,17 +44,17 @@ def chosen_root() -> Path | None:
 
 
 def cache_root() -> Path | None:
-    """Return the folder of everything that hybridsim caches, or None if no private folder is available."""
+    """Return the cache folder, or None if no private folder is available."""
     root = chosen_root()
     if root is None:
-        note("no cache: this user has no home folder", "set HYBRIDSIM_CACHE to a private folder")
+        note("the cache is not used: this user has no home folder", "set HYBRIDSIM_CACHE to a private folder")
         return None
     return root if _is_usable(root) else None
 
 
 @cache
 def _is_usable(folder: Path) -> bool:
-    """Return whether a folder exists or can be created and is private; print the reason if not."""
+    """Return whether a folder exists or can be created and is private; print a reason if not."""
     reason = why_not(folder)
     if reason is None:
         try:
@@ -63,7 +63,7 @@ def _is_usable(folder: Path) -> bool:
         except OSError as fault:
             reason = f"cannot create {folder}: {fault.strerror}"
     if reason is not None:
-        note(f"no cache: {reason}", "set HYBRIDSIM_CACHE to a private folder with mode 700")
+        note(f"the cache is not used: {reason}", "set HYBRIDSIM_CACHE to a private folder with mode 700")
     return reason is None
 
 
@@ -94,12 +94,12 @@ def engine_key() -> str:
 
 @cache
 def _model_key() -> str:
-    """Return a hash of the sources that determine the contents of a model's module."""
+    """Return a hash of all sources that affect the module of a model."""
     return _of_sources(_MODEL_FLOORS).hexdigest()[:16]
 
 
 def _of_sources(floors: tuple[str, ...]) -> hashlib._Hash:
-    """Return a hash of all sources of some packages, with the path and the length of each file."""
+    """Return a hash of all source files of some packages."""
     digest = hashlib.sha256()
     for floor in floors:
         for path in sorted((_PACKAGE / floor).glob("**/*.py")):
@@ -120,7 +120,7 @@ def kernel_folder() -> Path | None:
 
 @cache
 def _is_marked(folder: Path) -> bool:
-    """Return whether a folder for these sources is usable; create and mark it if it does not exist."""
+    """Return whether a cache folder can be used; create and mark it if it does not exist."""
     if not _is_usable(folder):
         return False
     if not (folder / _MARK).exists():
@@ -129,7 +129,7 @@ def _is_marked(folder: Path) -> bool:
 
 
 def model_folder() -> Path | None:
-    """Return the folder of generated model modules and their compiled functions; None without a cache."""
+    """Return the folder of generated modules and their compiled functions, or None without a cache."""
     kernels = kernel_folder()
     if kernels is None:
         return None
@@ -138,7 +138,7 @@ def model_folder() -> Path | None:
 
 
 def store(path: Path | None, content: bytes) -> bool:
-    """Write a file atomically, so that another process never reads half a file; return whether it was written.
+    """Write a file atomically, so that other processes never read half a file; return success.
 
     A full disk or a read-only folder only has the effect that code is compiled again.
     """
@@ -164,7 +164,7 @@ def store(path: Path | None, content: bytes) -> bool:
 
 
 def store_whole(path: Path | None, content: bytes) -> bool:
-    """Write some content together with its digest, for `load_whole`."""
+    """Write content together with its digest, for `load_whole`."""
     return store(path, hashlib.sha256(content).digest() + content)
 
 
@@ -181,7 +181,7 @@ def load_whole(path: Path | None) -> bytes | None:
 
 
 def _made_by_us(root: Path) -> tuple[list[Path], list[Path]]:
-    """List folders of compiled code that carry hybridsim's mark, and similarly named ones without it."""
+    """Return the folders of compiled code with hybridsim's mark, and similarly named folders without."""
     ours, others = [], []
     for entry in sorted(root.glob("engine-*")):
         is_folder = entry.is_dir() and not entry.is_symlink()
@@ -195,7 +195,7 @@ def _made_by_us(root: Path) -> tuple[list[Path], list[Path]]:
 
 
 def clear() -> tuple[int, list[Path]]:
-    """Delete the folders that carry hybridsim's mark; return the freed bytes and the remaining folders."""
+    """Delete the folders with hybridsim's mark; return the freed bytes and the remaining folders."""
     root = cache_root()
     if root is None:
         return 0, []

@@ -1,4 +1,4 @@
-"""Constants that several packages share, each with its unit and its reason."""
+"""This module defines constants that several packages share, each with its unit and its reason."""
 
 from __future__ import annotations
 

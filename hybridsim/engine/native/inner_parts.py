@@ -1,4 +1,4 @@
-"""The undocumented parts of numba and llvmlite that kernels use, and the effect if a part is missing.
+"""This module lists the undocumented parts of numba and llvmlite that kernels use.
 
 A later version may rename or drop them. Each is looked up here, and nowhere else. Without one of `_NEEDED` the engine
 runs as plain Python, as with ``HYBRIDSIM_JIT=0``. Without one of the others compiling takes longer or more often. One
@@ -37,7 +37,7 @@ def _version() -> str:
 
 
 def find_part(module: str, name: str, without: str) -> Any:
-    """Return a part of numba or llvmlite; if it is missing, return None and print the consequence once."""
+    """Return a part of numba or llvmlite, or None if it is missing; print the consequence once."""
     found = _found(module, name)
     if found is None:
         _print_once(f"{_version()} has no {module}.{name}; {without}")
@@ -52,7 +52,7 @@ def _found(module: str, name: str) -> Any:
 
 
 def needed(name: str) -> Any:
-    """Return a part of numba whose presence `is_complete` has checked."""
+    """Return a part of numba that exists, because `is_complete` has checked it."""
     return next(_found(module, known) for module, known in _NEEDED if known == name)
 
 

@@ -1,4 +1,4 @@
-"""A disk cache of compiled kernels, with the same safety rules as the other caches.
+"""This module caches compiled kernels on disk, with the same safety rules as the other caches.
 
 A cached kernel is private to this user and checked against its digest; a damaged file is compiled again.
 numba's own cache loads any pickle under a predictable name and ends with a traceback if a file is truncated.
@@ -24,14 +24,14 @@ dumps: Any = find_part("numba.core.serialize", "dumps", _AGAIN)
 
 
 def cache_on_disk(dispatcher: Any, function: Any) -> None:
-    """Make a compiled function of numba, or a callback for C, load its code from the cache and store it there."""
+    """Make a compiled numba function or C callback load its code from the cache and store it there."""
     folder = kernel_folder()
     if folder is not None and None not in (CompileResultCacheImpl, FunctionCache, dumps):
         dispatcher._cache = KernelCache(function, folder)
 
 
 class _Place:
-    """The folder and the source of one function's code, under the attribute names that numba expects."""
+    """The folder and the source of one function, with the attribute names that numba expects."""
 
     def __init__(self, function: Any, folder: Path) -> None:
         code = function.__code__
@@ -45,14 +45,14 @@ class _Place:
             self._stamp = _digest_of(source)
 
     def ensure_cache_path(self) -> None:
-        """Do nothing: the folder is created when a file is stored."""
+        """Do nothing, because the folder is created when a file is stored."""
 
     def get_cache_path(self) -> str:
-        """Return the folder of the functions of this source file."""
+        """Return the folder of the functions of one source file."""
         return str(self.folder)
 
     def get_source_stamp(self) -> str:
-        """Return a stamp that changes with the source."""
+        """Return a stamp that changes with the source code."""
         return self._stamp
 
     def get_disambiguator(self) -> str:
@@ -61,7 +61,7 @@ class _Place:
 
 
 class _Form(CompileResultCacheImpl or object):  # type: ignore[misc]  # a numba without it
-    """The format of numba's compiled functions, stored in our cache folder regardless of numba's settings."""
+    """The format of numba's compiled functions, independent of numba's settings."""
 
     def __init__(self, function: Any, folder: Path) -> None:
         self._lineno = function.__code__.co_firstlineno
@@ -70,7 +70,7 @@ class _Form(CompileResultCacheImpl or object):  # type: ignore[misc]  # a numba 
 
 
 class _Versions:
-    """The compiled versions of one function, each in its own file."""
+    """The compiled versions of one function, each stored in its own file."""
 
     def __init__(self, folder: Path, name: str, stamp: str) -> None:
         self._folder, self._name, self._stamp = folder, name, stamp
@@ -79,11 +79,11 @@ class _Versions:
         return self._folder / f"{self._name}.{hashlib.sha256(str(key).encode()).hexdigest()[:24]}.nbc"
 
     def save(self, key: Any, data: Any) -> None:
-        """Store a version together with its key."""
+        """Store a compiled version together with its key."""
         store_whole(self._path(key), dumps((self._stamp, key, data)))
 
     def load(self, key: Any) -> Any:
-        """Return the version for a key, or None if this source has no such version."""
+        """Return the compiled version for a key, or None if there is none for this source."""
         content = load_whole(self._path(key))
         if content is None:
             return None
@@ -91,11 +91,11 @@ class _Versions:
         return data if (stamp, found) == (self._stamp, key) else None
 
     def flush(self) -> None:
-        """Do nothing: no index is held in memory."""
+        """Do nothing, because no index is kept in memory."""
 
 
 class KernelCache(FunctionCache or object):  # type: ignore[misc]  # a numba without it
-    """A numba cache of one function that stores files in our format."""
+    """A numba cache of one function that stores files in hybridsim's format."""
 
     def __init__(self, function: Any, folder: Path) -> None:
         self._name, self._py_func = repr(function), function

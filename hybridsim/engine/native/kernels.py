@@ -34,7 +34,7 @@ _reached: list[Any] = []  # functions by their number, kept alive here
 
 
 def as_compiled(function: FunctionType) -> Callable[[float, Any, Any, Any, Any], int]:
-    """Return a function in which 0.0/0.0 is NaN, by numbers of NumPy; its whole result is NaN only if these fail."""
+    """Return a Python function in which 0.0/0.0 is NaN, as in compiled code."""
     numbers = tuple(np.float64(c) if isinstance(c, float) else c for c in function.__code__.co_consts)
     with_numpy = FunctionType(function.__code__.replace(co_consts=numbers), function.__globals__)
 
@@ -79,12 +79,12 @@ if ENABLED:
     SIGNATURE = types.int32(types.float64, _DOUBLES, _DOUBLES, _LONGS, _DOUBLES)
 
     class _Spent(threading.local):
-        """The compile time of a thread: current depth, start of the current compilation, and seconds before it."""
+        """The compile time of a thread: current depth, start of the current compilation, earlier seconds."""
 
         depth, since, spent = 0, 0.0, 0.0
 
     class _Compiling(_Listener):
-        """Measure the seconds that each thread spends on compiling or loading kernels, and set the optimisation level.
+        """Measures the seconds that each thread spends on compiling, and sets the optimisation level.
 
         Compilation holds numba's lock, so the global settings can be changed meanwhile.
         """
@@ -94,7 +94,7 @@ if ENABLED:
             self.others: list[Any] = []  # settings to restore, one entry per nested compilation
 
         def on_start(self, event: Any) -> None:
-            """Note that a kernel, or a kernel that it calls, starts to compile."""
+            """Record that a kernel, or a kernel that it calls, starts to compile."""
             of = self.of
             if event.kind == _COMPILING:  # not in the cache
                 compiled = event.data["dispatcher"].py_func.__module__ or ""
@@ -112,7 +112,7 @@ if ENABLED:
             of.depth += 1
 
         def on_end(self, event: Any) -> None:
-            """Note that the kernel is compiled."""
+            """Record that a kernel is compiled."""
             of = self.of
             if event.kind == _COMPILING:
                 _set(self.others.pop())
@@ -139,7 +139,7 @@ if ENABLED:
 
     @cache
     def _plain_machine() -> Any:
-        """Return this machine with its features and a generic cost model, or None if numba does not provide it."""
+        """Return this machine with a generic cost model, or None if numba does not provide it."""
         features = getattr(_code_generator(), "_tm_features", None)
         if features is None or _settings()[1] is None:
             return None
@@ -149,7 +149,7 @@ if ENABLED:
         )
 
     def _ours() -> tuple[Any, Any]:
-        """Return the settings for kernels.
+        """Return hybridsim's compiler settings for kernels.
 
         At level 2 the engine compiles in seven eighths of the time of numba's default, level 3, and runs as
         fast. For some machines (AMD's Zen 4 and 5) LLVM unrolls loops of unknown length a dozen times. Our
@@ -175,7 +175,7 @@ if ENABLED:
         return _compiling.of.spent
 
     def _compiled(function: Callable[..., Any], allocates: bool = False, **more: Any) -> Any:
-        """Compile a kernel with our options of numba; literal arguments make specialised versions, up to twice as fast.
+        """Compile a kernel with hybridsim's options of numba.
 
         Only a kernel that allocates counts references to arrays.
         """
@@ -187,7 +187,7 @@ if ENABLED:
         return made
 
     def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-        """Compile a function of the engine once, cached on disk; division by zero gives inf or nan, as in numpy."""
+        """Compile a function of the engine and cache it on disk; division by zero gives inf or nan."""
         return _compiled(function)
 
     def allocating_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -195,15 +195,15 @@ if ENABLED:
         return _compiled(function, allocates=True)
 
     def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
-        """Inline a short kernel into its callers."""
+        """Mark a short kernel to be inlined into its callers."""
         return _compiled(function, forceinline=True)
 
     def inline_always(function: Callable[..., Any]) -> Callable[..., Any]:
-        """Inline a function into the one kernel that calls it; it is never compiled separately."""
+        """Mark a function to be inlined into the one kernel that calls it; it is not compiled separately."""
         return _compiled(function, inline="always")
 
     def polynomial_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-        """Inline a short kernel whose products and sums may be fused, as in Horner's rule."""
+        """Mark a short kernel to be inlined, in which a product and a sum may be fused."""
         return _compiled(function, forceinline=True, fastmath={"contract"})
 
     def _entry(function: Any, arguments: tuple[Any, ...]) -> Callable[..., Any]:
@@ -213,7 +213,7 @@ if ENABLED:
         return found
 
     def compile_model_function(module: Any, name: str) -> tuple[Any, Any]:
-        """Compile one function of a generated module; return its address and the object that keeps it alive."""
+        """Compile one function of a generated module; return its address and an object to keep alive."""
         path = getattr(module, "__file__", None)  # None for a module that exists only in memory
         stored = None if path is None else _of_this_machine(Path(path).with_suffix(f".{name}"))
         return compile_text(module.__loader__.get_source(module.__name__), name, stored)
@@ -230,7 +230,7 @@ if ENABLED:
     def compile_series(
         stored: Path | None, names: Sequence[str], written: Callable[[], str]
     ) -> tuple[list[int], Any]:
-        """Return the addresses of series functions, for `call_series`, and the object that keeps them alive."""
+        """Return the addresses of series functions for `call_series`, and an object that keeps them alive."""
         return load_or_compile(None if stored is None else _of_this_machine(stored), names, written)
 
     def is_stored(stored: Path | None) -> bool:
@@ -242,7 +242,7 @@ if ENABLED:
 
     @intrinsic
     def fused(typingctx: Any, a: Any, b: Any, c: Any) -> Any:
-        """Compute a b + c of three doubles, rounded once if the processor supports it."""
+        """Compute a*b + c of three doubles, rounded only once if the processor supports it."""
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             double = ir.DoubleType()
@@ -256,7 +256,7 @@ if ENABLED:
     def call_series(
         typingctx: Any, address: Any, s: Any, error: Any, x: Any, guards: Any, constants: Any, out: Any
     ) -> Any:
-        """Call the series function at an address (see `engine.series.emit_series`) with contiguous arrays."""
+        """Call the series function at an address with contiguous arrays."""
         signature = types.void(types.int64, types.float64, types.float64, x, guards, constants, out)
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -274,7 +274,7 @@ if ENABLED:
         return signature, generate
 
     def _type_by_address(value: Any) -> Any:
-        """Return the type of a pack, a number, or the elements of an array, for a kernel called by address."""
+        """Return the type of an argument for a kernel that is called by its address."""
         found = numba.typeof(value)
         return types.CPointer(found.dtype) if isinstance(found, types.Array) else found
 
@@ -319,7 +319,7 @@ if ENABLED:
 
     @intrinsic
     def array_at(typingctx: Any, elements: Any, size: Any) -> Any:
-        """Return the array (size,) over elements that a kernel received by address."""
+        """Return an array of a given size over the memory that a kernel received by address."""
         kind = types.Array(elements.dtype, 1, "C")
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
@@ -376,7 +376,7 @@ if ENABLED:
 else:
 
     def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-        """Return the function itself, because the compiler is off; NaN raises no warning, as in compiled code."""
+        """Return the function itself, because the compiler is off; NaN causes no warning."""
 
         @wraps(function)
         def quiet(*arguments: Any) -> Any:
@@ -410,7 +410,7 @@ else:
         return False
 
     def fused(a: float, b: float, c: float) -> float:
-        """Compute a b + c."""
+        """Compute a*b + c of three doubles."""
         return a * b + c
 
     def call_series(
@@ -429,15 +429,15 @@ else:
         return _reached.index(function)
 
     def call_kernel(address: int, arguments: tuple[Any, ...]) -> int:
-        """Call a function by its number."""
+        """Call a function by its number, which replaces an address without a compiler."""
         return int(_reached[address](*arguments))
 
     def array_at(elements: Any, size: int) -> Any:
-        """Return the array itself."""
+        """Return the array itself, because the compiler is off."""
         return elements
 
     def compile_model_function(module: Any, name: str) -> tuple[Any, Any]:
-        """Wrap the function so that it computes as compiled code does."""
+        """Wrap a model function so that it computes as compiled code does."""
         return (as_compiled(getattr(module, name)),) * 2
 
     def texts_to_compile(module: Any) -> list[str]:
@@ -445,11 +445,11 @@ else:
         return []
 
     def call_noinline(kernel: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-        """Call a kernel."""
+        """Call a kernel as a Python function, because the compiler is off."""
         return kernel(*arguments)
 
     def call(function: Any, t: float, x: Any, p: Any, z: Any, out: Any) -> int:
-        """Call the model function."""
+        """Call a model function in Python, because the compiler is off."""
         return function(t, x, p, z, out)
 
 
@@ -457,7 +457,7 @@ _addresses: dict[tuple[Any, ...], int] = {}  # addresses of kernels, by their ar
 
 
 def kernel_address(function: Callable[..., int], *examples: Any) -> int:
-    """Return the address of a kernel that returns an integer, for arguments of the given types; see `call_kernel`.
+    """Return the address of a kernel that returns an integer, for arguments of the given types.
 
     The kernel is compiled if necessary. A kernel that calls others directly is compiled together with them,
     again for each caller; large kernels are compiled once because they are called by address. Only the
@@ -471,7 +471,7 @@ def kernel_address(function: Callable[..., int], *examples: Any) -> int:
 
 
 class Precompiled:
-    """A kernel whose argument types are the same at every call, so that they are resolved only once.
+    """A kernel with the same argument types at every call, which are resolved only once.
 
     Resolving the types of packs takes longer than a short run.
     """

@@ -1,4 +1,4 @@
-"""Machine code of generated functions, by way of LLVM."""
+"""This module compiles generated functions to machine code with LLVM."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def _prepare() -> None:
 
 
 def _machine() -> Any:
-    """Return a new LLVM target machine for this computer; each compilation uses its own."""
+    """Return a new LLVM target machine for this computer, for one compilation."""
     _prepare()
     return binding.Target.from_default_triple().create_target_machine(
         cpu=binding.get_host_cpu_name(), features=binding.get_host_cpu_features().flatten(), opt=2
@@ -42,7 +42,7 @@ def _machine() -> Any:
 
 
 def compile_text(text: str, name: str, stored: Path | None) -> tuple[int, Any]:
-    """Compile a function of a generated module from the module's text; return its address and the object to keep alive.
+    """Compile a function from the text of a module; return its address and an object to keep alive.
 
     stored: path of its cached machine code, if any; written at the first compilation.
     """
@@ -53,7 +53,7 @@ def compile_text(text: str, name: str, stored: Path | None) -> tuple[int, Any]:
 def load_or_compile(
     stored: Path | None, names: Sequence[str], written: Callable[[], str]
 ) -> tuple[list[int], Any]:
-    """Return the addresses of functions of an LLVM module and the object that keeps them alive.
+    """Return the addresses of functions of an LLVM module, and an object that keeps them alive.
 
     stored: path of the cached machine code, if any. If the file does not exist, the text that `written` returns
     is compiled and stored.
@@ -75,7 +75,7 @@ def _translated(text: str, name: str) -> str:
 
 
 def translated(text: str, names: Sequence[str]) -> str:
-    """Translate functions, of which later ones may call earlier ones, into an LLVM module that exports some of them."""
+    """Translate functions, of which later ones may call earlier ones, into one LLVM module."""
     module = ir.Module(names[0])
     for definition in python_tree(text).body:
         function = Translator(module, definition).function

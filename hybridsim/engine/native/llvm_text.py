@@ -1,4 +1,4 @@
-"""LLVM assembly text: values of one function, each computed once, and the function around them."""
+"""This module writes LLVM assembly text of functions, in which each value is computed once."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ declare double @c_tanh(double)
 
 
 class TooLong(Exception):
-    """An error for a tape whose code would take too long to compile."""
+    """Raised for a tape whose code would take too long to compile."""
 
 
 def number(value: float) -> str:
-    """Write a double exactly in LLVM's hexadecimal notation."""
+    """Return a double as text in LLVM's hexadecimal notation."""
     return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
 
 
@@ -42,13 +42,13 @@ class Lines:
         self._known: dict[tuple[str, ...], str] = {}
 
     def put(self, line: str) -> None:
-        """Append a line that has no value."""
+        """Append a line that has no result."""
         self.lines.append(line)
         if len(self.lines) > _LONGEST:
             raise TooLong
 
     def value(self, form: str, *parts: str) -> str:
-        """Return the value of a line, with operands inserted into its template; reuse an equal earlier line."""
+        """Return the result of a line; an equal earlier line is reused."""
         key = (form, *parts)
         if key not in self._known:
             name = f"%{self._prefix}{len(self._known)}"
@@ -63,11 +63,11 @@ class Lines:
         return self.value(name + " double {}, {}", a, b)
 
     def negative(self, a: str) -> str:
-        """Emit -a."""
+        """Emit the negative of a value."""
         return self.value("fneg double {}", a)
 
     def call(self, name: str, a: str) -> str:
-        """Emit a call of a function of one double."""
+        """Emit a call of a function with one double as argument."""
         return self.value("call double @" + name + "(double {})", a)
 
     def load(self, array: str, i: int) -> str:
@@ -81,16 +81,16 @@ class Lines:
         self.put(f"  store double {value}, ptr {place}")
 
     def fused(self, a: str, b: str, c: str) -> str:
-        """Emit a b + c."""
+        """Emit a fused product and sum a*b + c."""
         return self.value("call double @llvm.fmuladd.f64(double {}, double {}, double {})", a, b, c)
 
     def choice(self, condition: str, a: str, b: str, then: str, otherwise: str) -> str:
-        """Emit a choice between two values by a comparison of a and b."""
+        """Emit a choice between two values by a comparison of `a` and `b`."""
         is_so = self.value("fcmp " + condition + " double {}, {}", a, b)
         return self.value("select i1 {}, double {}, double {}", is_so, then, otherwise)
 
 
 def function(name: str, lines: Iterable[str]) -> str:
-    """Return a function that consists of these lines."""
+    """Return the text of a function that consists of the lines so far."""
     arguments = "double %s, double %e, ptr noalias %x, ptr noalias %g, ptr noalias %c, ptr noalias %out"
     return "\n".join((f"define void @{name}({arguments}) {{", *lines, "  ret void", "}", ""))

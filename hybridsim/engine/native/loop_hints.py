@@ -1,4 +1,4 @@
-"""Hints for loops over short arrays, which LLVM should neither unroll nor vectorise.
+"""This module marks loops over short arrays, which LLVM should neither unroll nor vectorise.
 
 For arrays of two or three entries most of the code of a vectorised loop only prepares it for long arrays.
 """
@@ -17,7 +17,7 @@ if ENABLED:
     from numba.extending import intrinsic
 
     def left_as_it_is(builder: Any) -> None:
-        """Emit an opaque empty statement: LLVM will not vectorise or unroll the loop around it."""
+        """Emit an opaque empty statement, so that LLVM does not vectorise or unroll the loop around it."""
         nothing = ir.InlineAsm(ir.FunctionType(ir.VoidType(), []), "", "", side_effect=True)
         call = builder.call(nothing, [])
         call.attributes.add("nounwind")
@@ -25,7 +25,7 @@ if ENABLED:
 
     @intrinsic
     def short_loop(typingctx: Any) -> Any:
-        """Mark the loop around this call as short."""
+        """Mark the loop around this call as a short loop."""
 
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             left_as_it_is(builder)
@@ -36,7 +36,7 @@ if ENABLED:
 else:
 
     def short_loop() -> None:
-        """Do nothing."""
+        """Do nothing, because the compiler is off."""
 
 
 @inlined
@@ -47,7 +47,7 @@ def index(i: int) -> int:
 
 @inlined
 def put(source: Any, out: Any) -> None:
-    """Copy a short array; a slice assignment takes ten times as long for a few numbers."""
+    """Copy a short array faster than a slice assignment does."""
     for i in range(source.shape[0]):
         short_loop()
         out[i] = source[i]

@@ -1,4 +1,4 @@
-"""Check that a folder is private, so that code found in it may be executed.
+"""This module checks that a folder is private, so that code found in it may be executed.
 
 Anybody who can put a file in the cache can run code as this user. A folder is used only if this user or
 the superuser owns it and every folder above it, and nobody else may write to them.
@@ -17,7 +17,7 @@ _LINKS = 40  # most links in one path, as in Linux
 
 
 def why_not(path: Path) -> str | None:
-    """Return why other users could have written code at a path, or None if they could not.
+    """Return why other users may have written code at a path, or None if they cannot.
 
     Missing parts of the path are accepted, since this user creates them.
     """
@@ -53,7 +53,7 @@ def why_not(path: Path) -> str | None:
 
 
 def is_trusted_file(path: str | Path) -> bool:
-    """Return whether a path is a regular file that only this user or the superuser can have written."""
+    """Return whether only this user or the superuser can have written a regular file at a path."""
     try:
         found = os.lstat(path)
     except OSError:
@@ -79,7 +79,7 @@ def _has_trusted_owner(found: os.stat_result) -> bool:
 
 
 def _unmapped() -> int | None:
-    """Return the user number that this namespace shows for all unmapped users; None if all are mapped."""
+    """Return the user number that stands for all unmapped users in this namespace, or None."""
     try:
         with open("/proc/self/uid_map") as mapped, open("/proc/sys/kernel/overflowuid") as number:
             knows_all = mapped.read().split() == ["0", "0", "4294967295"]
@@ -95,7 +95,7 @@ def _others_may_write(found: os.stat_result) -> bool:
 
 
 def _is_group_of_one(group: int) -> bool:
-    """Return whether a group has the user's name and no other member, as many systems create one per user."""
+    """Return whether a group has the user's name and no other member."""
     if group != os.getegid():
         return False
     import grp

@@ -1,4 +1,4 @@
-"""Products of small matrices and vectors in compiled code, four numbers at a time.
+"""This module multiplies small matrices and vectors in compiled code, four numbers at a time.
 
 A matrix is stored in blocks of four rows, or row by row for single rows. Vectors are padded with zeros up to
 the next multiple of four, and so are the columns that they multiply.
@@ -29,7 +29,7 @@ def vector_of(count: int) -> np.ndarray:
 
 
 def rows_of(matrix: np.ndarray, parts: Sequence[int] = ()) -> np.ndarray:
-    """Pad the columns of matrices (..., rows, columns) with zeros; `parts`: lengths of the vectors to multiply."""
+    """Pad the columns of matrices (..., rows, columns) with zeros, for vectors of the lengths in `parts`."""
     parts = parts or (matrix.shape[-1],)
     out = np.zeros((*matrix.shape[:-1], sum(map(filled_up, parts))))
     source = target = 0
@@ -40,7 +40,7 @@ def rows_of(matrix: np.ndarray, parts: Sequence[int] = ()) -> np.ndarray:
 
 
 def row_blocks_of(matrix: np.ndarray, parts: Sequence[int] = ()) -> np.ndarray:
-    """Arrange matrices (..., rows, columns) in zero-padded blocks (..., rows/4, columns, 4)."""
+    """Arrange matrices (..., rows, columns) in blocks (..., rows/4, columns, 4), padded with zeros."""
     wide = rows_of(matrix, parts)
     *lead, rows, columns = wide.shape
     out = np.zeros((*lead, filled_up(rows), columns))
@@ -67,7 +67,7 @@ if ENABLED:
         return builder.load(builder.bitcast(place, kind.as_pointer()), align=_BYTES)
 
     def _address(context: Any, builder: Any, kind: Any, value: Any, at: Any, numbers: Any) -> Any:
-        """Return the address of the subarray that the leading indices select."""
+        """Return the address of the subarray that leading indices select."""
         array = context.make_array(kind)(context, builder, value)
         place = builder.bitcast(array.data, ir.IntType(8).as_pointer())
         strides = cgutils.unpack_tuple(builder, array.strides, kind.ndim)
@@ -113,7 +113,7 @@ if ENABLED:
 
     @intrinsic
     def times(typingctx: Any, row_blocks: Any, at: Any, vectors: Any) -> Any:
-        """Multiply a block of four rows by the concatenated vectors of a tuple; `at`: the block's indices."""
+        """Multiply a block of four rows by several concatenated vectors; `at` is the index of the block."""
         result = types.UniTuple(types.float64, LANES)
 
         def body(builder: Any, entries: Any, rows: Any, sums: Any) -> Any:
@@ -148,7 +148,7 @@ if ENABLED:
 
     @intrinsic
     def dot(typingctx: Any, rows: Any, at: Any, vectors: Any) -> Any:
-        """Multiply a row by the concatenated vectors of a tuple; `at` holds the row's indices."""
+        """Multiply one row by several concatenated vectors; `at` is the index of the row."""
 
         def body(builder: Any, entries: Any, row: Any, sums: Any) -> Any:
             four, other = _loaded(builder, entries, 0, _FOUR), _loaded(builder, row, 0, _FOUR)
@@ -178,19 +178,19 @@ else:
         )
 
     def times(row_blocks: Any, at: tuple[int, ...], vectors: tuple[Any, ...]) -> tuple[float, ...]:
-        """Compute the products of a block of four rows with the vectors."""
+        """Multiply a block of four rows by several concatenated vectors."""
         entries = _entries(vectors)
         return tuple((entries @ row_blocks[at][: len(entries)]).tolist())
 
     def dot(rows: Any, at: tuple[int, ...], vectors: tuple[Any, ...]) -> float:
-        """Compute the product of a row with the vectors."""
+        """Multiply one row by several concatenated vectors."""
         entries = _entries(vectors)
         return float(entries @ rows[at][: len(entries)])
 
 
 @inlined
 def product(row_blocks: Any, k: int, vectors: Any, out: Any) -> None:
-    """Multiply matrix k of an array (K, Q, m, 4) by the vectors of a tuple, only for the rows of `out`."""
+    """Multiply matrix `k` of an array (K, Q, m, 4) by several concatenated vectors."""
     i = 0
     while i < out.shape[0]:
         short_loop()

@@ -1,4 +1,4 @@
-"""Powers of a step and sums of series over them as machine code, four terms at a time.
+"""This module computes powers of a step and sums of Taylor series, four terms at a time.
 
 The results equal those of `tabulate` and `sum_sizes` of `hybridsim.engine.series.interpreter` to the last
 bit.
@@ -10,7 +10,7 @@ from hybridsim.engine.native.llvm_text import ONE, Lines, number
 
 
 class Powers:
-    """The powers a**k for k = 0..order as in `tabulate` of `engine.series.interpreter`, and sums of series with them.
+    """The powers a**k for k = 0..order, and sums of Taylor series with these powers.
 
     Powers and terms are computed four at a time from the highest order down; the lowest order % 4 ones are
     scalar.
@@ -36,7 +36,7 @@ class Powers:
         return "<" + ", ".join(f"double {number(value)}" for value in values) + ">"
 
     def four(self, k: int) -> str:
-        """Return the powers k to k + 3."""
+        """Return the powers from k to k + 3 as a vector."""
         if k not in self._fours and k > 4:
             self._fours[k] = self._of_two("fmul", self.four(k - 4), self._fourth)
         elif k not in self._fours:
@@ -68,7 +68,7 @@ class Powers:
         return self.code.value("call <4 x double> @llvm.fabs.v4f64(<4 x double> {})", a)
 
     def _together(self, a: str) -> str:
-        """Add the four elements of a vector."""
+        """Return the sum of the four elements of a vector."""
         form = "shufflevector <4 x double> {}, <4 x double> poison, <2 x i32> <i32 {first}, i32 {second}>"
         halves = [self.code.value(form.format("{}", first=i, second=i + 1), a) for i in (0, 2)]
         two = self.code.value("fadd <2 x double> {}, {}", *halves)
@@ -77,7 +77,7 @@ class Powers:
         )
 
     def sum(self, array: str, at: int, is_size: bool) -> str:
-        """Compute sum_k c_k a**k, or of |c_k|, over k > 0, for the series that begins at a place of an array."""
+        """Compute the sum of c_k a**k, or of |c_k|, over k > 0, for a series stored in an array."""
         code, total = self.code, self._constants([0.0] * 4)
         for k in self.begins:
             c = self._load(array, at + k)
@@ -90,7 +90,7 @@ class Powers:
         return found
 
     def terms(self, array: str, at: int) -> tuple[str, str, str]:
-        """Compute the sums over k > 0 of the terms c_k a**k, of k times the terms, and of their sizes."""
+        """Compute the sums over k > 0 of c_k a**k, of k times each term, and of the sizes of the terms."""
         code, zero = self.code, self._constants([0.0] * 4)
         value, slope, size = zero, zero, zero
         for k in self.begins:

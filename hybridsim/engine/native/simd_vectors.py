@@ -1,4 +1,4 @@
-"""A vector type of eight doubles for kernels, because LLVM does not vectorise such short loops well.
+"""This module defines a vector of eight doubles for kernels.
 
 LLVM turns a loop over a few lanes into vectors of sixteen and a scalar rest. Here all operations are on
 vectors, and arrays are padded to whole vectors. Processors with shorter vectors use two or four of theirs. A
@@ -61,7 +61,7 @@ if ENABLED:
 
     @intrinsic
     def load(typingctx: Any, array: Any, at: Any) -> Any:
-        """Load eight numbers, starting at a flat index into an array."""
+        """Load eight numbers from an array, starting at a flat index."""
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             return builder.load(_place(context, builder, sig.args[0], *args), align=8)
@@ -80,7 +80,7 @@ if ENABLED:
 
     @intrinsic
     def put(typingctx: Any, array: Any, at: Any, value: Any) -> Any:
-        """Store one number in an array, at a flat index as in `store`."""
+        """Store one number in an array at a flat index."""
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             data = context.make_array(sig.args[0])(context, builder, args[0]).data
@@ -102,7 +102,7 @@ if ENABLED:
 
     @intrinsic
     def choose(typingctx: Any, mask: Any, value: Any, other: Any) -> Any:
-        """Select a value in lanes whose mask is not zero, and the other value elsewhere."""
+        """Select one value in lanes whose mask is not zero, and another value in other lanes."""
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             is_set = builder.fcmp_unordered("!=", args[0], ir.Constant(_VECTOR, [0.0] * WIDTH))
@@ -112,7 +112,7 @@ if ENABLED:
 
     @intrinsic
     def larger(typingctx: Any, value: Any, other: Any) -> Any:
-        """Return the larger of two values, or the other value if one is NaN."""
+        """Return the larger of two values; if one value is NaN, return the other one."""
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             return builder.select(builder.fcmp_ordered(">", *args), *args)
@@ -121,7 +121,7 @@ if ENABLED:
 
     @intrinsic
     def all_larger(typingctx: Any, value: Any, other: Any) -> Any:
-        """Return whether each number of a vector is larger than the same lane of the other vector."""
+        """Return whether each number of one vector is larger than the number of another in the same lane."""
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             bits = builder.bitcast(builder.fcmp_ordered(">", *args), ir.IntType(WIDTH))
@@ -131,7 +131,7 @@ if ENABLED:
 
     @intrinsic
     def size(typingctx: Any, value: Any) -> Any:
-        """Return absolute values."""
+        """Return the absolute values of a vector."""
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             kind = ir.FunctionType(_VECTOR, [_VECTOR])
@@ -143,7 +143,7 @@ if ENABLED:
 else:
 
     def load(array: Any, at: int) -> Any:
-        """Load eight numbers, starting at a flat index; negative indices count from the end."""
+        """Load eight numbers from an array; negative indices count from its end."""
         return array.reshape(-1)[np.arange(at, at + WIDTH)]
 
     def store(array: Any, at: int, value: Any) -> None:
@@ -151,7 +151,7 @@ else:
         array.reshape(-1)[np.arange(at, at + WIDTH)] = value
 
     def put(array: Any, at: int, value: float) -> None:
-        """Store one number in an array, at a flat index as in `store`."""
+        """Store one number in an array at a flat index."""
         array.reshape(-1)[at] = value
 
     def splat(value: float) -> Any:
@@ -159,30 +159,30 @@ else:
         return np.full(WIDTH, value)
 
     def choose(mask: Any, value: Any, other: Any) -> Any:
-        """Select a value in lanes whose mask is not zero, and the other value elsewhere."""
+        """Select one value in lanes whose mask is not zero, and another value in other lanes."""
         return np.where(mask != 0.0, value, other)
 
     def larger(value: Any, other: Any) -> Any:
-        """Return the larger of two values, or the other value if one is NaN."""
+        """Return the larger of two values; if one value is NaN, return the other one."""
         return np.where(value > other, value, other)
 
     def all_larger(value: Any, other: Any) -> bool:
-        """Return whether each number of a vector is larger than the same lane of the other vector."""
+        """Return whether each number of one vector is larger than the number of another in the same lane."""
         return bool((value > other).all())
 
     def size(value: Any) -> Any:
-        """Return absolute values."""
+        """Return the absolute values of a vector."""
         return abs(value)
 
 
 @inlined
 def whole_vectors(count: int) -> int:
-    """Round a count up to whole vectors."""
+    """Round a count up to a multiple of the vector length."""
     return (count + WIDTH - 1) & -WIDTH
 
 
 def padded_rows(rows: int, columns: int, before: int = 0) -> np.ndarray:
-    """Allocate zeros (rows, columns) aligned to a cache line, with padding for vectors at both ends."""
+    """Allocate zeros (rows, columns) with alignment and padding for vectors."""
     ahead = -(-before // WIDTH) * WIDTH
     whole = np.zeros(ahead + rows * columns + 2 * WIDTH)
     skip = ahead + (-whole.ctypes.data // whole.itemsize) % WIDTH

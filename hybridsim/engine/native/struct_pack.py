@@ -1,4 +1,4 @@
-"""Named tuples of many arrays, which are passed to kernels by one pointer.
+"""This module packs named tuples of arrays, so that kernels receive them by one pointer.
 
 A kernel that is given a tuple of arrays receives seven words per array, copied at every call, and counts
 references to each. With a hundred arrays that costs more than the kernel's own work and most of its compile
@@ -39,7 +39,7 @@ if ENABLED:
     AttributeTemplate: Any = needed("AttributeTemplate")
 
     class Packed:
-        """A named tuple of C-contiguous arrays in the form that kernels take: a table of addresses and shapes."""
+        """A named tuple of arrays in the form that kernels receive: a table of addresses and shapes."""
 
         def __init__(self, arrays: Any, table: np.ndarray, numba_type: PackType, address: int) -> None:
             self.arrays, self.table, self.numba_type, self.address = arrays, table, numba_type, address
@@ -60,12 +60,12 @@ if ENABLED:
             super().__init__(name=f"Pack({title}, {digest})")
 
         def place(self, name: str) -> int:
-            """Return the row of a field in the table."""
+            """Return the row of a field in the table of a pack."""
             return [field[0] for field in self.fields].index(name)
 
     @cache
     def type_of_fields(kind: Any, fields: tuple[Any, ...]) -> PackType:
-        """Return the type of a named tuple; fields: a `PackType`, or dtype and dimensions of an array."""
+        """Return the numba type of a named tuple from the types of its fields."""
         found = [
             field
             if isinstance(field, PackType)
@@ -125,21 +125,21 @@ if ENABLED:
 
     @intrinsic
     def pack_at(typingctx: Any, address: Any, like: Any) -> Any:
-        """Return the pack whose table is at an address, with the type of another pack."""
+        """Return the pack whose table is at an address; the pack has the type of another pack."""
         return like(types.int64, like), lambda context, builder, signature, arguments: arguments[0]
 
     def opaque(pack: Any) -> Any:
-        """Return a pack for a kernel that only passes it on to a kernel that knows its type: its address."""
+        """Return the address of a pack, for a kernel that only passes the pack on."""
         return pack.address
 
     def address_in(pack: Any, name: str) -> np.ndarray:
-        """Return the place (1,) of the address of a field in the table of a pack."""
+        """Return the place (1,) in the table of a pack that contains the address of a field."""
         row = pack.numba_type.place(name) * SLOTS_PER_ARRAY
         place: np.ndarray = pack.table[row : row + 1]
         return place
 
     def replaced(pack: Any, **inner: Any) -> Any:
-        """Return a pack with other packs in it: itself, with new addresses. No kernel may be using it."""
+        """Return a pack in which other packs are replaced by new addresses; no kernel may be using it."""
         for name, other in inner.items():
             if getattr(pack, name) is not other:
                 address_in(pack, name)[0] = other.address
@@ -149,7 +149,7 @@ if ENABLED:
 else:
 
     def pack_at(address: int, like: Any) -> Any:
-        """Raise an error: without a compiler there are no addresses."""
+        """Raise an error, because there are no addresses without a compiler."""
         raise NotImplementedError
 
     def opaque(pack: Any) -> Any:
@@ -157,16 +157,16 @@ else:
         return pack
 
     def address_in(pack: Any, name: str) -> np.ndarray:
-        """Raise an error: without a compiler there are no addresses."""
+        """Raise an error, because there are no addresses without a compiler."""
         raise NotImplementedError
 
     def replaced(pack: Any, **inner: Any) -> Any:
-        """Return a tuple with other tuples in it."""
+        """Return a named tuple in which other tuples are replaced."""
         return pack._replace(**inner)
 
 
 def packed(arrays: Any) -> Any:
-    """Pack a named tuple of arrays and packs for kernels; return the tuple itself if the compiler is off."""
+    """Return a named tuple of arrays as a pack for kernels, or unchanged if the compiler is off."""
     if not ENABLED:
         return arrays
     entries: list[int] = []

@@ -1,4 +1,4 @@
-"""Step lengths that can be added to the time without rounding."""
+"""This module computes step lengths that can be added to the time without rounding."""
 
 from __future__ import annotations
 

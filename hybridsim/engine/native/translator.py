@@ -1,4 +1,4 @@
-"""Translation of generated functions, which use a small part of Python, to LLVM.
+"""This module translates generated functions, which use a small part of Python, to LLVM.
 
 A general compiler of Python first infers types. Here all numbers are doubles except the modes, and a function
 of some dozen lines is compiled in milliseconds.
@@ -23,7 +23,7 @@ _COMPARE = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "=="
 
 
 class Translator(ast.NodeVisitor):
-    """Translate one function of a generated module into an LLVM module."""
+    """Translates one function of a generated module into an LLVM module."""
 
     def __init__(self, module: ir.Module, definition: ast.FunctionDef) -> None:
         self.module = module
@@ -64,7 +64,7 @@ class Translator(ast.NodeVisitor):
         self.builder.store(self.visit(node) if is_mode else self.number(node), place)
 
     def _allocate(self, name: str, kind: Any, size: int) -> None:
-        """Make a local array."""
+        """Allocate a local array in the translated function."""
         with self.builder.goto_block(self.entry):
             self.builder.position_at_start(self.entry)
             array = self.builder.alloca(ir.ArrayType(kind, size))
@@ -75,7 +75,7 @@ class Translator(ast.NodeVisitor):
         self.builder.call(self.module.globals[node.func.id], [self.number(node.args[0]), *arrays])
 
     def _place(self, target: Any) -> Any:
-        """Return the stack slot of a variable; the optimiser moves it to a register."""
+        """Return the stack slot of a variable in the translated function."""
         if target.id not in self.slots:
             with self.builder.goto_block(self.entry):
                 self.builder.position_at_start(self.entry)

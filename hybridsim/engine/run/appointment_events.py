@@ -1,4 +1,4 @@
-"""Test located guards at an input jump or a schedule by the motion that begins at that time.
+"""Test whether located guards fire at an input jump or a schedule, by the motion that begins there.
 
 A guard fires only if it is negative just after. A zero located by the motion before may turn back or stay at zero, such
 as a load that touches zero.
@@ -22,7 +22,7 @@ from hybridsim.engine.system.system import System
 def events_before_appointment(
     system: System, instant: Instant, found: Located, schedules: tuple[int, ...], forward: bool
 ) -> Located:
-    """Return the located event at an appointment, reduced to the guards that are resolved before it.
+    """Return a located event with only the guards that are resolved before the scheduled change.
 
     Guards that do not become negative on the new pieces of inputs are dropped. The rest is resolved on these pieces,
     while conditions and resets read the inputs before a jump. A load at zero waits for schedules that are due.
@@ -55,7 +55,7 @@ def events_before_appointment(
 
 
 def _ending_components(system: System, found: Located) -> frozenset[int]:
-    """Return the components with a located guard that would end the run."""
+    """Return the components with a located guard whose transition would end the run."""
     modes = zip(system.automata, found.at.z.tolist())
     ends = [
         c

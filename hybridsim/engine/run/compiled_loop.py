@@ -1,4 +1,4 @@
-"""Call the compiled event loop from the general one: pass the state in, commit what happened, return the state."""
+"""Call the compiled event loop: pass the state to the loop, store the results, and return the new state."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ _compiled: list[Any] = []  # methods whose loops are compiled
 
 
 def compile_loops(system: System, make: Callable[[System, Tolerances, float], MethodKernels]) -> None:
-    """Compile the functions of this system that compiled loops call, and once per process the loop itself."""
+    """Compile the model's functions for compiled loops, and once per process the event loop itself."""
     functions_of(system)
     if make in _compiled or not system.n:
         return
@@ -77,7 +77,7 @@ def compile_loops(system: System, make: Callable[[System, Tolerances, float], Me
 def _layout(
     system: System, steps: int, rows: Any, keeps_starts: bool, *fields: tuple[Any, tuple[int, ...]]
 ) -> ArrayLayout:
-    """Return the layout of the arrays that the kernels write; the trajectory keeps events longer than steps."""
+    """Return the layout of the arrays that the kernels write; events are kept longer than steps."""
     return ArrayLayout(
         (LoopRecord, rows),
         (
@@ -100,7 +100,7 @@ def _skipped_rows(first: int, steps: int, count: int) -> np.ndarray:
 
 
 class CallArrays:
-    """The arrays of one call of a compiled loop; later calls reuse them.
+    """The arrays of one call of a compiled loop, which later calls reuse.
 
     Parameters
     ----------
@@ -152,20 +152,20 @@ class CompiledLoop:
         self.renew()
 
     def fresh_copy(self) -> CompiledLoop:
-        """Return a copy for another run; this object must not have been used."""
+        """Return a copy of this loop for another run; the loop must not have been used."""
         other: CompiledLoop = object.__new__(type(self))
         other.__dict__ = vars(self).copy()
         other.kernels = self.kernels.fresh_copy()
         return other
 
     def renew(self) -> None:
-        """Write to new arrays from now on, allocated when needed; committed blocks keep the former ones."""
+        """Allocate new arrays for later calls, because the trajectory keeps the former arrays."""
         self.used = (0, 0)  # used rows of steps, and of segments
         self.memory: tuple[np.ndarray, ...] | None = None
 
     @property
     def place(self) -> tuple[np.ndarray, ...]:
-        """Return the state between calls as arrays that are never modified, for a checkpoint.
+        """Return the state between two calls as arrays for a checkpoint; the arrays are never modified.
 
         Either the method's own, or the numbers of used step rows, used segment rows, and all step rows.
         """
@@ -179,17 +179,17 @@ class CompiledLoop:
             self.kernels.place = place
             return
         if not (place.shape == (3,) and ((place >= 0.0) & (place <= max(_CALL_DOUBLES, self.steps))).all()):
-            raise damaged("the row counts of the run")
+            raise damaged("the row counts of the record")
         rows, segments, steps = (int(number) for number in place)
         if not (1 <= steps <= self.steps and rows <= steps and segments <= MAX_SEGMENTS + 1):
-            raise damaged("the row counts of the run")
+            raise damaged("the row counts of the record")
         if steps != self.steps:
             self.steps = steps
             self.renew()
         self.used = (rows, segments)
 
     def go(self, origin: Instant, state: HybridState, target: Instant) -> KernelRun | None:
-        """Call the kernel without committing the result; None if it cannot be called."""
+        """Call the kernel without storing the result in the trajectory; return None if impossible."""
         kernels, tape_cache = self.kernels, self.tape_cache
         tape_cache.surround(state.z)
         tapes = tape_cache.tapes  # read once, because another thread may replace them
@@ -244,7 +244,7 @@ class CompiledLoop:
     def advance(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
     ) -> LoopResult:
-        """Run until an event that is not ordinary, the target, or the end of the arrays, and commit the result."""
+        """Run until an event that needs Python, the target, or full arrays, and store the result."""
         run = self.kernel_run or self.go(origin, HybridState.of(outcome, p), target)
         self.kernel_run = None
         if run is None:
@@ -260,12 +260,12 @@ class CompiledLoop:
         return LoopResult(Instant(*run.clock), run.end.outcome, end, run.instants, run.owners)
 
     def count(self, run: KernelRun, counters: Counters) -> None:
-        """Add the cost of a call to the counters."""
+        """Add the cost of one call to the counters of the run."""
         run.count_in(counters)
         self.kernels.count(counters, run.steps, run.result)
 
     def forget_segments(self, run: KernelRun) -> bool:
-        """Release the memory of segments except the end of the last one. Return False if it is needed.
+        """Release the memory of all segments except the last end; return False if the memory is needed.
 
         `advance` must not be called afterwards.
         """
@@ -276,7 +276,7 @@ class CompiledLoop:
         return True
 
     def segments_of(self, run: KernelRun) -> SegmentBlock:
-        """Return the segments of a call, which must have stored some and released none."""
+        """Return the segments of one call; the call must have stored some and released none."""
         rows, begun = run.rows, slice(run.first, run.first + run.count)
         rows.last_steps[run.first] = 0
         steps = slice(run.first_step, run.first_step + run.steps)
@@ -291,7 +291,7 @@ class CompiledLoop:
         )
 
     def _commit(self, run: KernelRun, record: Trajectory) -> None:
-        """Add the segments and events of one call to the trajectory."""
+        """Append the segments and events of one call to the trajectory."""
         self.used = (run.first_step + run.steps, run.first + run.count + 1)
         if record.segments.is_end_alone and not self.kernels.is_looked_at:
             record.segments.set_end(run.last_end)

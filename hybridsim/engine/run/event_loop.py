@@ -1,4 +1,4 @@
-"""The compiled event loop: segments of one method from event to event, with ordinary events resolved without Python.
+"""The compiled event loop: it integrates segments and resolves ordinary events without Python.
 
 It knows no method. A kernel of the method, with which the loop is compiled, follows a segment. The contract of that
 kernel is in `hybridsim.engine.run.method_kernels.MethodKernels`. A call commits segments one by one. It ends at its
@@ -48,7 +48,7 @@ ORIGIN_AT, PHASES_AT, STEPS, SEGMENTS = range(4)
 
 
 class LoopModel(NamedTuple):
-    """What compiled loops read of a system, as packs."""
+    """The data of a system that compiled loops read, as packed arrays."""
 
     automata: Any  # `hybridsim.engine.system.programs.mode_tables.Automata`
     tapes: Any  # `hybridsim.engine.system.programs.mode_tables.Tapes`
@@ -68,7 +68,7 @@ class LoopCall(NamedTuple):
 
 
 class LoopRecord(NamedTuple):
-    """The committed segments, one row each."""
+    """The stored segments of a run, one row each."""
 
     clocks: np.ndarray  # (., 2) time origin
     modes: np.ndarray  # (., C) modes
@@ -114,7 +114,7 @@ def not_followed(outcome: int) -> SegmentEnd:
 
 @inlined
 def set_origin(place: Any, rates: Any, hi: float, lo: float, p: Any) -> None:
-    """Set the run-time vector for a segment whose local time starts at an instant; inputs stay unchanged."""
+    """Set the run-time vector for a segment that starts at a given instant; the inputs stay unchanged."""
     origin_at, phases_at = place
     p[origin_at] = hi + lo
     for i in range(rates.shape[0]):
@@ -125,7 +125,7 @@ def set_origin(place: Any, rates: Any, hi: float, lo: float, p: Any) -> None:
 def event_loop(
     segment: Any, model: Any, call: Any, state: Any, work: Any, record: Any, own: Any, rows: Any
 ) -> int:
-    """Run from event to event and return why the loop ended. segment: the kernel that follows one segment.
+    """Run from event to event, integrate each segment by the kernel `segment`, and return why the loop ended.
 
     The numbers of committed steps and segments are in `call`. state: `StateArrays` at the start of the segment,
     advanced by the call, like the clock. work: `EventScratch`. record: `LoopRecord`. own, rows: packs of the method,
@@ -199,7 +199,7 @@ def event_loop(
 
 @kernel
 def call_event_loop(model: Any, call: Any, state: Any, work: Any, record: Any, own: Any, rows: Any) -> int:
-    """Call the loop of a method by its address, and record the end of the last segment in the row after it."""
+    """Call the event loop of a method by its address, and store the end of the last segment."""
     code = call_kernel(work.entry_points[EVENT_LOOP], (model, call, state, work, record, own, rows))
     i = call.int_slots[SEGMENTS]
     if i > 0:  # without segments there may be no row left
@@ -211,14 +211,14 @@ def call_event_loop(model: Any, call: Any, state: Any, work: Any, record: Any, o
 def link_event_loop(
     loop: Any, model: Any, call: Any, state: Any, work: Any, record: Any, own: Any, rows: Any
 ) -> None:
-    """Compile the kernels that a call needs, if necessary, and store their addresses for other kernels."""
+    """Compile the kernels that a call needs, and store their addresses for other kernels."""
     link_event_resolution(model, state, work)
     work.entry_points[EVENT_LOOP] = kernel_address(loop, model, call, state, work, record, own, rows)
 
 
 @inlined
 def load_constants(inputs: Any, tapes: Any, k: int, p: Any, V: Any) -> None:
-    """Load the constants of a segment in the modes of row k into their registers."""
+    """Load the constants of the modes in row k into the registers of the segment kernel."""
     for i in range(inputs.constants.shape[0]):
         V[inputs.constants[i], 0] = inputs.values[i, 0]
     for i in range(inputs.parameters.shape[0]):
@@ -229,7 +229,7 @@ def load_constants(inputs: Any, tapes: Any, k: int, p: Any, V: Any) -> None:
 
 @inlined
 def any_holding(automata: Any, z: Any) -> bool:
-    """Return whether any component holds its surface."""
+    """Return whether any component is in the mode that holds its surface at zero."""
     for c in range(z.shape[0]):
         if automata.hold[c] >= 0 and z[c] == automata.hold[c]:
             return True
@@ -238,7 +238,7 @@ def any_holding(automata: Any, z: Any) -> bool:
 
 @inlined
 def any_projecting(automata: Any, z: Any) -> bool:
-    """Return whether any component keeps its surface by projection, so that each step is projected."""
+    """Return whether any component keeps its surface at zero by projection of each step."""
     for c in range(z.shape[0]):
         if automata.hold[c] >= 0 and z[c] == automata.hold[c] and automata.pin[c, 0] < 0:
             return True

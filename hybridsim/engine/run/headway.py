@@ -1,4 +1,4 @@
-"""Stop runs that would take days, and change to a stiff method if that is faster."""
+"""Stop runs that would take days, and switch to a stiff method if that is faster."""
 
 from __future__ import annotations
 
@@ -44,12 +44,12 @@ HEADWAY_SIZE, HEADWAY_PACE = (
 
 
 def cost(steps: float, compiled: float, events: float) -> float:
-    """Return an estimate in seconds of the cost of Python steps, compiled steps and events."""
+    """Return an estimated time in seconds for numbers of Python steps, compiled steps and events."""
     return steps * _STEP + compiled * _COMPILED_STEP + events * _EVENT
 
 
 class NoHeadway(StepFailure):
-    """Raised if the run would not reach its end at the present pace; advice: the remedy to report."""
+    """Raised if the run would not reach its end at its present speed; `advice` is the remedy to report."""
 
     def __init__(self, message: str, advice: str) -> None:
         super().__init__(message)
@@ -57,11 +57,11 @@ class NoHeadway(StepFailure):
 
 
 class TakenOver(Exception):
-    """Raised if another method continues the run from here."""
+    """Raised when another method continues the run from the present instant."""
 
 
 class Headway:
-    """Monitors the pace of one run from its origin to its end."""
+    """Monitors how fast one run advances in time, from its start to its end."""
 
     def __init__(self, system: System, counters: Counters, origin: Instant, end: Instant) -> None:
         self.system, self.counters, self.end = system, counters, end
@@ -76,14 +76,14 @@ class Headway:
 
     @property
     def place(self) -> np.ndarray:
-        """Return the state as an array, for a checkpoint."""
+        """Return the stored measurements as an array for a checkpoint."""
         counts = self._steps, self._events, self._in_python, self._last, self._slow
         return np.array(
             [*self._since, *self._half, *counts, self._cost, self._twice, self._led, self._fading]
         )
 
     def go_on(self, place: np.ndarray) -> None:
-        """Restore the state from a checkpoint."""
+        """Restore the stored measurements from a checkpoint."""
         high, low, half, rest, steps, events, in_python, last, slow, *cost, fading = place.tolist()
         self._since, self._half = Instant(high, low), Instant(half, rest)
         self._steps, self._events, self._in_python = int(steps), int(events), int(in_python)
@@ -91,18 +91,18 @@ class Headway:
         self._cost, self._twice, self._led = cost
 
     def step(self, now: Instant, run: SegmentRun) -> None:
-        """Count a step in Python, and judge the pace after each window."""
+        """Count a step in Python, and check the progress after a fixed number of steps."""
         self._in_python += 1
         if self._in_python * _STEP >= _WINDOW:
             self._check_pace(now, run)
 
     def check_compiled(self, now: Instant) -> None:
-        """Check whether a run in compiled code progresses fast enough."""
+        """Check whether a run in compiled code advances fast enough."""
         if self._spent() >= _WINDOW:
             self._check_pace(now, None)
 
     def is_sooner(self, now: Instant, h: float, compiled: bool) -> bool:
-        """Return whether a stiff method is probably faster than steps of length h up to the end."""
+        """Return whether a stiff method is probably faster than steps of length `h` up to the end."""
         return abs(self.end.minus(now)) * (_COMPILED_STEP if compiled else _STEP) > _SOONER * abs(h)
 
     def _spent(self) -> float:
@@ -124,13 +124,13 @@ class Headway:
         if self._fades(now, spent, left) or is_hopeless:
             advice = _JUMP if crawls else _EVENTS if has_events else _STEPS
             raise NoHeadway(
-                f"no headway: the last interval led from t = {float(before):.9g} to {float(now):.9g}, and the rest of "
+                f"no progress: the last interval led from t = {float(before):.9g} to {float(now):.9g}, and the rest of "
                 f"the run would take at least {to_go / spent:.0e} times as much work",
                 advice,
             )
 
     def _fades(self, now: Instant, spent: float, left: float) -> bool:
-        """Return whether several doublings of the cost advanced time by little, and the end is far away."""
+        """Return whether several doublings of the cost advanced time only a little, far from the end."""
         self._cost += spent
         if self._cost < self._twice:
             return False

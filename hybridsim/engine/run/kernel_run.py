@@ -1,4 +1,4 @@
-"""The result of one call of a compiled loop: its output, the reason for its end, and the final state."""
+"""The result of one call of a compiled loop: its record, the reason for its end, and the final state."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ARRIVED, PAUSED, BEFORE_SOMETHING = 0, 1, 2  # why a compiled call ended
 
 
 class LoopResult(NamedTuple):
-    """The end of a compiled call: the origin of the next segment, the state there, and why it ended.
+    """The end of a compiled call: the next segment's origin, the state there, and the reason for the end.
 
     end: ARRIVED at the target, PAUSED because the arrays are full, or BEFORE_SOMETHING that is not ordinary. instants
     (E, 2): instants of the events. owners (E,): the components whose guards fired. outcome: makes the state on demand.
@@ -38,7 +38,7 @@ class LoopResult(NamedTuple):
 
 @dataclass(eq=False)
 class KernelRun:
-    """One call, before it is committed to a trajectory.
+    """The result of one call, before its segments and events are stored in a trajectory.
 
     Parameters
     ----------
@@ -104,12 +104,12 @@ class KernelRun:
 
     @property
     def fires(self) -> np.ndarray:
-        """Return the numbers (E,) of the fired guards."""
+        """Return the indices (E,) of the guards that fired."""
         return self._happened.fires[self._ended]
 
     @property
     def event_block(self) -> EventBlock | None:
-        """Return the block of events, or None if there are none."""
+        """Return the events as one block, or None if there are none."""
         if self._event_block is None and self.events:
             rows, ended = self._happened, self._ended
             after = slice(ended.start + 1, ended.stop + 1)
@@ -129,7 +129,7 @@ class KernelRun:
         return self.count > 0 and self.events == self.count
 
     def count_in(self, counters: Counters) -> None:
-        """Add the cost common to all kernels to the counters."""
+        """Add the costs that all kernels count to the counters."""
         counters.kernel_time += self.seconds
         counters.steps += self.steps
         counters.restarts += self.count
@@ -137,13 +137,13 @@ class KernelRun:
 
     @property
     def last_end(self) -> Segment:
-        """Return the end of the last segment."""
+        """Return the time and the state at the end of the last segment."""
         rows, last = self._happened, self.first + self.count - 1
         vector = self.rows.vectors[last] if self.vector is None else self.vector
         return end_point(Instant(*self.clock), rows.modes[last], vector, rows.jumps[last, -2])
 
     def forget_segments(self) -> None:
-        """Release the memory of the segments, except the end of the last one."""
+        """Release the memory of the segments, except for the end of the last segment."""
         assert self.memory is not None
         self.vector = self.array_layout.row(self.memory, "vectors", self.first + self.count - 1)
         vars(self).pop("rows", None)

@@ -1,4 +1,4 @@
-"""The state at the origin of a segment, made on demand; a run of one compiled call never needs it."""
+"""The state at the origin of a segment, computed on demand; a run in one compiled call never needs it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hybridsim.engine.system.system import System
 
 
 class LazyState:
-    """The outcome of the last event, and the run-time vector at an instant.
+    """The outcome of the last event and the run-time vector, both computed on demand.
 
     Parameters
     ----------
@@ -39,14 +39,14 @@ class LazyState:
 
     @cached_property
     def outcome(self) -> Outcome:
-        """Return the outcome."""
+        """Return the outcome of the last event."""
         return self._make()
 
     @cached_property
     def p(self) -> np.ndarray:
-        """Return the run-time vector."""
+        """Return the run-time vector: parameters, inputs and discrete states."""
         return self._system.vector(self._instant, self._system.discrete(self.outcome.p), self._forward)
 
     def read(self) -> tuple[Outcome, np.ndarray]:
-        """Return outcome and run-time vector, which must not be modified."""
+        """Return the outcome and the run-time vector for reading; they must not be modified."""
         return self._shared or (self.outcome, self.p)

@@ -1,4 +1,4 @@
-"""Locate the first event along a step: search guards and monitors on the dense output, and refine the roots."""
+"""Locate the first event in a step: search guards and monitors on the dense output, and refine the roots."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _SHORT = 2.0**-13  # of the time of a run; on shorter steps it may be close to z
 
 @dataclass(frozen=True)
 class Hit:
-    """A located zero."""
+    """A located zero of a guard or a monitor."""
 
     theta: float  # position in (0, 1] of the step
     number: int  # guard or monitor number
@@ -33,7 +33,7 @@ class Hit:
 
 @dataclass(frozen=True)
 class Findings:
-    """The zeros found in a step."""
+    """The zeros of guards and monitors found in a step."""
 
     exits: tuple[Hit, ...]  # guards that become negative
     crossings: tuple[Hit, ...]  # all crossings of monitors
@@ -45,7 +45,7 @@ class Findings:
 
 
 def polish(sample: Callable[[np.ndarray], np.ndarray], crossing: Crossing) -> float:
-    """Return the zero inside the bracket of a crossing to rounding, by safeguarded secant steps."""
+    """Return the zero in a bracket to rounding error, by safeguarded secant steps."""
     left, right = crossing.left, crossing.right
 
     def value(theta: float) -> float:
@@ -93,7 +93,7 @@ def _in_order(hits: list[Hit]) -> tuple[Hit, ...]:
 
 
 class Locator:
-    """Searches the steps of one segment, and stores the side of each guard and monitor."""
+    """Searches the steps of one segment for zeros, and stores the side of each guard and monitor."""
 
     def __init__(self, flow: Flow, watch: Watch) -> None:
         self.flow = flow
@@ -105,7 +105,7 @@ class Locator:
         self.samples: list[np.ndarray] = []  # of guards and monitors, on the last searched step
 
     def search(self, step: Step, rounding: Callable[[], np.ndarray]) -> Findings:
-        """Return all zeros in a step; rounding: returns the errors of the states on the segment so far."""
+        """Return all zeros in a step; the function `rounding` returns the state errors so far."""
         flow, width = self.flow, step.s1 - step.s0
         times = step.s0 + width * POINTS
         times[-1] = step.s1
@@ -178,7 +178,7 @@ class Locator:
         )
 
     def is_clear(self, length: float, time: float) -> bool:
-        """Return whether no function is near zero at the end of a step of this length, at this time."""
+        """Return whether no guard or monitor is near zero at the end of a step of this length."""
         found = len(self.samples) == (len(self.numbers) > 0) + (len(self.monitor_numbers) > 0)
         clear = found and (length > _SHORT * time or not self.samples)
         for values in self.samples:
@@ -188,12 +188,12 @@ class Locator:
         return clear
 
     def exit(self, step: Step, guard: int) -> Hit:
-        """Return the zero of a guard that is positive at the start of a step and negative at its end."""
+        """Return the zero of a guard that is positive at the start of a step and negative at the end."""
         sample = self._sampler(step, self.flow.guards, guard)
         return Hit(polish(sample, Crossing(0.0, 1.0, -1)), guard, -1)
 
     def _rounding(self, step: Step, number: int, is_monitor: bool) -> Callable[[], float]:
-        """Return a function for the rounding error of a guard's or monitor's values on the step, computed on demand."""
+        """Return a function that computes the rounding error of a guard or monitor on the step, on demand."""
         known: list[float] = []
 
         def bound() -> float:
@@ -214,7 +214,7 @@ class Locator:
         return bound
 
     def _before(self, step: Step, number: int, is_monitor: bool) -> Callable[[float], float]:
-        """Return a function of theta: the error of a guard or monitor due to the errors at the start of the segment."""
+        """Return a function of theta: the error of a guard or monitor due to the errors at the start."""
         known: list[list[float]] = []
 
         def bound(theta: float) -> float:

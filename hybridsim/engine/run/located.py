@@ -19,7 +19,7 @@ from hybridsim.engine.system.system import System
 
 
 def situation(system: System, arrival: Arrival, segment: SegmentRun) -> Situation:
-    """Return the state before an event, with error bounds from rounding, the instant and the residual."""
+    """Return the state before an event, with bounds of the rounding errors, and the instant of the event."""
     flow, s_error = segment.flow, 2.0 * math.ulp(arrival.s)
     zero, asked = np.zeros(system.n), segment.tolerances
     slopes = np.abs(system.flow(arrival.s, arrival.x, flow.p, flow.z)) if system.n else zero
@@ -59,13 +59,13 @@ def distance_of_zero(series: Any) -> float:
 
 
 def time_error(series: Any, bounds: Any) -> float:
-    """Return the error of the time of a zero, from the error bound of the function there."""
+    """Return the error of the time of a zero, from the error bound of the function at the zero."""
     return distance_of_zero((bounds[0], *series[1:]))
 
 
 @dataclass(frozen=True)
 class Located:
-    """An instant at which a segment ended.
+    """The end of a segment at an event: the instant, the state, and the functions that are zero.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class Located:
 def coincident(
     system: System, origin: Instant, at: Situation, fired: tuple[int, ...], known: Any = None
 ) -> dict[int, int]:
-    """Return the located guards and those that leave zero at the same instant, with their order in time.
+    """Return the located guards and the guards that leave zero at the same instant, in order of time.
 
     known: the series there, if they have been computed.
     """
@@ -117,7 +117,7 @@ def coincident(
 def located(
     system: System, origin: Instant, arrival: Arrival, segment: SegmentRun, target: float, is_due: bool
 ) -> Located:
-    """Return which guards and monitors are zero at the end of a segment, and the state there.
+    """Return the guards and monitors that are zero at the end of a segment, and the state there.
 
     is_due: something is scheduled at the local time `target`, which may be this instant.
     """
@@ -154,7 +154,7 @@ def located(
 
 
 def as_stepped(system: System, at: Situation, arrival: Arrival, segment: SegmentRun) -> tuple[Situation, Any]:
-    """Return the state at an event with error bounds that include the rounding of the steps, and the series there."""
+    """Return the state at an event with error bounds that include the rounding of all steps."""
     with np.errstate(invalid="ignore"):  # a state may have become infinite
         wide, way = replace(at), np.abs(np.diff([*segment.states, arrival.x], axis=0)).sum(axis=0)
     add_steps(system, wide, segment.scale + way, len(segment.knots), segment.method.rounding * way)
@@ -164,7 +164,7 @@ def as_stepped(system: System, at: Situation, arrival: Arrival, segment: Segment
 def _as_due(
     system: System, origin: Instant, at: Situation, series: Any, arrival: Arrival, known_at: float
 ) -> tuple[Situation, Any]:
-    """Return the state at a scheduled time; widen its errors if more functions are then zero."""
+    """Return the state at a scheduled time; its error bounds are larger if more functions are zero then."""
     slopes = np.abs(system.flow(at.s, at.x, at.p, at.z)) if system.n else 0.0
     wide = replace(at, x_error=at.x_error + known_at * slopes, s_error=at.s_error + known_at)
     known = system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
@@ -173,7 +173,7 @@ def _as_due(
 
 
 def others_near(system: System, at: Situation, series: Any, arrival: Arrival, share: float) -> bool:
-    """Return whether rounding may make another function zero, within `share` times its bound."""
+    """Return whether another function may be zero within its error bound, multiplied by `share`."""
     active = set(map(int, np.flatnonzero(system.active(at.z) & ~system.is_corner[system.owner])))
     monitors = set(range(len(series.monitors))) - set(arrival.stopping)
     values = [(series.guards[g][0], series.guard_bounds[g][0]) for g in active.difference(arrival.fired)]
@@ -182,19 +182,19 @@ def others_near(system: System, at: Situation, series: Any, arrival: Arrival, sh
 
 
 def _zero_count(system: System, origin: Instant, at: Situation, arrival: Arrival, series: Any) -> int:
-    """Return the number of guards that leave zero at an event plus the number of monitors at zero."""
+    """Return how many guards leave zero at an event, plus how many monitors are zero."""
     bounded_monitors = zip(series.monitors, series.monitor_bounds, strict=True)
     monitors = sum(abs(value[0]) <= bound[0] for value, bound in bounded_monitors)
     return len(coincident(system, origin, at, arrival.fired, series)) + monitors
 
 
 def _is_near(series: Any, arrival: Arrival, guard: int, s: float) -> bool:
-    """Return whether a near-grazing of a guard is the zero at the event itself."""
+    """Return whether a near-grazing of a guard is the same zero as the event."""
     return abs(arrival.s - s) <= 2.0 * time_error(series.guards[guard], series.guard_bounds[guard])
 
 
 def _before_instant(series: Any, arrival: Arrival, segment: SegmentRun) -> np.ndarray:
-    """Return the sides of the monitors just before an instant. Monitors that are zero within rounding have not crossed.
+    """Return the sides of the monitors just before an instant; monitors at zero have not yet crossed.
 
     If a crossing of such a monitor was recorded, it is removed. The sides before and after the instant decide.
     """
@@ -217,7 +217,7 @@ def _before_instant(series: Any, arrival: Arrival, segment: SegmentRun) -> np.nd
 
 
 def located_backward(system: System, origin: Instant, arrival: Arrival, segment: SegmentRun) -> Located:
-    """Return the guards and monitors that are zero and the state, backward in time, without schedules."""
+    """Return the guards and monitors that are zero and the state, for a run backward in time."""
     at = situation(system, arrival, segment)
     fired = coincident(system, origin, at, arrival.fired) if arrival.fired else {}
     sides = segment.locator.monitor_sides
@@ -229,7 +229,7 @@ def located_backward(system: System, origin: Instant, arrival: Arrival, segment:
 def errors_when_due(
     system: System, target: Instant, at: Situation, steps: int, rounding: float, before: np.ndarray
 ) -> np.ndarray:
-    """Return errors of the states at a scheduled time that a compiled loop reached in so many steps.
+    """Return the state errors at a scheduled time that a compiled loop reached in the given number of steps.
 
     rounding: of the method. before: the states at which the loop began.
     """
@@ -244,7 +244,7 @@ def errors_when_due(
 def with_evaluated(
     system: System, before: np.ndarray, x: np.ndarray, p: np.ndarray, z: np.ndarray, error: np.ndarray
 ) -> np.ndarray:
-    """Return errors of the states at a scheduled time, including those of states held in the modes before.
+    """Return the state errors at a scheduled time, including the errors of held states.
 
     Held states were evaluated at a local time of the run-time vector `before`, and are judged at the origin of p. Both
     times are rounded.
@@ -259,7 +259,7 @@ def with_evaluated(
 
 
 def add_steps(system: System, at: Situation, scale: np.ndarray, steps: int, stages: np.ndarray) -> None:
-    """Add the rounding errors of so many steps to the errors of the states.
+    """Add the rounding errors of a number of steps to the errors of the states.
 
     A step is a sum of rounded terms. scale: size of the states plus the distance they moved. stages: that distance
     times the sum of the stages of the method, which cancel each other.
@@ -270,7 +270,7 @@ def add_steps(system: System, at: Situation, scale: np.ndarray, steps: int, stag
 
 
 def without_fatal(system: System, found: Located) -> Located:
-    """Return the located event at the end of a run without fatal guards, because nothing has to continue."""
+    """Return a located event without fatal guards, for the end of a run, after which nothing continues."""
     modes = zip(system.automata, found.at.z.tolist(), strict=True)
     fatal = {g for a, m in modes if m >= 0 for g, message in zip(a.guards[m], a.fatal[m]) if message}
     return replace(found, fired={g: place for g, place in found.fired.items() if g not in fatal})

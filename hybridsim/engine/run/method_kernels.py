@@ -1,4 +1,4 @@
-"""The contract between the compiled event loop and a method: a segment kernel, its arrays, and its record."""
+"""The interface between the compiled event loop and a method: a segment kernel, its arrays, its record."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NOT_LINEAR = no_tables()  # for kernels without tables of linear modes
 
 
 class MethodKernels(ABC):
-    """What a method adds to the compiled event loop of one run, in which no segment is longer than `longest`.
+    """The parts that a method adds to the compiled event loop of one run; `longest` limits the segments.
 
     ``segment(start, model, call, state, work, own, rows)`` is an `inlined` kernel from `SegmentStart` to `SegmentEnd`.
     `loop` is a plain function that passes it to `event_loop`; both are compiled together. The other arguments of a
@@ -60,7 +60,7 @@ class MethodKernels(ABC):
         self._reusable: tuple[Any, deque[Any]] | None = None
 
     def fresh_copy(self) -> MethodKernels:
-        """Return a copy for another run, or itself if the method remembers nothing from call to call."""
+        """Return a copy for another run, or this object if the method stores nothing between calls."""
         if not self.remembers:
             return self
         other: MethodKernels = object.__new__(type(self))
@@ -69,11 +69,11 @@ class MethodKernels(ABC):
 
     @abstractmethod
     def arrays(self) -> Any:
-        """Return new arrays of the kernel for one call, as a pack."""
+        """Return new packed arrays of the segment kernel for one call."""
 
     @abstractmethod
     def fields(self) -> Sequence[tuple[Any, tuple[int, ...]]]:
-        """Return the dtype and the shape of a row of each array in `rows`."""
+        """Return the dtype and the row shape of each array in `rows`."""
 
     @abstractmethod
     def block(
@@ -86,38 +86,38 @@ class MethodKernels(ABC):
         vectors: np.ndarray,
         jumps: np.ndarray,
     ) -> SegmentBlock:
-        """Return the committed segments of a call; last_steps (N + 1,): 0, then the last step of each segment."""
+        """Return the segments of a call as one block; `last_steps` contains the last step of each."""
 
     def tables(
         self, tapes: Tapes, state: HybridState, origin: Instant, target: Instant
     ) -> tuple[Any, deque[Any]] | None:
-        """Return tables of linear modes, and reusable arrays of calls; None if the kernel cannot be called."""
+        """Return the tables of linear modes and reusable arrays, or None if the kernel cannot be called."""
         if self._reusable is None:
             self._reusable = NOT_LINEAR, spare_scratch(self.system, self.kind)
         return self._reusable
 
     def begin(self, own: Any, tapes: Tapes) -> Any:
-        """Write the settings of the run to the arrays before a call. Return the arrays."""
+        """Write the settings of the run to the arrays before a call, and return the arrays."""
         return own
 
     def end(self, own: Any, tapes: Tapes, lin: Any) -> Any:
-        """Return the result of a call besides its record, for `count`, `take` and `block`."""
+        """Return the parts of a call's result other than its record."""
         return None
 
     def count(self, counters: Counters, steps: int, result: Any) -> None:
-        """Add the cost of the steps to the counters, except for their number."""
+        """Add the cost of the steps, without the number of steps, to the counters."""
         return
 
     def take(self, result: Any) -> None:
-        """Keep what the next call of this run needs of a result."""
+        """Store the parts of a result that the next call of this run needs."""
         return
 
     @property
     def place(self) -> tuple[np.ndarray, ...]:
-        """Return the method's state between calls as arrays, for a checkpoint, if calls do not share a record."""
+        """Return the method's state between calls as arrays, for a checkpoint."""
         return ()
 
     @place.setter
     def place(self, place: np.ndarray) -> None:
-        """Restore the method's state between calls."""
+        """Restore the method's state between calls from a checkpoint."""
         return

@@ -1,4 +1,4 @@
-"""The mode loop: integrate to the first event, resolve it, and continue. It depends on no method and no law."""
+"""The mode loop: integrate to the first event, resolve it, and continue; it is the same for all methods."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ _NEAR = 1e-6  # relative to a time
 
 
 class ModeLoop:
-    """One run of a system with one stepping method. compiled_loop: a compiled loop that was called in advance."""
+    """One run of a system with one stepping method; `compiled_loop` may have been called in advance."""
 
     def __init__(
         self,
@@ -82,33 +82,33 @@ class ModeLoop:
 
     @property
     def outcome(self) -> Outcome:
-        """Return the outcome at the origin."""
+        """Return the outcome of the last event at the origin of the segment."""
         return self.lazy_state.outcome
 
     @property
     def p(self) -> np.ndarray:
-        """Return the run-time vector at the origin."""
+        """Return the run-time vector at the origin of the segment."""
         return self.lazy_state.p
 
     def _set_state(self, instant: Instant, make: Callable[[], Outcome]) -> None:
-        """Set the instant at which the next segment begins; its state is made on demand."""
+        """Set the instant at which the next segment begins; the state there is computed on demand."""
         self.lazy_state = LazyState(self.system, instant, self.forward, make)
 
     def _progress(self, instant: Instant) -> None:
-        """Report the progress and check the limits; raises LimitReached."""
+        """Report the progress and check the limits of the run; raises LimitReached."""
         self._tell(instant)
         if self.limit_monitor is not None:
             self.limit_monitor.check()
 
     def _stepped(self, instant: Instant, run: SegmentRun) -> None:
-        """Report progress after a step in Python; check limits and pace (raises NoHeadway, TakenOver)."""
+        """Report progress after a step in Python, and check the limits; raises NoHeadway or TakenOver."""
         self._progress(instant)
         self.headway.step(instant, run)
         if self.notices.look_on_the_way(run):
             raise TakenOver
 
     def _take_over(self) -> None:
-        """Continue with the stiff method."""
+        """Continue the run with the stiff method."""
         assert self.task.successor is not None
         self.method = self.notices.method = self.task.successor
         self.compiled_loop, self.notices.takes_over = None, False
@@ -120,7 +120,7 @@ class ModeLoop:
             self._on_progress((float(instant) - self.task.t0) / (self.task.t1 - self.task.t0))
 
     def run(self) -> Trajectory:
-        """Integrate to the end, or until the run stops. Results computed so far are kept in every case."""
+        """Integrate to the end, or until the run stops; the results so far are kept in every case."""
         try:
             self._run()
         except StepFailure as failure:
@@ -212,13 +212,13 @@ class ModeLoop:
             self._mark(None)  # t1 may have cut the last step short
 
     def _reach(self) -> float:
-        """Return the longest segment allowed from here."""
+        """Return the length of the longest segment allowed from the present instant."""
         return min(self.renewal, self.accumulation.reach(float(self.origin)))
 
     def _no_farther(
         self, target: Instant, appointment: Appointment | None
     ) -> tuple[Instant, Appointment | None]:
-        """Return the target with its appointment, or the end of the longest allowed segment if earlier."""
+        """Return the target and its scheduled event, or the end of the longest allowed segment."""
         reach = self._reach()
         if abs(target.minus(self.origin)) <= reach:
             return target, appointment
@@ -226,7 +226,7 @@ class ModeLoop:
         return target, Appointment(target, (), is_renewal=True)
 
     def _arrival(self, segment: SegmentRun, bound: float, step_size: float | None) -> Arrival:
-        """Return the end of a segment, or the point at which another method takes over."""
+        """Return the end of a segment, or the point at which another method continues."""
         try:
             return segment.run(bound, step_size)
         except TakenOver:
@@ -253,7 +253,7 @@ class ModeLoop:
         self.record.mark(checkpoint)
 
     def _go_on_from(self, checkpoint: Checkpoint) -> float | None:
-        """Restore a checkpoint. Return the first step size."""
+        """Restore a checkpoint, and return the first step size."""
         arrays = checkpoint.arrays
         if "step_size" not in arrays:  # from a method with fixed steps
             raise damaged("the checkpoint")
@@ -275,7 +275,7 @@ class ModeLoop:
     def _run_compiled(
         self, compiled_loop: CompiledLoop, target: Instant, appointment: Appointment | None
     ) -> tuple[bool, bool]:
-        """Run over ordinary events in compiled code. Return whether the target was reached, and whether to stop."""
+        """Run over ordinary events in compiled code; return if the target was reached, if the run stops."""
         steps, x_before = self.record.counters.steps, self.lazy_state.read()[0].x.copy()
         while True:
             result = compiled_loop.advance(self.origin, *self.lazy_state.read(), target, self.record)
@@ -318,7 +318,7 @@ class ModeLoop:
         return Situation(0.0, outcome.x.copy(), p, outcome.z.copy(), outcome.x_error.copy(), 0.0)
 
     def _is_event(self, found: Located) -> bool:
-        """Return whether an event happens at the end of the run; corners alone do not count."""
+        """Return whether an event happens at the end of the run; changes of side at corners do not count."""
         owners = set(self.system.owner[list(found.fired)].tolist())
         return bool(owners - self._led) or bool(found.monitors.leads.any())
 
@@ -353,7 +353,7 @@ class ModeLoop:
         return run
 
     def _store(self, run: SegmentRun) -> None:
-        """Append a segment, with the events that did not end it."""
+        """Append a segment with its steps, and the events in it that did not end it."""
         record = self.record
         if len(run.knots) > 1:
             record.segments.append(run.segment())
@@ -374,7 +374,7 @@ class ModeLoop:
         segment: SegmentRun,
         found: Located | None,
     ) -> bool:
-        """Resolve the event at the end of a segment. Return True if the run stops."""
+        """Resolve the event at the end of a segment; return True if the run stops."""
         schedules = appointment.schedules if appointment else ()
         if arrival.entered:
             self.origin = instant
@@ -486,7 +486,7 @@ class ModeLoop:
         error: np.ndarray,
         s_error: float = 0.0,
     ) -> Outcome:
-        """Resolve a scheduled instant with the inputs that hold after it.
+        """Resolve a scheduled event, with the values of the inputs after it.
 
         before: the outcome that holds until then. s_error: error of the times of zeros located there. An event that was
         resolved within two roundings of the instant has its zero there as well.
@@ -504,7 +504,7 @@ class ModeLoop:
         return resolution.run((), resets)
 
     def _accumulated(self, instant: Instant, x_minus: np.ndarray, fired: tuple[int, ...]) -> bool:
-        """Detect an accumulation of events. Return whether the run ends there."""
+        """Detect an accumulation of events; return whether the run ends there."""
         closed = closed_now(self.system, self.outcome)
         self.accumulation.forget(closed)  # a closed contact does not bounce any more
         changed = {c.component for c in self.outcome.changes}.difference(closed)
@@ -519,7 +519,7 @@ class ModeLoop:
         return self._ends_at(hidden or limit)
 
     def _ends_at(self, limit: Limit | None) -> bool:
-        """Return whether the run ends at this limit of events, because no motion continues from it."""
+        """Return whether the run ends at this limit of events, because no motion continues from the limit."""
         stop = False if limit is None else self._gathered(limit)
         if limit is None or stop is not None:
             return bool(stop)
@@ -528,7 +528,7 @@ class ModeLoop:
         return True
 
     def _gathered(self, limit: Limit) -> bool | None:
-        """Continue from a limit along surfaces, in contacts, or as declared. Return whether the run stops there.
+        """Continue from a limit of events along surfaces, in contacts, or as declared; return if it stops.
 
         The result is None if no motion continues.
         """
@@ -571,7 +571,7 @@ class ModeLoop:
         monitors: MonitorSides | None = None,
         is_last: bool = True,
     ) -> bool:
-        """Make the state after an event the start of the next segment, and record the event. Return True to stop.
+        """Start the next segment from the state after an event, and record the event; return True to stop.
 
         is_last: nothing else follows at this instant. Otherwise only monitors whose resets were applied are recorded
         yet.
@@ -606,7 +606,7 @@ class ModeLoop:
     def _fired_monitors(
         self, recorder: Recorder, outcome: Outcome, monitors: MonitorSides, is_last: bool
     ) -> list[str]:
-        """Record the monitors that fire at an instant. Return those that end the run."""
+        """Record the monitors that fire at an instant, and return those that end the run."""
         is_last = is_last or bool(outcome.status)
         if is_last:
             monitors.fire(outcome)

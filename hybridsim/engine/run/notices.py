@@ -1,4 +1,4 @@
-"""Produce warnings on a run: accumulation, chattering, and steps limited by stability.
+"""Warn of accumulating events, of chattering, and of steps that stability limits.
 
 They are derived from the record every few hundred events or steps and at the end. They never change the run.
 """
@@ -38,7 +38,7 @@ Sample = tuple[int, float, float, np.ndarray, np.ndarray, np.ndarray]
 
 @kernel
 def moves_little(states: Any, share: float, extent: Any) -> bool:
-    """Return whether no state moves by more than a fraction `share` of its range between consecutive events.
+    """Return whether no state moves by more than the fraction `share` of its range between two events.
 
     states (k, 2, n): before and after each event. extent (2, n): least and largest states so far, which this function
     extends.
@@ -58,7 +58,7 @@ def moves_little(states: Any, share: float, extent: Any) -> bool:
 
 
 class Notices:
-    """Monitors one run for warnings.
+    """Monitors one run, and collects its warnings.
 
     Stiffness is detected as in the code DOP853 (Hairer, Norsett and Wanner 1996, section IV.2), by comparing h |lambda|
     with the border of the stability region. The power method on differences of the flow gives lambda, the fastest rate.
@@ -82,16 +82,16 @@ class Notices:
 
     @cached_property
     def _range(self) -> np.ndarray:
-        """Return the least and largest states (2, n) so far."""
+        """Return the least and the greatest value of each state so far, as an array (2, n)."""
         return np.array([self._start, self._start])
 
     def accumulated(self, names: list[str]) -> None:
-        """Warn that events of these components were replaced by their limit."""
+        """Warn that the run continues from the limit of the events of some components."""
         self.record.warn(f"accumulation: events of {', '.join(names)} follow each other ever faster; the run "
                          f"continues from their limit")  # fmt: skip
 
     def look(self) -> None:
-        """Examine the new events and steps if there are enough."""
+        """Examine the new events and steps for warnings, if there are enough of them."""
         counters = self.record.counters
         if counters.events - self._events >= _EVENTS:
             self._events = counters.events
@@ -102,7 +102,7 @@ class Notices:
             self._look_for_stiffness(_sampled(block), lambda i: Instant(*block.origins[i].tolist()))
 
     def look_on_the_way(self, run: SegmentRun) -> bool:
-        """Examine the steps of an unfinished segment. Return whether a stiff method takes over."""
+        """Examine the steps of an unfinished segment; return whether a stiff method takes over."""
         counters = self.record.counters
         if not self.method.stable_to or counters.steps - self._steps < _STEPS or len(run.knots) <= _STEPS:
             return False
@@ -166,7 +166,7 @@ class Notices:
         )
 
     def _fastest_turning(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> float:
-        """Return the largest |lambda| of oscillating decays, on which the power method does not converge."""
+        """Return the largest |lambda| of decaying eigenvalues, including complex pairs, from the Jacobian."""
         jacobian = Flow(self.system, p, z, Counters()).jacobian(s, x)
         if not np.isfinite(jacobian).all():
             return 0.0
@@ -177,7 +177,7 @@ class Notices:
 
 @kernel
 def fastest_decay(flow: Any, s: float, x: Any, p: Any, z: Any, floors: Any, work: Any) -> float:
-    """Return the fastest rate of the flow at a state, negative unless it is a decay without oscillation.
+    """Return the fastest decay rate of the flow at a state, or a negative number if there is none.
 
     The power method on differences of the flow is used. floors (n,): sizes for states that are zero. work (5, n):
     scratch.
@@ -214,7 +214,7 @@ def fastest_decay(flow: Any, s: float, x: Any, p: Any, z: Any, floors: Any, work
 
 
 def _last_transitions(blocks: Sequence[Any], count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return instants (k, 2) and states (k, 2, n) on both sides of the transitions among the last events."""
+    """Return instants (k, 2) and states (k, 2, n) on both sides of the transitions in the last events."""
     parts, missing = [], count
     for block in reversed(blocks):
         first = max(0, len(block) - missing)
@@ -243,7 +243,7 @@ def _last(blocks: Sequence[Any], count: int) -> list[Occurrence]:
 
 
 def _sampled(block: Any) -> list[Sample]:
-    """Return steps that no event cut short, spread evenly over the segments of a block."""
+    """Return complete steps, not shortened by events, from segments spread evenly over a block."""
     chosen = _evenly(len(block), _LOOKS)
     share = -(-_LOOKS // len(chosen))
     found: list[Sample] = []
@@ -256,7 +256,7 @@ def _sampled(block: Any) -> list[Sample]:
 
 
 def _evenly(count: int, most: int) -> list[int]:
-    """Return at most `most` numbers below count, evenly spaced from the first to the last."""
+    """Return at most `most` whole numbers below `count`, evenly spaced from 0 to `count` - 1."""
     if count <= most:
         return list(range(count))
     return [k * (count - 1) // (most - 1) for k in range(most)] if most > 1 else [0]

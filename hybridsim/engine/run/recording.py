@@ -1,4 +1,4 @@
-"""Record events: those of one instant, and those that a segment passed without an end."""
+"""Record events: all events of one instant, and events in a segment that did not end it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from hybridsim.engine.system.system import System
 
 
 class Recorder:
-    """Appends the events of one instant to a record, with the states x- and x+ (n,) there."""
+    """Appends the events of one instant to a record, with the states before (x-) and after (x+)."""
 
     def __init__(
         self, record: Trajectory, system: System, instant: Instant, x_minus: np.ndarray, x_plus: np.ndarray
@@ -24,7 +24,7 @@ class Recorder:
         self.states = x_minus, x_plus
 
     def changes(self, changes: Sequence[Change]) -> None:
-        """Record changes of mode, and count them as events."""
+        """Record the changes of mode at an instant, and count them as events."""
         for change in changes:
             automaton = self.system.automata[change.component]
             modes = automaton.modes[change.source], automaton.modes[change.target]
@@ -32,14 +32,14 @@ class Recorder:
         self.record.counters.events += len(changes)
 
     def schedules(self, schedules: Sequence[int]) -> list[str]:
-        """Record schedules; return the names of those that end the run."""
+        """Record the schedules that are due, and return the names of those that end the run."""
         declared = [self.system.model.schedules[k] for k in schedules]
         for schedule in declared:
             self._append("scheduled", schedule.name, 0)
         return [schedule.name for schedule in declared if schedule.terminate]
 
     def monitors(self, seen: Sequence[tuple[str, int]]) -> None:
-        """Record monitors, with the direction in which each crossed zero."""
+        """Record the monitors that fired, with the direction in which each one crossed zero."""
         for name, direction in seen:
             self._append("monitor", name, direction)
 
@@ -52,7 +52,7 @@ class Recorder:
 
 
 def passed_events(system: System, origin: Instant, run: SegmentRun, record: Trajectory) -> list[Occurrence]:
-    """Return recorded monitors and near-grazings in order of time; warn of near-grazings in the record."""
+    """Return recorded monitors and near-grazings in order of time, and warn of near-grazings."""
     passed = [(seen.s, _passed_monitor(system, origin, seen)) for seen in run.passed_monitors]
     declared = [g for g in run.grazings if not system.is_corner[system.owner[g[0]]]]
     if declared:

@@ -1,4 +1,4 @@
-"""Report the engine's view of a model: clusters, held states, linear modes, and the cost of compiling it."""
+"""Report the structure of a model: clusters, held states, linear modes, and the cost of compiling."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _SECONDS, _SECONDS_PER_CHARACTER = 0.006, 9e-6
 
 @dataclass(frozen=True)
 class Report:
-    """The engine's view of a model.
+    """The structure of a model as the engine uses it.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class Report:
 
 
 def describe(model: Model) -> Report:
-    """Lower a model without compiling it, and report the result. A model that no run could start with is refused."""
+    """Report the structure of a model without compiling it; raise an error if no run could start with it."""
     model = smoothed(model)
     system = System(model, as_written=True)
     discrete = np.array(list(model.discrete_values().values()), dtype=float)

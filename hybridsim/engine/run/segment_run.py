@@ -1,4 +1,4 @@
-"""Integrate one segment: take steps from one event to the next, search each step, and refine the event time."""
+"""Integrate one segment: take steps up to the next event, search each step, and refine the event time."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ _SHORTER = 0.1
 
 
 class Still:
-    """The stepper of a model without continuous states: one step to the bound."""
+    """The stepper of a model without continuous states: one step to the end of the segment."""
 
     def __init__(self, bound: float) -> None:
         self.bound = bound
@@ -71,7 +71,7 @@ class Still:
         return Step(0.0, self.bound, np.zeros(0), np.zeros(0), lambda s: np.zeros((len(s), 0)))
 
     def restep(self, step: Step, s: float) -> Step:
-        """Return the step up to s."""
+        """Return the step, shortened to the local time s."""
         return Step(step.s0, s, step.x0, step.x1, step.dense)
 
 
@@ -114,7 +114,7 @@ class SegmentRun:
         self.entries = () if forward else entries(system, z)
 
     def run(self, bound: float, first_step: float | None) -> Arrival:
-        """Step to the first event, or to the bound."""
+        """Take steps up to the first event, or up to the bound of the segment."""
         undecided = self.watch.guards[np.isnan(self.watch.guard_floors[self.watch.guards])]
         # the stepper reports rates that are not finite
         if len(undecided) and np.isfinite(self.flow.rhs(0.0, self.states[0])).all():
@@ -159,12 +159,12 @@ class SegmentRun:
                 return Arrival(step.s1, self._projected(step))
 
     def cut(self) -> Arrival:
-        """Return the end of the last step as the end of an unfinished segment."""
+        """Return the end of the last complete step as the end of an unfinished segment."""
         s = self.knots[-1]
         return Arrival(s, self.flow.project(np.array([s]), self.states[-1][None, :])[0])
 
     def _refuse_standstill(self, step: Step) -> None:
-        """Stop a run whose steps have become too short. The steps at the standstill are discarded."""
+        """Stop a run whose steps have become too short, and discard these steps."""
         length = abs(step.s1 - step.s0)
         if length >= STANDSTILL * abs(step.s1):
             self.short = 0
@@ -182,17 +182,17 @@ class SegmentRun:
     def _collapse(self, since: float, how: str) -> NoReturn:
         """End the run at the local time at which its steps became too short."""
         self._go_back(since)
-        raise Creeping(f"the step size collapsed at t = {float(self.origin.plus(since)):.9g}: {how}", since)
+        raise Creeping(f"steps became too small at t = {float(self.origin.plus(since)):.9g}: {how}", since)
 
     def _go_back(self, s: float) -> None:
-        """Discard everything after the end of a step."""
+        """Discard everything after the end of the given step."""
         knot = self.knots.index(s)
         del self.knots[knot + 1 :], self.states[knot + 1 :], self.interpolants[knot:]
         self.passed_monitors = [seen for seen in self.passed_monitors if seen.s <= s]
         self.grazings = [grazing for grazing in self.grazings if grazing[1] <= s]
 
     def _check_shape(self, step: Step) -> None:
-        """Refuse dense output of a wrong shape, tested with a number of times that is not the number of states."""
+        """Check the shape of the dense output, for a number of times different from the states."""
         n = self.system.n
         times = np.linspace(step.s0, step.s1, 2 if n != 2 else 3)
         try:
@@ -209,7 +209,7 @@ class SegmentRun:
         )
 
     def carry_on(self, arrival: Arrival, s: float) -> Arrival:
-        """Return the end moved to a time that differs by rounding only."""
+        """Return the end of the segment at a time that differs by rounding only."""
         if not self.interpolants:
             return arrival
         before, after = self.interpolants[-1](np.array([arrival.s, s]))
@@ -218,16 +218,16 @@ class SegmentRun:
         return replace(arrival, s=s, x=x)
 
     def is_clear_at_end(self, t: float) -> bool:
-        """Return whether guards and monitors are far from zero at the end of the last step, at time t."""
+        """Return whether all guards and monitors are far from zero at the end of the last step."""
         s = self.knots[-1]
         return len(self.knots) > 1 and self.locator.is_clear(s - self.knots[-2], max(s, abs(t)))
 
     def rounding(self) -> np.ndarray:
-        """Return error bounds of the states on the segment: its rounding plus the errors at its start."""
+        """Return error bounds of the states on the segment, including the errors at its start."""
         return 4.0 * UNIT * self.scale + self.watch.x_error
 
     def segment(self) -> Segment:
-        """Return the finished segment of the trajectory."""
+        """Return the finished segment, for the trajectory."""
         knots, flow = np.array(self.knots), self.flow
         states = flow.project(knots, np.array(self.states).reshape(len(knots), -1))
         return Segment(
@@ -249,7 +249,7 @@ class SegmentRun:
     # -- events that the engine locates ---------------------------------------------------------------------
 
     def _examine(self, stepper: Stepper, step: Step) -> tuple[Step, Arrival | None]:
-        """Search a step. If an event stops the segment, return the step up to it and the arrival."""
+        """Search a step for zeros; if an event stops the segment, return the step up to the event."""
         found = self.locator.search(step, self.rounding)
         first = self._first_stop(found)
         if first is not None and self._has_not_moved(step, *first):
@@ -283,7 +283,7 @@ class SegmentRun:
         return self._at_step_end(stepper, step, found)
 
     def _has_not_moved(self, step: Step, hit: Hit, is_monitor: bool) -> bool:
-        """Return whether a guard was located in the first step before its series exceeds rounding.
+        """Return whether a guard was located in the first step while its change is below rounding error.
 
         The step then contradicts the flow at its start, as a long step of a stiff method may if the motion grows away
         from the surface. A shorter step is searched instead.
@@ -310,7 +310,7 @@ class SegmentRun:
         return want in (0, direction)
 
     def _is_recorded(self, hit: Hit, first: tuple[Hit, bool] | None) -> bool:
-        """Return whether a monitor crossing is only to be recorded, before the first stop."""
+        """Return whether a monitor's crossing is only recorded, because nothing stops before it."""
         is_before = first is None or hit.theta < first[0].theta
         recorded = self.monitors[hit.number].action == "record"
         return is_before and recorded and self._fires_in(hit.number, hit.direction)
@@ -331,7 +331,7 @@ class SegmentRun:
                 self.locator.monitor_sides[hit.number] = hit.direction
 
     def _at_step_end(self, stepper: Stepper, step: Step, found: Findings) -> tuple[Step, Arrival | None]:
-        """Set the sides for the next step; a zero at the end of this step belongs to it.
+        """Set the sides of guards and monitors for the next step; a zero at the end belongs to this step.
 
         A guard that the search left undecided and that is negative beyond rounding at the end was zero before it.
         """
@@ -386,7 +386,7 @@ class SegmentRun:
         return step, None
 
     def _refine(self, stepper: Stepper, step: Step, hit: Hit, is_monitor: bool) -> tuple[Step, bool]:
-        """Return the step up to the event with the accuracy of the method and True, or a shorter step and False.
+        """Return the step up to the event and True if it is accurate, otherwise a shorter step and False.
 
         If the dense output is less accurate than the method, the step is repeated to the event time, which Newton's
         method corrects until the guard is zero within rounding. An event in a step whose error there exceeds the
@@ -436,7 +436,7 @@ class SegmentRun:
         return bool(abs(values[number, 0]) <= bounds[number, 0])
 
     def _look_for_entries(self, step: Step, arrival: Arrival | None) -> tuple[Step, Arrival | None]:
-        """Stop a backward run if the present mode may have been entered through a guard of another mode."""
+        """Stop a run backward in time if the present mode may have begun through a guard of another mode."""
         for entry in self.entries:
             sample = self._entry_sampler(step, entry)
             found, *_ = find_roots(sample, sample(POINTS), 0, 0, 0, lambda: 0.0, lambda _: 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""The set-up of a run before its first instant, stored with the task for all its runs."""
+"""The set-up of a run before its first instant, stored with its task and shared by all runs of the task."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _RENEWAL_TURNS = 100
 
 
 class RunSetup:
-    """The set-up shared by all runs of one task with one method. It is stored in the task and does not refer to it."""
+    """The set-up shared by all runs of one task with one method; the task stores it."""
 
     def __init__(self, system: System, method: Method, task: Task) -> None:
         self.system, self.method = system, method
@@ -34,7 +34,7 @@ class RunSetup:
         self._buffer: HybridState | None = None  # the same in the layout of compiled loops
 
     def _compiled_loop(self, task: Task) -> CompiledLoop | None:
-        """Return the compiled loop if method and model allow it, else None."""
+        """Return the compiled loop if the method and the model allow one, else None."""
         system, model = self.system, self.system.model
         if (
             not self.method.has_compiled_loop
@@ -52,7 +52,7 @@ class RunSetup:
 
     @property
     def silent_start(self) -> HybridState | None:
-        """Return the read-only start state if an earlier run has shown that the start records nothing.
+        """Return the read-only state at the start, if an earlier run has shown that the start has no events.
 
         The result is None if an event is recorded at the start, if there are schedules or input signals, or if there is
         no compiled loop.
@@ -64,7 +64,7 @@ class RunSetup:
         return self._buffer
 
     def start(self, task: Task, due: tuple[int, ...]) -> LazyState:
-        """Return the state just after the start of the task, with the schedules due then applied."""
+        """Return the state just after the start of a task, after schedules that are due at the start."""
         system, forward = self.system, task.forward
         if self._start is None:
             outcome = settled_start(system, task, self.origin, due)
@@ -75,7 +75,7 @@ class RunSetup:
 
 
 def setup_of(system: System, method: Method, task: Task) -> RunSetup:
-    """Return the set-up stored with a task, and create it if needed."""
+    """Return the set-up stored with a task; create the set-up if there is none."""
     setup = task.setups.get("last")
     if setup is None or setup.system is not system or setup.method is not method:
         setup = task.setups["last"] = RunSetup(system, method, task)

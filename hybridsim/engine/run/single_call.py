@@ -32,7 +32,7 @@ from hybridsim.engine.system.system import System
 
 
 class LazyTrajectory(Trajectory):
-    """The record of a finished run. Only its segments, events and cost exist before the full record is requested.
+    """The record of a finished run in compact form; the full record is built on demand.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class LazyTrajectory(Trajectory):
         self._kernel_run, self._segments, self._count, self._make = kernel_run, segments, count, make
 
     def then(self, last: Callable[[Trajectory], None]) -> None:
-        """Register a function to be applied to the full record once it is made."""
+        """Register a function that is applied to the full record after it is built."""
         first = self._make
 
         def make() -> Trajectory:
@@ -64,7 +64,7 @@ class LazyTrajectory(Trajectory):
         self._make = make
 
     def whole(self) -> None:
-        """Make the full record now."""
+        """Build the full record now."""
         vars(self).update(vars(self._make()))
 
     def __getattr__(self, name: str) -> Any:
@@ -86,7 +86,7 @@ class LazyTrajectory(Trajectory):
 
 
 class _FailedCall:
-    """A substitute for a compiled loop whose first call failed; it raises the error in the mode loop."""
+    """Replaces a compiled loop whose first call failed; it raises the error in the mode loop."""
 
     kernel_run = None
 
@@ -94,7 +94,7 @@ class _FailedCall:
         self.place, self._error = place, error
 
     def advance(self, *_: Any) -> Any:
-        """Raise the error."""
+        """Raise the error of the failed call."""
         raise self._error
 
 
@@ -102,7 +102,7 @@ _cannot_accumulate = Precompiled(cannot_accumulate)
 
 
 def _is_over(system: System, kernel_run: KernelRun) -> bool:
-    """Return whether the call is certainly the whole run: no events accumulate, no bounces are hidden."""
+    """Return whether one call is certainly the whole run: no events accumulate, and no bounces are hidden."""
     if not kernel_run.is_at_target or kernel_run.has_news or not kernel_run.count:
         return False
     if kernel_run.events == 0:
@@ -120,7 +120,7 @@ def _is_over(system: System, kernel_run: KernelRun) -> bool:
 def run_task(
     system: System, method: Method, task: Task, progress: Callable[[float], None] | None
 ) -> Trajectory:
-    """Run a task with its compiled loop if possible, and with the mode loop for the rest."""
+    """Run a task with its compiled loop if possible, and continue with the mode loop if necessary."""
     setup, retention = setup_of(system, method, task), task.retention
     start = setup.silent_start
     is_plain = progress is None and task.record is None and task.limits is UNLIMITED and not task.is_stepped

@@ -1,4 +1,4 @@
-"""The interface between the mode loop and integrators: a flow goes in, steps with dense output come out."""
+"""The interface between the mode loop and integrators: an integrator gets a flow and returns steps."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Watch:
-    """The active guards and all monitors of one segment, with their sides and leading orders at its start."""
+    """The active guards and all monitors of one segment, with their sides and orders of zero at its start."""
 
     guards: np.ndarray  # numbers of the active guards
     sides: np.ndarray  # sides (G,) of all guards
@@ -60,7 +60,7 @@ class Watch:
 
 @dataclass
 class Flow:
-    """The smooth vector field of one segment, as integrators see it: rhs(s, x), with counters.
+    """The smooth vector field of one segment, for integrators: `rhs(s, x)` and counts of evaluations.
 
     look: called with the local time by a method that integrates a whole segment in one call. It raises an error if the
     run has to end.
@@ -81,13 +81,13 @@ class Flow:
         self._projected = sorted({i for c in holding for i in system.projected[c]})
 
     def rhs(self, s: float, x: np.ndarray) -> np.ndarray:
-        """Return dx/dt in a new array; NaN if the model has no value."""
+        """Return dx/dt in a new array, with NaN if the model has no value there."""
         out = np.empty(self.n)
         evaluate(self._flow, float(s), x, self.p, self.z, out)
         return out
 
     def jacobian(self, s: float, x: np.ndarray) -> np.ndarray:
-        """Return d(dx/dt)/dx (n, n), derived from the declaration, or by differences for Python functions."""
+        """Return the Jacobian (n, n) of the rates: exact for expressions, else by differences."""
         if not self.system.has_tape:
             return self.system.jacobian(float(s), np.ascontiguousarray(x, dtype=float), self.p, self.z)
         tangent, columns, both = (
@@ -103,12 +103,12 @@ class Flow:
         return columns.T
 
     def project(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Return states (k, n) at local times (k,) with held states on their constraints."""
+        """Return states (k, n) at local times (k,), in which held states satisfy their constraints."""
         x = np.ascontiguousarray(x, dtype=float)
         return self.system.rows("project", self.n, s, x, self.p, self.z) if self.system.can_hold else x
 
     def landed(self, s: float, x: np.ndarray) -> np.ndarray:
-        """Return the end of a step, with states that a projection keeps on a surface moved back onto it."""
+        """Return the end of a step, moved back onto the surfaces on which projection keeps the states."""
         if not self._projected:
             return x
         held = x.copy()
@@ -116,7 +116,7 @@ class Flow:
         return held
 
     def guards(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Return guard values (k, guards), with held states evaluated from their constraints."""
+        """Return guard values (k, guards) at times and states, with held states on their constraints."""
         self.counters.guard_evaluations += len(s)
         out = np.empty((len(s), self.system.guard_count))
         evaluate_rows(
@@ -125,7 +125,7 @@ class Flow:
         return out
 
     def monitors(self, s: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Return monitor values (k, monitors), with held states evaluated from their constraints."""
+        """Return monitor values (k, monitors) at times and states, with held states on their constraints."""
         out = np.empty((len(s), len(self.system.monitor_names)))
         evaluate_rows(
             self.system.address("monitors"), s, np.ascontiguousarray(x, dtype=float), self.p, self.z, out
@@ -137,10 +137,10 @@ class Stepper(Protocol):
     """An integration in progress through one smooth segment."""
 
     def step(self) -> Step:
-        """Take and return the next accepted step; raises StepFailure."""
+        """Take the next accepted step and return it; raises StepFailure."""
 
     def restep(self, step: Step, s: float) -> Step:
-        """Repeat the step from its start to exactly s, with the accuracy of the method.
+        """Repeat a step from its start to exactly the local time s, with the accuracy of the method.
 
         If the error there exceeds the tolerance, return a shorter step, from whose end the next one continues.
         """
@@ -163,18 +163,18 @@ class Method(Protocol):
 
     @property
     def has_compiled_loop(self) -> bool:
-        """Return whether the method has a compiled loop."""
+        """Return whether the method has a compiled event loop."""
 
     @property
     def stable_to(self) -> float:
-        """Return the stability limit of -h*lambda on the negative real axis; 0 means no limit."""
+        """Return the limit of -h*lambda for stable steps on the negative real axis, or 0 for no limit."""
 
     @property
     def rounding(self) -> float:
-        """Return the largest rounding error of a step, in units of rounding of the change of the states."""
+        """Return the largest rounding error of a step, relative to the rounding of the state change."""
 
     def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> CompiledLoop | None:
-        """Return the method's compiled loop for one run, or None if the method cannot compile this model."""
+        """Return the compiled loop of this method for one run, or None if it cannot compile the model."""
 
     def start(
         self,
@@ -185,4 +185,4 @@ class Method(Protocol):
         first_step: float | None,
         watch: Watch,
     ) -> Stepper:
-        """Begin a segment at local time 0 towards s_bound (negative backward in time)."""
+        """Begin a segment at local time 0 towards `s_bound`, which is negative for a run backward in time."""

@@ -1,4 +1,4 @@
-"""This folder declares mechanical systems with many contacts, and contains known examples.
+"""This package declares mechanical systems with many contacts, and contains known examples.
 
 Start with `system`.
 """

@@ -13,7 +13,7 @@ from hybridsim.model.free_name import free_name
 
 
 def as_model(system: MechanicalSystem) -> Model:
-    """Return a model with explicit accelerations and one contact for each contact of the system.
+    """Return a model with explicit accelerations, and one contact for each contact of the system.
 
     An angular frequency becomes a parameter, so that its angle stays accurate over any time.
     """

@@ -14,7 +14,7 @@ _MOVES = "; for coefficients that vary in time or space write an hs.Model, start
 
 
 def finite(part: Declared, what: str, value: Any) -> float:
-    """Return a finite number, or raise an error that names the part."""
+    """Return a finite number, or raise an error that names the argument."""
     number = as_real(value)
     if number is None or not math.isfinite(number):
         raise part._fault(f"{what} is {value!r}", "give finite numbers" + _MOVES * isinstance(value, str))
@@ -22,18 +22,18 @@ def finite(part: Declared, what: str, value: Any) -> float:
 
 
 def weights(part: Declared, direction: Any) -> tuple[tuple[tuple[int, float], ...], int]:
-    """Return the non-zero weights as (coordinate, weight) pairs, and the row's length (0 for a mapping)."""
+    """Return the non-zero weights as (coordinate, weight) pairs, and the row length (0 for a mapping)."""
     is_mapping = isinstance(direction, Mapping)
     if not (is_mapping or is_row(direction)):
         raise part._fault(
-            f"direction is {direction!r}", "give a row of weights, or a mapping from coordinates"
+            f"direction is {direction!r}", "use a row of weights, or a mapping from coordinates"
         )
     row = list(direction.items() if is_mapping else enumerate(direction))
     entries = [(i, finite(part, "direction", w)) for i, w in row]
     for i, _ in entries:
         if not isinstance(i, Integral):
-            raise part._fault(f"direction names the coordinate {i!r}", "give whole numbers, counted from 0")
+            raise part._fault(f"direction names the coordinate {i!r}", "use whole numbers, counted from 0")
     pairs = tuple((int(i), w) for i, w in entries if w != 0.0)
     if not pairs:
-        raise part._fault("the direction is zero", "give at least one weight that is not zero")
+        raise part._fault("the direction is zero", "use at least one weight that is not zero")
     return pairs, 0 if is_mapping else len(row)

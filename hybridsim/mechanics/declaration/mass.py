@@ -15,7 +15,7 @@ _ASYMMETRY = 1e-12  # relative to the largest entry; the asymmetry that assembly
 
 
 def require_positive_definite(M: Any, name: str) -> None:
-    """Refuse a mass matrix that is not symmetric, or not positive definite beyond rounding.
+    """Raise an error if a mass matrix is not symmetric, or not positive definite beyond rounding.
 
     A symmetric matrix is positive definite if and only if all pivots of its elimination without exchanges are
     positive. A pivot that is no larger than the rounding of its diagonal entry counts as zero.
@@ -29,7 +29,7 @@ def require_positive_definite(M: Any, name: str) -> None:
     from scipy.sparse.linalg import splu
 
     if abs(M - M.T).max() > _ASYMMETRY * abs(M).max():
-        raise UsageError(f"{name}: M is not symmetric", remedy="give a symmetric mass matrix")
+        raise UsageError(f"{name}: M is not symmetric", remedy="use a symmetric mass matrix")
     diagonal = M.diagonal()
     pivots = diagonal
     if (diagonal > 0.0).all() and M.nnz > len(diagonal):

@@ -28,7 +28,7 @@ def chain_on_belt(
     gap: float | None = None,
     restitution: float = 0.5,
 ) -> MechanicalSystem:
-    """Build a chain of n blocks on a moving belt, each held by a leaf spring: the model of Burridge and Knopoff.
+    """Build a chain of n blocks on a moving belt with leaf springs: the model of Burridge and Knopoff.
 
     ::
 
@@ -79,7 +79,7 @@ def chain_on_belt(
     belt = finite_number(belt, "belt")
     spread, gap = finite_number(spread, "spread"), None if gap is None else finite_number(gap, "gap")
     if not spread >= 0.0:
-        raise UsageError(f"spread is {spread!r}", remedy="give a number >= 0")
+        raise UsageError(f"spread is {spread!r}", remedy="use a number >= 0")
     diagonal = np.full(n, leaf + 2.0 * coupling)
     diagonal[0] -= coupling
     diagonal[-1] -= coupling
@@ -90,7 +90,7 @@ def chain_on_belt(
     ]
     if gap is not None and not 2.0 * spread < gap:
         raise UsageError(
-            f"gap is {gap!r}, but the blocks start within +-{spread!r}", remedy="give a spread below gap/2"
+            f"gap is {gap!r}, but the blocks start within +-{spread!r}", remedy="use a spread below gap/2"
         )
     stops = range(n - 1) if gap is not None else ()
     return MechanicalSystem(
@@ -161,7 +161,7 @@ def two_blocks_on_belt(
 def three_coupled_blocks(
     *, mu: tuple[float, float, float] = (0.15, 0.3, 0.2), amplitude: float = 12.0, omega: float = 1.5
 ) -> MechanicalSystem:
-    """Build three blocks on top of each other, the lowest on the ground, the middle one shaken.
+    """Build three blocks on top of each other, of which the lowest is on the ground and the middle is shaken.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def three_coupled_blocks(
     """
     coefficients = numbers(mu, "mu", "give three numbers")
     if len(coefficients) != 3:
-        raise UsageError(f"mu is {mu!r}", remedy="give three numbers")
+        raise UsageError(f"mu is {mu!r}", remedy="use three numbers")
     directions = [[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [0.0, -1.0, 1.0]]
     contacts = [
         MechanicalContact(

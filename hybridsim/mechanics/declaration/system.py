@@ -52,9 +52,7 @@ class Harmonic:
         for what in ("omega", "sin", "cos"):
             value = as_real(getattr(self, what))
             if value is None or not math.isfinite(value):
-                raise UsageError(
-                    f"Harmonic: {what} is {getattr(self, what)!r}", remedy="give a finite number"
-                )
+                raise UsageError(f"Harmonic: {what} is {getattr(self, what)!r}", remedy="use a finite number")
             object.__setattr__(self, what, value)
 
 
@@ -104,7 +102,7 @@ class MechanicalContact(Declared):
         if isinstance(law, str):
             object.__setattr__(self, "law", load_law(law))
         elif not isinstance(law, FrictionLaw):
-            raise self._fault(f"law is {law!r}", "give hs.FrictionLaw(...), or the name of a law")
+            raise self._fault(f"law is {law!r}", "use hs.FrictionLaw(...), or the name of a law")
         if not self.law.is_set_valued or self.law.tables:
             what = "tables" if self.law.tables else "a direct force instead of slip and stick"
             raise self._fault(
@@ -113,7 +111,7 @@ class MechanicalContact(Declared):
             )
         object.__setattr__(self, "normal", finite(self, "normal", self.normal))
         if not self.normal >= 0.0:
-            raise self._fault(f"normal is {self.normal!r}", "give a load >= 0")
+            raise self._fault(f"normal is {self.normal!r}", "use a load >= 0")
         if not isinstance(self.base, Harmonic):
             object.__setattr__(self, "base", finite(self, "base", self.base))
         pairs, count = weights(self, self.direction)
@@ -121,7 +119,7 @@ class MechanicalContact(Declared):
         object.__setattr__(self, "direction", pairs)
 
     def values(self) -> dict[str, float]:
-        """Return the values of the law's parameters, including defaults.
+        """Return the values of the parameters of the friction law, including default values.
 
         Raises
         ------
@@ -197,7 +195,7 @@ class MechanicalSystem:
     ) -> None:
         for what, text in (("name", name), ("title", title), ("source", source)):
             if not isinstance(text, str):
-                raise UsageError(f"MechanicalSystem: {what} is {text!r}", remedy="give a string")
+                raise UsageError(f"MechanicalSystem: {what} is {text!r}", remedy="use a string")
         self.name, self.title, self.source = name, title, source
         self.M = _matrix(M, "M", None)
         require_positive_definite(self.M, name)
@@ -209,17 +207,17 @@ class MechanicalSystem:
         self.q0, self.v0 = self._start(q0, "q0"), self._start(v0, "v0")
         self.names = tuple(f"q{i + 1}" for i in range(self.n)) if names is None else as_tuple(names)
         if not all(isinstance(x, str) for x in self.names):
-            raise UsageError(f"{name}: names is {names!r}", remedy=f"give {self.n} strings")
+            raise UsageError(f"{name}: names is {names!r}", remedy=f"use {self.n} strings")
         self.velocities = tuple(f"v{i + 1}" if names is None else f"v_{x}" for i, x in enumerate(self.names))
         self._check()
 
     def _parts(self, declared: Any, what: str, kind: type[Part]) -> tuple[Part, ...]:
-        """Return a tuple of contacts or impacts."""
+        """Return the contacts or the impacts as a tuple, after checking their types."""
         parts = as_tuple(declared)
         for part in parts:
             if not isinstance(part, kind):
                 raise UsageError(
-                    f"{self.name}: {what} contain {part!r}", remedy=f"give hs.{kind.__name__}(...) objects"
+                    f"{self.name}: {what} contain {part!r}", remedy=f"use hs.{kind.__name__}(...) objects"
                 )
         return parts
 
@@ -230,13 +228,13 @@ class MechanicalSystem:
             if not is_row(forcing):
                 raise UsageError(
                     f"{self.name}: forcing is {forcing!r}",
-                    remedy="give one entry for each coordinate, or a mapping from coordinates",
+                    remedy="use one entry for each coordinate, or a mapping from coordinates",
                 )
             forcing = tuple(forcing)
         if not isinstance(forcing, Mapping) and len(forcing) != self.n:
             raise UsageError(
                 f"{self.name}: forcing has {len(forcing)} entries for {self.n} coordinates",
-                remedy="give one entry for each coordinate, or a mapping from coordinates",
+                remedy="use one entry for each coordinate, or a mapping from coordinates",
             )
         pairs = dict(forcing if isinstance(forcing, Mapping) else enumerate(forcing))
         found: dict[int, tuple[float | Harmonic, ...]] = {}
@@ -253,7 +251,7 @@ class MechanicalSystem:
                 ):
                     raise UsageError(
                         f"{self.name}: forcing of coordinate {i} holds {term!r}",
-                        remedy="give numbers and hs.Harmonic(omega, ...); write other forcing in an hs.Model",
+                        remedy="use numbers and hs.Harmonic(omega, ...); write other forcing in an hs.Model",
                     )
             nonzero = tuple(t if isinstance(t, Harmonic) else float(t) for t in terms if t != 0.0)
             if nonzero:
@@ -271,7 +269,7 @@ class MechanicalSystem:
         if len(self.names) != self.n:
             raise UsageError(
                 f"{self.name}: there are {len(self.names)} names for {self.n} coordinates",
-                remedy="give a name for each coordinate",
+                remedy="use a name for each coordinate",
             )
         every = [*self.names, *self.velocities, *(c.name for c in self.all_contacts)]
         twice = sorted({x for x in every if every.count(x) > 1}) if len(set(every)) < len(every) else []
@@ -282,7 +280,7 @@ class MechanicalSystem:
             if contact.weights not in (0, self.n):
                 raise UsageError(
                     f"{what} {contact.name}: its direction has {contact.weights} weights for {self.n} coordinates",
-                    remedy="give one weight for each coordinate, or a mapping from coordinates",
+                    remedy="use one weight for each coordinate, or a mapping from coordinates",
                 )
             for i, _ in contact.direction:
                 if not 0 <= i < self.n:
@@ -293,7 +291,7 @@ class MechanicalSystem:
 
     @property
     def all_contacts(self) -> tuple[MechanicalContact | MechanicalImpact, ...]:
-        """The contacts, then the impacts."""
+        """All contacts of the system, followed by its impacts."""
         return (*self.contacts, *self.impacts)
 
     def with_(self, **changes: Any) -> MechanicalSystem:
@@ -330,7 +328,7 @@ class MechanicalSystem:
 
 
 def _matrix(entries: Any, what: str, n: int | None) -> Any:
-    """Return a square matrix as scipy.sparse.csr_array; a row of numbers is a diagonal."""
+    """Return a square matrix as scipy.sparse.csr_array; a single row of numbers becomes a diagonal matrix."""
     from scipy import sparse
 
     if entries is None and n is not None:
@@ -342,11 +340,11 @@ def _matrix(entries: Any, what: str, n: int | None) -> Any:
         dense = real_array(entries, what, "give finite real numbers, (n, n), or (n,) for a diagonal")
         if dense.ndim not in (1, 2):
             raise UsageError(
-                f"{what} has {dense.ndim} dimensions", remedy="give (n, n), or (n,) for a diagonal"
+                f"{what} has {dense.ndim} dimensions", remedy="use shape (n, n), or (n,) for a diagonal"
             )
         matrix = sparse.csr_array(sparse.diags_array(dense) if dense.ndim == 1 else dense)
     if not matrix.shape[0]:
-        raise UsageError(f"{what} is empty", remedy="give at least one coordinate")
+        raise UsageError(f"{what} is empty", remedy="use at least one coordinate")
     if matrix.shape[0] != matrix.shape[1] or (n is not None and matrix.shape[0] != n):
-        raise UsageError(f"{what} has shape {matrix.shape}", remedy=f"give ({n or 'n'}, {n or 'n'})")
+        raise UsageError(f"{what} has shape {matrix.shape}", remedy=f"use shape ({n or 'n'}, {n or 'n'})")
     return matrix

@@ -33,7 +33,7 @@ _SLIP, _BESIDE, _FORWARD, _BASE, _MOBILITY, _HOLDING, _STILL, _DIAGONALS = range
 
 @kernel
 def gather_neighbours(arrays: Any, state: Any, scratch: Any, count: int, tau: float, top: int) -> bool:
-    """Store the values of a patch at tau if its nodes are consecutive; return whether they are."""
+    """Store the values of the patch at time tau if its nodes are consecutive; return whether they are."""
     first, last = scratch.nodes[0], scratch.nodes[0]
     for i in range(count):
         first, last = min(first, scratch.nodes[i]), max(last, scratch.nodes[i])
@@ -60,7 +60,7 @@ def gather_neighbours(arrays: Any, state: Any, scratch: Any, count: int, tau: fl
 
 @kernel
 def clear_beside(arrays: Any, scratch: Any, count: int, top: int) -> None:
-    """Write zeros into the lanes on both sides of consecutive nodes, as far as coupling reaches."""
+    """Write zeros on both sides of the values of consecutive nodes, as far as the coupling reaches."""
     wide, offsets = scratch.Q.shape[1], arrays.offsets
     before, after = -min(offsets[0], 0), max(offsets[-1], WIDTH)  # including padding of the last vector
     for k in range(top + 1):
@@ -167,7 +167,7 @@ def expand_run(arrays: Any, laws: Any, state: Any, scratch: Any, count: int, top
 
 @kernel
 def law_holds_in_run(arrays: Any, laws: Any, scratch: Any, count: int, share: float) -> bool:
-    """Return whether the forces in scratch.sums agree with the law at the velocities in scratch.sums."""
+    """Return whether the friction forces at the end agree with the friction law at the end velocities."""
     sums, W, band_rows = scratch.sums, scratch.W, scratch.band_rows
     orders, wide, height = scratch.Q.shape[0], sums.shape[1], _height(arrays)
     block = laws.registers[0] * orders * WIDTH

@@ -1,4 +1,4 @@
-"""This module stores the matrices of a chain of blocks by their diagonals.
+"""This module stores the banded matrices of a chain of blocks by their diagonals.
 
 If each coordinate is a node with its own contact, and K and C have few diagonals (a chain of masses), series
 are computed for eight neighbours at once: `hybridsim.mechanics.series_loop.banded_series`.
@@ -20,7 +20,7 @@ _FULL = 1 / 3  # least fraction of non-zero entries in the diagonals
 def in_bands(
     K: Any, C: Any, B: Any, W: Any, single: bool, base: np.ndarray, still: np.ndarray, par: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the offsets of the diagonals, and the rows: constants of nodes and laws, diagonals of K and C.
+    """Return the offsets of the diagonals, and rows with constants of nodes and laws and with the diagonals.
 
     There are no offsets if the system is not of this kind. single: each coordinate is a node with one
     contact, nothing depends on time, and there is one law.

@@ -1,4 +1,4 @@
-"""This module handles sticking contacts: the pseudo-inverse of their Delassus matrix, and consistent velocities.
+"""This module computes the constraint forces and consistent velocities of sticking contacts.
 
 A set of sticking contacts may be redundant (two in one direction, or more contacts than coordinates). The
 motion is still unique. Of the possible forces those of least norm are used, f = G^+ g (A. Ben-Israel, T. N.
@@ -23,7 +23,7 @@ _CORRECTIONS = 2  # the first removes the rounding of G^+, the second that of th
 
 @kernel
 def factorise(arrays: Any, state: Any, scratch: Any, j: int) -> None:
-    """Compute the pseudo-inverse of G over the sticking contacts of node j, and the pins and anchors."""
+    """Compute the pseudo-inverse of the Delassus matrix of the sticking contacts of node j."""
     first, last = arrays.node_con[j], arrays.node_con[j + 1]
     m, size = last - first, 0
     for x in range(arrays.node_dof[j], arrays.node_dof[j + 1]):
@@ -53,7 +53,7 @@ def factorise(arrays: Any, state: Any, scratch: Any, j: int) -> None:
 
 @kernel
 def _anchors(arrays: Any, state: Any, first: int, last: int) -> None:
-    """Choose an anchor for each sticking contact with several weights and no coordinate shared with others.
+    """Choose a coordinate for each sticking contact that acts on several, to satisfy its constraint exactly.
 
     It is the coordinate with the largest weight. Contacts that share coordinates are solved by least squares only.
     """
@@ -76,7 +76,7 @@ def _anchors(arrays: Any, state: Any, first: int, last: int) -> None:
 
 @kernel
 def pseudo_inverse(G: Any, m: int, order: Any, size: int, L: Any, P: Any) -> int:
-    """Set P = (G over `order`)^+ for a positive semidefinite G (m*m,) and return its rank; L and P are (m, m) arrays.
+    """Set P = (G over `order`)^+ for a positive semidefinite G, and return the rank of G.
 
     Pivoted Cholesky gives G = L L^T with L of full column rank; then G^+ = L (L^T L)^-2 L^T.
     """
@@ -149,7 +149,7 @@ def _from_factor(L: Any, size: int, rank: int, P: Any) -> None:
 
 @inlined
 def misfit(arrays: Any, c: int, v: Any, base: float) -> float:
-    """Return w . v - base of a contact, summed in doubled precision."""
+    """Return the relative velocity w . v - base of a contact, summed in double-double precision."""
     high, low = -base, 0.0
     for e in range(arrays.w_ptr[c], arrays.w_ptr[c + 1]):
         product, error = two_product(arrays.w_val[e], v[arrays.w_col[e]])
@@ -160,7 +160,7 @@ def misfit(arrays: Any, c: int, v: Any, base: float) -> float:
 
 @kernel
 def project(arrays: Any, state: Any, scratch: Any, j: int, tau: float, v: Any) -> None:
-    """Make the velocities v (n,) satisfy the constraints of the sticking contacts of node j, after `factorise`.
+    """Make the velocities v (n,) satisfy the stick constraints of node j; call `factorise` first.
 
     Single coordinates are set exactly. The others get the least change in kinetic energy, v -= M^-1 W^T f
     with f = G^+ (W v - base), with the misfit in doubled precision; the remaining error is the rounding of v.

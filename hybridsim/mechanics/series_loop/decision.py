@@ -1,4 +1,4 @@
-"""This module chooses which contacts of a node stick or slip, by one complementarity problem.
+"""Choose the modes of node j at time tau after a mode of contact `fired` has ended (-1: no contact).
 
 A candidate gives each contact at zero relative velocity a mode. It is admissible if, just after the instant,
 the forces of all sticking contacts stay within their limits and all slipping contacts move in their
@@ -31,7 +31,7 @@ DECIDED = 0
 
 @inlined
 def joint_choice(arrays: Any, laws: Any, state: Any, scratch: Any, j: int, tau: float, fired: int) -> int:
-    """Choose the modes of node j at tau, where contact `fired` (-1: none) ended its mode.
+    """Call `joint_choice` with the arguments stored in the state.
 
     The node's series are replaced by its positions and exact velocities at tau.
     """
@@ -80,7 +80,7 @@ def choose_jointly(arrays: Any, laws: Any, state: Any, scratch: Any) -> int:
 
 @kernel
 def _stop_at(arrays: Any, state: Any, j: int, tau: float) -> None:
-    """Replace the series of a node by its position and velocity at tau."""
+    """Replace the Taylor series of a node by its position and velocity at time tau."""
     d = tau - state.origin[j]
     for x in range(arrays.node_dof[j], arrays.node_dof[j + 1]):
         value, slope = state_at(state.series, x, d)
@@ -115,7 +115,7 @@ def _set_velocities(arrays: Any, state: Any, scratch: Any, j: int, tau: float) -
 
 @kernel
 def _bounds(arrays: Any, state: Any, scratch: Any, j: int, nd: int, tau: float) -> None:
-    """Bound the rounding errors of accelerations, forces and relative velocities of a node.
+    """Compute bounds of the rounding errors of accelerations, forces and relative velocities of a node.
 
     err[k, a]: coefficient k of the accelerations; err_f[k, c]: of the forces; err_f[_SHORT + k, c]: of the
     relative velocities. The instant is known to a few ulps of the step.
@@ -175,7 +175,7 @@ def _bounds(arrays: Any, state: Any, scratch: Any, j: int, nd: int, tau: float) 
 
 @kernel
 def _count_violations(arrays: Any, state: Any, scratch: Any, count: int) -> int:
-    """Return the number of violations; scratch.next[c] is the required mode of a violating contact, else its own."""
+    """Return the number of contacts that violate their mode, and write the required modes to scratch.next."""
     violations, is_continuous = 0, True
     for z in range(count):
         c = scratch.zero[z]
@@ -225,7 +225,7 @@ def _count_violations(arrays: Any, state: Any, scratch: Any, count: int) -> int:
 
 @kernel
 def _change(state: Any, scratch: Any, count: int, together: bool) -> None:
-    """Set the next modes of all violating contacts, or only of the last one in order."""
+    """Change the modes of all violating contacts, or only of the last violating contact."""
     if not together:
         last = -1
         for z in range(count):
@@ -244,7 +244,7 @@ def _change(state: Any, scratch: Any, count: int, together: bool) -> None:
 
 @kernel
 def _hold_at_limits(arrays: Any, state: Any, scratch: Any, j: int, count: int) -> None:
-    """Hold slipping contacts that sticking contacts fix, with the force at its limit; release the others."""
+    """Hold slipping contacts that sticking contacts keep from moving, by the limit force; release others."""
     for z in range(count):
         c = scratch.zero[z]
         if state.mode[c] == STICK and state.held[c] == 0:
@@ -258,7 +258,7 @@ def _hold_at_limits(arrays: Any, state: Any, scratch: Any, j: int, count: int) -
 
 @kernel
 def _is_held(arrays: Any, state: Any, j: int, c: int) -> bool:
-    """Return whether a contact's direction is in the span of the sticking contacts, within rounding."""
+    """Return whether a contact's direction is a combination of those of sticking contacts."""
     first, last = arrays.node_con[j], arrays.node_con[j + 1]
     m, at = last - first, arrays.g_ptr[j]
     own = arrays.g_val[at + (c - first) * m + (c - first)]

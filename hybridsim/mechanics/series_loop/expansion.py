@@ -1,4 +1,4 @@
-"""This module computes Taylor series of a patch of nodes: coordinates, relative velocities, friction forces.
+"""This module computes the Taylor series of coordinates, relative velocities and forces of some nodes.
 
 All nodes of a patch are expanded together; the nodes around it enter by their existing series. When q is
 known to order k + 1, the relative velocities have their coefficient k and the laws give the slip forces. The
@@ -20,7 +20,7 @@ from hybridsim.mechanics.series_loop.simd_series import advance_simd_series, cle
 
 @kernel
 def gather(arrays: Any, state: Any, scratch: Any, count: int, tau: float, top: int) -> tuple[int, int]:
-    """Number the coordinates and contacts of the nodes scratch.nodes[:count], and store their values at tau.
+    """Number the coordinates and contacts of the nodes in scratch.nodes, and store their values at time tau.
 
     The nodes around them get series about tau. Returns the numbers of coordinates and contacts of the patch.
     """
@@ -59,7 +59,7 @@ def gather(arrays: Any, state: Any, scratch: Any, count: int, tau: float, top: i
 
 @kernel
 def whole(arrays: Any, state: Any, scratch: Any, top: int) -> tuple[int, int]:
-    """Make all coordinates one patch, which starts at the beginning of the step."""
+    """Select all coordinates as one patch, which starts at the beginning of the step."""
     state.whole[FIRST] = -1
     if arrays.offsets.shape[0] > 0:
         state.whole[FIRST] = 0
@@ -77,7 +77,7 @@ def whole(arrays: Any, state: Any, scratch: Any, top: int) -> tuple[int, int]:
 
 @kernel
 def _angles(arrays: Any, state: Any, scratch: Any, tau: float, top: int) -> None:
-    """Compute the series of sine and cosine of every angle about tau."""
+    """Compute the Taylor series of the sine and cosine of every angle about time tau."""
     for r in range(arrays.rates.shape[0]):
         rate = arrays.rates[r]
         angle = state.phase[r] + rate * tau
@@ -89,7 +89,7 @@ def _angles(arrays: Any, state: Any, scratch: Any, tau: float, top: int) -> None
 
 @inlined
 def base_coefficient(arrays: Any, scratch: Any, c: int, k: int) -> float:
-    """Return coefficient k of the speed of a contact's base."""
+    """Return Taylor coefficient k of the speed of a contact's base."""
     r = arrays.base_rate[c]
     if r >= 0:
         return arrays.base[c, 1] * scratch.trig[r, 0, k] + arrays.base[c, 2] * scratch.trig[r, 1, k]
@@ -108,7 +108,7 @@ def base_speed(arrays: Any, state: Any, c: int, tau: float) -> float:
 
 @kernel
 def _fill_registers(arrays: Any, laws: Any, state: Any, scratch: Any, nc: int, orders: int) -> None:
-    """Sort the slipping contacts by tape, and put the constants of each into its registers."""
+    """Sort the slipping contacts by their law, and store the constants of each law in the registers."""
     tapes, used, at = laws.registers.shape[0], 0, 0
     for t in range(tapes):
         scratch.lane_ptr[t], scratch.place[t] = used, at
@@ -124,7 +124,7 @@ def _fill_registers(arrays: Any, laws: Any, state: Any, scratch: Any, nc: int, o
 
 @kernel
 def constants(arrays: Any, laws: Any, scratch: Any, t: int, last: int, orders: int) -> int:
-    """Store the constants of lanes lane_ptr[t]..last - 1 in a tape's registers; return the end."""
+    """Store the constants of some lanes in the registers of a tape; return the end of the registers."""
     first, at, block = scratch.lane_ptr[t], scratch.place[t], laws.registers[t] * orders * WIDTH
     count, rows = last - first, laws.constant_rows
     end = at + whole_vectors(count) // WIDTH * block
@@ -143,7 +143,7 @@ def constants(arrays: Any, laws: Any, scratch: Any, t: int, last: int, orders: i
 
 @inlined
 def _forces_of_slip(arrays: Any, laws: Any, state: Any, scratch: Any, orders: int, k: int) -> None:
-    """Compute coefficient k of all slip forces from coefficients of the relative velocities."""
+    """Compute coefficient k of all friction forces in slip from coefficients of the relative velocities."""
     for t in range(laws.registers.shape[0]):
         first, count, at = (
             scratch.lane_ptr[t],
@@ -165,7 +165,7 @@ def _forces_of_slip(arrays: Any, laws: Any, state: Any, scratch: Any, orders: in
 
 @inlined
 def _relative(arrays: Any, state: Any, scratch: Any, nc: int, k: int) -> None:
-    """Compute coefficient k of the relative velocities, exactly zero in stick."""
+    """Compute coefficient k of the relative velocities, which are exactly zero in stick."""
     cons, loc, mode, ptr, col, val = (
         scratch.cons,
         scratch.loc,
@@ -189,7 +189,7 @@ def _relative(arrays: Any, state: Any, scratch: Any, nc: int, k: int) -> None:
 
 @inlined
 def _accelerate(arrays: Any, scratch: Any, nd: int, k: int) -> None:
-    """Compute coefficient k of the accelerations with slip forces, without forces of sticking contacts."""
+    """Compute coefficient k of the accelerations without the forces of sticking contacts."""
     dofs, loc, lcon, acc = scratch.dofs, scratch.loc, scratch.lcon, scratch.acc
     q, v, f = scratch.Q[k], scratch.Q[k + 1], scratch.F[k]
     k_ptr, k_col, k_val, b_ptr, b_col, b_val = (
@@ -221,7 +221,7 @@ def _accelerate(arrays: Any, scratch: Any, nd: int, k: int) -> None:
 
 @inlined
 def _advance(arrays: Any, state: Any, scratch: Any, nd: int, k: int) -> None:
-    """Compute coefficient k + 2 of the positions from the accelerations, or from the base for a pinned coordinate."""
+    """Compute coefficient k + 2 of the positions from the accelerations or, in stick, from the base."""
     dofs, acc, pin, q, divisor = (
         scratch.dofs,
         scratch.acc,
@@ -241,7 +241,7 @@ def _advance(arrays: Any, state: Any, scratch: Any, nd: int, k: int) -> None:
 
 @inlined
 def _hold_one(arrays: Any, state: Any, scratch: Any, j: int, k: int) -> None:
-    """Compute the holding force of a node whose only contact sticks; see `_hold`."""
+    """Compute the holding force of a node if its only contact sticks; `_hold` is the general case."""
     c, total = arrays.node_con[j], 0.0
     for e in range(arrays.w_ptr[c], arrays.w_ptr[c + 1]):
         total += arrays.w_val[e] * scratch.acc[scratch.loc[arrays.w_col[e]]]
@@ -254,7 +254,7 @@ def _hold_one(arrays: Any, state: Any, scratch: Any, j: int, k: int) -> None:
 
 @kernel
 def _hold(arrays: Any, state: Any, scratch: Any, j: int, k: int) -> None:
-    """Compute the forces of sticking contacts of a node, f = (W M^-1 W^T)^+ (W a - base'), and add their effect."""
+    """Compute the forces of the sticking contacts of a node, and add their effect to the accelerations."""
     first, last = arrays.node_con[j], arrays.node_con[j + 1]
     m = last - first
     for c in range(first, last):
@@ -278,7 +278,7 @@ def _hold(arrays: Any, state: Any, scratch: Any, j: int, k: int) -> None:
 
 
 def expand(arrays: Any, laws: Any, state: Any, scratch: Any) -> int:
-    """Compute the series of the gathered patch, Q, R and F; see `expanded`."""
+    """Compute the Taylor series of the gathered patch: positions, relative velocities, friction forces."""
     count, nd, nc, top = state.whole[COUNT], state.whole[DOFS], state.whole[CONS], state.whole[ORDER]
     tau = state.real[AT]
     if state.whole[FIRST] >= 0:
@@ -306,7 +306,7 @@ def expand(arrays: Any, laws: Any, state: Any, scratch: Any) -> int:
 def expanded(
     arrays: Any, laws: Any, state: Any, scratch: Any, count: int, nd: int, nc: int, tau: float, top: int
 ) -> None:
-    """Expand the patch with these counts of nodes, coordinates and contacts about tau, to order `top`."""
+    """Expand a patch with the given numbers of nodes, coordinates and contacts about tau, to order `top`."""
     state.whole[COUNT], state.whole[DOFS], state.whole[CONS], state.whole[ORDER] = count, nd, nc, top
     state.real[AT] = tau
     call_kernel(state.kernels[EXPAND], (arrays, laws, state, scratch))

@@ -1,4 +1,4 @@
-"""This module is the compiled loop: all nodes step together; an event restarts the nodes that it affects.
+"""This module contains the compiled loop: all nodes step together; an event restarts nodes near it.
 
 The series of a node far from an event does not change: a jump of an acceleration changes coefficient 2 + 2 r
 of the positions r couplings away. Beyond half the order nothing changes, and nearer nodes soon change by less
@@ -29,7 +29,7 @@ _ROUNDS = 1000  # events of one node at one instant
 
 @kernel
 def _hold(arrays: Any, state: Any, scratch: Any) -> None:
-    """Compute phases of bases and forcing, and make the velocities satisfy the stick constraints."""
+    """Compute the phases of bases and forcing, and make the velocities satisfy the stick constraints."""
     for r in range(arrays.rates.shape[0]):
         state.phase[r] = phase_of(state.clock[0], state.clock[1], arrays.rates[r], 0.0)
     for j in range(arrays.node_dof.shape[0] - 1):
@@ -41,7 +41,7 @@ def _hold(arrays: Any, state: Any, scratch: Any) -> None:
 def _begin_step(
     arrays: Any, laws: Any, state: Any, scratch: Any, record: Any, control: Any, left: float
 ) -> bool:
-    """Expand all nodes at the origin of a step, and set the length of the step."""
+    """Expand the series of all nodes at the beginning of a step, and choose the length of the step."""
     rtol, longest, top, is_recorded, _ = control
     _hold(arrays, state, scratch)
     count = arrays.node_dof.shape[0] - 1
@@ -73,7 +73,7 @@ def _begin_step(
 
 @kernel
 def _record_series(arrays: Any, state: Any, scratch: Any, record: Any, count: int, tau: float) -> None:
-    """Record the series of the nodes scratch.nodes[:count]."""
+    """Record the Taylor series of the nodes in scratch.nodes[:count]."""
     for i in range(count):
         j, at, row = scratch.nodes[i], record.used[0], record.used[1]
         record.segment[at, 0], record.segment[at, 1] = j, row
@@ -87,7 +87,7 @@ def _record_series(arrays: Any, state: Any, scratch: Any, record: Any, count: in
 
 @kernel
 def _grow(arrays: Any, scratch: Any, j: int, radius: int, most: int) -> tuple[int, int]:
-    """Write the nodes within `radius` couplings of j to scratch.nodes; return (count, first outer node).
+    """Write the nodes within `radius` couplings of node j to scratch.nodes; return (count, first outer node).
 
     Returns (-1, 0) if there are more than `most`.
     """
@@ -162,7 +162,7 @@ def _changes_outside(
 def _restart(
     arrays: Any, laws: Any, state: Any, scratch: Any, record: Any, control: Any, j: int, tau: float
 ) -> int:
-    """Expand a patch around node j at tau; return 1 if done, 0 if it is too large, -1 without a series."""
+    """Restart a patch around node j at tau; return 1 for success, 0 if too large, -1 without a series."""
     rtol, _, top, is_recorded, _ = control
     nodes = arrays.node_dof.shape[0] - 1
     left = state.clock[2] - tau
@@ -224,7 +224,7 @@ def _record_events(
 
 @kernel
 def _end_step(arrays: Any, state: Any, scratch: Any, tau: float) -> None:
-    """Move all positions and velocities to tau, the origin of the next step."""
+    """Evaluate all positions and velocities at tau, and begin the next step there."""
     for x in range(arrays.dof_node.shape[0]):
         scratch.acc[x] = tau - state.origin[arrays.dof_node[x]]
     for x in range(0, arrays.dof_node.shape[0], WIDTH):
@@ -243,7 +243,7 @@ def _end_step(arrays: Any, state: Any, scratch: Any, tau: float) -> None:
 
 @kernel
 def run(arrays: Any, laws: Any, state: Any, scratch: Any, record: Any, control: Any, target: Any) -> int:
-    """Continue to the target (high, low), or until no mode is admissible (see `arrays`).
+    """Continue up to a time (high, low), or until no combination of modes is admissible.
 
     It returns FULL if the record is full, or after the largest number of steps and events of one call.
     """

@@ -1,4 +1,4 @@
-"""This module converts a mechanical system to arrays for the kernels: accelerations, Delassus matrices, law tapes.
+"""This module converts a mechanical system to arrays for the kernels, such as matrices and friction laws.
 
 Coordinates that are coupled by the mass matrix, or by a common contact, form a *node*. Coordinates and
 contacts are renumbered so that those of a node are consecutive. Accelerations jump within a node only, so
@@ -25,7 +25,7 @@ MOST_COUPLED = 3000  # largest number of coordinates in a dense inverse of the m
 
 
 class MechanicalArrays(NamedTuple):
-    """The arrays that are constant in a run; sparse matrices are (ptr, col, val), rows in the order of the nodes."""
+    """The arrays that are constant in a run; sparse matrices are (ptr, col, val) in node order."""
 
     node_dof: np.ndarray  # first coordinate of each node
     node_con: np.ndarray  # first contact of each node
@@ -64,7 +64,7 @@ class MechanicalArrays(NamedTuple):
 
 
 class Laws(NamedTuple):
-    """The tapes of all laws: their rows one after another, and the registers of inputs and outputs."""
+    """The instruction tapes of all friction laws, and the registers of their inputs and outputs."""
 
     rows: np.ndarray
     row_ptr: np.ndarray
@@ -82,7 +82,7 @@ class Laws(NamedTuple):
 
 @dataclass(frozen=True)
 class Built:
-    """The arrays, and the declared numbers of their coordinates and contacts."""
+    """The arrays of a system, and the declared numbers of its coordinates and contacts."""
 
     arrays: MechanicalArrays
     laws: Laws
@@ -92,7 +92,7 @@ class Built:
 
 
 def build(system: MechanicalSystem) -> Built:
-    """Convert a system to arrays for the kernels.
+    """Convert a mechanical system to the arrays that the kernels read.
 
     Raises
     ------
@@ -143,13 +143,13 @@ def build(system: MechanicalSystem) -> Built:
 
 
 def rates_of(system: MechanicalSystem) -> list[float]:
-    """Return all angular frequencies in ascending order."""
+    """Return all angular frequencies of the system in ascending order."""
     of_forces = {t.omega for terms in system.forcing.values() for t in terms if isinstance(t, Harmonic)}
     return sorted(of_forces | {c.base.omega for c in system.contacts if isinstance(c.base, Harmonic)})
 
 
 def _inverse(system: MechanicalSystem) -> Any:
-    """Return M^-1 block by block, sparse if M consists of small blocks."""
+    """Return the inverse of the mass matrix; the inverse is sparse if the mass matrix has small blocks."""
     M = system.M
     count, label = connected_components(M, directed=False)
     largest = np.bincount(label).max()
@@ -170,12 +170,12 @@ def _inverse(system: MechanicalSystem) -> Any:
 
 
 def integers(values: Any) -> np.ndarray:
-    """Return an array of integers for kernels."""
+    """Return the values as an array of integers for kernels."""
     return np.ascontiguousarray(values, dtype=np.int64)
 
 
 def parts(matrix: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return a sparse matrix by rows: (ptr, col, val)."""
+    """Return a sparse matrix in row form as (ptr, col, val)."""
     matrix = sparse.csr_array(matrix)
     matrix.eliminate_zeros()
     matrix.sort_indices()
@@ -197,7 +197,7 @@ def _neighbours(coupling: Any, node_of: np.ndarray, count: int) -> tuple[np.ndar
 def forcing(
     system: MechanicalSystem, inverse: Any, dofs: np.ndarray, rates: list[float]
 ) -> tuple[Any, tuple[Any, Any, Any]]:
-    """Return the constant acceleration (n,), and (ptr, rate, [sine, cosine]) of harmonics."""
+    """Return the constant accelerations (n,), and the harmonics (ptr, rate, [sine, cosine])."""
     n, place = system.n, np.argsort(dofs)
     still = np.zeros(n)
     entries: dict[tuple[int, int], np.ndarray] = {}
@@ -223,7 +223,7 @@ def forcing(
 
 
 def bases(contacts: list[MechanicalContact], rates: list[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return constant, sine and cosine (m, 3) of each base speed, and its rate's number (-1 if constant)."""
+    """Return constant, sine and cosine (m, 3) of each base speed, and the number of its angular frequency."""
     base, rate = np.zeros((len(contacts), 3)), np.full(len(contacts), -1, dtype=np.int64)
     for i, contact in enumerate(contacts):
         if isinstance(contact.base, Harmonic):
@@ -234,7 +234,7 @@ def bases(contacts: list[MechanicalContact], rates: list[float]) -> tuple[np.nda
 
 
 def stick_limits(contacts: list[MechanicalContact]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the stick limits, forward and backward, and whether they equal the force at the onset of slip."""
+    """Return the stick limits in both directions, and whether they equal the force at the onset of slip."""
     limits = np.zeros((len(contacts), 2))
     smooth = np.zeros((len(contacts), 2), dtype=np.int64)
     for i, contact in enumerate(contacts):
@@ -252,12 +252,12 @@ def stick_limits(contacts: list[MechanicalContact]) -> tuple[np.ndarray, np.ndar
 
 
 def sides(law: Any) -> tuple[tuple[Any, Any], tuple[Any, Any]]:
-    """Return (slip, stick) forward and backward."""
+    """Return the slip force and the stick limit, in both directions."""
     return (law.slip, law.stick), (law.slip_backward or law.slip, law.stick_backward or law.stick)
 
 
 def law_tapes(contacts: list[MechanicalContact]) -> tuple[Laws, np.ndarray, np.ndarray, bool]:
-    """Return the tapes, their number for each contact and side, and the constants of each contact."""
+    """Return the tapes of the laws, the tape of each contact in each direction, and the constants."""
     tapes: list[ScalarTape] = []
     known: dict[tuple[str, str], int] = {}
     number = np.zeros((len(contacts), 2), dtype=np.int64)

@@ -1,4 +1,4 @@
-"""This module stores a run of a mechanical system as segments of series per node, and evaluates it at any time."""
+"""This module stores a run as Taylor series for each node and time interval, and evaluates it at any time."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hybridsim.mechanics.series_loop.expansion import expanded, whole
 def evaluate(
     node_dof: Any, ptr: Any, begins: Any, start: Any, row: Any, series: Any, times: Any, right: bool, out: Any
 ) -> None:
-    """Evaluate positions and velocities (k, 2n) at times; segments are sorted by node (ptr) and time (begins)."""
+    """Evaluate positions and velocities (k, 2n) at times, from segments sorted by node and then by time."""
     n = out.shape[1] // 2
     for j in range(node_dof.shape[0] - 1):
         for i in range(times.shape[0]):
@@ -52,7 +52,7 @@ def quantities(
     forces: Any,
     velocities: Any,
 ) -> None:
-    """Make velocities satisfy the stick constraints at each time; compute forces and relative velocities (k, m).
+    """Apply the stick constraints to velocities, and compute forces and relative velocities (k, m).
 
     order sorts the times; first: modes at the start; out (k, 2n): states, whose velocities are changed in place.
     """
@@ -99,7 +99,7 @@ class NodeSegments:
         self.begins = instants(self.start)
 
     def states(self, times: np.ndarray, right: bool) -> np.ndarray:
-        """Return positions and velocities (k, 2n) in the order of the arrays."""
+        """Return positions and velocities (k, 2n) at given times, in the order of the arrays."""
         out = np.empty((len(times), 2 * len(self.arrays.dof_node)))
         arguments = (self.ptr, self.begins, self.start, self.row, self.series)
         evaluate(self.arrays.node_dof, *arguments, np.ascontiguousarray(times), right, out)
@@ -107,5 +107,5 @@ class NodeSegments:
 
 
 def instants(parts: np.ndarray) -> np.ndarray:
-    """Return the doubles nearest to (high, low, local) times (k, 3)."""
+    """Return times (k, 3), given as (high, low, local), rounded to the nearest doubles."""
     return parts[:, 0] + (parts[:, 1] + parts[:, 2]) if len(parts) else np.zeros(0)

@@ -58,7 +58,7 @@ _MIN_ORDER = 10  # a lower order makes series useless
 
 
 def _order_in_range(built: Built, span: tuple[float, float]) -> int:
-    """Return the largest order for which powers of rates and times stay in the range of doubles."""
+    """Return the largest order for which powers of rates and times do not overflow."""
     arrays = built.arrays
     rates = [abs(arrays.k_val).max(initial=0.0) ** 0.5, abs(arrays.c_val).max(initial=0.0), *arrays.rates]
     sizes = [size for size in (max(rates), abs(span[1] - span[0])) if size > 0.0]
@@ -126,7 +126,7 @@ class MechanicalRun:
         self.kernel_time = perf_counter() - began - self.compile_time
 
     def _count(self) -> None:
-        """Update the counters of steps and events."""
+        """Update the counts of steps and events after a call of the kernel."""
         self.counters.steps, self.counters.events = self.state.counts[:2].tolist()
 
     def _resolve_start(self, *packs: Any) -> int:
@@ -198,7 +198,7 @@ class MechanicalRun:
 
 @kernel
 def _resolve_nodes(arrays: Any, laws: Any, state: Any, scratch: Any) -> int:
-    """Choose the modes of the nodes at the start one by one; stop at a node without an admissible choice."""
+    """Choose the modes of the nodes at the start; stop at a node that has no admissible modes."""
     for j in range(arrays.node_dof.shape[0] - 1):
         state.whole[NODE], state.whole[FIRED], state.real[AT] = j, -1, 0.0
         code = call_kernel(state.kernels[JOINT_CHOICE], (arrays, laws, state, scratch))
@@ -216,7 +216,7 @@ def reach_kernels(state: State, *packs: Any) -> None:
 
 
 def new_state(built: Built, order: int) -> State:
-    """Return a state of zeros."""
+    """Return a new state of the run, with zeros."""
     arrays = built.arrays
     nodes, n, m = len(arrays.node_dof) - 1, len(arrays.dof_node), len(arrays.con_node)
     leaves = 1 << max(m, 1).bit_length()
@@ -234,7 +234,7 @@ def new_state(built: Built, order: int) -> State:
 
 
 def new_scratch(built: Built, order: int) -> Scratch:
-    """Return the scratch arrays."""
+    """Return new scratch arrays for the kernels."""
     arrays, laws = built.arrays, built.laws
     nodes, n, m = len(arrays.node_dof) - 1, len(arrays.dof_node), len(arrays.con_node)
     widest = max(int(np.diff(arrays.node_con).max(initial=0)), 2)

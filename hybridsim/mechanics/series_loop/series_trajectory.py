@@ -1,4 +1,4 @@
-"""This module reads the answers of a solution from a Taylor run of a mechanical system."""
+"""This module computes the results of a solution from a Taylor run of a mechanical system."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class SeriesTrajectory(ArraysTrajectory):
         self._place = np.argsort(run.built.contacts)
 
     def __reduce__(self) -> NoReturn:
-        """Refuse to pickle or copy: the arrays for kernels have padding that a copy would lose."""
+        """Raise an error on pickling and copying, because copied arrays would lose their padding."""
         raise UsageError(
             'a run of a MechanicalSystem with integrator="taylor" cannot be pickled or copied',
             remedy="use its tables, such as sol.to_npz(path) or sol.table(), or run system.to_model()",
@@ -70,7 +70,7 @@ class SeriesTrajectory(ArraysTrajectory):
 
     @cached_property
     def own_times(self) -> np.ndarray:
-        """Return the starts of series (m,), with every event time twice."""
+        """Return the times (m,) at which Taylor series begin; every event time occurs twice."""
         at_events = np.unique(self._when[self._when > self.t_start])
         begins = np.unique(self._segments.begins)
         starts = begins[~np.isin(begins, at_events) & (begins < self.t_end)]
@@ -78,7 +78,7 @@ class SeriesTrajectory(ArraysTrajectory):
 
     @property
     def own_states(self) -> np.ndarray:
-        """Return the states (2n, m) at the starts of series."""
+        """Return the states (2n, m) at the times at which Taylor series begin."""
         times, first = self.own_times, np.append(np.diff(self.own_times) == 0.0, False)
         out = self.states(times, "+")
         out[first] = self.states(times[first], "-")
@@ -90,14 +90,14 @@ class SeriesTrajectory(ArraysTrajectory):
         return np.array(self.run.state.x.reshape(-1)[self._columns])
 
     def states(self, times: np.ndarray, side: str) -> np.ndarray:
-        """Return states (k, 2n)."""
+        """Return the states (k, 2n) at given times."""
         out = self._segments.states(times, side == "+")
         if not self.run.built.arrays.unit.all():
             self._quantities(times, side, out)
         return out[:, self._columns]
 
     def _quantities(self, times: np.ndarray, side: str, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return forces and relative velocities (k, m), at states that satisfy the stick constraints."""
+        """Return forces and relative velocities (k, m) at given times; stick constraints are satisfied."""
         built, (state, scratch) = self.run.built, self._scratch
         forces, velocities = np.empty((2, len(times), len(self.components)))
         order = np.argsort(times, kind="stable")
@@ -115,7 +115,7 @@ class SeriesTrajectory(ArraysTrajectory):
         return (*self.event_names, *(f"v_rel({c})" for c in self.event_names))
 
     def values(self, name: str, times: np.ndarray, side: str) -> np.ndarray:
-        """Return a state, a friction force or a relative velocity (k,)."""
+        """Return the values (k,) of a state, a friction force or a relative velocity at given times."""
         if name in self.names:
             return self.states(times, side)[:, self.names.index(name)]
         own = name.removeprefix("v_rel(").removesuffix(")")
@@ -171,7 +171,7 @@ class SeriesTrajectory(ArraysTrajectory):
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """Return the warnings of the run: events that rounding leaves undecided, and near-grazings."""
+        """Return the warnings of the run on near-grazings and on events that rounding leaves undecided."""
         *_, undecided, touches = self.run.state.counts.tolist()
         texts = {
             f"undecided at rounding ({undecided} times)": undecided,
@@ -181,7 +181,7 @@ class SeriesTrajectory(ArraysTrajectory):
 
     @property
     def stats(self) -> dict[str, float]:
-        """Return the cost: steps of the whole system, events, restarts of patches, restarted nodes, seconds."""
+        """Return the cost of the run: numbers of steps, events, restarts and restarted nodes, and seconds."""
         steps, events, restarts, nodes, *_ = self.run.state.counts.tolist()
         return {
             "steps": steps, "events": events, "restarts": restarts, "nodes_restarted": nodes,
@@ -189,7 +189,7 @@ class SeriesTrajectory(ArraysTrajectory):
         }  # fmt: skip
 
     def summary(self) -> list[str]:
-        """Return the number of events and the cost."""
+        """Return the number of events and the cost of the run as text."""
         stats = self.stats
         return [
             f"  events: {stats['events']}",

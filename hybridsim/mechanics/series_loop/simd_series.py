@@ -1,4 +1,4 @@
-"""This module evaluates a tape for many contacts at once: one row of numbers per register and order.
+"""This module evaluates a friction law for many contacts at once, with vector instructions.
 
 The recurrences are those of `hybridsim.engine.series.interpreter`. Each operation works on eight contacts (lanes), so
 that the interpreter's overhead is shared. Each group of eight has a block with its registers one after the
@@ -42,20 +42,20 @@ from hybridsim.engine.series.tape import (
 
 @inlined
 def clear(V: Any, at: int, length: int) -> None:
-    """Write zeros from a place on, in whole vectors."""
+    """Write zeros from a given position to the end, in whole vectors."""
     for i in range(at, at + length, WIDTH):
         store(V, i, splat(0.0))
 
 
 @inlined
 def lane_place(at: int, block: int, register: int, orders: int, k: int, lane: int) -> int:
-    """Return the index of coefficient k of a register for a lane."""
+    """Return the index of Taylor coefficient k of a register, for one lane of the vectors."""
     return at + (lane >> 3) * block + (register * orders + k) * WIDTH + (lane & 7)
 
 
 @inlined
 def _product(V: Any, a: int, b: int, first: int, last: int) -> Any:
-    """Return sum_{i=first}^{last} a_i b_{first + last - i}; a, b: indices of coefficients `first` and `last`."""
+    """Return the sum of a_i b_{first + last - i} over i from `first` to `last`."""
     total = splat(0.0)
     for _ in range(first, last + 1):
         total = total + load(V, a) * load(V, b)
@@ -65,7 +65,7 @@ def _product(V: Any, a: int, b: int, first: int, last: int) -> Any:
 
 @inlined
 def _weighted(V: Any, a: int, b: int, k: int, last: int) -> Any:
-    """Return sum_{i=1}^{last} i a_i b_{k-i}; a, b: indices of coefficient 0."""
+    """Return the sum of i a_i b_{k-i} over i from 1 to `last`."""
     total = splat(0.0)
     for i in range(1, last + 1):
         total = total + splat(float(i)) * (load(V, a + i * WIDTH) * load(V, b + (k - i) * WIDTH))
@@ -74,7 +74,7 @@ def _weighted(V: Any, a: int, b: int, k: int, last: int) -> Any:
 
 @kernel
 def _leading(op: int, V: Any, a: int, b: int, flag: int, kind: int, o: int, o2: int) -> None:
-    """Compute order 0 of the operations that are defined by a differential equation."""
+    """Compute coefficient 0 of the operations that are defined by a differential equation."""
     for j in range(WIDTH):
         u = V[a + j]
         if op == EXP:
@@ -103,7 +103,7 @@ def _leading(op: int, V: Any, a: int, b: int, flag: int, kind: int, o: int, o2: 
 
 @kernel
 def _higher(op: int, V: Any, a: int, b: int, flag: int, out: int, out2: int, k: int) -> None:
-    """Compute order k >= 1 of the operations defined by a differential equation."""
+    """Compute coefficient k >= 1 of the operations that are defined by a differential equation."""
     o, o2, share = out + k * WIDTH, out2 + k * WIDTH, splat(1.0 / k)
     if op == EXP:
         store(V, o, share * _weighted(V, a, out, k, k))
@@ -126,7 +126,7 @@ def _higher(op: int, V: Any, a: int, b: int, flag: int, out: int, out2: int, k: 
 
 @inlined
 def _quotient(V: Any, x: int, out: int, b: int, k: int) -> Any:
-    """Return (V[x] - sum_{i<k} out_i b_{k-i}) / b_0; out, b: indices of coefficient 0.
+    """Return coefficient k of a quotient `out` = x/b, from the lower coefficients of `out`.
 
     The newest coefficient of b is used last, and no division by b_0 follows it. A processor with out-of-order
     execution has then finished everything else.
@@ -141,7 +141,7 @@ def _quotient(V: Any, x: int, out: int, b: int, k: int) -> Any:
 
 @inlined
 def _with_constant(op: int, x: Any, c: Any) -> Any:
-    """Return order 0 of an operation on a series and a constant."""
+    """Return coefficient 0 of an operation on a Taylor series and a constant."""
     if op == ADD_CONSTANT:
         return x + c
     return x - c if op == SUB_CONSTANT else c - x
@@ -151,7 +151,7 @@ def _with_constant(op: int, x: Any, c: Any) -> Any:
 def advance_simd_series(
     rows: Any, first: int, last: int, V: Any, begin: int, end: int, block: int, orders: int, k: int
 ) -> None:
-    """Compute coefficient k of operations first..last - 1 in all blocks of eight lanes from `begin` to `end` in V.
+    """Compute coefficient k of the operations first..last - 1 for all contacts from `begin` to `end` in V.
 
     Coefficient k of register r is at (r*orders + k)*WIDTH of a block.
     """
@@ -190,7 +190,7 @@ def advance_simd_series(
 
 @kernel
 def clear_constants(laws: Any, V: Any, t: int, base: int, orders: int) -> None:
-    """Clear the constant registers of a block, and store its numbers."""
+    """Set the constant registers of a block of contacts to zero, and store the numbers of the law."""
     length = orders * WIDTH
     for i in range(laws.constant_ptr[t], laws.constant_ptr[t + 1]):
         pair = 2 if laws.constant_rows[i, 0] in PAIRED else 1

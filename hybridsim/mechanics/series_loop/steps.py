@@ -1,4 +1,4 @@
-"""This module computes step lengths and the first exits of contacts, in a tournament tree."""
+"""This module computes step lengths, and finds the first contact that leaves its mode."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def set_time(tree: Any, leaf: int, t: float) -> None:
 
 @kernel
 def first_leaf(tree: Any) -> int:
-    """Return the leaf of the tree with the earliest time."""
+    """Return the leaf of the tournament tree with the earliest time."""
     i, half = 1, tree.shape[0] // 2
     while i < half:
         i = 2 * i if tree[2 * i] == tree[i] else 2 * i + 1
@@ -71,7 +71,7 @@ def first_leaf(tree: Any) -> int:
 
 @inlined
 def _largest(scratch: Any, first: Any, second: Any, total: Any) -> tuple[float, float, bool]:
-    """Return the largest number of each of two vectors, and whether those of a third are finite."""
+    """Return the largest number of each of two vectors, and whether a third vector is finite."""
     wide = scratch.sums.shape[1]
     store(scratch.sums, 2 * wide, first)
     store(scratch.sums, 2 * wide + WIDTH, second)
@@ -87,7 +87,7 @@ def _largest(scratch: Any, first: Any, second: Any, total: Any) -> tuple[float, 
 def reach(
     arrays: Any, state: Any, scratch: Any, nd: int, nc: int, top: int, rtol: float, longest: float
 ) -> float:
-    """Return the time over which the last two terms of each series are below tolerance, or NaN."""
+    """Return the time over which the last two terms of each Taylor series are below the tolerance, or NaN."""
     h, Q, wide = longest, scratch.Q, scratch.Q.shape[1]
     for a in range(nd):
         x = scratch.dofs[a]
@@ -130,7 +130,7 @@ def reach(
 def _reach_of_bases(
     arrays: Any, state: Any, scratch: Any, nc: int, top: int, rtol: float, longest: float
 ) -> float:
-    """Return the time over which the series of the oscillating bases of slipping contacts meet the tolerance.
+    """Return the time over which the Taylor series of the base speeds meet the tolerance.
 
     The velocity of such a base is part of no coordinate, so that no other series bounds it.
     """
@@ -151,7 +151,7 @@ def _reach_of_bases(
 def _exit_of(
     state: Any, scratch: Any, top: int, terms: int, h: float, order: int, slack: float, is_short: bool
 ) -> tuple[int, float]:
-    """Find when the polynomial in scratch.poly[:terms] first becomes negative on (0, h], in units of h.
+    """Find the first time in (0, h] at which the polynomial in scratch.poly becomes negative, in units of h.
 
     A polynomial that is zero throughout, or within the rounding `slack` of its terms, does not go negative.
     It is undecided if the series omits terms that are comparable with it, or with its first term after an event.
@@ -181,7 +181,7 @@ def _exit_of(
 
 @kernel
 def _bound_rest(arrays: Any, state: Any, scratch: Any, nc: int, top: int, h: float) -> None:
-    """Sum positive and negative terms of each guard (slip) or force (stick) over a time h, except the first.
+    """Sum the positive and the negative terms of each guard over a time h, without the first terms.
 
     The first term is left out; results go to scratch.sums, rows 1 and 2.
     """
@@ -217,7 +217,7 @@ def _is_far(
 def isolate(
     arrays: Any, state: Any, scratch: Any, nc: int, tau: float, h: float, top: int, is_short: bool
 ) -> tuple[int, float]:
-    """Find the first exit of each contact over (0, h]; return (OPEN, fraction) if an exit is undecided."""
+    """Find the first exit of each contact from its mode in (0, h]; return (OPEN, fraction) if undecided."""
     _bound_rest(arrays, state, scratch, nc, top, h)
     power = h ** (top - 2)
     for i in range(nc):
@@ -261,7 +261,7 @@ def isolate(
 
 @kernel
 def _at_ends(scratch: Any, nc: int, h: float, top: int) -> None:
-    """Compute relative velocities and forces at the end or at the exits, and their largest terms."""
+    """Compute relative velocities and forces at the end of the series or at the exits, with error scales."""
     R, F, sums = scratch.R, scratch.F, scratch.sums
     wide = R.shape[1]
     for i in range(whole_vectors(nc)):
@@ -317,7 +317,7 @@ def _law_holds(
 
 
 def step_length_kernel(arrays: Any, laws: Any, state: Any, scratch: Any) -> int:
-    """Run `step_length` with the arguments in the state."""
+    """Call `step_length` with the arguments stored in the state."""
     nd, nc, top = state.whole[DOFS], state.whole[CONS], state.whole[ORDER]
     tau, longest, rtol = state.real[AT], state.real[LONGEST], state.real[RTOL]
     h = reach(arrays, state, scratch, nd, nc, top, rtol, longest)
@@ -341,7 +341,7 @@ def step_length_kernel(arrays: Any, laws: Any, state: Any, scratch: Any) -> int:
 
 @inlined
 def step_length(arrays: Any, laws: Any, state: Any, scratch: Any, longest: float, rtol: float) -> float:
-    """Return the length over which the patch's series are used, and find its exits up to this length.
+    """Return how long the series of a patch can be used, and find the exits from modes in this time.
 
     NaN if there is no such length.
     """

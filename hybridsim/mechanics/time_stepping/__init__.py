@@ -1,4 +1,4 @@
-"""This folder runs mechanical systems by Moreau-Jean time stepping.
+"""This package simulates mechanical systems by Moreau-Jean time stepping.
 
 Start with `run`.
 """

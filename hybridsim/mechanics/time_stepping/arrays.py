@@ -33,7 +33,7 @@ _CHUNK = 256  # right-hand sides solved at a time
 
 
 class Stepped(NamedTuple):
-    """The arrays that are constant in a run; sparse matrices are (ptr, col, val) by rows, as declared."""
+    """The arrays that are constant in a run; sparse matrices are (ptr, col, val), in the declared order."""
 
     k_ptr: np.ndarray  # k: K
     k_col: np.ndarray
@@ -71,7 +71,7 @@ class Stepped(NamedTuple):
 
 
 def build_stepped(system: MechanicalSystem, step: float, theta: float) -> tuple[Stepped, Laws]:
-    """Convert a system to arrays for steps of one length.
+    """Convert a mechanical system to arrays for steps of one length.
 
     Raises
     ------
@@ -84,7 +84,7 @@ def build_stepped(system: MechanicalSystem, step: float, theta: float) -> tuple[
         factors = splu(A)
     except RuntimeError:
         raise UsageError(
-            f"{system.name}: M + h theta C + (h theta)^2 K is singular", remedy="give every coordinate a mass"
+            f"{system.name}: M + h theta C + (h theta)^2 K is singular", remedy="use masses above zero"
         ) from None
     W = directions(system)
     lower = sparse.csc_array(sparse.tril(factors.L, -1))
@@ -114,7 +114,7 @@ def directions(system: MechanicalSystem) -> Any:
 
 
 def _delassus(W: Any, factors: Any) -> Any:
-    """Return W A^-1 W^T without entries that are negligible relative to the diagonal."""
+    """Return the Delassus matrix W A^-1 W^T without entries that are negligible next to the diagonal."""
     m = W.shape[0]
     columns, diagonal = [], np.zeros(m)
     for first in range(0, m, _CHUNK):

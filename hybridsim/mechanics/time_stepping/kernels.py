@@ -24,7 +24,7 @@ _NOTHING = 1e-2  # of the tolerance; a smaller change of an impulse is not passe
 
 
 class SteppedState(NamedTuple):
-    """The state of a run: q, v (n,), mode, impulse (m,), works (5,), counts (4,), residual (1,)."""
+    """The state of a run: positions q and velocities v (n,), modes and impulses (m,), works, and counts."""
 
     q: np.ndarray
     v: np.ndarray
@@ -60,7 +60,7 @@ class SteppedScratch(NamedTuple):
 
 
 class SteppedRecord(NamedTuple):
-    """The record: states (k, 2n), forces (k, m), events (step, which, mode before, after), counts used."""
+    """The record of a run: states (k, 2n), forces (k, m), and events (step, contact, mode before, after)."""
 
     states: np.ndarray
     forces: np.ndarray
@@ -79,7 +79,7 @@ def product(ptr: Any, col: Any, val: Any, k: int, x: Any) -> float:
 
 @kernel
 def solve_step(arrays: Any, x: Any, work: Any) -> None:
-    """Replace x by A^-1 x."""
+    """Replace x by the solution A^-1 x of a linear system."""
     n = x.shape[0]
     for i in range(n):
         work[arrays.row[i]] = x[i]
@@ -99,7 +99,7 @@ def solve_step(arrays: Any, x: Any, work: Any) -> None:
 
 @kernel
 def forces_at(arrays: Any, t: float, out: Any) -> None:
-    """Compute the forcing at a time."""
+    """Compute the external forces at a given time."""
     for x in range(out.shape[0]):
         total = arrays.still[x]
         for e in range(arrays.h_ptr[x], arrays.h_ptr[x + 1]):
@@ -110,7 +110,7 @@ def forces_at(arrays: Any, t: float, out: Any) -> None:
 
 @inlined
 def base_at(arrays: Any, c: int, t: float) -> float:
-    """Return the speed of a contact's base."""
+    """Return the speed of a contact's base at a given time."""
     r = arrays.base_rate[c]
     if r < 0:
         return arrays.base[c, 0]
@@ -121,7 +121,7 @@ def base_at(arrays: Any, c: int, t: float) -> float:
 
 @kernel
 def slip_forces(arrays: Any, laws: Any, scratch: Any) -> None:
-    """Compute the slip forces, forward and backward, at the relative velocities; at v = 0 the forces at onset."""
+    """Compute the slip forces in both directions; at zero velocity, the forces at the onset of slip."""
     nc = scratch.speed.shape[0]
     for c in range(nc):
         scratch.up[c], scratch.down[c] = arrays.onset[c, 0], arrays.onset[c, 1]
@@ -155,7 +155,7 @@ def slip_forces(arrays: Any, laws: Any, scratch: Any) -> None:
 
 @kernel
 def sweep(arrays: Any, state: Any, scratch: Any, h: float, tolerance: float) -> bool:
-    """Compute impulses for given slip forces by projected Gauss-Seidel; return whether they converged.
+    """Compute impulses for given slip forces by projected Gauss-Seidel; return whether they converge.
 
     Only contacts with a changed neighbour are swept. A friction impulse is positive along its direction, so that a
     force f gives - h f.
@@ -221,7 +221,7 @@ def sweep(arrays: Any, state: Any, scratch: Any, h: float, tolerance: float) -> 
 def impulses(
     arrays: Any, laws: Any, state: Any, scratch: Any, h: float, tolerance: float, iterations: int
 ) -> bool:
-    """Compute the impulses of a step, with slip forces at the end velocities; return if they converged."""
+    """Compute the impulses of a step, with slip forces at the end velocities; return if they converge."""
     nc = scratch.speed.shape[0]
     slip_forces(arrays, laws, scratch)
     for _ in range(iterations):
@@ -250,7 +250,7 @@ def impulses(
 
 @kernel
 def begin(arrays: Any, state: Any, scratch: Any, h: float, theta: float, t: float, t_after: float) -> None:
-    """Prepare a step: velocities and rates without impulses, and the gaps that may exert a force."""
+    """Prepare a step: compute velocities without impulses, and find the gaps that may exert a force."""
     n, nc = state.q.shape[0], scratch.speed.shape[0]
     forces_at(arrays, t_after, scratch.force_after)
     for x in range(n):
@@ -282,7 +282,7 @@ def begin(arrays: Any, state: Any, scratch: Any, h: float, theta: float, t: floa
 
 @kernel
 def finish(arrays: Any, state: Any, scratch: Any, h: float, theta: float) -> None:
-    """Compute velocities and positions at the end of a step from its impulses, and the works of the step.
+    """Compute velocities and positions at the end of a step, and the work of each force in the step.
 
     An impulse does the work of the mean of the velocities before and after, whatever theta is.
     """
@@ -324,7 +324,7 @@ def finish(arrays: Any, state: Any, scratch: Any, h: float, theta: float) -> Non
 
 @kernel
 def put_impulses(arrays: Any, state: Any, scratch: Any) -> None:
-    """Add the effect of the impulses to b."""
+    """Add the effect of the contact impulses to the right-hand side b."""
     for k in range(scratch.y.shape[0]):
         for e in range(arrays.w_ptr[k], arrays.w_ptr[k + 1]):
             scratch.b[arrays.w_col[e]] += arrays.w_val[e] * state.impulse[k]
@@ -342,7 +342,7 @@ def steps(
     first: int,
     count: int,
 ) -> int:
-    """Make up to `count` steps; stop if the record is full or a state is NaN. Return the number of steps.
+    """Make up to `count` steps, fewer if the record is full or a state is NaN; return the number of steps.
 
     settings: step, theta, tolerance, iterations. record.used: numbers of rows of states and of events.
     """

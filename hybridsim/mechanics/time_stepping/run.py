@@ -37,7 +37,7 @@ _EQUAL = 1e-9  # tolerance for a span that is a whole number of steps
 
 
 class SteppedRun:
-    """One run by time stepping; `go` carries it out.
+    """One run by time stepping, which the method `go` carries out.
 
     The span is divided into equal steps, none longer than requested, so that one factored matrix serves all.
     """
@@ -132,11 +132,11 @@ class SteppedRun:
 
 
 def _length(system: MechanicalSystem, method: Moreau) -> float:
-    """Return the given step, or a fraction of the single period of forcing and bases."""
+    """Return the step that was passed, or a fraction of the period of forcing and bases."""
     for label in ("step", "period", "steps_per_period"):
         value = getattr(method, label)
         if value is not None and not (math.isfinite(value) and value > 0.0):
-            raise UsageError(f"moreau: {label} is {value!r}", remedy="give a positive number")
+            raise UsageError(f"moreau: {label} is {value!r}", remedy="use a positive number")
     if method.step is not None:
         return method.step
     rates = [abs(rate) for rate in rates_of(system) if rate != 0.0]
@@ -144,7 +144,7 @@ def _length(system: MechanicalSystem, method: Moreau) -> float:
     if period is None:
         raise UsageError(
             f"moreau needs a step size, because {system.name} has no single forcing period",
-            remedy="give step=... or period=...",
+            remedy="use step=... or period=...",
         )
     return period / method.steps_per_period
 

@@ -1,4 +1,4 @@
-"""This module reads the answers of a solution from a time-stepping run of a mechanical system."""
+"""This module computes the results of a solution from a time-stepping run of a mechanical system."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class SteppedTrajectory(ArraysTrajectory):
 
     @cached_property
     def own_times(self) -> np.ndarray:
-        """Return the ends of the steps (m,)."""
+        """Return the times (m,) at the ends of the steps."""
         return self._instants(np.arange(self.run.done + 1))
 
     def _instants(self, steps: np.ndarray) -> np.ndarray:
@@ -57,7 +57,7 @@ class SteppedTrajectory(ArraysTrajectory):
         return self._states.T
 
     def states(self, times: np.ndarray, side: str) -> np.ndarray:
-        """Return states (k, 2n), which are the same on both sides of an event."""
+        """Return the states (k, 2n) at given times; they are the same on both sides of an event."""
         n, first = self.model.n, self._step_of(times)
         after = np.minimum(first + 1, self.run.done)
         d = (times - self.own_times[first])[:, None]
@@ -78,7 +78,7 @@ class SteppedTrajectory(ArraysTrajectory):
         return (*self.event_names, *speeds, *(f"gap({i.name})" for i in self.model.impacts))
 
     def values(self, name: str, times: np.ndarray, side: str) -> np.ndarray:
-        """Return a state; a force, as the mean over its step; a relative velocity or a gap (k,)."""
+        """Return the values (k,) of a state, a force (mean over a step), a relative velocity or a gap."""
         if name in self.names:
             return self.states(times, side)[:, self.names.index(name)]
         nc, parts = len(self.model.contacts), self.event_names
@@ -121,7 +121,7 @@ class SteppedTrajectory(ArraysTrajectory):
         return self._instants(self._event[:, 0]), self._event[:, 1], self._event[:, 2:]
 
     def event_states(self, component: str, kind: str | None, side: str) -> np.ndarray:
-        """Return the states (m, 2n) at these events."""
+        """Return the states (m, 2n) at the events of one contact or impact."""
         chosen = (self.changes[1] == self.event_names.index(component)) & (kind in (None, "transition"))
         return np.array(self._states[self._event[chosen, 0]])
 
@@ -137,7 +137,7 @@ class SteppedTrajectory(ArraysTrajectory):
 
     @property
     def x_end(self) -> np.ndarray:
-        """Return the states (2n,) at the end."""
+        """Return the states (2n,) at the end of the run."""
         return np.concatenate([self.run.state.q, self.run.state.v])
 
     @property
@@ -174,7 +174,7 @@ class SteppedTrajectory(ArraysTrajectory):
 
     @property
     def stats(self) -> dict[str, float]:
-        """Return the cost: steps, sweeps over the contacts, bounces, events, seconds; residual: the largest."""
+        """Return the cost: steps, sweeps over contacts, bounces, events, seconds and the largest residual."""
         counts = self.run.state.counts.tolist()
         return {
             "steps": counts[STEPS], "sweeps": counts[SWEEPS], "bounces": counts[BOUNCES], "events": len(self._event),
@@ -183,7 +183,7 @@ class SteppedTrajectory(ArraysTrajectory):
         }  # fmt: skip
 
     def summary(self) -> list[str]:
-        """Return the numbers of events and bounces, and the cost."""
+        """Return the numbers of events and bounces, and the cost, as text."""
         stats = self.stats
         return [
             f"  events: {stats['events']}, bounces: {stats['bounces']}",

@@ -20,7 +20,7 @@ _BEYOND = 1.5  # a diverging run is cut at this multiple of the true motion's he
 
 
 def scene(example: Example) -> Axes:
-    """Draw one state over a window of time, and below it the events of both runs."""
+    """Draw one state in a time window, and below it the events of the correct and of the failing run."""
     right, failing = example.right, example.failing
     off = None if failing is None else _error(right, failing)
     figure = style.figure(5.2, 2.5 if off is None else 3.3)
@@ -83,7 +83,7 @@ def scene(example: Example) -> Axes:
 
 
 def _error(right: Line, failing: Line) -> np.ndarray | None:
-    """Return the difference of the runs if it is too small to be visible but above rounding, else None."""
+    """Return the difference of the two runs if it is too small to see but above rounding, else None."""
     if failing.t.size < 2:
         return None
     off = np.interp(right.t, failing.t, failing.x, left=np.nan, right=np.nan) - right.x

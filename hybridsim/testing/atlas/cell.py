@@ -1,4 +1,4 @@
-"""One cell of the matrix: a scene run by one method within a time limit."""
+"""One cell of the atlas: one scene, run by one method within a time limit."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ LONG = 20.0  # units of time; longer scenes are run only by compiled methods
 
 @dataclass(frozen=True)
 class Row:
-    """One setting of a study: relative errors as in `Scene` (NaN if not compared), steps and seconds."""
+    """One run of a study: its setting, its relative errors (NaN if not compared), steps and seconds."""
 
     setting: str
     time_error: float
@@ -54,18 +54,18 @@ class Cell:
 
     @property
     def error(self) -> float | None:
-        """The larger of both errors at the last completed setting, or None."""
+        """The larger of the two errors at the last completed setting, or None."""
         error = max(self.rows[-1].time_error, self.rows[-1].state_error) if self.rows else math.nan
         return error if math.isfinite(error) else None
 
     def to_plain(self) -> dict[str, Any]:
-        """Return plain data; a row becomes a list of its values."""
+        """Return the cell as plain data, in which each row is a list of its values."""
         rows = [dataclasses.astuple(row) for row in self.rows]
         return dataclasses.asdict(self) | {"rows": rows, "error": self.error}
 
     @classmethod
     def from_plain(cls, plain: Mapping[str, Any]) -> Cell:
-        """Return the cell of `to_plain`; missing errors become NaN."""
+        """Return a cell from the plain data of `to_plain`; missing errors become NaN."""
         known = {name: value for name, value in plain.items() if name not in ("rows", "error")}
         rows = tuple(
             Row(setting, _number(of_times), _number(of_states), steps, seconds)
@@ -75,7 +75,7 @@ class Cell:
 
 
 def run_cell(scene: Scene, configuration: Configuration, quick: bool = False) -> Cell:
-    """Run one cell; `quick` runs only the loosest setting of the study."""
+    """Run one scene with one method; `quick` runs only the loosest setting of the study."""
     reason = configuration.applies(scene)
     length = abs(scene.span[1] - scene.span[0]) / scene.unit
     if not reason and length > LONG and length < 1e6 and not configuration.is_compiled:
@@ -114,7 +114,7 @@ def _number(value: float | None) -> float:
 
 
 def row(setting: str, run: Measured) -> Row:
-    """Return a row of a cell; a run with a wrong end or sequence has no numeric errors."""
+    """Return a row of a cell; a run with a wrong end or a wrong event sequence has no numeric errors."""
     if run.ending or run.sequence:
         return Row(setting, math.nan, math.nan, run.steps, run.seconds)
     return Row(setting, run.time_error, run.state_error, run.steps, run.seconds)
@@ -127,7 +127,7 @@ def loosened(tolerances: tuple[float, float], setting: Setting) -> tuple[float, 
 
 
 def seen_by(scene: Scene, configuration: Configuration) -> Scene:
-    """Return the scene for a method; with regularised contacts, modes are not compared."""
+    """Return the scene as a method can solve it; for regularised contacts, modes are not compared."""
     if not configuration.form:
         return scene
     truth = scene.truth

@@ -1,4 +1,4 @@
-"""The methods of the atlas: every integrator, and other common methods, each with its own study."""
+"""The methods of the atlas: every integrator, and other common methods, each with its own settings."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ RIVALS: dict[str, type[Integrator]] = {
 
 @dataclass(frozen=True)
 class Configuration:
-    """A method of running a scene.
+    """A method of the atlas: an integrator with its options, and the settings of its runs.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def configurations() -> tuple[Configuration, ...]:
 
 
 def chosen(names: tuple[str, ...] | None) -> tuple[Configuration, ...]:
-    """Return the methods with these names, or of these integrators; without names, all.
+    """Return the methods with the given names, or of the given integrators; without arguments, all methods.
 
     Regularised forms belong to no integrator and must be named themselves.
     """

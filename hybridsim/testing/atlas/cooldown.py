@@ -17,7 +17,7 @@ from hybridsim.integrators.scipy.solvers import ScipyRK45
 
 @dataclass(frozen=True)
 class CooldownRK45(ScipyRK45):
-    """SciPy's RK45 with the events of `solve_ivp`, restarted after each event, with guards ignored at first.
+    """SciPy's RK45, restarted after each event, with all guards ignored for a short time.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ class _Blind(NativeStepper):
         return self._blinded(super()._monitor(number))
 
     def _blinded(self, event: Any) -> Callable[[float, np.ndarray], float]:
-        """Return an event function that has the far side's sign in the cooldown, so that it cannot fire."""
+        """Return an event function that keeps one sign during the cooldown, so that it cannot fire."""
         far = 1.0 if event.direction > 0 else -1.0
 
         def blinded(s: float, x: np.ndarray) -> float:

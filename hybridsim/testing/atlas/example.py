@@ -83,7 +83,7 @@ def example(result: Atlas, scene: Scene) -> Example | None:
 
 
 def typical_failure(cells: list[Cell]) -> Cell | None:
-    """Return the cell to show: wrong runs before hanging ones, in the order of `TYPICAL`."""
+    """Return the failure to show for a scene: a wrong run is preferred to a run without an end."""
     for verdicts in (WRONG, (HANG,)):
         found = [cell for cell in cells if cell.verdict in verdicts]
         found.sort(
@@ -101,7 +101,7 @@ def first_wrong(cell: Cell) -> str:
 
 
 def solution(scene: Scene, configuration: Configuration, setting: str) -> Any:
-    """Return the run of one setting, or None if it has no solution."""
+    """Return the solution of one run of a study, or None if the run has no solution."""
     options = next((s.options for s in configuration.settings(scene) if s.text == setting), None)
     if options is None:
         options = configuration.settings(scene)[-1].options
@@ -158,7 +158,7 @@ def _compared(scene: Scene, right: Any, failing: Any, cell: Cell | None) -> Exam
 
 
 def _window(first: float, last: float, centre: float, width: float) -> tuple[float, float]:
-    """Return a window of this width around the centre, inside the run."""
+    """Return a time window of the given width around the given centre, inside the run."""
     low = min(max(first, centre - 0.4 * width), last - width)
     return low, low + width
 

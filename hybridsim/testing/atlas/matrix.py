@@ -75,7 +75,7 @@ class Atlas:
         }
 
     def to_json(self) -> str:
-        """Return JSON text with a line for each cell; nan and inf become null."""
+        """Return JSON text with one line per cell; nan and inf become null."""
         plain = _finite(self.to_plain())
         parts = []
         for name, part in plain.items():
@@ -85,7 +85,7 @@ class Atlas:
 
     @classmethod
     def from_json(cls, text: str) -> Atlas:
-        """Return the atlas of `to_json`, with the current descriptions of the packaged scenes."""
+        """Return an atlas from the JSON text of `to_json`, with the current descriptions of the scenes."""
         plain = json.loads(text)
         scenes = {scene.name: scene for scene in SCENES}
         found = [Cell.from_plain(cell) for cell in plain["cells"]]
@@ -158,7 +158,7 @@ def atlas(
 
 
 def scenes_named(names: Sequence[str], trouble: str = "") -> tuple[Scene, ...]:
-    """Return the packaged scenes with these names, or of one class; without both, all scenes."""
+    """Return the packaged scenes with the given names, or of one class; without arguments, all scenes."""
     known = {scene.name: scene for scene in SCENES}
     if trouble and trouble not in TROUBLES:
         raise UsageError(
@@ -228,7 +228,7 @@ def _signals_later() -> Iterator[None]:
 
 
 def _quiet_worker() -> None:
-    """Ignore Ctrl-C and warnings in a worker process."""
+    """Ignore Ctrl-C and warnings in a worker process, because the main process handles them."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     warnings.simplefilter("ignore")  # as in the parent process
     os.environ.setdefault("OMP_NUM_THREADS", "1")

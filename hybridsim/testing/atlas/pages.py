@@ -60,7 +60,7 @@ _RUBBING = "For friction at a hard stop see the scene `rubbing-stop` and `hybrid
 
 
 def pages(result: Atlas, pictures: Collection[str] = ()) -> dict[str, str]:
-    """Return the Markdown text of each file; `pictures` names the scenes with a picture, CLASS/SCENE.png."""
+    """Return the Markdown text of each page; `pictures` names the scenes that have a picture."""
     groups = result.by_class()
     found = {"index.md": index(result, groups)}
     for trouble, scenes in groups.items():
@@ -98,12 +98,12 @@ def index(result: Atlas, groups: Mapping[str, list[Scene]]) -> str:
 
 
 def anchor(title: str) -> str:
-    """Return the anchor of a heading in links."""
+    """Return the anchor of a heading, for links to the heading."""
     return re.sub(r"[^\w\- ]", "", title.strip().lower()).replace(" ", "-")
 
 
 def page(result: Atlas, trouble: str, scenes: list[Scene], pictures: Collection[str] = ()) -> str:
-    """Return the page of one class."""
+    """Return the Markdown text of the page on one class of scenes."""
     lines = [f"# {TROUBLES.get(trouble, 'Scenes')}", "", "[The whole matrix](index.md)", ""]
     for scene in scenes:
         lines += [f"## {scene.title or scene.name}", "", f"`{scene.name}`: {scene.cause}.", ""]
@@ -144,7 +144,7 @@ def _by_reason(cells: list[Cell]) -> dict[str, list[str]]:
 
 
 def _with_error(cell: Cell) -> str:
-    """Return a name with its error and, if visible, its order of convergence."""
+    """Return a method's name with its error and, if visible, its order of convergence."""
     known = []
     if cell.error is not None and cell.rows:
         known.append(f"{cell.error:.0e}")
@@ -154,7 +154,7 @@ def _with_error(cell: Cell) -> str:
 
 
 def _safe(reason: str) -> str:
-    """Return a reason that is safe in a table, with numbers shortened to a readable number of digits."""
+    """Return a reason as text that is safe in a Markdown table, with numbers in few digits."""
     return _NUMBER.sub(lambda number: f"{float(number[0]):.{_DIGITS}g}", reason).replace("|", r"\|")
 
 

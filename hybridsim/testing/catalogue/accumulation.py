@@ -16,7 +16,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _twisting() -> Scene:
-    """With x'' = -2 sign(x) - sign(x') each half turn is 3 times narrower and sqrt(3) times shorter."""
+    """Return the scene of a twisting motion, in which each half turn is sqrt(3) times shorter."""
     half, end = 4 * math.sqrt(2) / 3, 4 * math.sqrt(2) / 3 / (1 - 1 / math.sqrt(3))
     first, second = half, half * (1 + 1 / math.sqrt(3))
 
@@ -48,7 +48,7 @@ def _twisting() -> Scene:
 
 
 def _tanks() -> tuple[Scene, ...]:
-    """The hose fills the lower tank; each visit lasts half as long as the one before (w = 0.75, leaks 0.5)."""
+    """Return scenes of two water tanks, in which each visit of the hose is half as long as the last one."""
     t, x = 2.0, [0.5, 0.0]  # the second tank is low
     events, low, left = [(t, "hose:second")], 1, 1e-4
     states = [(1.0, (0.25, 0.5)), (3.0, (0.0, 0.25))]

@@ -1,4 +1,4 @@
-"""Scenes of events at one instant: guards listed twice, two ulp apart, flat, resets onto guards, a run's end."""
+"""Scenes of events at one instant: coinciding guards, flat guards, resets onto guards, the end of a run."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from hybridsim.testing.scene import END, Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return scenes of guards that coincide, are zero at the start or flat, and of resets onto guards."""
+    """Return scenes of guards that coincide, are zero at the start or are flat, and of resets onto guards."""
     after = ("a:after", "b:after")
     return (
         Scene(
@@ -117,7 +117,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def left_once(solution: Any) -> list[str]:
-    """Check the flat guard: one transition and at most one monitor event, both at t = 1."""
+    """Check that a flat guard causes one transition and at most one monitor event, both at t = 1."""
     changes = [event.t for event in solution.events if event.kind == "transition"]
     wrong = [] if changes == [1.0] else [f"the mode changes {at_times(changes)} instead of once, at t = 1"]
     crossed = [event.t for event in solution.events if event.component == "down"]

@@ -13,25 +13,25 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _pulses() -> Scene:
-    """The solution is the sum of widths times heights."""
+    """Return the scene of pulses in a rate; the solution is the sum of their widths times their heights."""
     states = ((20.0, (0.0, 0.0, 0.0, 20.0, -10.0)), (100.0, (1000.0, 40.0, 10.0, 50.0, -80.0)))
     return Scene("conditions", "conditions", (0.0, 100.0), Truth((), states), unit=10.0)
 
 
 def _region() -> Scene:
-    """The states x = t - 1 and y = t - 2 are positive after t = 2, and their sum is below 8 until t = 5.5."""
+    """Return the scene of a condition on x = t - 1, y = t - 2 and x + y, which holds from t = 2 to 5.5."""
     states = ((4.0, (3.0, 2.0, 2.0, 2.0)), (10.0, (9.0, 8.0, 3.5, 6.5)))
     return Scene("region", "region", (0.0, 10.0), Truth(None, states), needs("sliding"))
 
 
 def _held_in_part() -> Scene:
-    """The state x reaches zero at t = 3, stays there while y > 0 until t = 5, and then grows."""
+    """Return the scene of a state x that reaches zero at t = 3, stays there until t = 5, and then grows."""
     states = ((2.0, (-1.0, 1.0)), (4.0, (0.0, 1.0)), (5.0, (0.0, 0.0)), (10.0, (5.0, -5.0)))
     return Scene("held-in-part", "held-in-part", (0.0, 10.0), Truth(None, states), needs("sliding"))
 
 
 def _load() -> Scene:
-    """The motion is 3 cos t without friction, then half an oscillation about x = 2, which ends in stick."""
+    """Return the scene of a load that jumps: an oscillation without friction, then friction, then stick."""
     x, v = 3 * math.cos(0.4), -3 * math.sin(0.4)
     amplitude, angle = math.hypot(x - 2, v), math.atan2(-v, x - 2)
     stop = 0.4 + math.pi - angle
@@ -52,7 +52,7 @@ def _load() -> Scene:
 
 
 def _belt() -> Scene:
-    """The belt overtakes the block, which follows at the rate 1/2, and stops below it."""
+    """Return the scene of a belt that overtakes a block, after which the block follows and stops."""
     events = ((1.0, "f:slip-"), (3.0, "f:stick"), (8.0, "f:slip+"), (10.0, "f:stick"))
     states = ((2.0, (0.5,)), (5.0, (1.0,)), (9.0, (0.5,)), (12.0, (0.0,)))
     truth = Truth(events, states)
@@ -62,7 +62,7 @@ def _belt() -> Scene:
 
 
 def _guards() -> Scene:
-    """The tank fills from t = 3 to x = 5 at t = 6, and empties at twice the rate to x = 7 at t = 8."""
+    """Return the scene of a tank whose guards jump, at the border of a condition or at a known time."""
     states = ((3.0, (2.0, 0.0)), (6.0, (5.0, 3.0)), (10.0, (9.0, -1.0)))
     return Scene(
         "stepped-guard",

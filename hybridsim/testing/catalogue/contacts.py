@@ -56,7 +56,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def tied() -> Scene:
-    """Return the scene of two contacts that reach their limits together; one release holds the other."""
+    """Return the scene of two contacts that reach their limits together, of which only one releases."""
     release, own, forced = math.asin(0.4) / 4, math.sqrt(30), 7.5 / 14
 
     def after(t: float) -> tuple[float, float]:
@@ -80,7 +80,7 @@ def tied() -> Scene:
 
 
 def turning_belt() -> Scene:
-    """Return the scene of an input that moves the surface away suddenly, so that the body slips."""
+    """Return the scene of a belt whose speed jumps, so that the body slips."""
     turns = ["f:stick", "f:slip+", "f:slip-"]
     states = ((0.5, (0.5,)), (1.5, (1.0,)), (3.25, (-0.5,)), (4.5, (0.25,)))
     return Scene(
@@ -95,7 +95,7 @@ def turning_belt() -> Scene:
 
 
 def sequence(expected: list[str]) -> Any:
-    """Return a check of the mode sequence; the states test its times."""
+    """Return a check of the mode sequence without its times; the states test the times."""
 
     def check(solution: Any) -> list[str]:
         found = [f"{e.component}:{e.target}" for e in solution.events if e.component]

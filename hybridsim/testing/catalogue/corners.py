@@ -14,7 +14,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _bilinear() -> Scene:
-    """The frequency is 2 for x > 0 and 1 for x < 0, with half periods of pi/2 and pi."""
+    """Return the scene of a bilinear oscillator with half periods of pi/2 and pi."""
     period = 1.5 * math.pi
     quarter, root = math.pi / 4, math.sqrt(0.5)
     states = (
@@ -28,7 +28,7 @@ def _bilinear() -> Scene:
 
 
 def _backlash() -> Scene:
-    """Free flights of length 2 at speed 1 alternate with half periods of a spring of frequency 2."""
+    """Return the scene of backlash: free flights alternate with half periods of a spring of frequency 2."""
     half = math.pi / 2
     states = (
         (0.5, (0.5, 1.0)),
@@ -41,7 +41,7 @@ def _backlash() -> Scene:
 
 
 def _saturation() -> Scene:
-    """The input 2 sin(t) is clipped to 1 between pi/6 and 5 pi/6, and its integral is known."""
+    """Return the scene of the integral of 2 sin(t), clipped to 1 between pi/6 and 5 pi/6."""
     rise = 2 * (1 - math.cos(math.pi / 6))
     top = rise + 2 * math.pi / 3
     states = (
@@ -57,7 +57,7 @@ def _saturation() -> Scene:
 
 
 def _drag() -> Scene:
-    """Upward v = vt tan, downward v = -vt tanh, with the terminal speed vt."""
+    """Return the scene of quadratic drag: v = vt tan upward, v = -vt tanh downward, vt: terminal speed."""
     g, c, v0 = 9.81, 0.3, 5.0
     terminal = math.sqrt(g / c)
     rate = math.sqrt(g * c)
@@ -77,7 +77,7 @@ def _hinge() -> Scene:
 
 
 def _elastogap() -> Scene:
-    """The motion is that of MSL-elastogap, whose modes are sides of corners here."""
+    """Return the scene of the motion MSL-elastogap, declared with corners instead of modes."""
     states = tuple((row[0], tuple(row[1:])) for row in TRUTHS["MSL-elastogap"]["states"])
     return Scene(
         "elastogap-clipped",
@@ -91,7 +91,7 @@ def _elastogap() -> Scene:
 
 
 def _sizes() -> Scene:
-    """The guards reach zero at x = 1.06, y = -0.86 and z = -1.75."""
+    """Return the scene of nested absolute values with known zeros: x = 1.06, y = -0.86 and z = -1.75."""
     events = ((0.04, "second:off"), (0.16, "first:off"), (0.25, "third:off"))
     return Scene(
         "sizes-of-sizes",

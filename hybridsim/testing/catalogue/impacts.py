@@ -30,7 +30,7 @@ def _height(t: float) -> tuple[float, float]:
 
 
 def closed(name: str, solution: Any) -> list[float]:
-    """Return the times at which a contact closes."""
+    """Return the times at which a contact closes in a solution."""
     return [e.t for e in solution.events if e.component == name and e.target == "closed"]
 
 
@@ -63,7 +63,7 @@ def rests(*names: str) -> Any:
 
 
 def _bounce() -> Scene:
-    """A ball bounces from t = 0.5 on; its n-th flight lasts E**n seconds, and it rests at t = 1.5."""
+    """Return the scene of a ball that bounces from t = 0.5 on, and comes to rest at t = 1.5."""
     states = (*((t, _height(t)) for t in (0.3, 0.8, 1.1, 1.3)), (END, (0.0, 0.0)))
     checks = (("", closes("p")), ("located", rests("p")), ("", equals(2.0, h=0.0, w=0.0)))
     return Scene(
@@ -78,7 +78,7 @@ def _bounce() -> Scene:
 
 
 def _bar() -> Scene:
-    """The bar is hit at both ends at once, stays level, and bounces like a ball."""
+    """Return the scene of a bar that is hit at both ends at once, stays level, and bounces like a ball."""
     heights = ((t, _height(t)) for t in (0.3, 0.8, 1.1))
     states = (*((t, (h, h, w, w)) for t, (h, w) in heights), (END, (0.0,) * 4))
     checks = (
@@ -98,7 +98,7 @@ def _bar() -> Scene:
 
 
 def _table() -> Scene:
-    """The ball is thrown, bounces, rests and is thrown again; the flights after each throw are known."""
+    """Return the scene of a ball on a vibrating table, which rests and is thrown again."""
     truth = TRUTHS["vibrating-table"]
     end = 0.25  # a rest and a throw; later periods are the same
     states = tuple((float(row[0]), tuple(row[1:])) for row in truth["states"] if row[0] < end)

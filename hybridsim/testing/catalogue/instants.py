@@ -1,4 +1,4 @@
-"""Scenes of several changes at one instant: additive resets, zeros at ticks, touches, copied values."""
+"""Scenes of several changes at one instant: additive resets, zeros at clock ticks, touches, copied values."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hybridsim.testing.scene import Scene, Truth, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return scenes of additive resets, zeros at clock ticks, touches, copied values and chains of zeros."""
+    """Return scenes of additive resets, zeros at clock ticks, touches, copied values and successive zeros."""
     return (
         _doses(),
         _counting_balls(),
@@ -24,7 +24,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _doses() -> Scene:
-    """The amount is the sum of the earlier doses, each decayed by exp(-1.2 t)."""
+    """Return the scene of doses, of which several are due at one instant, and which decay as exp(-1.2 t)."""
     doses = ((0.0, 100.0), (3.0, 50.0), (6.0, 200.0), (12.0, 100.0))
 
     def amount(t: float) -> tuple[float, ...]:
@@ -42,7 +42,7 @@ def _doses() -> Scene:
 
 
 def _counting_balls() -> Scene:
-    """Each ball bounces four times with restitution 0.8 from 1 m; flight k lasts 2 (0.8)**k fall times."""
+    """Return the scene of two balls that share a count of bounces and hit the ground simultaneously."""
     fall = math.sqrt(2.0 / 9.81)
     times = [fall * (1.0 + 2.0 * sum(0.8**i for i in range(1, k + 1))) for k in range(4)]
     events = tuple((t, f"{ball}:flight") for t in times for ball in ("one", "two"))
@@ -57,7 +57,7 @@ def _counting_balls() -> Scene:
 
 
 def _guard_and_tick() -> Scene:
-    """The ramp 0.7 t reaches 0.21 at t = 0.3; in doubles 0.7 * 0.3 and 0.21 differ by rounding."""
+    """Return the scene of a ramp 0.7 t that reaches 0.21 at a clock tick, except for rounding."""
     times = [0.3 * k for k in range(1, 11)]
     return Scene(
         "guard-at-each-tick",
@@ -76,7 +76,7 @@ def _guard_and_tick() -> Scene:
 
 
 def _carried_back() -> Scene:
-    """The monitor touches zero without changing its sign."""
+    """Return the scene of a monitor that touches zero without changing its sign."""
     return Scene(
         "monitor-carried-back",
         "carried-back",
@@ -98,7 +98,7 @@ def _never_crossed(solution: Any) -> list[str]:
 
 
 def _samples() -> Scene:
-    """A sine of amplitude 8 is sampled whenever it has changed by 2, also at its extremes.
+    """Return the scene of a sine that is sampled whenever it has changed by 2, also at its extremes.
 
     Whether these touches are sampled is open, and with them the first level on the way back.
     """
@@ -128,7 +128,7 @@ def _samples() -> Scene:
 
 
 def _copied() -> Scene:
-    """The solution x = 10 - 11.3 cos(sqrt(3) t) reaches 0.7; its copy then decreases at rate one."""
+    """Return the scene of x = 10 - 11.3 cos(sqrt(3) t), whose copy decreases once x has reached 0.7."""
     at, end = math.acos(9.3 / 11.3) / math.sqrt(3.0), 1.0
 
     def state(t: float) -> tuple[float, ...]:
@@ -147,7 +147,7 @@ def _copied() -> Scene:
 
 
 def _successive_zeros() -> Scene:
-    """Guards of two successive modes are zero at 0.87/0.7 together with the first guard."""
+    """Return the scene of three successive modes, each with a guard that is zero at t = 0.87/0.7."""
     at = 0.87 / 0.7
     return Scene(
         "chain-of-zeros",

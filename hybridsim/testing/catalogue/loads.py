@@ -28,7 +28,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _floor() -> Scene:
-    """A bounce on a spring decreases the speed along the floor by mu times the impulse of the load."""
+    """Return the scene of a bounce on a spring, with friction that slows the speed along the floor."""
     g, k, mu, end = 9.81, 1000.0, 0.3, 0.3
     own, down, start = math.sqrt(k), math.sqrt(2 * g * 0.1), math.sqrt(2 * 0.1 / g)
 
@@ -50,7 +50,7 @@ def _floor() -> Scene:
 
 
 def _touching() -> Scene:
-    """The impulse of the load is the area under its curve."""
+    """Return the scene of a load that touches zero; the friction impulse is the area under the load."""
     return Scene(
         "touching-load",
         "touching-load",
@@ -62,7 +62,7 @@ def _touching() -> Scene:
 
 
 def _waves() -> Scene:
-    """The mean load is 25 in both periods; the load of the wave has the same integral as 25/8."""
+    """Return the scene of a triangular load that touches zero, with a known friction impulse."""
     return Scene(
         "load-of-waves",
         "load-of-waves",
@@ -78,7 +78,7 @@ def _waves() -> Scene:
 
 
 def _ending() -> Scene:
-    """The truth uses the areas under the ramps, and a force that grows after t = 2 without friction."""
+    """Return the scene of two loads that decrease to zero: one body slides on, the other starts to slide."""
     return Scene(
         "load-that-ends",
         "load-that-ends",
@@ -94,7 +94,7 @@ def _ending() -> Scene:
 
 
 def _series() -> Scene:
-    """The lower contact releases at t = 2; both blocks move together, x'' + x = (t - 1)/8, until t = 5."""
+    """Return the scene of two blocks in series that move together from t = 2 to 5."""
     tau = 3.0
     x = 0.125 * (tau + 1.0 - math.cos(tau) - math.sin(tau))
     v = 0.125 * (1.0 + math.sin(tau) - math.cos(tau))
@@ -109,7 +109,7 @@ def _series() -> Scene:
 
 
 def _painleve() -> Scene:
-    """Two motions are admissible, and the message of the run names both."""
+    """Return the scene of two admissible motions, which must both be named in the message of the run."""
     return Scene(
         "painleve-start",
         "painleve",
@@ -126,7 +126,7 @@ def _painleve() -> Scene:
 
 
 def _stop_off_zero() -> Scene:
-    """The gap opens at t = pi/6 with zero force, and grows with the cube of time."""
+    """Return the scene of a gap that opens at t = pi/6 with zero force, and grows as the cube of time."""
     began, end = math.pi / 6, 3.0
     left = end - began
     v = math.cos(began) - math.cos(end) - 0.5 * left
@@ -142,7 +142,7 @@ def _stop_off_zero() -> Scene:
 
 
 def _moving_floor() -> Scene:
-    """The contact opens when the acceleration of the floor reaches gravity; then the body flies."""
+    """Return the scene of a body that leaves the floor when the floor's acceleration reaches gravity."""
     g, size, turns, end = 9.81, 0.02, 30.0, 0.25
     phase = math.asin(g / (size * turns**2))
     first, again = phase / turns, (phase + 2 * math.pi) / turns
@@ -169,7 +169,7 @@ def _moving_floor() -> Scene:
 
 
 def _kinked_floors() -> Scene:
-    """The floors kink at t = 0.1: the body on the rising floor is thrown up, the other falls freely."""
+    """Return the scene of two floors whose speeds jump at t = 0.1, one upward and one downward."""
     began, end = 0.1, 0.14
 
     def state(t: float) -> tuple[float, ...]:
@@ -190,7 +190,7 @@ def _kinked_floors() -> Scene:
 
 
 def _own_speed() -> Scene:
-    """The speed v' = 0.48 min(-v, 0.85) - 2 is exponential until v = -0.85, and linear after that."""
+    """Return the scene of v' = 0.48 min(-v, 0.85) - 2, whose solution is exponential, then linear."""
     limit = 2.0 / 0.48
     reached = math.log((limit - 0.2) / (limit - 0.85)) / 0.48
 
@@ -210,7 +210,7 @@ def _own_speed() -> Scene:
 
 
 def _element() -> Scene:
-    """The spring extends up to the limit; the slider stops when the spring would be slower than the limit."""
+    """Return the scene of a spring with a slider, in which the force limit of the slider varies."""
     stiffness, mu, end = 20.0, 0.5, 7.0
 
     def place(t: float) -> float:

@@ -22,7 +22,7 @@ def closed_form(p: Mapping[str, float]) -> ForcedCoulombOscillator:
 
 
 def at(motion: Motion, t: float) -> tuple[float, float]:
-    """Return position and velocity at a time."""
+    """Return position and velocity of the closed form at a time."""
     x, v = motion(t)
     return float(x), float(v)
 
@@ -42,7 +42,7 @@ def states(
 
 
 def oscillator(case: str, **changes: Any) -> Scene:
-    """Return the scene of a case of the facts file, with all events and samples from the closed form."""
+    """Return the scene of a case with a closed form, which gives all events and samples of the states."""
     fact = CASES[case]
     p = {name: float(fact["params"][name]) for name in NAMES}
     x0, v0 = fact["x0"]
@@ -76,7 +76,7 @@ def oscillator(case: str, **changes: Any) -> Scene:
 
 
 def den_hartog(case: str) -> Scene:
-    """Return the scene of a periodic orbit without stops over ten periods, which ends at a reversal."""
+    """Return the scene of a periodic orbit without stops over ten periods, which ends at a turning point."""
     t0, t1 = CASES[case]["t_span"]
     return oscillator(
         case,
@@ -125,7 +125,7 @@ def dfcs(name: str, F0: float, ratio: float) -> Scene:
 
 
 def backward_orbit() -> Scene:
-    """Return the scene of a Den Hartog orbit that runs backward through a reversal, where it is unique."""
+    """Return the scene of a Den Hartog orbit that runs backward in time through a turning point."""
     case = "DH-r2-f0.2"
     fact = CASES[case]
     p = {name: float(fact["params"][name]) for name in NAMES}
@@ -147,7 +147,7 @@ def backward_orbit() -> Scene:
 
 
 def backward_stick() -> Scene:
-    """Return the scene of a body at rest, run backward, where the earlier motion is not unique."""
+    """Return the scene of a body at rest that runs backward in time, where the past is not unique."""
     return oscillator(
         "FLAG-flag_a",
         name="backward-stick",
@@ -159,7 +159,7 @@ def backward_stick() -> Scene:
 
 
 def threshold() -> Scene:
-    """Return the scene of a force that reaches the stick limit and decreases again, so that nothing moves."""
+    """Return the scene of a force that reaches the stick limit and decreases again without any motion."""
     end = CASES["THR-exact"]["t_span"][1]
     truth = Truth(
         (), tuple((t, (0.0, 0.0)) for t in (1.0, math.pi, 7.0, end)), checks=(("", no_transition), *STUCK)

@@ -1,4 +1,4 @@
-"""Scenes that amplify errors: chaotic motion and grazing."""
+"""Scenes that amplify errors, such as chaotic motion and grazing."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def grazing_stop() -> Scene:
 
 
 def lifting() -> Scene:
-    """Return the scene of an opening contact in chaotic motion, in which the error of a fixed step grows."""
+    """Return the scene of a contact that opens in chaotic motion, which amplifies errors of a fixed step."""
     expected = CASES["FEENY"]["expected"]
 
     def turns(solution: Any) -> list[float]:

@@ -32,7 +32,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def stays(component: str, *terms: str, to_one: bool = False) -> Check:
-    """Return a check that a sum of outputs is 1 or 0, within rounding, during sliding."""
+    """Return a check that a sum of outputs is 1 or 0 during sliding, except for rounding."""
 
     def check(solution: Any) -> list[str]:
         for interval in solution.modes[component]:
@@ -53,7 +53,7 @@ def stays(component: str, *terms: str, to_one: bool = False) -> Check:
 
 
 def _published() -> tuple[Scene, ...]:
-    """Return cases published with other tools, and cases that are declared a second time with modes."""
+    """Return scenes published with other tools, and scenes of the same systems declared with modes."""
     exact: dict[str, Any] = {"tol_t": 1e-9, "tol_x": 1e-9}
     at_rest = (("", equals(1.0, x1=0.0, x2=0.0)),)
     passages = CASES["SIC-filippov"]["expected"]["first_crossings"]
@@ -124,7 +124,7 @@ def _published() -> tuple[Scene, ...]:
 
 
 def spirals_in(solution: Any) -> list[str]:
-    """The sum |x1| + |x2| is 6 - 4t until t = 1.5, where infinitely many crossings accumulate."""
+    """Check that |x1| + |x2| is 6 - 4t until t = 1.5, at which infinitely many crossings accumulate."""
     times = np.linspace(0.0, 1.5, 301)
     off = np.abs(np.abs(solution(times)).sum(axis=0) - (6 - 4 * times)).max()
     wrong = [f"|x1| + |x2| is off by {off:.2g}"] if off > 1e-8 else []  # the rates are constant in between
@@ -135,7 +135,7 @@ def spirals_in(solution: Any) -> list[str]:
 
 
 def _along_the_circle() -> Scene:
-    """The motion is that of `_circle` until t = 3.5, and is still sliding then."""
+    """Return the scene of a motion that slides along a circle and still slides at the end, t = 3.5."""
     scene = _circle()
     events = (scene.truth.events or ())[:1]
     truth = replace(scene.truth, events=events, states=scene.truth.states[:2])
@@ -143,7 +143,7 @@ def _along_the_circle() -> Scene:
 
 
 def _circle() -> Scene:
-    """With x + iy = r exp(it), (ln r)' = t/4 - u: r = 1 from 4 - sqrt(16 - 8 ln 2) to 4, where u reaches 1."""
+    """Return the scene of a motion that spirals to the circle r = 1, slides along it and leaves it."""
     onto, off = 4 - math.sqrt(16 - 8 * math.log(2)), 4.0
 
     def at(t: float, log_r: float) -> tuple[float, tuple[float, float]]:
@@ -162,7 +162,7 @@ def _circle() -> Scene:
 
 
 def _decay() -> Scene:
-    """The solution is v = -t, x = 1 - t**2/2 until x + v = 0 at sqrt(3) - 1; then x decays as exp(-t)."""
+    """Return the scene of v = -t until x + v = 0 at t = sqrt(3) - 1, after which x decays as exp(-t)."""
     onto = math.sqrt(3) - 1
     states = [(0.5, (0.875, -0.5))]
     states += [(t, (onto * math.exp(onto - t), -onto * math.exp(onto - t))) for t in (1.0, 2.0, 5.0)]
@@ -177,7 +177,7 @@ def _decay() -> Scene:
 
 
 def _rubbing_servo() -> Scene:
-    """The speed has v' = 1.7 + sin(3t)/2 until x - 1 + v = 0; then v and x - 1 decay as exp(-t)."""
+    """Return the scene of a servo with friction, which slides along x - 1 + v = 0 with decay exp(-t)."""
 
     def speed(t: float) -> float:
         return 1.7 * t + (1.0 - math.cos(3.0 * t)) / 6.0
@@ -200,7 +200,7 @@ def _rubbing_servo() -> Scene:
 
 
 def _two_relays() -> Scene:
-    """The motion reaches y = 0 at t = 1/6, then x = 0, slides along both, and leaves x = 0 at t = 3/2."""
+    """Return the scene of two relays: the motion slides along x = y = 0, and leaves x = 0 at t = 3/2."""
     first, both, off = 1 / 6, 1.5 - math.sqrt(0.75), 1.5
 
     def x(t: float) -> float:
@@ -222,7 +222,7 @@ def _two_relays() -> Scene:
 
 
 def _chatter() -> Scene:
-    """The state rises at 1 and falls at 1.5 between +-1e-3, with a change every 2e-3 and every 4/3e-3."""
+    """Return the scene of a thermostat whose state changes between rising and falling within +-1e-3."""
     band, end = 1e-3, 0.3
     events, t, up = [], band, True
     while t < end:
@@ -242,7 +242,7 @@ def _chatter() -> Scene:
 
 
 def _refused() -> tuple[Scene, ...]:
-    """More than one motion is admissible, so the run stops and names the surfaces."""
+    """Return scenes with several admissible motions, in which the run must stop and name the surfaces."""
     return (
         Scene(
             "ambiguous-meeting",

@@ -13,7 +13,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _walls() -> Scene:
-    """Flights have length 2 (at first 1) at speed 1, and contacts last pi/sqrt(k)."""
+    """Return the scene of two stiff walls, with flights of length 2 at speed 1 and contacts of pi/sqrt(k)."""
     contact = math.pi / 1e3
     events, t = [], 1.0
     for n in range(5):
@@ -37,7 +37,7 @@ def _walls() -> Scene:
 
 
 def _follower() -> Scene:
-    """The solution is x = sin(t) for every value of the rate."""
+    """Return the scene of a fast filter with the solution x = sin(t) for every value of its rate."""
     return Scene(
         "step-limit",
         "follower",
@@ -50,7 +50,7 @@ def _follower() -> Scene:
 
 
 def _long_swing() -> Scene:
-    """The solution is cos(t) over two thousand periods."""
+    """Return the scene of a swing with the solution cos(t) over two thousand periods."""
     end = 2000 * 2 * math.pi
     times = (end / 2 + 0.5, end - 1.0, end)
     return Scene(

@@ -22,7 +22,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _guards() -> Scene:
-    """The guards are piecewise linear in time, since all states move at constant rates."""
+    """Return the scene of guards with corners; all states move at constant rates."""
     events = (
         (0.5, "nested:after"),
         (1.0, "largest:after"),
@@ -47,7 +47,7 @@ def _guards() -> Scene:
 
 
 def _contacts() -> Scene:
-    """The stick limits are 0.8, 3.5, 3.6, 0.8, 0: three bodies rest, one starts at t = 2, one slides freely."""
+    """Return the scene of five contacts: three bodies rest, one starts at t = 2, and one slides freely."""
     events = ((0.0, "lifted_N:open"), (2.0, "step:slip+"))
     states = (
         (1.0, (-1.0, 0.0, -2.0, 0.0, 0.0, 0.0, -1.0, 0.5)),
@@ -73,7 +73,7 @@ def _relay() -> Scene:
 
 
 def _gap() -> Scene:
-    """The force is -3 at the start, -5 after the jump, and -1 + 3 y where y > 0: it lifts the ball at y = 1/3."""
+    """Return the scene of a ball on a force with a corner, which lifts the ball at y = 1/3."""
     lifted = 0.5 + 2.0 + 1.0 / 3.0
     rise = 4.0 - lifted
     states = ((0.25, (0.0, 0.0, -0.75)), (2.5, (0.0, 0.0, 0.0)), (4.0, (0.5 * rise**3, 1.5 * rise**2, 1.5)))
@@ -87,7 +87,7 @@ def _gap() -> Scene:
 
 
 def _sampled() -> Scene:
-    """At t = 1 the ball is half a metre lower and the body rises from -0.7 to -0.2; f was always -0.5."""
+    """Return the scene of a clock that ticks at the start, before the contacts have modes."""
     read = tuple(
         (partial(_read, name, t), value)
         for t, values in (
@@ -122,7 +122,7 @@ def _order() -> Scene:
 
 
 def _flat() -> Scene:
-    """The solution is c = 9 + cos(t)."""
+    """Return the scene of a corner with zero slope on both sides; the solution is c = 9 + cos(t)."""
     return Scene(
         "flat-corner",
         "flat-corner",
@@ -135,7 +135,7 @@ def _flat() -> Scene:
 
 
 def _zeros() -> Scene:
-    """Each state starts at a zero, written as a sum, and leaves it at rate one."""
+    """Return the scene of states that start at zeros of their guards and leave them at rate one."""
     starts = tuple(a + b for a, b in _SUMS)
     return Scene(
         "starts-at-zeros",
@@ -147,7 +147,7 @@ def _zeros() -> Scene:
 
 
 def _held() -> Scene:
-    """Three bodies start at the speed of their belts, and the force 0.1 is below the friction limit."""
+    """Return the scene of three bodies that start at the speeds of their belts and stay in stick."""
     starts = {f"v{k}": a + b for k, (a, b) in enumerate(_SUMS[:3])}
     return Scene(
         "starts-at-belt-speeds",

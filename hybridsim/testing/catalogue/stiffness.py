@@ -44,7 +44,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _neuron() -> Scene:
-    """The interval between spikes is the integral of dV/V' over the potential."""
+    """Return the scene of a neuron, whose interval between spikes is the integral of dV/V'."""
 
     def time_per_volt(V: float) -> float:
         return 281.0 / (30.0 * 2.0 * math.exp((V + 50.4) / 2.0) + 1000.0 - 30.0 * (V + 70.6))
@@ -64,7 +64,7 @@ def _neuron() -> Scene:
 
 
 def _decades() -> Scene:
-    """One half-life is ln(2)/1e8, the other is ln(2)."""
+    """Return the scene of two decays whose half-lives ln(2)/1e8 and ln(2) differ by eight decades."""
     early, late = math.log(2) * 1e-8, math.log(2)
     states = (
         (early, (math.exp(-early), 0.5)),

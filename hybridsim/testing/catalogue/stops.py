@@ -25,7 +25,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _motion(t: float) -> tuple[float, float, float]:
-    """Return position, velocity and drive."""
+    """Return the position, the velocity and the drive of the exact motion."""
     drive = -PUSH + RISE * max(t - 3.0, 0.0)
     if t >= OFF:
         return RISE * (t - OFF) ** 3 / 6, RISE * (t - OFF) ** 2 / 2, drive
@@ -42,7 +42,7 @@ def _motion(t: float) -> tuple[float, float, float]:
 
 
 def _pulled_off(solution: Any) -> list[str]:
-    """The friction limit is reached by the pull, and at this instant the gap opens."""
+    """Check that the friction limit is reached at the instant at which the gap opens."""
     found = {
         name: [e.t for e in solution.events if e.component == name and e.source == mode and e.t > REST + 1e-3]
         for name, mode in (("f", "stick"), ("p", "closed"))

@@ -14,7 +14,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _speeds() -> Scene:
-    """Three bodies move with piecewise known accelerations, and guards on their speeds fire at stops."""
+    """Return the scene of three bodies with guards on their speeds, which fire at stops."""
     back = math.sqrt(5.4) - 2.0  # after its kick the third body moves by -0.7 + 2 s + s**2/2
     turn = 0.8 + 1 / 3
     events = (
@@ -43,7 +43,7 @@ def _speeds() -> Scene:
 
 
 def _gaps() -> Scene:
-    """The gap h is 1 - t**2 until t = 1, then s - s**2; k is 2 - t**2 until sqrt(2), then zero."""
+    """Return the scene of guards on two gaps with piecewise polynomial motion."""
     rest = math.sqrt(2.0)
     states = (
         (0.5, (0.75, -1.0, 1.75, -1.0, 0.0)),

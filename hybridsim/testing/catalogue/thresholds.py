@@ -40,7 +40,7 @@ def _swing(name: str, periods: float, **changes: Any) -> Scene:
 
 
 def _micro_slip() -> Scene:
-    """The force exceeds the limit by 1e-4, which causes slips of 1e-7 in a hundredth of a period."""
+    """Return the scene of a force that exceeds the stick limit by 1e-4, so that the body slips by 1e-7."""
     found, samples = recomputed("micro-slip")
     return Scene(
         "micro-slip",
@@ -59,7 +59,7 @@ def _micro_slip() -> Scene:
 
 
 def _fading() -> Scene:
-    """The limit 2 (1 - t/10) decreases to the push of 1 at t = 5; then v' = (t - 5)/5."""
+    """Return the scene of a stick limit that decreases to the force at t = 5, where slip begins."""
     samples = tuple((t, ((t - 5) ** 3 / 30, (t - 5) ** 2 / 10)) for t in (5.5, 7.0, 9.0))
     checks = (("exact-stick", exact_stick("f", {"v": 0.0}, rest=("x",))),)
     return Scene(
@@ -75,24 +75,24 @@ def _fading() -> Scene:
 
 
 def _many_stops() -> Scene:
-    """The body is pulled slowly and stops many times in each period."""
+    """Return the scene of a body that is pulled slowly and stops many times in each period."""
     swing = _swing("many-stops", 1, w=0.05, c=0.1, Fs=0.1, Fk=0.05)
     return replace(swing, needs=STICK | {"multiple-roots"})  # a slip is short compared with the period
 
 
 def _half() -> Scene:
-    """The oscillator is undamped and driven at half its frequency."""
+    """Return the scene of an undamped oscillator that is driven at half its natural frequency."""
     swing = _swing("half-frequency", 10, w=0.5)
     return replace(swing, floor=1e-9)  # undamped, so the errors of ten periods add up
 
 
 def _small() -> Scene:
-    """All forces are scaled by 1/1000; speeds are then of the order of the published velocity interval."""
+    """Return the scene of an oscillator with forces scaled by 1/1000, and therefore small speeds."""
     return _swing("small-speeds", 10, F0=1e-3, Fs=3e-4, Fk=3e-4, w=0.75, c=0.1)
 
 
 def _at_rest() -> Scene:
-    """A spring pulls with half of the limit, so nothing moves."""
+    """Return the scene of a spring that pulls with half of the stick limit, so that nothing moves."""
     samples = tuple((t, (0.5, 0.0)) for t in (1.0, 30.0, 100.0))
     return Scene(
         "resting-load",

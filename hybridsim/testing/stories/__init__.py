@@ -13,7 +13,7 @@ HERE = Path(__file__).parent
 
 
 def read() -> dict[str, dict[str, Any]]:
-    """Read the files, and return class, title, cause and description of each scene."""
+    """Read the TOML files, and return the class, the title, the cause and the description of each scene."""
     found: dict[str, dict[str, Any]] = {}
     for trouble in TROUBLES:
         for name, fields in tomllib.loads((HERE / f"{trouble}.toml").read_text("utf-8")).items():

@@ -1,4 +1,4 @@
-"""This folder divides the points of a sweep into batches, which an executor runs.
+"""This package divides the points of a sweep into batches, and runs the batches on an executor.
 
 Start with `measure`.
 """

@@ -18,7 +18,7 @@ _MAX_JOBS = 4  # number of sweeps whose model a worker process keeps
 
 
 class Incomplete(SimulationError):
-    """Raised if a measurement failed; `found` holds its partial results."""
+    """Raised if a measurement failed; `found` contains the partial results."""
 
     def __init__(self, message: str, found: dict[str, Reading]) -> None:
         super().__init__(message)
@@ -29,13 +29,13 @@ Settings = tuple[float | Expression, ...]
 
 
 class Measure(Protocol):
-    """The protocol of a measure, which runs a model and selects the readings to store."""
+    """The protocol of a measure, which runs a model and selects the values to store."""
 
     def run(self, model: Model, previous: Any) -> Any:
-        """Return the result at a point; ``previous`` is the result of the point before it in a chain."""
+        """Return the result at a point; ``previous`` is the previous point's result, or None."""
 
     def read(self, result: Any) -> Any:
-        """Return the readings to store: a number, an array, or a mapping of numbers, arrays and texts."""
+        """Return the values to store: a number, an array, or a mapping of numbers, arrays and texts."""
 
 
 @dataclass(frozen=True)
@@ -69,21 +69,21 @@ class Job:
 
 
 class Outcome(NamedTuple):
-    """The outcome of one point: status "ok" or the error, and the readings if there are any."""
+    """The outcome of one point: status "ok" or the error, and the values if there are any."""
 
     status: str
     found: dict[str, Reading] | None
 
 
 class Batch(NamedTuple):
-    """The outcomes of a batch in order, and the seconds that the batch took."""
+    """The outcomes of a batch in order, and the time in seconds that the batch took."""
 
     outcomes: list[Outcome]
     seconds: float
 
 
 class Watch(NamedTuple):
-    """The link from a worker to the sweep, which reports finished points and passes on a request to stop."""
+    """The link from a worker to the sweep, which reports finished points and passes on stop requests."""
 
     may_continue: Callable[[], bool]
     tell: Callable[[int], None]
@@ -153,7 +153,7 @@ def _message(error: Exception) -> str:
 
 
 def _first_copy(job: Job) -> Job:
-    """Return the first received copy of a job, so that all batches in a process share its compiled model."""
+    """Return the first received copy of a job, so that all batches in a process share a compiled model."""
     known = _jobs.get(job.token)
     if known is not None:
         return known

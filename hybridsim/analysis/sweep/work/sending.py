@@ -25,14 +25,14 @@ class Points(Protocol):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Shape of the arrays of results; chains of points run along the first axis."""
+        """Shape of the arrays of results; with `warm_start`, runs follow each other along the first axis."""
 
     def settings(self, numbers: range) -> list[Settings]:
         """Return the values of all axes at some points."""
 
 
 def worker_count(executor: Any, workers: int | None) -> int:
-    """Return the number of workers: as requested, as the executor has, or one per processor."""
+    """Return how many workers to use: as requested, or one per worker of the executor, or per processor."""
     if workers is not None:
         return workers
     # The pools of the standard library have no public attribute for it; others count as one worker per
@@ -135,7 +135,7 @@ class Sending:
                 self._refused(numbers, error)
 
     def _refused(self, numbers: range, error: BaseException) -> None:
-        """Record a batch that could not be run; the workers themselves catch errors of single points."""
+        """Record a batch that could not be run; errors of single points are handled by the workers."""
         require_sendable(self._job, error)
         lost = Outcome(f"the executor lost the batch: {type(error).__name__}: {error}", None)
         self._collected.put(numbers, [lost] * len(numbers))

@@ -1,4 +1,4 @@
-"""Find located guards that stay non-negative once the modes at surfaces are chosen; they are not events.
+"""Find located guards that stay non-negative after the modes at surfaces are chosen, and so do not fire.
 
 A guard on the velocity of a contact reaches zero together with it, according to the motion before. If the contact then
 sticks, the guard stays at zero. If an impact reverses the motion, the guard only touches zero.
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def cancelled_by_surfaces(resolution: EventResolution, automata: set[int], surfaces: set[int]) -> set[int]:
-    """Return the automata whose located guards do not fire if the modes at surfaces are chosen first."""
+    """Return the automata whose located guards do not fire after the modes at surfaces are chosen."""
     ahead = copy(resolution)
     ahead.at = replace(resolution.at, z=resolution.at.z.copy())
     ahead.fired, ahead.on_surface = resolution.fired.copy(), resolution.on_surface.copy()

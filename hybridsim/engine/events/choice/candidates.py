@@ -1,4 +1,4 @@
-"""Judge the combinations of modes at the surfaces of a cluster, as many as the joint choice needs."""
+"""Judge combinations of modes at the surfaces of a cluster, as far as the choice requires."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _rank_candidates, _joint_choice, _is_settled = map(Precompiled, (rank_candidates
 
 
 class JudgedCandidates(NamedTuple):
-    """The candidates of a joint choice, the verdicts on those that were judged, and the chosen one."""
+    """The candidates of a joint choice, the verdicts on the judged candidates, and the chosen candidate."""
 
     candidates: np.ndarray  # modes (k, members)
     verdicts: np.ndarray  # (k,)
@@ -35,7 +35,7 @@ def judged_candidates(
     keeps: np.ndarray,
     cluster: tuple[int, ...],
 ) -> JudgedCandidates:
-    """Choose among joint candidates in which contacts below their limits (`keeps`) stay in their holding modes.
+    """Choose among candidates in which contacts below their limits (`keeps`) stay in their holding modes.
 
     If a member needs a unique motion, all candidates are judged.
     """
@@ -62,7 +62,7 @@ def judged_candidates(
 def completed(
     resolution: EventVerdicts, members: list[int], found: JudgedCandidates, cluster: tuple[int, ...]
 ) -> np.ndarray:
-    """Judge the remaining candidates, and return all verdicts."""
+    """Judge the candidates that are not judged yet, and return all verdicts."""
     for number in np.flatnonzero(found.verdicts == _UNJUDGED):
         z = resolution.with_modes(members, found.candidates[number])
         found.verdicts[number] = resolution.verdict(z, cluster)

@@ -1,4 +1,4 @@
-"""Choose the modes of clusters at an event in the general loop, and report when there is no or no unique motion."""
+"""Choose the modes of clusters at an event in Python, and report if there is no unique motion."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ Failure = tuple[str, str]  # status and message
 
 
 class ClusterChoice(EventVerdicts):
-    """The joint choices of modes at one event."""
+    """The joint choices of modes at one event, made in Python."""
 
     def choose_jointly(self, open_: set[int]) -> tuple[str, str] | None:
-        """Decide the clusters that contain an open component: one that fired, leaves, or has no mode yet."""
+        """Choose the modes of clusters with a component that fired, leaves its mode, or has no mode yet."""
         for cluster in self.system.clusters:
             if open_ & set(cluster):
                 failure = self._choose_cluster(cluster, open_)
@@ -91,7 +91,7 @@ class ClusterChoice(EventVerdicts):
         return None
 
     def _enter(self, members: list[int], modes: np.ndarray) -> None:
-        """Give components their modes."""
+        """Set components to the chosen modes."""
         at, automata, source = self.at, self.system.automata, self.at.z.copy()
         fired = [(c, j) for c, j, _ in self.fired_guards() if source[c] >= 0]
         guards = {c: automata[c].guard_names[source[c]][j] for c, j in fired}
@@ -102,7 +102,7 @@ class ClusterChoice(EventVerdicts):
                 self.changes.append(Change(c, guards.get(c, ""), int(source[c]), int(mode), at.x, at.x))
 
     def _several(self, components: list[int], candidates: np.ndarray) -> tuple[str, str]:
-        """Return status and message if no joint candidate is preferred, or if a rate is not a number."""
+        """Return the status and the message if no candidate is preferred, or if a rate is not a number."""
         at = self.at
         for modes in candidates:
             lost = rates_without_value(self.system, at.s, at.x, at.p, self.with_modes(components, modes))
@@ -116,7 +116,7 @@ class ClusterChoice(EventVerdicts):
         return mask
 
     def _pinned(self, components: list[int]) -> np.ndarray:
-        """Return x with the surfaces of some components exactly zero."""
+        """Return the states x, with the surfaces of some components exactly zero."""
         z = np.maximum(self.at.z, 0)
         for c in components:
             z[c] = self.system.automata[c].hold

@@ -1,4 +1,4 @@
-"""Judge modes at one event in the general loop: the series of their guards, and what the event has made zero."""
+"""Judge modes at one event in Python, by the Taylor series of their guards."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _verdict, _kind_of_change, _is_smooth = map(Precompiled, (verdict, kind_of_chang
 
 
 class EventVerdicts:
-    """The verdicts on modes at one event. before: the modes (C,) at the event, -1 for a component without one."""
+    """The verdicts on modes at one event; `before` contains the modes at the event, -1 for none."""
 
     is_thorough = False  # whether to judge all candidates, even if the choice does not need them
 
@@ -53,7 +53,7 @@ class EventVerdicts:
         self.behind: tuple[object, ...] = (None,) * 4
 
     def locate(self, located: set[int]) -> None:
-        """Store the guards at which the event was located, and the components that they release."""
+        """Store the guards at which the event was located, and the components that the guards release."""
         self.fired[list(located)] = True
         for c, automaton in enumerate(self.system.automata):
             if automaton.has_surface and self.before[c] == automaton.hold:
@@ -61,7 +61,7 @@ class EventVerdicts:
                 self.released_to[c] = next((j for j, g in guards if g in located), NO_SIDE)
 
     def series_of(self, z: np.ndarray, x: np.ndarray | None = None) -> Series:
-        """Return the Taylor series along the flow of the modes z, at the present state or at x."""
+        """Return the Taylor series along the flow of the modes `z`, at the present state or at `x`."""
         at = self.at
         x = at.x if x is None else x
         behind = (at.s, x, at.p, at.x_error)
@@ -83,14 +83,14 @@ class EventVerdicts:
         ]
 
     def event(self, judged: np.ndarray = _NO_SERIES) -> JudgedEvent:
-        """Return what verdicts read, with the series of the guards and their bounds (2, G, 4)."""
+        """Return the data for verdicts, with the series of the guards and their error bounds (2, G, 4)."""
         return JudgedEvent(
             self.before, self.at.z, self.fired, self.on_surface, self.released_to, judged, self.decreed,
             self.sides[None], self.orders[None], self.floors[None],
         )  # fmt: skip
 
     def judged(self, z: np.ndarray) -> JudgedEvent:
-        """Return the event with the series of the guards in the modes z, along time or against it."""
+        """Return the data for verdicts on the modes `z`, forward or backward in time."""
         series = self.series_of(z)
         judged = np.array([series.guards, series.guard_bounds])
         if not self.forward:
@@ -98,18 +98,18 @@ class EventVerdicts:
         return self.event(judged)
 
     def verdict(self, z: np.ndarray, components: Iterable[int]) -> int:
-        """Return whether the guards of some components admit the modes z just after the event."""
+        """Return whether the guards of some components admit the modes `z` just after the event."""
         components = list(components)
         found = self.verdict_on_guards(z, components, self.is_continuous(z, components))
         return LEAVES if found == UNDECIDED and not can_hold(self, components, z) else found
 
     def verdict_on_guards(self, z: np.ndarray, components: list[int], continuous: bool) -> int:
-        """Return the verdict, whether or not the surfaces that z holds are compatible."""
+        """Return the verdict on the guards, without a check that the held surfaces are compatible."""
         members = np.array(components, dtype=np.int64)
         return int(_verdict(self.automata, None, 0, self.judged(z), z, members, continuous, True, 0))
 
     def is_continuous(self, z: np.ndarray, components: Iterable[int]) -> bool:
-        """Return whether every change so far leaves all unknowns unchanged."""
+        """Return whether all unknowns are unchanged by all changes of mode so far."""
         if self.jumped:
             return False
         members, event = np.array(list(components), dtype=np.int64), self.event()
@@ -120,12 +120,12 @@ class EventVerdicts:
         return bool(_is_smooth(self.automata, event, z, members, jumps))
 
     def guard_verdicts(self, components: Iterable[int]) -> dict[int, int]:
-        """Return the verdict on the guards of each component in the present modes."""
+        """Return a verdict for each component, on its guards in the present modes."""
         continuous = self.is_continuous(self.at.z, range(len(self.system.automata)))
         return {c: self.verdict_on_guards(self.at.z, [c], continuous) for c in components}
 
     def with_modes(self, components: list[int], modes: np.ndarray) -> np.ndarray:
-        """Return the modes after a change of some modes, with corners on their sides along the motion."""
+        """Return the modes after changes of some modes, with corners on the sides of the motion."""
         z = self.at.z.copy()
         z[components] = modes
         return sides_along(self, np.maximum(z, 0), self.at.x)[0] if self.system.led else np.maximum(z, 0)

@@ -1,4 +1,4 @@
-"""Select the transitions of a mode if several of its guards reach zero together and have one target mode."""
+"""Select the transitions of a mode if several of its guards reach zero together and lead to one mode."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Failure = tuple[str, str]  # status and message
 def guards_taken_together(
     resolution: EventResolution, read_from: Situation, component: int, leaving: Sequence[int]
 ) -> tuple[list[tuple[int, int]], Failure | None]:
-    """Return the guards whose transitions are taken, each with the number of its choice, or an error.
+    """Return the guards whose transitions are taken, with the numbers of their choices, or an error.
 
     leaving: positions of the guards that become negative, in the order in which they reached zero. read_from: the
     situation that conditions and resets read. If several guards are negative when the mode begins, the first declared

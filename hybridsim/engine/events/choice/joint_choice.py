@@ -1,4 +1,4 @@
-"""Choose the modes of several components at one instant, by the verdicts on their combinations.
+"""Choose the modes of several components at one instant, by verdicts on combinations of modes.
 
 The current modes stay if they are admissible or undecided. Otherwise the certainly admissible combination with the
 highest rank is chosen: unchanged modes count first, then holding modes, because static friction holds. Undecided
@@ -26,7 +26,7 @@ NO_CAUSE = -1  # rank of a candidate in which a component below its limits leave
 
 @inlined
 def is_below_limit(automata: Any, event: Any, c: int) -> bool:
-    """Return whether contact c is certainly below its limits, by the series of its holding mode in `judged`."""
+    """Return whether contact `c` is certainly below its limits, by the series of its holding mode."""
     for j in range(automata.guards_of.shape[2]):
         g = automata.guards_of[c, automata.hold[c], j]
         if g >= 0 and not event.judged[0, g, 0] > event.judged[1, g, 0]:
@@ -38,7 +38,7 @@ def is_below_limit(automata: Any, event: Any, c: int) -> bool:
 def rank_candidates(
     modes: Any, total: int, count: int, current: Any, holds: Any, keeps: Any, ranks: Any
 ) -> None:
-    """Write the ranks of joint candidates, or NO_CAUSE; see `rank_of`.
+    """Write the rank of each joint candidate, or NO_CAUSE; `rank_of` defines the rank.
 
     modes (total, count): the candidates, one row each. current, holds (count,): the current and the holding modes.
     keeps (count,): contacts below their limits, which have no cause to leave their holding modes. Static friction above
@@ -56,13 +56,13 @@ def rank_candidates(
 
 @inlined
 def rank_of(unchanged: int, held: int, count: int) -> int:
-    """Return the rank of a candidate by the numbers of unchanged and of holding modes among `count`."""
+    """Return the rank of a candidate by its numbers of unchanged modes and of holding modes."""
     return held + (count + 1) * unchanged
 
 
 @inlined
 def is_current(rank: int, count: int) -> bool:
-    """Return whether a candidate of this rank changes no mode."""
+    """Return whether a candidate with the given rank changes no mode."""
     return rank >= count * (count + 1)
 
 
@@ -70,7 +70,7 @@ def is_current(rank: int, count: int) -> bool:
 def joint_choice(
     chosen: int, score: int, number: int, rank: int, verdict: int, count: int
 ) -> tuple[int, int]:
-    """Return the choice after the verdict on one more candidate, and its score; it begins with NONE, NO_SCORE.
+    """Return the choice and its score after the verdict on one more candidate.
 
     The choice is NONUNIQUE if two candidates share the highest score.
     """
@@ -85,12 +85,12 @@ def joint_choice(
 
 @inlined
 def is_settled(score: int, rank: int, count: int) -> bool:
-    """Return whether candidates of this rank, and of lower ones, cannot change a choice with this score."""
+    """Return whether candidates with the given rank or lower ranks cannot change the choice any more."""
     return score - (count + 1) * (count + 1) > rank
 
 
 def joint_candidates(sizes: Iterable[int]) -> np.ndarray:
-    """Return all combinations of modes of a cluster, one row each. The array must not be modified."""
+    """Return all combinations of modes of a cluster, one per row; the array must not be modified."""
     return _joint(tuple(sizes))
 
 

@@ -30,7 +30,7 @@ _SAME = 64.0 * UNIT  # relative difference of two series of one motion, by the r
 def rivals(
     resolution: EventVerdicts, members: list[int], candidates: np.ndarray, verdicts: np.ndarray
 ) -> np.ndarray:
-    """Return the admissible joint candidates if they differ in the mode of a switching surface and in the motion.
+    """Return the admissible candidates if they differ in a switching surface's mode and in the motion.
 
     Otherwise the result is empty. A relay that is just strong enough has one motion in two modes: it may slide, or be
     on the side on which nothing moves any more.
@@ -45,7 +45,7 @@ def rivals(
 
 
 def is_one_motion(resolution: EventVerdicts, members: list[int], candidates: np.ndarray) -> bool:
-    """Return whether the states have the same Taylor series in all of these modes."""
+    """Return whether the motions in several combinations of modes have the same Taylor series."""
     motions = [resolution.series_of(resolution.with_modes(members, modes)).states for modes in candidates]
     if not np.isfinite(motions).all():
         return False
@@ -54,7 +54,7 @@ def is_one_motion(resolution: EventVerdicts, members: list[int], candidates: np.
 
 
 def can_hold(resolution: EventVerdicts, members: list[int], z: np.ndarray) -> bool:
-    """Return whether the held surfaces in the modes z are compatible, so that their holding forces exist."""
+    """Return whether all surfaces held in the modes `z` can be held together by forces."""
     automata = resolution.system.automata
     if sum(automata[c].has_surface and z[c] == automata[c].hold for c in members) < 2:
         return True
@@ -63,7 +63,7 @@ def can_hold(resolution: EventVerdicts, members: list[int], z: np.ndarray) -> bo
 
 
 def on_its_side(resolution: EventVerdicts, members: list[int], candidates: np.ndarray) -> int:
-    """Return the number of the first candidate that moves to its own side of every surface, or 0.
+    """Return the number of the first candidate whose motion enters its own side of every surface, or 0.
 
     A body at rest may slip either way within rounding. Its holding mode leaves it a speed, or a rate, of some sign.
     """
@@ -83,7 +83,7 @@ def on_its_side(resolution: EventVerdicts, members: list[int], candidates: np.nd
 
 
 def keeps_nothing(resolution: EventVerdicts, members: list[int], z: np.ndarray) -> str:
-    """Return why a motion along several surfaces may not be unique, or an empty text if it is."""
+    """Return why a motion along several surfaces may not be unique, or an empty text if it is unique."""
     automata = resolution.system.automata
     sliding = [c for c in members if automata[c].is_unique and z[c] == automata[c].hold]
     if len(sliding) < 2:
@@ -109,7 +109,7 @@ def keeps_nothing(resolution: EventVerdicts, members: list[int], z: np.ndarray) 
 
 
 def _pull(resolution: EventVerdicts, sliding: list[int], z: np.ndarray) -> np.ndarray:
-    """Return -B (k, k): how much the rate of each surface falls from below to above each other surface."""
+    """Return a matrix (k, k): how much the rate of each surface falls from below to above another surface."""
     automata, order = resolution.system.automata, resolution.system.surface_of
     rows = [order.index(c) for c in sliding]
     found = np.empty((len(sliding), len(sliding)))
@@ -128,7 +128,7 @@ def _pull(resolution: EventVerdicts, sliding: list[int], z: np.ndarray) -> np.nd
 
 
 def refused(resolution: EventVerdicts, members: list[int], message: str) -> tuple[str, str]:
-    """Return status and message if no joint candidate is admissible, with hints on switching surfaces."""
+    """Return the status and the message if no candidate is admissible, with hints on switching surfaces."""
     system = resolution.system
     if fatal := message_of_every_mode(system, members, resolution.sides):
         return "inconsistent", fatal
@@ -158,7 +158,7 @@ def message_on_cascade(resolution: EventVerdicts) -> str:
 
 
 def _message_on_drift(resolution: EventVerdicts) -> str:
-    """Return a hint if a guard is slightly below zero after a transition leads back to its mode."""
+    """Return a hint if a guard is slightly negative after a transition leads back to the guard's mode."""
     system, last = resolution.system, resolution.changes[-2:]
     if len(last) < 2 or last[0].component != last[1].component or last[0].source != last[1].target:
         return ""

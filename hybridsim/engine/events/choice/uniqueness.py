@@ -1,4 +1,4 @@
-"""Discard combinations in which friction below its limit starts to slip, and check that the motion is unique.
+"""Discard combinations in which contacts below their limits slip, and check that the motion is unique.
 
 Static friction above kinetic friction makes several combinations admissible: if one contact releases, the force on
 another jumps. A contact below its limit has no cause to release unless the other contacts leave no alternative, as in
@@ -24,7 +24,7 @@ _is_below_limit = Precompiled(is_below_limit)
 
 
 def below_limits(resolution: EventVerdicts, members: list[int]) -> np.ndarray:
-    """Return a mask of the members that are certainly below their limits, if several are decided together."""
+    """Return a mask of the contacts that are certainly below their limits, if several are in a cluster."""
     automata, at = resolution.system.automata, resolution.at
     modes, keeps = np.maximum(at.z, 0), np.zeros(len(members), dtype=np.bool_)
     holding = [
@@ -50,7 +50,7 @@ def other_outcomes(
     open_: set[int],
     cluster: tuple[int, ...],
 ) -> np.ndarray:
-    """Return admissible candidates with another motion than the selected one, if a reaction loads friction.
+    """Return admissible candidates with a motion other than the chosen one, if a reaction loads friction.
 
     Contacts that keep their mode are not examined, because the present mode stays if it is admissible.
     """

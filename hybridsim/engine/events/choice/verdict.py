@@ -1,4 +1,4 @@
-"""Judge one combination of modes: whether its guards stay non-negative just after an event, without tolerances.
+"""Judge one combination of modes by the signs of its guards just after an event, without tolerances.
 
 Each guard is given by Taylor coefficients along the flow of these modes, with running error bounds, and by the number
 of leading coefficients that are zero by decree (the set Z of the event contract). The general loop and compiled loops
@@ -23,7 +23,7 @@ NO_SIDE = -1  # the component was not released at the event
 
 
 class JudgedEvent(NamedTuple):
-    """What a verdict reads of an event, and where it is written; `EventScratch` has the same fields for compiled loops.
+    """The data of an event that a verdict reads and writes; `EventScratch` has the same fields.
 
     Rows of all_sides, all_orders and all_floors belong to the candidates of a joint choice.
     """
@@ -42,7 +42,7 @@ class JudgedEvent(NamedTuple):
 
 @inlined
 def side_after(series: Any, bounds: Any, decreed: int) -> tuple[int, int]:
-    """Return the sign of a guard just after the instant, and the order that decides it.
+    """Return the sign of a guard just after an instant, and the order of the derivative that decides it.
 
     The first coefficient beyond its bound decides. Coefficients before `decreed` are zero, whatever rounding made of
     them. The result is (0, number of coefficients) if no coefficient is beyond its bound, or if one before it is nan.
@@ -60,7 +60,7 @@ def side_after(series: Any, bounds: Any, decreed: int) -> tuple[int, int]:
 
 @kernel
 def side_before(series: Any, bounds: Any, decreed: int) -> tuple[int, int]:
-    """Return the sign of a guard just before the instant: odd orders count with the opposite sign."""
+    """Return the sign of a guard just before an instant, by the first derivative that is not zero."""
     side, order = side_after(series, bounds, decreed)
     if order % 2 == 1:
         side = -side
@@ -78,13 +78,13 @@ def open_question(series: Any, bounds: Any, decreed: int) -> bool:
 
 @inlined
 def is_release(automata: Any, event: Any, z: Any, c: int) -> bool:
-    """Return whether a component leaves its holding mode in the modes z through the guard located at zero."""
+    """Return whether a component leaves its holding mode through its located guard in the modes `z`."""
     return z[c] != automata.hold[c] and event.released_to[c] == (0 if z[c] == automata.above[c] else 1)
 
 
 @inlined
 def kind_of_change(automata: Any, event: Any, z: Any, members: Any) -> int:
-    """Return whether components changed their modes, and whether every change is a release; corners do not count."""
+    """Return whether components changed their modes, and whether each of the changes is a release."""
     kind = UNCHANGED
     for i in range(members.shape[0]):
         c = index(members[i])
@@ -98,7 +98,7 @@ def kind_of_change(automata: Any, event: Any, z: Any, members: Any) -> int:
 
 @inlined
 def is_smooth(automata: Any, event: Any, z: Any, members: Any, jumps: Any) -> bool:
-    """Return whether no unknown jumps at a release; jumps: of each surface on release to above and to below."""
+    """Return whether a release leaves all unknowns continuous; `jumps` are those on release."""
     for i in range(members.shape[0]):
         c = index(members[i])
         jump = 2 * automata.surface[c] + (0 if z[c] == automata.above[c] else 1)
@@ -118,7 +118,7 @@ def zeros_of_surface(automata: Any, event: Any, z: Any, c: int, continuous: bool
 
 @inlined
 def decreed_zeros(automata: Any, event: Any, z: Any, c: int, j: int, g: int, continuous: bool) -> int:
-    """Return how many leading coefficients of a guard the event decrees to be zero in the modes z.
+    """Return how many leading coefficients of a guard are zero by definition of the event in the modes `z`.
 
     g: number of the guard; c, j: its component, and its index in the mode.
 
@@ -136,7 +136,7 @@ def decreed_zeros(automata: Any, event: Any, z: Any, c: int, j: int, g: int, con
 
 @inlined
 def verdict_with(found: int, side: int, is_open: bool) -> int:
-    """Combine the verdict on a candidate with the side of one more of its guards; is_open: rounding hides the side."""
+    """Combine the verdict on a candidate with the sign of one more guard."""
     if side < 0:
         return LEAVES
     return UNDECIDED if is_open and found == FINE else found
@@ -154,7 +154,7 @@ def verdict(
     is_whole: bool,
     row: int,
 ) -> int:
-    """Judge the guards of some components in the modes z: LEAVES if any becomes negative, UNDECIDED if any is open.
+    """Judge the guards in the modes `z`: LEAVES if any becomes negative, UNDECIDED if any sign is unknown.
 
     Otherwise the result is FINE. lin, k: tables of linear modes and the row of z in them; None if the series of all
     guards are in `judged`. continuous: whether all unknowns stay unchanged. is_whole: judge all guards even if one

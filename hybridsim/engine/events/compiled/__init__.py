@@ -1,4 +1,4 @@
-"""This folder resolves ordinary events in compiled code, by the same rules as `resolve`.
+"""This package resolves ordinary events in compiled code, by the same rules as `resolve`.
 
 Start with `after_segment`, then `resolve_ordinary`.
 """

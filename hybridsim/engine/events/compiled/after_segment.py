@@ -1,4 +1,4 @@
-"""Resolve the event at the end of a segment in a compiled loop: error bounds there, and the event."""
+"""Resolve the event at the end of a segment in a compiled loop, with error bounds of the state."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _ULPS = 64.0  # events closer than this are left to the general mode loop
 
 @kernel
 def is_crowded(gap: float, clock: Any, pace: Any) -> bool:
-    """Return whether events follow each other so closely, or ever faster, that a compiled loop has to stop.
+    """Return whether events follow each other so fast that a compiled loop has to stop.
 
     gap: time since the last event. pace (3,): the gap before, its ratio to the one before that, and how often that
     ratio was steady.
@@ -37,7 +37,7 @@ def is_crowded(gap: float, clock: Any, pace: Any) -> bool:
 def state_errors(
     automata: Any, s_error: float, y: Any, scale: Any, x_error: Any, z: Any, slopes: Any, out: Any
 ) -> None:
-    """Write error bounds of the states at an event: from rounding, earlier errors and the event time."""
+    """Write error bounds of the states at an event, from rounding, earlier errors and the event time."""
     for i in range(y.shape[0]):
         short_loop()
         out[i] = 4.0 * UNIT * scale[i] + x_error[i] + s_error * abs(slopes[i])
@@ -52,7 +52,7 @@ def state_errors(
 
 @inlined
 def spread(steps: int, rounding: float) -> float:
-    """Return the factor by which rounding of the steps enlarges guard bounds; see `add_steps`."""
+    """Return the factor by which the rounding of the steps enlarges guard bounds, as in `add_steps`."""
     return 1.0 + 12.0 * steps + 0.5 * rounding
 
 
@@ -68,7 +68,7 @@ def is_shallow(slope: float, bend: float, length: float) -> bool:
 
 @inlined
 def resolve(model: Any, s: float, s_error: float, fired: int, state: Any, work: Any) -> bool:
-    """Resolve an ordinary event at the state y, y_error of the work space; return False for other events.
+    """Resolve an ordinary event at the state in the work space; return False for other events.
 
     model: `LoopModel`. state: `StateArrays`, replaced by the state after the event.
     """
@@ -79,7 +79,7 @@ def resolve(model: Any, s: float, s_error: float, fired: int, state: Any, work: 
 
 @inlined
 def fill_guard_series(model: Any, s: float, s_error: float, state: Any, work: Any) -> None:
-    """Write the series of the active guards with bounds to `judged` of the work space, at the state y, y_error."""
+    """Write the Taylor series of the active guards and their bounds to `judged` of the work space."""
     resolve(model, s, s_error, NOBODY, state, work)
 
 
@@ -87,7 +87,7 @@ def fill_guard_series(model: Any, s: float, s_error: float, state: Any, work: An
 def is_hidden(
     model: Any, g: int, slope: float, bend: float, s: float, s_error: float, state: Any, work: Any
 ) -> bool:
-    """Return whether a guard turns back before it exceeds the rounding error of its expression.
+    """Return whether a guard turns back while it is still below the rounding error of its expression.
 
     The state is that in the work space, at local time s.
     """
@@ -97,7 +97,7 @@ def is_hidden(
 
 @kernel
 def differ_by_rounding(model: Any, k: int, s: float, values: Any, sums: Any, state: Any, work: Any) -> bool:
-    """Return whether values of the active guards and the sums of their series agree within rounding.
+    """Return whether the values of active guards agree with the sums of their series within rounding.
 
     A guard may be the small difference of large terms, and then shorter steps do not improve the agreement. k: row of
     the modes. y of the work space is the state from which the series are computed, at local time s.
@@ -115,13 +115,13 @@ def differ_by_rounding(model: Any, k: int, s: float, values: Any, sums: Any, sta
 
 @inlined
 def moved_on(high: float, low: float, s: float) -> tuple[float, float]:
-    """Return an instant (high, low) advanced by a time s."""
+    """Return the instant (high, low) later by a time s."""
     high, rest = two_sum(high, s)
     return two_sum(high, rest + low)
 
 
 def link_event_resolution(model: Any, state: Any, work: Any) -> None:
-    """Compile the kernel that resolves events and its callees if needed, and store their addresses."""
+    """Compile the kernel that resolves events, and store its address and those of its callees."""
     x, (automata, tapes, inputs, lin) = work.y, (model.automata, model.tapes, model.inputs, model.lin)
     work.entry_points[SERIES] = kernel_address(
         interpreted_series, tapes, inputs, 0, 0.0, 0.0, x, x, state.p, work

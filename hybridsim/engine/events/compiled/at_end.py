@@ -1,4 +1,4 @@
-"""Check whether a guard may be zero at the known time at which a compiled loop ends a segment.
+"""Check whether a guard may be zero at the known end time of a segment.
 
 A guard that is zero there within rounding comes before what is due, and the general loop decides it with its bounds.
 The bounds here are wider, so that both loops decide alike.
@@ -20,7 +20,7 @@ _SHORT = 2.0**-13  # of the time of a run; on shorter segments a guard may be cl
 
 @inlined
 def is_clear(values: Any, largest: Any, s: float, time: float) -> bool:
-    """Return whether guards are far from zero at the end s of a segment, relative to their largest values on it."""
+    """Return whether all guards are far from zero at the end of a segment, relative to their maxima."""
     clear = s > _SHORT * time
     for i in range(values.shape[0]):
         clear = clear and (abs(values[i]) > _FAR * largest[i] or largest[i] == 0.0)
@@ -31,7 +31,7 @@ def is_clear(values: Any, largest: Any, s: float, time: float) -> bool:
 def may_vanish(
     model: Any, k: int, s: float, time: float, steps: int, scale: Any, slopes: Any, state: Any, work: Any
 ) -> bool:
-    """Return whether a guard of the modes in row k may be zero and about to become negative.
+    """Return whether a guard of the modes in row `k` may be zero and about to become negative.
 
     y of the work space is the state at local time s, after `steps` steps of the segment; slopes: its rates; scale: as
     for `state_errors`.
@@ -55,7 +55,7 @@ def may_vanish(
 def may_vanish_linear(
     lin: Any, tapes: Any, k: int, s: float, time: float, v: Any, sizes: Any, terms: Any
 ) -> bool:
-    """Return whether a guard of linear modes may be about to become negative, at modal coordinates v.
+    """Return whether a guard of linear modes may be about to become negative, at modal coordinates `v`.
 
     terms (TERMS,): scratch.
     """

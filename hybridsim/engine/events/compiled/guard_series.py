@@ -1,4 +1,4 @@
-"""Compute in compiled loops what a verdict reads: series of the guards, and whether unknowns jump."""
+"""Compute the data of verdicts in compiled loops: Taylor series of guards, and jumps of unknowns."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hybridsim.engine.series.bounded import run_series
 def interpreted_series(
     tapes: Any, inputs: Any, k: int, s: float, s_error: float, x: Any, x_error: Any, p: Any, work: Any
 ) -> int:
-    """Compute `guard_series` with the tape interpreter. This kernel is called by address."""
+    """Compute `guard_series` with the tape interpreter; compiled code calls this kernel by its address."""
     judged, V, E = work.judged, work.V, work.E
     constant = tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]]
     rows = tapes.optimised[tapes.optimised_start[k] : tapes.optimised_start[k + 1]]
@@ -31,7 +31,7 @@ def interpreted_series(
 
 @inlined
 def guard_series(tapes: Any, inputs: Any, lin: Any, k: int, at: Any, x: Any, x_error: Any, work: Any) -> None:
-    """Write coefficients to third order of the active guards, with bounds, along the flow of the modes in row k.
+    """Write the Taylor coefficients of the active guards to third order, with error bounds.
 
     For linear modes these are rows over states and functions of time, and a verdict computes only those that decide.
     """
@@ -46,7 +46,7 @@ def guard_series(tapes: Any, inputs: Any, lin: Any, k: int, at: Any, x: Any, x_e
 
 @inlined
 def is_continuous(automata: Any, at: Any, z: Any, members: Any, work: Any) -> bool:
-    """Return whether every change among some components is a release without a jump of an unknown."""
+    """Return whether every change of mode in some components is a release without a jump of an unknown."""
     kind = kind_of_change(automata, work, z, members)
     if kind == RELEASED:
         call(called_by(work).jumps, at.s, work.x_after, at.p, z, work.jumps)

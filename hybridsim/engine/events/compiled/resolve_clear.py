@@ -1,4 +1,4 @@
-"""Resolve events of linear modes with a clear outcome: one contact changes its mode, no other guard is near zero.
+"""Resolve clear events of linear modes: one contact changes its mode, and no other guard is near zero.
 
 The first coefficient of each guard after its decreed zeros decides. If all of these are far beyond their rounding
 errors, the outcome is that of `hybridsim.engine.events.compiled.resolve_surface`, at a fraction of the cost. Otherwise
@@ -28,7 +28,7 @@ def _zeros_of(automata: Any, c: int, g: int, zeros: int) -> int:
 
 @inlined
 def _clear_verdict(automata: Any, tapes: Any, lin: Any, k: int, c: int, zeros: int, work: Any) -> int:
-    """Return the verdict on the trial modes of row k if it is clear, else UNDECIDED; only c may leave them."""
+    """Return the verdict on the trial modes of row `k` if it is clear, otherwise UNDECIDED."""
     found = FINE
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         short_loop()
@@ -42,7 +42,7 @@ def _clear_verdict(automata: Any, tapes: Any, lin: Any, k: int, c: int, zeros: i
 
 @inlined
 def _is_alone(tapes: Any, lin: Any, k: int, fired: int, work: Any) -> bool:
-    """Return whether the fired guard certainly becomes negative and no other guard in row k is near zero."""
+    """Return whether the fired guard certainly becomes negative and no other guard is near zero."""
     for i in range(tapes.active_start[k], tapes.active_start[k + 1]):
         short_loop()
         g = index(tapes.active[i])
@@ -54,7 +54,7 @@ def _is_alone(tapes: Any, lin: Any, k: int, fired: int, work: Any) -> bool:
 
 @kernel
 def resolve_clear(automata: Any, tapes: Any, lin: Any, state: Any, work: Any, fired: int) -> bool:
-    """Resolve the event in the work space if its outcome is clear; return whether the event was resolved.
+    """Resolve the event in the work space if its outcome is clear; return whether it was resolved.
 
     `ROW` of the work space is the row of the modes before the event, and then of those after it. If the event is not
     clear, other parts of the work space may have been overwritten.

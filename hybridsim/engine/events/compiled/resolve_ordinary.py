@@ -1,4 +1,4 @@
-"""Resolve ordinary events in compiled code: one guard of one component, with a certain outcome.
+"""Resolve ordinary events in compiled code: one guard of one component fires, with a certain outcome.
 
 The rules are those of `hybridsim.engine.events.choice`. Other events are left unchanged for
 `hybridsim.engine.events.resolve`, which can report the reason: several guards at once, a case undecided at rounding, a
@@ -35,7 +35,7 @@ from hybridsim.engine.system.programs.modes_index import find_modes
 
 @inlined
 def is_alone(automata: Any, tapes: Any, lin: Any, k: int, fired: int, z: Any, work: Any) -> bool:
-    """Return whether no other guard can be zero together with the fired one, given the rounding of the steps.
+    """Return whether no other guard can be zero together with the fired guard.
 
     A guard that rises from zero does not count, except the limit of another contact, which may be released too.
     """
@@ -68,7 +68,7 @@ def take_choice(
     p: Any,
     work: Any,
 ) -> bool:
-    """Apply the declared transition of the guard and its reset; return False if surfaces may move."""
+    """Take the declared transition of a guard and apply its reset; return False if surfaces may move."""
     for d in range(z.shape[0]):
         short_loop()
         if automata.hold[d] >= 0 and not automata.is_corner[automata.owner[fired]]:
@@ -112,7 +112,7 @@ def take_choice(
 def resolve_ordinary(
     automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any, fired: int
 ) -> int:
-    """Compute the state after an ordinary event (x_after, slopes, trial); return -1 for other events.
+    """Compute the state and the modes after an ordinary event; return -1 for other events.
 
     The result is the row with sides, orders and floors of the guards in the new modes. A transition of a component
     without a surface may change the run-time vector, which is then written to p_after. If the event is not ordinary,
@@ -166,7 +166,7 @@ def resolve_ordinary(
 
 
 def resolve_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> int:
-    """Resolve the event in the work space and replace the state. Return 1, or 0 if it is not ordinary.
+    """Resolve the event in the work space and replace the state; return 1, or 0 for other events.
 
     If no guard fired, only the series of the active guards are written to the work space. lin: tables of linear modes,
     empty for others. state: `hybridsim.engine.events.state.StateArrays`.

@@ -1,4 +1,4 @@
-"""Resolve events at surfaces in compiled loops: find the modes of a cluster that are admissible just after."""
+"""Resolve events at surfaces in compiled loops: find the modes that are admissible after the event."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _MODES = 3  # modes of a surface
 
 @inline_always
 def cluster_of(automata: Any, c: int) -> Any:
-    """Return the components whose modes are chosen together with the mode of component c."""
+    """Return the components whose modes are chosen together with the mode of component `c`."""
     return automata.cluster[automata.cluster_start[c] : automata.cluster_start[c + 1]]
 
 
@@ -34,7 +34,7 @@ def cluster_of(automata: Any, c: int) -> Any:
 def row_verdict(
     automata: Any, lin: Any, k: int, z: Any, members: Any, continuous: bool, row: int, work: Any
 ) -> int:
-    """Return the verdict on the modes in row k of the tapes; the sides of other guards are positive."""
+    """Return the verdict on the modes in row `k`, if the other guards are positive."""
     for g in range(work.all_sides.shape[1]):
         short_loop()
         work.all_sides[row, g], work.all_orders[row, g], work.all_floors[row, g] = 1, 0, 0.0
@@ -53,7 +53,7 @@ def choose_modes(
     count: int,
     work: Any,
 ) -> int:
-    """Choose the modes of the first `count` members, and write them to `trial`, which holds the other modes.
+    """Choose the modes of the first `count` components of a cluster, and write them to `trial`.
 
     Returns the number of the chosen candidate, or -1 if the outcome is not certain. at: the event; the states after it
     are `x_after`. k: row of the current modes, or -1 for no tapes; is_known: the series of their guards are in

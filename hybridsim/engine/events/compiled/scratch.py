@@ -1,4 +1,4 @@
-"""Scratch arrays of compiled loops for one event: the located event, work arrays, and functions of the model."""
+"""Scratch arrays of compiled loops for one event: the event, work arrays, and model functions."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ NOBODY = -1  # no guard fired
 
 
 class Functions(NamedTuple):
-    """Addresses of the functions of a model; unused ones are never called."""
+    """The addresses of the functions of a model; unused functions are never called."""
 
     flow: Any
     project: Any
@@ -32,7 +32,7 @@ class Functions(NamedTuple):
 
 
 class LocatedEvent(NamedTuple):
-    """An event as it was located."""
+    """A located event: its time, states and modes, with error bounds."""
 
     s: float  # local time
     s_error: float  # its error bound
@@ -43,7 +43,7 @@ class LocatedEvent(NamedTuple):
 
 
 class EventScratch(NamedTuple):
-    """Work arrays for one event.
+    """Work arrays for resolving one event.
 
     The last ones, from `candidates` on, have a row for each joint candidate.
     """
@@ -91,21 +91,21 @@ class EventScratch(NamedTuple):
 
 @inlined
 def called_by(work: Any) -> Any:
-    """Return the functions of the model that belong to a work space."""
+    """Return the functions of the model for a work space."""
     f = work.functions
     return Functions(f[0], f[1], f[2], f[3], f[4])
 
 
 @inline_always
 def located(state: Any, work: Any) -> LocatedEvent:
-    """Return the event in a work space. state: the state at the start of the segment that the event ends."""
+    """Return the event in a work space; `state` is the state at the start of the segment."""
     return LocatedEvent(
         work.float_slots[AT], work.float_slots[AT_ERROR], work.y, work.y_error, state.p, state.z
     )
 
 
 def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> EventScratch:
-    """Return work arrays for the events of a system; linear modes need atoms and monomials of time as well."""
+    """Return work arrays for the events of a system; linear modes need additional arrays."""
     guards, count = system.guard_count, len(system.automata)
     registers = system.registers.count
     together = min(MAX_JOINT_COMPONENTS, len(system.surface_of))
@@ -162,7 +162,7 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> EventScratch:
 
 
 def _atoms(count: int) -> np.ndarray:
-    """Return an array for the values of `count` atoms with their errors, and for the constant one."""
+    """Return an array for the values and errors of `count` atoms, and for the constant one."""
     factors = np.zeros((2 * count + 1, 2))
     factors[-1, 0] = 1.0
     return factors
@@ -170,7 +170,7 @@ def _atoms(count: int) -> np.ndarray:
 
 @per_structure
 def functions_of(system: Any) -> Functions:
-    """Return the functions that a compiled loop calls."""
+    """Return the addresses of the functions that a compiled loop calls."""
     has_surface = any(a.has_surface for a in system.automata)
     has_choice = any(not a.has_surface for a in system.automata)
     none: Any = system.address("flow")  # never called

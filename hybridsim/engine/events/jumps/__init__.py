@@ -1,1 +1,1 @@
-"""This folder computes how states jump at an event: impulses of impacts, and resets."""
+"""This package computes the jumps of the states at an event, by impacts and by resets."""

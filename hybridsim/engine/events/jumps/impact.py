@@ -24,7 +24,7 @@ Failure = tuple[str, str]
 
 
 def strike(resolution: EventResolution, open_: set[int]) -> Failure | None:
-    """Compute the collision of contacts in `open_` whose gaps close; contacts at rest after it stay in `open_`.
+    """Compute the collision of contacts whose gaps close; contacts at rest after it stay in `open_`.
 
     A contact at zero gap with a velocity of separation is open from now on.
     """
@@ -52,7 +52,7 @@ def strike(resolution: EventResolution, open_: set[int]) -> Failure | None:
 
 
 def _surfaces(resolution: EventResolution) -> tuple[np.ndarray, np.ndarray]:
-    """Return Taylor coefficients of the surfaces with bounds, at the states without projection by a mode."""
+    """Return the Taylor coefficients of the surfaces, with bounds, at states without projection."""
     at, system = resolution.at, resolution.system
     free = at.p.copy()
     free[system.layout.pin_at] = 0.0
@@ -61,13 +61,13 @@ def _surfaces(resolution: EventResolution) -> tuple[np.ndarray, np.ndarray]:
 
 
 def message_on_restitution(name: str, value: float, speed: float) -> str:
-    """Return the message for a restitution outside [0, 1]."""
+    """Return the error message for a coefficient of restitution outside [0, 1]."""
     where = f"at a speed of approach of {speed:.6g}"
     return f"the restitution of {name} is {value!r} {where}, and must lie between 0 and 1"
 
 
 class _Collision:
-    """One collision of the contacts of a cluster, some of which have reached a zero gap."""
+    """One collision of the contacts of a cluster, in which some gaps have reached zero."""
 
     def __init__(
         self, resolution: EventResolution, cluster: tuple[int, ...], mine: list[int], open_: set[int]
@@ -78,7 +78,7 @@ class _Collision:
         self.rates = dict.fromkeys(mine, 0.0)
 
     def run(self) -> tuple[Failure | None, bool]:
-        """Return why the run ends, or None, and whether there was an impact."""
+        """Compute the impact; return why the run ends, or None, and whether there was an impact."""
         failure = self._measure()
         if failure:
             return failure, False
@@ -120,7 +120,7 @@ class _Collision:
         return _surfaces(self.resolution)
 
     def _join(self) -> None:
-        """Add friction contacts at zero velocity, whose modes are chosen together with the normal forces."""
+        """Include friction contacts at zero velocity, whose modes depend on the normal forces."""
         values, bounds = self._surfaces
         for c in self.cluster:
             k = self.place[c]
@@ -128,7 +128,7 @@ class _Collision:
                 self.open_.add(c)
 
     def _opens(self, c: int) -> None:
-        """Open a contact; from now on its gap counts as exactly zero at this instant."""
+        """Open a contact whose gap is exactly zero at this instant."""
         automaton = self.system.automata[c]
         if self.at.z[c] == automaton.hold:
             self._changes(c, "impact", automaton.above)
@@ -243,7 +243,7 @@ class _Collision:
                 self._opens(c)
 
     def _on_gaps(self, normal: list[int]) -> np.ndarray:
-        """Return the state with these gaps zero, or zero within rounding, at unchanged velocities.
+        """Return the state with some gaps set to zero, at unchanged velocities.
 
         A gap that is linear in a position determines it. Other gaps move the positions along their gradients, by at
         most the error of locating the impact. A holding mode would also make the rates of the gaps zero.
@@ -273,5 +273,5 @@ class _Collision:
         return x
 
     def _uncertain(self, answer: Answer) -> np.ndarray:
-        """Return rounding error bounds of the impulses."""
+        """Return bounds of the rounding errors of the impulses."""
         return 8.0 * UNIT * len(answer.impulses) * np.abs(answer.impulses)

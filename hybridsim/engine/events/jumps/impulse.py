@@ -1,4 +1,4 @@
-"""Compute the impulses of contacts struck together, and the rates after the impact, as a pure function.
+"""Compute the impulses of simultaneous impacts, and the rates after the impacts, as a pure function.
 
 Of the contacts that take part, some are normal (their rates are those of gaps) and the others tangential:
 
@@ -35,7 +35,7 @@ _OFF, _ON, _FORWARD, _BACKWARD = range(4)
 
 @dataclass(frozen=True)
 class ImpactProblem:
-    """An impact on several contacts, the normal ones first.
+    """An impact on several contacts, of which the normal contacts come first.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class ImpactProblem:
 
 @dataclass(frozen=True)
 class Answer:
-    """A solution of the impact law."""
+    """One solution of the impact law: the impulses, and the rates after the impact."""
 
     impulses: np.ndarray  # P (m,)
     after: np.ndarray  # rates after the impact (m,)
@@ -69,12 +69,12 @@ class Answer:
 
 
 def count(problem: ImpactProblem) -> int:
-    """Return the number of combinations to try."""
+    """Return how many combinations of contact states have to be tried."""
     return 2**problem.normal * 3 ** (len(problem.before) - problem.normal)
 
 
 def answers(problem: ImpactProblem) -> list[Answer]:
-    """Return all solutions with different motions; independent contacts without friction have only one."""
+    """Return all solutions of the impact law with different motions."""
     rebound = problem.restitution * np.maximum(-problem.before[: problem.normal], 0.0)
     found = _answers(problem, rebound)
     if len(found) != 1 or not _gains(problem, found[0].impulses) or not rebound.any():
@@ -84,7 +84,7 @@ def answers(problem: ImpactProblem) -> list[Answer]:
 
 
 def energy(problem: ImpactProblem, impulses: np.ndarray) -> tuple[float, float]:
-    """Return the work of the impulses, and a bound of the rounding error of the work."""
+    """Return the work of the impulses, and a bound of its rounding error."""
     n = problem.normal
     sign = np.where(np.arange(len(impulses)) < n, 1.0, -1.0)
     p, metric = sign * impulses, problem.effects * sign
@@ -145,7 +145,7 @@ def _answers(problem: ImpactProblem, rebound: np.ndarray) -> list[Answer]:
 
 
 def _combinations(problem: ImpactProblem) -> np.ndarray:
-    """Return the state of each contact, one combination per row: first most contacts closed, then most sticking."""
+    """Return the combinations of contact states, one per row, those with most closed contacts first."""
     found = []
     for normal in product((_ON, _OFF), repeat=problem.normal):
         pushed = np.array(normal) == _ON
@@ -160,7 +160,7 @@ def _same(one: Answer, other: Answer) -> bool:
 
 
 def _between(problem: ImpactProblem, dead: Answer, lively: Answer) -> Answer:
-    """Return the last impulses on the line between two solutions whose work is not positive.
+    """Return the last impulses on the line between two solutions at which the work is not positive.
 
     The work is quadratic in the position w on this line, not positive at 0 and positive at 1.
     """

@@ -1,4 +1,4 @@
-"""Apply the resets of one instant together: all read the state before, additions are summed, assignments must agree.
+"""Apply the resets of one instant together: each reads the state before all of them.
 
 Each new value carries an error bound, from the values it was made of and from its own evaluation.
 """
@@ -28,7 +28,7 @@ Key = tuple[Any, ...]
 
 @dataclass
 class _Changes:
-    """The changes of one variable by the resets of one instant: values assigned and amounts added."""
+    """The changes of one variable by the resets of one instant: assigned values and added amounts."""
 
     set: list[tuple[Key, float, float]] = field(default_factory=list)  # key of the reset, value, error bound
     added: list[tuple[Key, float, float]] = field(default_factory=list)
@@ -42,7 +42,7 @@ def combine_resets(
     p_plus: np.ndarray,
     x_error: np.ndarray,
 ) -> str:
-    """Write the state after all resets of one instant. Return a message if they contradict each other."""
+    """Write the state after all resets of one instant; return a message if resets contradict each other."""
     changes: dict[str, _Changes] = {}
     for key in keys:
         if key not in system.resets:
@@ -100,7 +100,7 @@ def _contradiction(system: System, name: str, one: _Changes) -> str:
 
 
 def _place(system: System, name: str) -> int:
-    """Return the index of a variable among the states followed by the discrete states."""
+    """Return the index of a variable in the list of states and discrete states."""
     if name in system.names:
         return system.names.index(name)
     return system.n + [d.name for d in system.model.discrete].index(name)
@@ -126,7 +126,7 @@ def _reads(model: Model, key: Key, name: str) -> bool:
 
 
 def _evaluated(system: System, at: Situation, key: Key) -> tuple[np.ndarray, np.ndarray]:
-    """Return the values that one reset assigns to states and discrete states, with error bounds.
+    """Return the values that one reset assigns, with their error bounds.
 
     The bounds are first-order propagations of the errors of all inputs. Each is at least the roundoff of the value.
     """
@@ -144,7 +144,7 @@ def _evaluated(system: System, at: Situation, key: Key) -> tuple[np.ndarray, np.
 
 
 def _of_numbers(system: System, at: Situation, key: Key) -> np.ndarray:
-    """Return the errors of states due to the numbers in a reset; zero if it reads definitions."""
+    """Return the errors of states due to the rounding of numbers in a reset."""
     found = np.zeros(system.n + len(system.model.discrete))
     values = dict(zip(system.names, at.x.tolist(), strict=True))
     discrete = at.p[system.layout.discrete_slice].tolist()
@@ -164,7 +164,7 @@ def _of_numbers(system: System, at: Situation, key: Key) -> np.ndarray:
 
 
 def _slopes(system: System, at: Situation, key: Key, errors: np.ndarray) -> np.ndarray | None:
-    """Return derivatives of the values of a reset by all quantities that it reads; None if not finite."""
+    """Return the derivatives of the values of a reset with respect to the quantities that the reset reads."""
     n, size = system.n, len(errors)
     seeds = np.eye(size)
     x, p = with_slopes(at.x, seeds[:n]), with_slopes(at.p, seeds[n:-1])
@@ -182,7 +182,7 @@ def _slopes(system: System, at: Situation, key: Key, errors: np.ndarray) -> np.n
 
 
 def _differences(system: System, at: Situation, key: Key, errors: np.ndarray) -> np.ndarray:
-    """Return the derivatives of a reset's values by finite differences, for code without derivatives."""
+    """Return the derivatives of a reset's values by finite differences, for Python code."""
     n, discrete = system.n, system.layout.discrete_slice
     columns = []
     for shift in np.diag(errors):

@@ -1,4 +1,4 @@
-"""Compute impulses that stop contacts which close, without a change of the other momentum."""
+"""Compute impulses that stop closing contacts and leave the remaining momentum unchanged."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 
 def stopped(x: np.ndarray, rates: np.ndarray, slopes: np.ndarray, changes: np.ndarray) -> np.ndarray:
-    """Return the states after impulses P along m contacts that make their rates (m,) zero.
+    """Return the states after impulses along m contacts that make the rates (m,) of their gaps zero.
 
     slopes, changes (m, n): derivatives of the rates by the states, and of the states by impulses (`System.impulses`).
     If contacts depend on each other, P has the smallest norm.
@@ -16,7 +16,7 @@ def stopped(x: np.ndarray, rates: np.ndarray, slopes: np.ndarray, changes: np.nd
 
 
 def loaded(changes: np.ndarray, loads: np.ndarray, sliding: np.ndarray) -> np.ndarray:
-    """Return the changes (m, n) of the states by impulses together with the friction that they load.
+    """Return the changes (m, n) of the states by normal impulses and the friction that they cause.
 
     loads (2, m, m): friction per load, forward and backward (`System.impulses`). sliding (m,): 1, -1, or 0 for a
     contact that does not slide.

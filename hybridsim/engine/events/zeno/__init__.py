@@ -1,4 +1,4 @@
-"""This folder detects events that accumulate, and finds the motion that continues from their limit.
+"""This package detects accumulating (Zeno) events, and continues the motion from their limit.
 
 Start with `accumulation`.
 """

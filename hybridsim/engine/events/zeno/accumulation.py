@@ -43,7 +43,7 @@ _NO_INTERVALS = np.empty(0)
 def _follow(
     gap: float, now: float, i: int, known: int, longest: float, shortest: float, resolution: float, work: Any
 ) -> bool:
-    """Process the i-th interval, which ends now. Return whether the series may have ended. See `may_end`."""
+    """Process the i-th interval, which ends now; return whether the series may have ended."""
     before, falls, ended = work[0], work[1], False
     is_nothing = gap <= max(shortest, _ULPS * 2.0**-52 * abs(now))
     end = max(resolution, _END * 2.0**-52 * abs(now), _FAR_DOWN * longest)
@@ -59,7 +59,7 @@ def _follow(
 
 @inlined
 def _is_shrinking(work: Any) -> bool:
-    """Return whether the last intervals form a shrinking series."""
+    """Return whether the last intervals between events form a shrinking series."""
     for turn in range(MAX_EVENTS_PER_TURN):
         if work[1, turn] >= _TERMS:
             return True
@@ -79,7 +79,7 @@ def may_end(
     work: Any,
     last: Any,
 ) -> tuple[bool, int]:
-    """Return whether the series of intervals continues or may have ended, and its number of intervals.
+    """Return whether the series of intervals continues or may have ended, and how many intervals it has.
 
     In a series an interval is shorter than the one a turn before it, or negligible, many times in a row. The series has
     not ended while the next interval, predicted by the last factor, exceeds the threshold.
@@ -141,7 +141,7 @@ def cannot_accumulate(instants: Any, fires: Any, owner: Any, components: int, wo
 
 
 def turn_of(gaps: Sequence[float], count: int, same: float) -> tuple[int, float]:
-    """Return the events per turn and the factor by which intervals shrink per turn, or (0, 1).
+    """Return the events per cycle and the factor by which intervals shrink per cycle, or (0, 1).
 
     same : relative accuracy with which the factor must repeat.
     """
@@ -159,7 +159,7 @@ def turn_of(gaps: Sequence[float], count: int, same: float) -> tuple[int, float]
 
 
 class Limit(NamedTuple):
-    """The limit of the events of some components."""
+    """The limit of accumulating events: its time and its components."""
 
     time: float
     components: tuple[int, ...]  # NOBODY for resets of monitors
@@ -204,7 +204,7 @@ class Accumulation:
         )
 
     def reach(self, now: float) -> float:
-        """Return a time span ahead in which rounding of the long run does not hide events of a series."""
+        """Return a time span ahead in which rounding does not hide the events of a series."""
         if not self.is_under_way(now):
             return math.inf
         return min(
@@ -213,19 +213,19 @@ class Accumulation:
         )
 
     def go_on(self, paces: dict[int, Pace]) -> None:
-        """Restore the state from a checkpoint."""
+        """Restore the intervals from a checkpoint."""
         self.paces = dict(paces)
         self._shrinking, self._unjudged = set(), set(paces)
 
     def forget(self, components: tuple[int, ...]) -> None:
-        """Discard the series of these components."""
+        """Discard the series of intervals of some components."""
         for c in components:
             self.paces.pop(c, None)
             self._shrinking.discard(c)
             self._unjudged.discard(c)
 
     def limit_of_all(self, instants: np.ndarray, owners: np.ndarray) -> Limit | None:
-        """Add events (E, 2) in a row, each of one component (E,). Return the first limit, or None."""
+        """Add successive events (E, 2), each of one component (E,), and return the first limit, or None."""
         count = len(instants)
         is_short = count <= _STORED_INTERVALS + 1  # a series there has forecasts, which need single events
         if count < 2 or (is_short and self.paces):
@@ -247,7 +247,7 @@ class Accumulation:
         return None
 
     def _paced(self, instants: np.ndarray, owners: np.ndarray, component: int) -> tuple[bool, Pace]:
-        """Return whether the series of a component may end with these events, and its updated intervals."""
+        """Return whether the series of a component may end with its new events, and the updated intervals."""
         pace = self.paces.get(component, BEGINNING)
         known = np.array(pace.intervals) if pace.intervals else _NO_INTERVALS
         at, work, last = (
@@ -270,7 +270,7 @@ class Accumulation:
         return None
 
     def limit(self, instant: Instant, components: tuple[int, ...]) -> Limit | None:
-        """Add an event of these components; return the limit if the remaining time is negligible."""
+        """Add an event of some components; return the limit if the remaining time is negligible."""
         times = {c: self._limit_of(instant, c) for c in components}
         ended = [(self._sign * time, c) for c, time in times.items() if time is not None]
         return self._shared(self._sign * min(ended)[0], min(ended)[1]) if ended else None
@@ -284,7 +284,7 @@ class Accumulation:
         return None
 
     def _shared(self, time: float, first: int) -> Limit:
-        """Return the limit with all components whose series converge to it."""
+        """Return the limit with all components whose series of events converge to it."""
         among = {first}
         for c in self._under_way:
             forecast = self.paces[c].forecast
@@ -354,7 +354,7 @@ def _expected(pace: Pace, instant: Instant) -> float | None:
 
 
 def _steadier(before: Pace, limit: float, least: float) -> tuple[float, float, float]:
-    """Return the steadiest forecast of a series, as (last change, least change, forecast).
+    """Return the steadiest forecast of a series as (last change, least change, forecast).
 
     The first forecasts miss the deviation of the series from a geometric one. The last ones are dominated by rounding,
     unless the events are located at zero.
@@ -368,7 +368,7 @@ def _steadier(before: Pace, limit: float, least: float) -> tuple[float, float, f
 
 
 def accumulated(limit: Limit, automata: Sequence[Automaton], has_rtol: bool) -> str:
-    """Return the message of a run that ends where events accumulate without a declared limit."""
+    """Return the message of a run that ends at accumulating events without a declared limit."""
     changed = [automata[c] for c in limit.components if c != NOBODY]
     names = ", ".join(a.name for a in changed) or "monitors with resets"
     holding = [f"{a.name}.{a.modes[a.limit_mode]}" for a in changed if a.limit_mode >= 0]

@@ -1,4 +1,4 @@
-"""Find when bounces end if rounding hides the last bounces.
+"""Find when bounces end if rounding hides the last of them.
 
 A guard w leaves zero with w' = u > 0 and w'' = -g, for a flight of 2 u/g. The next flights last e, e**2, ... of it,
 with e the ratio of the speeds after and before, so that they take 2 u/(g (1 - e)) in total. A bounce loses
@@ -31,7 +31,7 @@ _AGREEING_BOUNCES = 2  # bounces that have to agree if they are not impacts of a
 
 
 class Bounce(NamedTuple):
-    """A transition of a component."""
+    """A bounce: a transition of a component, with its time."""
 
     instant: Instant
     source: int  # mode before
@@ -58,7 +58,7 @@ class _Forecast(NamedTuple):
 
 
 def bounces_of(outcome: Outcome, now: Instant, x_minus: np.ndarray) -> dict[int, Bounce]:
-    """Return the first transition of each component in an event that led to the outcome."""
+    """Return the first transition of each component in the event that led to an outcome."""
     found: dict[int, Bounce] = {}
     for change in outcome.changes:
         bounce = Bounce(now, change.source, change.guard, change.target, x_minus, outcome.x)
@@ -67,7 +67,7 @@ def bounces_of(outcome: Outcome, now: Instant, x_minus: np.ndarray) -> dict[int,
 
 
 def last_bounces(system: System, happened: Sequence[Occurrence]) -> dict[int, Bounce]:
-    """Return the last recorded event as a bounce."""
+    """Return the last recorded event of a run as bounces."""
     if not happened:
         return {}
     last = happened[-1]
@@ -83,7 +83,7 @@ def _recorded(automaton: Automaton, o: Occurrence) -> Bounce:
 def limit_of_hidden(
     system: System, outcome: Outcome, bounces: dict[int, Bounce], record: Trajectory
 ) -> Limit | None:
-    """Return the time and the components whose bounces end, if rounding hides further bounces, or None."""
+    """Return the time at which bounces end, and their components, if rounding hides further bounces."""
     found = {}
     for c, departure in _barely_seen(system, outcome, bounces).items():
         last = bounces[c]
@@ -104,7 +104,7 @@ def may_be_hidden(system: System, outcome: Outcome, happened: Sequence[Occurrenc
 
 
 def _barely_seen(system: System, outcome: Outcome, bounces: dict[int, Bounce]) -> dict[int, _Departure]:
-    """Return the departures with flights so short that rounding may hide the next loss of speed."""
+    """Return the departures with flights so short that rounding may hide the loss of speed."""
     found = {}
     for c, last in bounces.items() if system.has_tape else ():
         automaton = system.automata[c]
@@ -120,7 +120,7 @@ def _barely_seen(system: System, outcome: Outcome, bounces: dict[int, Bounce]) -
 def _agreed(
     system: System, outcome: Outcome, c: int, best: _Forecast, speed: float, last: Bounce, record: Trajectory
 ) -> tuple[float, int]:
-    """Return the forecast of the first bounce with which all later forecasts agree, and how many agree."""
+    """Return the forecast with which all later forecasts agree, and how many agree."""
     count = 1
     for bounce in _backward(system.automata[c], last, record):
         departure = _departure(system, outcome, c, bounce)
@@ -136,7 +136,7 @@ def _agreed(
 
 
 def _departure(system: System, outcome: Outcome, c: int, bounce: Bounce) -> _Departure | None:
-    """Return how a guard of the new mode leaves zero and turns back; None if no guard does."""
+    """Return how a guard of the new mode leaves zero and returns, or None if no guard does."""
     series = _series(system, outcome, c, bounce.instant, bounce.target, bounce.x_plus)
     for guard in system.automata[c].guards[bounce.target]:
         (value, rate, curve), bound = series.guards[guard, :3].tolist(), float(series.guard_bounds[guard, 0])
@@ -148,7 +148,7 @@ def _departure(system: System, outcome: Outcome, c: int, bounce: Bounce) -> _Dep
 def _forecast(
     system: System, outcome: Outcome, c: int, bounce: Bounce, departure: _Departure
 ) -> _Forecast | None:
-    """Return the forecast of the limit by one bounce, or None if no speed is lost."""
+    """Return the time at which bounces end, forecast from one bounce, or None if no speed is lost."""
     automaton = system.automata[c]
     names = automaton.guard_names[bounce.source]
     if bounce.guard not in names:
@@ -166,7 +166,7 @@ def _forecast(
 
 
 def _backward(automaton: Automaton, last: Bounce, record: Trajectory) -> Iterator[Bounce]:
-    """Yield the bounces of a component before the last one, backward, until it was in its holding mode."""
+    """Yield the earlier bounces of a component, backward in time, until it was in its holding mode."""
     blocks = reversed(record.occurrences.blocks)
     events = (block[i] for block in blocks for i in range(len(block) - 1, -1, -1))
     for o in islice(events, LOOKED_BACK_ON):
@@ -178,7 +178,7 @@ def _backward(automaton: Automaton, last: Bounce, record: Trajectory) -> Iterato
 
 
 def _series(system: System, outcome: Outcome, c: int, instant: Instant, mode: int, x: np.ndarray) -> Series:
-    """Return the series of all guards with one component in the given mode."""
+    """Return the Taylor series of all guards, with one component in the given mode."""
     z = outcome.z.copy()
     z[c] = mode
     p = system.vector(instant, system.discrete(outcome.p))

@@ -20,7 +20,7 @@ _REACH = 2.0  # a surface farther away than this many times its possible motion 
 def behind(
     limit: Limit, system: System, outcome: Outcome, p: np.ndarray, s: float
 ) -> tuple[float, Outcome] | None:
-    """Return how the motion continues after infinitely many events at local time s, or None if it cannot.
+    """Return the motion that continues after infinitely many events at local time `s`, or None.
 
     The first item is the local time from which it holds. That is the present time if another event may come before the
     limit.
@@ -32,7 +32,7 @@ def behind(
 def _gathered(
     system: System, outcome: Outcome, p: np.ndarray, s: float, left: float, changed: tuple[int, ...]
 ) -> tuple[float, Outcome] | None:
-    """Return the outcome that holds surfaces and contacts at a limit of events, or None if none can be held.
+    """Return the outcome that holds surfaces and contacts at a limit of events, or None.
 
     The limit is on the surfaces whose rates, or derivatives of rates, may bring them to zero within the time `left`,
     and in the contacts whose gaps and rates become zero in it. They are held from here on. On average, bounces that
@@ -54,7 +54,7 @@ def _gathered(
 
 
 def _without_bounces(system: System, outcome: Outcome, p: np.ndarray, near: list[int]) -> np.ndarray:
-    """Return the state after impulses that stop these contacts and keep closed contacts closed."""
+    """Return the state after impulses that stop some contacts and keep closed contacts closed."""
     automata, modes, of = system.automata, outcome.z, system.surface_of
     if not system.is_unilateral[near].any():
         return outcome.x
@@ -78,7 +78,7 @@ def _without_bounces(system: System, outcome: Outcome, p: np.ndarray, near: list
 
 
 def _moved(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, s0: float, s: float) -> np.ndarray:
-    """Return the state at local time s from x at s0, by one step of the classical Runge-Kutta method."""
+    """Return the state at local time `s` from `x` at `s0`, by one classical Runge-Kutta step."""
     h, middle = s - s0, 0.5 * (s0 + s)
     a = system.flow(s0, x, p, z)
     b = system.flow(middle, x + 0.5 * h * a, p, z)
@@ -90,7 +90,7 @@ def _moved(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, s0: floa
 def _held_at(
     system: System, outcome: Outcome, p: np.ndarray, s: float, near: list[int], x: np.ndarray, z: np.ndarray
 ) -> Outcome | None:
-    """Return the outcome at local time s with the near surfaces at zero, or None if one of them is not held."""
+    """Return the outcome at local time `s` with the near surfaces at zero, or None if one cannot be held."""
     if not np.isfinite(x).all():
         return None
     z = z.copy()
@@ -111,7 +111,7 @@ def _held_at(
 def _at_the_end(
     system: System, start: np.ndarray, p: np.ndarray, z: np.ndarray, s: float, apart: Collection[int]
 ) -> np.ndarray | None:
-    """Return the state at local time s; None if it is inaccurate or another event may come before."""
+    """Return the state at local time `s`, or None if it is inaccurate or another event may come before."""
     with np.errstate(over="ignore", invalid="ignore"):
         whole = _moved(system, start, p, z, 0.0, s)
         halves = _moved(system, _moved(system, start, p, z, 0.0, 0.5 * s), p, z, 0.5 * s, s)
@@ -129,7 +129,7 @@ def _at_the_end(
 def _at_declared_limit(
     system: System, outcome: Outcome, p: np.ndarray, s: float, changed: tuple[int, ...]
 ) -> tuple[float, Outcome] | None:
-    """Return the outcome in the declared limit modes of these components, or None if no limit is declared."""
+    """Return the outcome in the declared limit modes of some components, or None if none is declared."""
     entered = tuple(c for c in changed if c >= 0 and system.automata[c].limit >= 0)
     if not entered:
         return None
@@ -160,7 +160,7 @@ def closed_now(system: System, outcome: Outcome) -> tuple[int, ...]:
 
 
 def holds_several(system: System, outcome: Outcome) -> bool:
-    """Return whether an event ends with several switching surfaces held that were not held before it."""
+    """Return whether several switching surfaces are held after an event that were not held before it."""
     changed = [(system.automata[c.component], c.target) for c in outcome.changes]
     return sum(automaton.is_unique and target == automaton.hold for automaton, target in changed) > 1
 
@@ -169,7 +169,7 @@ def holds_several(system: System, outcome: Outcome) -> bool:
 def _within_reach(
     system: System, outcome: Outcome, p: np.ndarray, left: float, changed: tuple[int, ...]
 ) -> list[int]:
-    """Return the contacts and surfaces that may become zero within a time, and friction that they affect."""
+    """Return the contacts and surfaces that may become zero within a time, and the friction they affect."""
     series = system.series(0.0, outcome.x, p, outcome.z, outcome.x_error, 0.0)
     found: list[int] = []
     rubbing: list[int] = []

@@ -1,4 +1,4 @@
-"""This package reproduces published studies: the published method, the exact result, and a verdict on each claim."""
+"""This package computes the study of He et al. (2026) again, and judges each claim of the paper."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""This module reproduces figures 4 and 5: convergence of A and E with the step and the zero-velocity interval."""
+"""This module reproduces figures 4 and 5: convergence of amplitude and energy with the settings."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Curves:
     exact: dict[str, tuple[float, float]]
 
     def converged(self, method: str, case: str) -> float:
-        """Return the first setting from which on A and E change by at most 0.1 %; nan if there is none."""
+        """Return the first setting after which A and E change by at most 0.1 %, or nan if there is none."""
         pair = self.values[method][case]
         change = np.abs(np.diff(pair, axis=1)) / np.abs(pair[:, 1:])
         bad = np.flatnonzero((change > LIMIT).any(axis=0))
@@ -66,13 +66,13 @@ class Curves:
         return float(self.settings[first]) if first < len(self.settings) - 1 else float("nan")
 
     def off(self, method: str, case: str, setting: float) -> float:
-        """Return the deviation of A from the exact value at the setting nearest to the given one."""
+        """Return the relative deviation of A from the exact value at the setting nearest to the given one."""
         nearest = int(np.argmin(np.abs(np.log(np.array(self.settings) / setting))))
         return float(abs(self.values[method][case][0, nearest] / self.exact[case][0] - 1.0))
 
 
 def over_steps(size: Size, pool: Pool) -> Curves:
-    """Compute figure 4: curves over h0, at eps_v = 1e-6 m/s."""
+    """Compute figure 4: amplitude and energy as functions of the step, at eps_v = 1e-6 m/s."""
 
     def run(point: Point, variant: Variant, steps: float) -> Periods:
         eps = EPS_V_SMALL if variant.integrator == "rk4-dichotomy" else None
@@ -82,7 +82,7 @@ def over_steps(size: Size, pool: Pool) -> Curves:
 
 
 def over_eps(size: Size, pool: Pool) -> Curves:
-    """Compute figure 5: curves over eps_v, at h0 = 1200."""
+    """Compute figure 5: amplitude and energy as functions of the velocity interval eps_v, at h0 = 1200."""
 
     def run(point: Point, variant: Variant, eps: float) -> Periods:
         return by_steps(point, variant, size.periods, size.last, STEPS_PER_PERIOD, eps)
@@ -110,7 +110,7 @@ def _curves(
 
 
 def claim_figure_4(curves: Curves) -> Claim:
-    """Judge the claim of convergence at about T/1200, with and without stick."""
+    """Judge the claim that the results converge at a step of about T/1200, with and without stick."""
     ours = {method: _row(curves, method, STEPS_PER_PERIOD) for method in curves.values}
     with_ = {m: row for m, row in ours.items() if m in (LITERAL.name, ZEROED.name)}
     without = {m: row for m, row in ours.items() if m not in with_}
@@ -142,7 +142,7 @@ def claim_figure_4(curves: Curves) -> Claim:
 
 
 def claim_figure_5(curves: Curves) -> Claim:
-    """Judge the claim of convergence at about eps_v = 8e-4."""
+    """Judge the claim that the results converge at a velocity interval of about eps_v = 8e-4."""
     ours = {method: _row(curves, method, EPS_V) for method in curves.values}
     closest = min(ours, key=lambda m: abs(np.log(_sortable(ours[m]["latest"], 1e-9) / EPS_V)))
     best = ours[closest]

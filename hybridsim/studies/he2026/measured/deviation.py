@@ -1,4 +1,4 @@
-"""This module reproduces figures 10 and 11: the deviation of the motion without stick, over F0/N and r."""
+"""This module reproduces figures 10 and 11: the deviation of a method that ignores stick, over F0/N and r."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ EXACT = "exact"
 
 @dataclass(frozen=True)
 class Maps:
-    """Steady A and E over F0/N (rows) and r (columns), by method: mean, least and greatest of the last periods."""
+    """Steady amplitude and energy over F0/N (rows) and r (columns), for each method."""
 
     ratios: np.ndarray
     r: np.ndarray
@@ -41,7 +41,7 @@ class Maps:
 
 
 def maps(size: Size, pool: Pool) -> Maps:
-    """Compute the steady states of all points by the exact method and every reading of the published ones."""
+    """Compute the steady states on a map by the exact method and by every reading of the published ones."""
     ratios, r = np.array(size.ratios), np.array(size.r)
     points = [Point(float(b), float(a)) for a in ratios for b in r]
     methods: tuple[Variant, ...] = (*SIGNS, *MATTERING)
@@ -92,7 +92,7 @@ _RIDGE_FROM, _RIDGE_WIDTH = 0.54, 0.12
 
 
 def read(found: Maps, quantity: str, without: str, with_: str) -> dict[str, Any]:
-    """Return the features of one of our maps: ridge, its end at each level, maximum, side of the threshold.
+    """Return the features of a map of deviations: ridge and ends, maximum, values near the threshold.
 
     near the threshold: the median over r at the smallest F0/N. beyond resonance: the largest at r > 1.
     """
@@ -127,7 +127,7 @@ def _nearest(found: Maps, place: tuple[float, float]) -> tuple[int, int]:
 
 
 def distance(reading: dict[str, Any], quantity: str) -> float:
-    """Return the distance from the paper's reading, in steps of the paper's accuracy."""
+    """Return the distance of a value from the paper's value, in units of the paper's accuracy."""
     published = PUBLISHED[quantity]
     total = abs(math.log(reading["maximum"] / published["maximum"])) / math.log(1.2)
     for name in LEVELS:
@@ -140,17 +140,17 @@ def distance(reading: dict[str, Any], quantity: str) -> float:
 
 
 def combinations() -> list[tuple[str, str]]:
-    """Return every pair of a method without stick and a method with stick."""
+    """Return every pair of a method that ignores stick and a method that includes stick."""
     return [(a.name, b) for a in SIGNS for b in (*(v.name for v in MATTERING), EXACT)]
 
 
 def pair_name(pair: tuple[str, str]) -> str:
-    """Return the name of a pair."""
+    """Return the name of a pair of methods."""
     return f"{pair[0]}; {pair[1]}"
 
 
 def claim(found: Maps, quantity: str, study: StepStudy) -> Claim:
-    """Judge the claim of figure 10 (A) or 11 (E)."""
+    """Judge the claim of figure 10 (amplitude) or figure 11 (energy)."""
     published = PUBLISHED[quantity]
     readings = {pair_name(pair): read(found, quantity, *pair) for pair in combinations()}
     ours = {name: row for name, row in readings.items() if not name.endswith(EXACT)}

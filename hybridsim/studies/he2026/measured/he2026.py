@@ -1,4 +1,4 @@
-"""This module runs the study of He et al. 2026: all computations in order, and the verdicts."""
+"""This module runs all computations of the study of He et al. (2026) in order, and collects the verdicts."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Study:
 
     @property
     def claims(self) -> tuple[Claim, ...]:
-        """Every claim of the paper, in its order."""
+        """Every claim of the paper with its verdict, in the order of the paper."""
         return (
             response.claim_figure_3(self.figure_3),
             convergence.claim_figure_4(self.over_steps),
@@ -83,7 +83,7 @@ class Study:
         )
 
     def to_plain(self) -> dict[str, Any]:
-        """Return the content of the file of verdicts."""
+        """Return the verdicts and the measured numbers as plain values, for a JSON file."""
         claims = self.claims
         return {
             "schema": 1,
@@ -106,7 +106,7 @@ class Study:
         return json.dumps(plain(self.to_plain()), indent=1, allow_nan=False) + "\n"
 
     def rows(self) -> list[tuple[str, str, str]]:
-        """Return name, verdict and reason of each claim, for a table."""
+        """Return the name, the verdict and the reason of each claim, for a table."""
         return [(claim.name, str(claim.verdict), claim.why) for claim in self.claims]
 
 

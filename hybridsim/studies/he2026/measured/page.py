@@ -42,7 +42,7 @@ _PAIR = "Read as: method without stick; reading of the method with stick."
 
 
 def page(study: Study, image: Callable[[str], str]) -> str:
-    """Return the text of the page; `image` returns the path of a picture by its name."""
+    """Return the text of the page; `image` is a function that returns the path of a picture."""
     claims = study.claims
     parts = [_head(study, claims)]
     for claim in claims:
@@ -58,7 +58,7 @@ def page(study: Study, image: Callable[[str], str]) -> str:
 
 
 def _wrapped(block: str) -> str:
-    """Return a paragraph wrapped to equal lines; headings, tables and pictures are unchanged."""
+    """Return a paragraph with its lines wrapped; headings, tables and pictures are unchanged."""
     if block.startswith(("#", "|", "!")):
         return block
     return textwrap.fill(" ".join(block.split()), _WIDTH, break_long_words=False, break_on_hyphens=False)

@@ -1,4 +1,4 @@
-"""This module works on many points in parallel threads, which is effective because kernels release the GIL."""
+"""This module evaluates a function at many points in parallel threads; the kernels release the GIL."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Result = TypeVar("Result")
 
 
 class Pool:
-    """Threads for batches of work, with progress of the whole.
+    """Threads that process batches of items, and report the progress of the whole study.
 
     Parameters
     ----------
@@ -33,14 +33,14 @@ class Pool:
         self._progress, self._before, self._part = progress, 0.0, ""
 
     def part(self, name: str) -> None:
-        """Begin a part of the work."""
+        """Begin the next part of the study."""
         if self._part:
             self._before += self._shares[self._part]
         self._part = name
         self.tell(0.0)
 
     def tell(self, fraction: float) -> None:
-        """Report the progress within the present part."""
+        """Report the progress within the current part."""
         if self._progress is not None and self._part:
             done = self._before + self._shares[self._part] * min(max(fraction, 0.0), 1.0)
             self._progress(done, self._part)
@@ -52,7 +52,7 @@ class Pool:
         begin: float = 0.0,
         end: float = 1.0,
     ) -> list[Result]:
-        """Return function(item) for every item in order; begin and end give the interval of progress in the part.
+        """Return function(item) for every item in order, and report progress from `begin` to `end`.
 
         An exception stops items that have not begun. Progress is reported from the calling thread, which may interrupt.
         """

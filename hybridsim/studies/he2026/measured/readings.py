@@ -1,4 +1,4 @@
-"""This module runs every reading of the published method at three points, to find the choices that matter."""
+"""This module compares readings of the published method at three points, to find which choices matter."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ MAP_POINTS = {
 
 @dataclass(frozen=True)
 class Readings:
-    """By reading and place: least, mean, greatest signed deviation of A from the exact one over the last periods."""
+    """Least, mean and greatest signed deviation of A from the exact value, by reading and by place."""
 
     table: dict[str, dict[str, tuple[float, float, float]]]
 
     def to_plain(self) -> dict[str, Any]:
-        """Return the entries for the file of verdicts."""
+        """Return the deviations as plain values, for a JSON file."""
         return {
             name: {
                 map_point: dict(zip(("least", "mean", "greatest"), values, strict=True))
@@ -37,7 +37,7 @@ class Readings:
 
 
 def readings(size: Size, pool: Pool) -> Readings:
-    """Run all readings at all places."""
+    """Run every reading of the published method at every place."""
     variants = (*SIGNS, *DICHOTOMIES)
     truth = {map_point: exact(point).amplitude for map_point, point in MAP_POINTS.items()}
     tasks = list(itertools.product(variants, MAP_POINTS))

@@ -1,4 +1,4 @@
-"""This module reproduces figures 8 and 9: whether (r, N, F0) reduce to (r, F0/N), and how accurately."""
+"""This module reproduces figures 8 and 9: whether the results depend on r and F0/N only."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _SCALES = (40.0, 7.3, 1234.5)  # N
 
 @dataclass(frozen=True)
 class Reduction:
-    """A/A0 and E/E0 by method over ratios (rows) and forces (columns), and deviations from scaling.
+    """A/A0 and E/E0 by method over ratios F0/N (rows) and forces F0 (columns), and deviations from scaling.
 
     rounding : largest relative difference of A, E and stick fraction between scales, over points of the plane.
     """
@@ -56,7 +56,7 @@ class Reduction:
     rounding: dict[str, float]
 
     def spread(self, method: str, quantity: str = "A", usual: bool = False) -> np.ndarray:
-        """Return (max - min)/mean over the forces, for each ratio."""
+        """Return the range (max - min)/mean of the values over the forces, for each ratio F0/N."""
         table = (self.A if quantity == "A" else self.E)[method]
         if usual:
             table = table[:, [_USUAL[0] <= force <= _USUAL[1] for force in FORCES]]
@@ -74,7 +74,7 @@ def free_energy(point: Point) -> float:
 
 
 def reduction(size: Size, pool: Pool) -> Reduction:
-    """Run all methods over the forces at fixed F0/N."""
+    """Run all methods at several forces F0 with the same ratio F0/N."""
     points = [Point(R, ratio, force / ratio) for ratio in RATIOS for force in FORCES]
     shape = (len(RATIOS), len(FORCES))
     tasks = list(itertools.product(METHODS, points))
@@ -115,7 +115,7 @@ def reduction(size: Size, pool: Pool) -> Reduction:
 
 
 def _stribeck(point: Point) -> ExactState:
-    """Return the exact state with a Stribeck law, whose velocity is an additional scale."""
+    """Return the exact motion with a Stribeck law, whose velocity is an additional scale."""
     solution = simulate(
         declared("dfcs-stribeck"),
         (0.0, _STRIBECK_PERIODS * point.period),

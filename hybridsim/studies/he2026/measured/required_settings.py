@@ -1,4 +1,4 @@
-"""This module finds the step of `rk4-sign` and the interval of `rk4-dichotomy` for an error of A below 1 %."""
+"""This module finds the largest step and velocity interval with which the error of A is below 1 %."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _PERIODS, _LAST = 60, 40
 
 @dataclass(frozen=True)
 class RequiredSettings:
-    """For each method, a map of the coarsest setting from which on all periods are within 1 %.
+    """The coarsest setting with which all periods have an error below 1 %, as a map for each method.
 
     nan if the finest one is not enough.
     """
@@ -42,7 +42,7 @@ class RequiredSettings:
     eps: dict[str, np.ndarray]
 
     def to_plain(self) -> dict[str, Any]:
-        """Return the entries for the file of verdicts."""
+        """Return the maps as plain values, for a JSON file."""
         result: dict[str, Any] = {"tolerance": TOLERANCE, "finest h0": STEPS[-1], "finest eps_v": EPS[-1]}
         for name, table in (*self.steps.items(), *self.eps.items()):
             published = STEPS_PER_PERIOD if name in self.steps else 8e-4
@@ -57,7 +57,7 @@ class RequiredSettings:
 
 
 def required_settings(size: Size, pool: Pool) -> RequiredSettings:
-    """Try the settings at every point from coarse to fine."""
+    """Try the settings from coarse to fine at every point of the map."""
     ratios, r = np.linspace(*RATIO_SPAN, size.ladder_count), np.linspace(*R_SPAN, size.ladder_count)
     points = [Point(float(b), float(a)) for a in ratios for b in r]
     starts = pool.map(_start, points, 0.0, 0.05)
@@ -75,7 +75,7 @@ def required_settings(size: Size, pool: Pool) -> RequiredSettings:
 
 
 def _start(point: Point) -> tuple[float, tuple[float, float]]:
-    """Return the exact amplitude, and the state at the beginning of a period of the exact orbit."""
+    """Return the exact amplitude, and the state at which a period of the exact motion begins."""
     solution = simulate(
         declared("dfcs"),
         (0.0, settling_periods(point) * point.period),

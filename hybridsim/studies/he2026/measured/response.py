@@ -1,4 +1,4 @@
-"""This module reproduces figures 3, 12 and 13: motion and friction force over two periods, and harmonics."""
+"""This module reproduces figures 3, 12 and 13: motion, friction force and their harmonics."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ _NOTHING = (
 
 @dataclass(frozen=True)
 class Response:
-    """Displacement and friction force over the shown periods, and the spectrum of the last sixteen.
+    """Displacement and friction force over two periods, and their spectrum over the last sixteen periods.
 
     harmonics : |c_k|/|c_1| of x for k = 0, 1, 2, ...
     between : the largest line between whole multiples of w, over |c_1|.
@@ -109,7 +109,7 @@ def _response(point: Point, variant: Variant | None, size: Size) -> Response:
 
 
 def claim_figure_3(runs: dict[str, Response]) -> Claim:
-    """Check the claim that the motion is periodic, with odd harmonics only and large high harmonics."""
+    """Judge the claim that the motion is periodic and contains odd harmonics only."""
     ours = {name: _spectrum(run) for name, run in runs.items() if name != EXACT}
     exact = _spectrum(runs[EXACT])
     keeps = [name for name, row in ours.items() if row["holds"]]
@@ -149,7 +149,7 @@ def _spectrum(run: Response) -> dict[str, float | bool]:
 
 
 def claim_figure_12(runs: dict[str, Response], study: StepStudy) -> Claim:
-    """Judge the claim of A_D = 15 %, and of a friction force that jumps around zero velocity."""
+    """Judge the claims of figure 12: A_D is 15 %, and the friction force jumps near zero velocity."""
     ours, exact, closest = _deviations(runs, 0.15)
     place = LOADS_AND_RATIOS.index((FIGURE_12.ratio, FIGURE_12.r))
     falls = {v.name: study.by_step[v.name]["A"][place] for v in SIGNS}
@@ -182,7 +182,7 @@ def claim_figure_12(runs: dict[str, Response], study: StepStudy) -> Claim:
 
 
 def claim_figure_13(runs: dict[str, Response], figure_12: dict[str, Response]) -> Claim:
-    """Judge the claim of A_D = 2 %, and of less deviation with less stick."""
+    """Judge the claims of figure 13: the deviation A_D is 2 %, and less stick causes less deviation."""
     ours, exact, closest = _deviations(runs, 0.02)
     greatest = max(row["A_D"] for row in (*ours.values(), *exact["deviation without stick"].values()))
     near = abs(ours[closest]["A_D"] - 0.02) <= 0.01
@@ -211,7 +211,7 @@ def claim_figure_13(runs: dict[str, Response], figure_12: dict[str, Response]) -
 def _deviations(
     runs: dict[str, Response], published: float
 ) -> tuple[dict[str, dict[str, Any]], dict[str, Any], str]:
-    """Return the deviation (Eq. 9) of every pair of readings, with the pair nearest to the paper."""
+    """Return the deviation (Eq. 9) of every pair of readings, and the pair nearest to the paper."""
     ours = {
         f"{sign.name}; {with_.name}": {
             "A_D": abs(runs[sign.name].amplitude / runs[with_.name].amplitude - 1.0),

@@ -1,4 +1,4 @@
-"""This module reproduces figures 6 and 7: the costs of a smaller zero-velocity interval, and of stick."""
+"""This module reproduces figures 6 and 7: the cost of a smaller velocity interval, and the cost of stick."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ WITH = (LITERAL, ZEROED)
 
 @dataclass(frozen=True)
 class Cost:
-    """Mean seconds of a run, and its number of right-hand sides."""
+    """Mean run time in seconds, and the number of evaluations of the right-hand side."""
 
     seconds: float
     evaluations: int
@@ -38,7 +38,7 @@ class Cost:
 
 @dataclass(frozen=True)
 class RunTimes:
-    """Costs of a run by method and case; `by_eps`: by method, case and zero-velocity interval."""
+    """Costs of a run by method and case; `by_eps` contains the costs at each velocity interval."""
 
     by_eps: dict[str, dict[str, tuple[Cost, ...]]]
     by_method: dict[str, dict[str, Cost]]
@@ -46,17 +46,17 @@ class RunTimes:
     repeats: int
 
     def t_d(self, method: str, case: str) -> list[float]:
-        """Return (t' - t)/t over the intervals, Eq. 7."""
+        """Return the relative increase of run time (t' - t)/t at each velocity interval, Eq. 7."""
         costs = self.by_eps[method][case]
         return [cost.seconds / costs[0].seconds - 1.0 for cost in costs]
 
     def t_D(self, with_: str, without: str, case: str) -> float:
-        """Return (t2 - t1)/t1, Eq. 8."""
+        """Return the relative increase of run time (t2 - t1)/t1 due to stick, Eq. 8."""
         return self.by_method[with_][case].seconds / self.by_method[without][case].seconds - 1.0
 
 
 def run_times(size: Size, pool: Pool) -> RunTimes:
-    """Time the runs on one thread, alternating the compared ones, so that disturbances affect all alike."""
+    """Time the runs in rotation on one thread, so that disturbances affect all runs alike."""
     total = 2 * len(CASES)
     by_eps: dict[str, dict[str, tuple[Cost, ...]]] = {v.name: {} for v in WITH}
     methods: tuple[Variant | None, ...] = (*SIGNS, *WITH, None)
@@ -110,7 +110,7 @@ def _run(point: Point, variant: Variant | None, eps: float, periods: int) -> Cos
 
 
 def claim_figure_6(times: RunTimes) -> Claim:
-    """Judge the claim that run time grows fast as eps_v falls."""
+    """Judge the claim that the run time grows fast as the velocity interval eps_v becomes smaller."""
     ours: dict[str, dict[str, Any]] = {}
     for v in WITH:
         last = [times.t_d(v.name, case)[-1] for case in CASES]
@@ -147,7 +147,7 @@ def claim_figure_6(times: RunTimes) -> Claim:
 
 
 def claim_figure_7(times: RunTimes) -> Claim:
-    """Judge the claim that stick costs more than 225 % run time."""
+    """Judge the claim that stick increases the run time by more than 225 %."""
     ours: dict[str, dict[str, Any]] = {}
     for with_ in WITH:
         for sign in SIGNS:

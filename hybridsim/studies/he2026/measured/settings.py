@@ -1,4 +1,4 @@
-"""This module holds the system and the settings of He et al. 2026, and the sizes of the study."""
+"""This module contains the system, the settings and the problem sizes of the study of He et al. (2026)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ EPS_V_SMALL = 1e-6  # the paper's choice while it varies the step
 
 @dataclass(frozen=True)
 class Point:
-    """A forcing: frequency ratio r, F0/N, and N in newtons."""
+    """A point of a map: frequency ratio r, force ratio F0/N, and normal force N in newtons."""
 
     r: float
     ratio: float
@@ -47,13 +47,13 @@ class Point:
 
     @property
     def friction(self) -> float:
-        """Friction force over force amplitude, mu N / F0: the f of Den Hartog's formulas."""
+        """Ratio mu N/F0 of the friction force to the force amplitude: f in Den Hartog's formulas."""
         return MU / self.ratio
 
 
 @dataclass(frozen=True)
 class Variant:
-    """One reading of the published method, where the paper leaves choices open."""
+    """One reading of the published method: a choice for each detail that the paper leaves open."""
 
     name: str
     integrator: str
@@ -89,7 +89,7 @@ SIGNS = tuple(
 
 @dataclass(frozen=True)
 class Size:
-    """The amount of computation.
+    """The amount of computation: numbers of points, periods and repetitions.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def _range(first: float, last: float, step: float) -> tuple[float, ...]:
 
 
 def _intervals(first: float, step: float) -> tuple[float, ...]:
-    """Return powers of ten down to 1e-6, with the paper's own choice among them."""
+    """Return powers of ten down to 1e-6, and the velocity interval of the paper."""
     return tuple(sorted([*(10.0**k for k in _range(first, -6.0, -step)), EPS_V], reverse=True))
 
 

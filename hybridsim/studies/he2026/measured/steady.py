@@ -1,4 +1,4 @@
-"""This module computes steady amplitude and energy, of the exact motion and per period of a fixed-step run."""
+"""This module computes the steady amplitude and energy of the exact motion and of fixed-step runs."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 
 @dataclass(frozen=True)
 class Periods:
-    """Amplitude A, (max - min)/2 of x, and energy E, the integral of x^2, of each of the last periods of a run."""
+    """Amplitude A = (max - min)/2 and energy E (integral of x^2) of each of the last periods of a run."""
 
     A: np.ndarray
     E: np.ndarray
@@ -48,7 +48,7 @@ class Periods:
 
 @dataclass(frozen=True)
 class ExactState:
-    """The exact steady motion: amplitude, energy, stick fraction, stops per period, periodicity error."""
+    """The exact steady motion: amplitude, energy, stick fraction, stops per period, and periodicity error."""
 
     amplitude: float
     energy: float
@@ -59,7 +59,7 @@ class ExactState:
 
 @cache
 def declared(name: str) -> Model:
-    """Return a packaged model, read once for all runs."""
+    """Return a packaged model, which is read from its file once for all runs."""
     return load(name)
 
 
@@ -69,7 +69,7 @@ def settling_periods(point: Point) -> int:
 
 
 def exact(point: Point, periods: int | None = None) -> ExactState:
-    """Compute the steady motion with `exact`, settled to rounding by default."""
+    """Compute the exact steady motion; by default the transients decay to rounding error."""
     count = settling_periods(point) if periods is None else periods
     solution = simulate(
         declared("dfcs"),
@@ -82,7 +82,7 @@ def exact(point: Point, periods: int | None = None) -> ExactState:
 
 
 def measured(solution: Solution, point: Point) -> ExactState:
-    """Measure the last period of a run with located events; x has its extremes at events, where v is zero."""
+    """Measure the last period of a run with located events, which include the extremes of x."""
     x = solution.y[0]
     amplitude = 0.5 * float(x.max() - x.min())
     intervals = solution.modes[CONTACT]

@@ -1,4 +1,4 @@
-"""This module varies the step without stick, and the interval with stick, to separate artefacts from physics."""
+"""This module varies the step and the velocity interval, to separate numerical artefacts from physics."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _SHRINKS = 0.5
 
 @dataclass(frozen=True)
 class StepStudy:
-    """Deviations from the exact motion, over places (rows) and settings (columns); means over the last periods.
+    """Deviations from the exact motion over places (rows) and settings (columns), averaged over periods.
 
     by_step : method without stick -> quantity -> deviations over `STEPS`.
     by_eps : method with stick -> quantity -> deviations over `EPS`.
@@ -46,22 +46,22 @@ class StepStudy:
     worst: dict[str, np.ndarray]
 
     def along(self, method: str, quantity: str) -> np.ndarray:
-        """Return the root mean square along the ridge at each step."""
+        """Return the root mean square of the deviations along the ridge, for each step."""
         return np.asarray(np.sqrt((self.by_step[method][quantity] ** 2).mean(axis=0)))
 
     def along_eps(self, method: str, quantity: str) -> np.ndarray:
-        """Return the root mean square along the ridge at each zero-velocity interval."""
+        """Return the root mean square of the deviations along the ridge, for each velocity interval."""
         return np.asarray(np.sqrt((self.by_eps[method][quantity] ** 2).mean(axis=0)))
 
     def shrinks(self, quantity: str) -> bool:
-        """Return whether the deviation along the ridge falls with the step in every reading."""
+        """Return whether the deviation along the ridge decreases with the step for every reading."""
         first = STEPS.index(STEPS_PER_PERIOD)
         return all(
             self.along(v.name, quantity)[-1] < _SHRINKS * self.along(v.name, quantity)[first] for v in SIGNS
         )
 
     def sentence(self, quantity: str) -> str:
-        """Return the result of the step study as part of a sentence."""
+        """Return the result of the step study as text for the middle of a sentence."""
         first = STEPS.index(STEPS_PER_PERIOD)
         values = [self.along(v.name, quantity) for v in SIGNS]
         parts = " and ".join(f"from {100 * a[first]:.2g} % to {100 * a[-1]:.2g} %" for a in values)
@@ -72,7 +72,7 @@ class StepStudy:
         )
 
     def to_plain(self, quantity: str) -> dict[str, Any]:
-        """Return the entries for the file of verdicts."""
+        """Return the deviations as plain values, for a JSON file."""
         return {
             "places": [{"F0/N": a, "r": b} for a, b in LOADS_AND_RATIOS],
             "h0": list(STEPS),
@@ -90,7 +90,7 @@ class StepStudy:
 
 
 def step_study(size: Size, pool: Pool) -> StepStudy:
-    """Run the ridge at every step and every interval."""
+    """Run the points on the ridge with every step and every velocity interval."""
     points = [Point(r, ratio) for ratio, r in LOADS_AND_RATIOS]
     truth = pool.map(exact, points, 0.0, 0.01)
     one = list(itertools.product(SIGNS, points, STEPS))

@@ -1,4 +1,4 @@
-"""This module judges the paper's conclusion that the fraction of time in stick decides the deviation."""
+"""This module judges the paper's conclusion that the stick fraction determines the deviation."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _STRONG = 0.5  # a larger rank correlation counts as a correlation
 
 
 def claim(maps: Maps, study: StepStudy, truth: Truth) -> Claim:
-    """Judge the conclusion in the text."""
+    """Judge the conclusion that the stick fraction determines the deviation."""
     from scipy.stats import spearmanr
 
     def row(pair: tuple[str, str]) -> dict[str, Any]:

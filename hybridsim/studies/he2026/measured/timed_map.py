@@ -1,4 +1,4 @@
-"""Measure the run time of a map of amplitude and energy by `exact`, the published method and shooting.
+"""This module times a map of amplitude and energy by `exact`, by the published method and by shooting.
 
 `exact` computes the map with `hybridsim.sweep`; the others compute point by point on the same threads.
 """
@@ -26,7 +26,7 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class Entry:
-    """One method: seconds per point on all threads, points timed, and relative errors of A and E at a sample."""
+    """The cost and errors of one method: seconds per point on all threads, and errors of A and E."""
 
     seconds: float
     points: int
@@ -34,7 +34,7 @@ class Entry:
     E: np.ndarray
 
     def to_plain(self) -> dict[str, Any]:
-        """Return the entries for the file of verdicts."""
+        """Return the numbers as plain values, for a JSON file."""
         return {
             "milliseconds a point": 1e3 * self.seconds,
             "points timed": self.points,
@@ -49,13 +49,13 @@ class Entry:
 
 @dataclass(frozen=True)
 class TimedMap:
-    """The methods by name, over a map of side x side points."""
+    """The costs and errors of all methods on a map with side x side points."""
 
     side: int
     entries: dict[str, Entry]
 
     def to_plain(self) -> dict[str, Any]:
-        """Return the entries for the file of verdicts."""
+        """Return the costs and errors as plain values, for a JSON file."""
         base = self.entries["exact"].seconds
         return {
             "map": {"F0/N": RATIO_SPAN, "r": R_SPAN, "points": [self.side, self.side]},
@@ -68,7 +68,7 @@ class TimedMap:
 
 
 def time_map(size: Size, pool: Pool) -> TimedMap:
-    """Time all methods on the same threads: `exact` on the whole map, the others on a random sample of its points."""
+    """Time all methods on the same threads: `exact` on the whole map, the others at random points."""
     side = size.timed_count
     grid = [
         [Point(float(r), float(q)) for r in np.linspace(*R_SPAN, side)]
@@ -106,7 +106,7 @@ def time_map(size: Size, pool: Pool) -> TimedMap:
 def _map(
     rows: list[list[Point]], pool: Pool, begin: float, end: float
 ) -> tuple[float, list[tuple[float, float]]]:
-    """Return seconds per point, and A and E of each point in the last of many periods from rest."""
+    """Return the seconds per point, and A and E of each point in the last of many periods from rest."""
 
     def tell(done: int, total: int, _: str) -> None:
         pool.tell(begin + (end - begin) * done / total)

@@ -1,4 +1,4 @@
-"""This module computes exact results on a map: where the motion sticks and stops, and errors of simpler models."""
+"""This module computes the exact motion on a map: regions of stick, and errors of simpler models."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Truth:
         return np.asarray(np.where(self.amplitude > 0.0, value, np.nan))
 
     def to_plain(self) -> dict[str, Any]:
-        """Return the numbers for the file of verdicts, without the maps."""
+        """Return the numbers without the maps, for a JSON file."""
         free = self.stick == 0.0
         moving = self.amplitude > 0.0
         off = self.deviation(NO_STOPS)
@@ -67,14 +67,14 @@ class Truth:
         }
 
     def harmless(self, tol: float) -> float:
-        """Return the smallest share of stick at which the formula without stops is off by more than `tol`."""
+        """Return the smallest stick fraction at which the error of the no-stop formula exceeds `tol`."""
         off = self.deviation(NO_STOPS)
         bad = (self.amplitude > 0.0) & ~(off <= tol)
         return float(self.stick[bad].min()) if bad.any() else 1.0
 
 
 def truth(size: Size, pool: Pool) -> Truth:
-    """Settle the exact motion at every point of the map."""
+    """Compute the exact steady motion at every point of the map."""
     ratios, r = np.linspace(*RATIO_SPAN, size.map_count), np.linspace(*R_SPAN, size.map_count)
     points = [Point(float(b), float(a)) for a in ratios for b in r]
     states = pool.map(exact, points, 0.0, 0.85)

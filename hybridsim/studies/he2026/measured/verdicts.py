@@ -59,7 +59,7 @@ class Claim:
 
 
 def plain(value: Any) -> Any:
-    """Return a value as lists, mappings, text and numbers of six digits; NaN becomes None."""
+    """Return a value as lists, mappings, text and numbers with six digits; NaN becomes None."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if hasattr(value, "tolist"):  # numpy arrays and numbers

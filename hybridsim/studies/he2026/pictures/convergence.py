@@ -14,7 +14,7 @@ _LINES = {"r": "-", "N": "--", "F": ":"}
 
 
 def convergence(curves: Curves, title: str, label: str, published: float) -> Figure:
-    """Draw the relative errors of A and E over the settings, with a column per method and a line per case."""
+    """Draw the relative errors of A and E over the settings; a column is a method, a line is a case."""
     methods = list(curves.values)
     figure = style.figure(2.6 * len(methods) + 0.6, 5.4)
     figure.suptitle(title, fontsize=11, x=0.01, ha="left")

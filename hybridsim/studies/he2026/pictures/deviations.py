@@ -1,4 +1,4 @@
-"""This module draws maps of the deviation without stick, with the paper's regions, and the effect of the step."""
+"""This module draws maps of the deviation of a method that ignores stick, and the effect of the step."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def edges(centres: np.ndarray) -> np.ndarray:
 
 
 def deviation_maps(maps: Maps, quantity: str) -> Figure:
-    """Draw Eq. 9 over r and F0/N: against the published A2 in two readings, and against the exact one."""
+    """Draw the deviation (Eq. 9) over r and F0/N, from two readings of the paper and from the exact value."""
     columns = (LITERAL.name, ZEROED.name, EXACT)
     figure = style.figure(10.2, 6.4)
     number = {"A": "10", "E": "11"}[quantity]
@@ -85,7 +85,7 @@ def _regions(axes: Axes, quantity: str) -> None:
 
 
 def step_lines(study: StepStudy) -> Figure:
-    """Draw the deviation along the published ridge, against the step and the zero-velocity interval."""
+    """Draw the deviation along the published ridge over the step and over the velocity interval."""
     figure = style.figure(9.6, 4.0)
     figure.suptitle(
         "Deviation of A from the exact motion, root mean square over ten places along the published ridge",

@@ -1,4 +1,4 @@
-"""This module draws maps over F0/N and r: stick, stops, errors of simpler models, and needed settings."""
+"""This module draws maps over F0/N and r: stick, stops, errors of simpler models, and required settings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _MOST_STOPS = 8  # larger numbers are drawn as this one
 
 
 def stick_and_stops(truth: Truth) -> Figure:
-    """Draw stick fraction, stops per period and amplitude of the exact motion, with the no-stop boundary."""
+    """Draw stick fraction, stops per period and amplitude of the exact motion, and the no-stop boundary."""
     figure = style.figure(11.0, 4.0)
     figure.suptitle(
         "The exact steady motion; white: no stops above it (closed form)", fontsize=11, x=0.01, ha="left"
@@ -75,7 +75,7 @@ def simpler_models(truth: Truth) -> Figure:
 
 
 def required_settings_map(required: RequiredSettings) -> Figure:
-    """Draw the coarsest step and the largest interval for an error of the amplitude below 1 %."""
+    """Draw the coarsest step and the largest velocity interval with which the error of A is below 1 %."""
     figure = style.figure(9.6, 7.4)
     figure.suptitle(
         "The coarsest setting that is within 1 % of the exact amplitude; hatched: the finest is not",
@@ -99,7 +99,7 @@ def required_settings_map(required: RequiredSettings) -> Figure:
 
 
 def timed_map(timing: TimedMap) -> Figure:
-    """Draw the error of the amplitude against the time per point, as median and largest over the sample."""
+    """Draw the amplitude error over the time per point: median and largest error of the sample."""
     figure = style.figure(7.6, 4.2)
     figure.suptitle(
         f"Steady amplitude over a map: {timing.side} x {timing.side} points, error against time of a point",

@@ -33,7 +33,7 @@ def plain_log(axis: Axis) -> None:
 
 
 def motions(runs: dict[str, Response], title: str, spectrum: bool = False) -> Figure:
-    """Draw x and f over two periods; with `spectrum`, the harmonics of x below."""
+    """Draw x and f over two periods; with `spectrum`, also draw the harmonics of x."""
     names = [*(name for name in runs if name != "exact"), "exact"]
     rows = 3 if spectrum else 2
     figure = style.figure(2.45 * len(names) + 0.6, 1.9 * rows + 0.6)

@@ -18,7 +18,7 @@ from hybridsim.studies.he2026.pictures.motions import column_title
 
 
 def reduction(found: Reduction) -> Figure:
-    """Draw a line for each F0/N, which is flat if only (r, F0/N) matters."""
+    """Draw one line for each F0/N; a line is flat if the results depend only on r and F0/N."""
     names = [*(v.name for v in METHODS), EXACT, STRIBECK]
     figure = style.figure(2.3 * len(names) + 0.4, 4.8)
     figure.suptitle(

@@ -1,4 +1,4 @@
-"""This module draws figures 6 and 7: run time and right-hand sides for a small interval, and for stick."""
+"""This module draws figures 6 and 7: run time and evaluations for a small interval, and for stick."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hybridsim.studies.he2026.pictures.motions import column_title, plain_log
 
 
 def interval_cost(times: RunTimes) -> Figure:
-    """Draw t_d over eps_v for every case, and the right-hand sides next to it."""
+    """Draw the time increase t_d over eps_v for every case, and the number of right-hand side evaluations."""
     figure = style.figure(9.2, 3.8)
     figure.suptitle(
         f"Figure 6: cost of a smaller zero-velocity interval, mean of {times.repeats} runs of {times.periods} periods",
@@ -42,7 +42,7 @@ def interval_cost(times: RunTimes) -> Figure:
 
 
 def stick_cost(times: RunTimes) -> Figure:
-    """Draw the milliseconds per run for every method and case."""
+    """Draw the run time in milliseconds for every method and case."""
     figure = style.figure(8.6, 4.2)
     figure.suptitle(
         f"Figure 7: time of {times.periods} periods, mean of {times.repeats} runs",
