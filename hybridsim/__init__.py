@@ -105,7 +105,7 @@ class _Package(ModuleType):
 
 def __getattr__(name: str) -> Any:
     if name in _FORMER:
-        what = f"hybridsim.{name} is deprecated; it will go in version 0.2. Use hybridsim.Solution"
+        what = f"hybridsim.{name} is deprecated; version 0.2 removes it. Use hybridsim.Solution"
         warn(what, DeprecationWarning, stacklevel=2)
         return getattr(import_module(_FORMER[name]), name)
     if name not in _HOME:

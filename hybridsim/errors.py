@@ -44,7 +44,7 @@ class Place:
     text: str | None = None
 
     def at(self, text: str, column: int | None = None) -> Place:
-        """Return a place in the same file and line, with another piece of text."""
+        """Return a place in the same file and line, but with another piece of text."""
         return replace(self, text=text, column=column)
 
     @property
@@ -146,7 +146,7 @@ class ModelError(HybridsimError):
 
     @classmethod
     def collect(cls, errors: Iterable[ModelError], title: str) -> ModelError:
-        """Combine errors: return a single error itself, or one error with a title that lists all by line."""
+        """Return a single error itself, or combine several errors into one that lists them by line."""
         # errors with equal texts are reported once
         every = {str(single): single for error in errors for single in error.errors}
         found = sorted(every.values(), key=_line)
@@ -225,7 +225,7 @@ class RunInterrupted(KeyboardInterrupt):
 
 
 def plain(text: str) -> str:
-    """Replace the repr of NumPy scalars in a message by plain numbers: 2.0 instead of np.float64(2.0)."""
+    """Return a message in which NumPy scalars appear as plain numbers: 2.0 instead of np.float64(2.0)."""
     return re.sub(_NUMPY, lambda found: found["value"] or found["word"], text)
 
 
@@ -258,7 +258,7 @@ def _line(error: HybridsimError) -> int:
 
 
 def printable(text: str) -> str:
-    """Replace the control characters of a text, which could change the terminal, by "?" or a blank."""
+    """Replace the control characters of a text by "?" or a blank, because they could change the terminal."""
     return "".join(c if c.isprintable() or c == "\n" else " " if c.isspace() else "?" for c in text)
 
 

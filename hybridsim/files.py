@@ -21,7 +21,7 @@ _LETTERS = 100  # leading characters of the name that a temporary name copies; f
 
 @contextmanager
 def whole_file(path: str | PathLike[str]) -> Iterator[str]:
-    """Yield a temporary path; if the block succeeds, the file at this path replaces `path`.
+    """Yield a temporary path; after the block succeeds, the file there replaces `path`.
 
     The temporary file has a unique name in the same folder. If two processes write the same file, the last complete
     file remains. A replaced file keeps its mode and owner, and before the replacement only this user can read the new
@@ -70,7 +70,7 @@ def _found(path: str) -> os.stat_result | None:
 
 
 def _new_file(final: str, mode: int) -> str:
-    """Create an empty file with an unused name in the same folder and with the same suffix."""
+    """Create an empty file with an unused name in the same folder as a path."""
     folder, name = os.path.split(final)
     stem, suffix = os.path.splitext(name)
     for _ in range(_TRIALS):
@@ -82,7 +82,7 @@ def _new_file(final: str, mode: int) -> str:
 
 
 def _dress(path: str, before: os.stat_result) -> None:
-    """Flush a file to the disk, and give it the owner and the mode of the file that it replaces."""
+    """Flush a file to the disk, and give it the owner and the mode of the replaced file."""
     handle = os.open(path, os.O_RDONLY)
     try:
         os.fsync(handle)
@@ -101,7 +101,7 @@ def _dress(path: str, before: os.stat_result) -> None:
 
 @contextmanager
 def held(path: str | PathLike[str], busy: str) -> Iterator[None]:
-    """Lock a file or folder during a block; other processes and threads that try to lock it get an error.
+    """Lock a file or folder during a block; others that try to lock it get an error.
 
     The operating system releases the lock when the process ends. On systems without such locks nothing is locked.
 
@@ -123,7 +123,7 @@ def held(path: str | PathLike[str], busy: str) -> Iterator[None]:
 
 
 def hold(handle: int, busy: str) -> None:
-    """Lock an open file until it is closed (see `held`)."""
+    """Lock an open file until it is closed."""
     try:
         import fcntl
     except ImportError:

@@ -29,7 +29,7 @@ class SharedLock:
         self._lock.release()
 
     def renew(self) -> None:
-        """Replace the lock by a new one, whoever holds the old one."""
+        """Replace the lock by a new one, even if a thread holds the old one."""
         self._lock = Lock()
 
 
@@ -37,7 +37,7 @@ _locks: WeakSet[SharedLock] = WeakSet()
 
 
 def _renew_all() -> None:
-    """Replace all locks in a newly forked child process."""
+    """Replace all locks by new ones in a newly forked child process."""
     for lock in list(_locks):
         lock.renew()
     if sys.version_info < (3, 12):  # older versions keep one lock per cached property in the class

@@ -1,4 +1,4 @@
-"""This module gives one mode of a model as an initial value problem for other solvers."""
+"""This module converts one mode of a model to an initial value problem for other solvers."""
 
 from __future__ import annotations
 

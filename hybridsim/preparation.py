@@ -35,7 +35,7 @@ _PLAIN = frozenset({int, float, np.float64, str, type(None)})  # types whose equ
 
 
 def _run_key(t_span: Any, settings: tuple[Any, ...]) -> tuple[Any, ...] | None:
-    """Return a key that identifies runs with equal arguments, or None if an argument is not a plain value.
+    """Return a key of the arguments of a run, or None if an argument is not a plain value.
 
     Checking the arguments costs up to a tenth of a short run, and loops often repeat the same arguments.
     """
@@ -60,7 +60,7 @@ def prepared(
     options: dict[str, Any],
     keywords: Sequence[str],
 ) -> tuple[Run, float]:
-    """Return the prepared run and the compile time in seconds; `keywords` are hints for unknown options."""
+    """Return the prepared run and the compile time in seconds; `keywords` are for suggestions."""
     run_key = None
     if x0 is z0 is limits is None:
         settings: tuple[Any, ...] = (integrator, rtol, atol, max_step, first_step, save)
@@ -117,7 +117,7 @@ def prepared(
 
 
 def _check_functions(method: Integrator, system: System, code: PythonCode, x0: np.ndarray, t0: float) -> None:
-    """Reject Python functions that the method does not support, or that return values of the wrong shape."""
+    """Raise an error for Python functions that the method cannot use, or with a wrong result."""
     reason, remedy = method.lacks.get("functions", ""), "write the model in expressions, or use dop853"
     if code.refused and not method.name.startswith("scipy-"):
         reason, remedy = code.refusal_message, "use scipy-dop853, which calls the functions in Python"
@@ -127,7 +127,7 @@ def _check_functions(method: Integrator, system: System, code: PythonCode, x0: n
 
 
 def _refuse_velocity_powers(method: Integrator, model: Model) -> None:
-    """Reject powers of a contact's velocity whose derivatives at zero do not exist."""
+    """Raise an error for powers of a contact velocity that have no derivatives at zero."""
     if type(method).run is not Integrator.run:
         return  # the method selects the modes itself, without derivatives
     for power in velocity_powers(model):

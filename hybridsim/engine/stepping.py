@@ -1,4 +1,4 @@
-"""The earlier path of `Step`, `Flow` and what belongs to them: deprecated, see `hybridsim.integrators.contract`."""
+"""The former module of `Step` and `Flow`, now in `hybridsim.integrators.contract`; deprecated."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def __getattr__(name: str) -> Any:
     for module in (stepping, failures, tolerances, counters, segments):
         if not name.startswith("_") and hasattr(module, name):
             warnings.warn(
-                f"hybridsim.engine.stepping is deprecated; it will go in version 0.2. Import {name} from "
+                f"hybridsim.engine.stepping is deprecated; version 0.2 removes it. Import {name} from "
                 "hybridsim.integrators.contract",
                 DeprecationWarning,
                 stacklevel=2,

@@ -1,4 +1,4 @@
-"""Run many parameter points one after the other in compiled code, and sum over the last period of each."""
+"""This module runs many parameter points in compiled code, and measures the last period of each."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def run_ensemble(
 
 @inlined
 def _begin(record: Any, stored: int, count: int, since: float) -> tuple[int, float]:
-    """Return the segment that contains an instant, and the local time; -1 if it is before all segments."""
+    """Return the segment that contains an instant, and the local time, or -1 if there is none."""
     first = SEGMENTS + count - 1
     while first >= SEGMENTS - stored:
         high, low = record.clocks[first, 0], record.clocks[first, 1]
@@ -139,7 +139,7 @@ def _begin(record: Any, stored: int, count: int, since: float) -> tuple[int, flo
 
 @inlined
 def _shift_back(record: Any, rows: Any, stored: int, count: int) -> None:
-    """Move the segments after the middle of a record to its start, to free rows for new segments."""
+    """Move the later half of the segments to the start of a record, to make room for new segments."""
     for i in range(SEGMENTS - stored, SEGMENTS):
         rows.ends[i], rows.rows[i] = rows.ends[i + count], rows.rows[i + count]
         put(record.clocks[i + count], record.clocks[i])
@@ -160,7 +160,7 @@ def _clear(found: Any) -> None:
 
 @inlined
 def _take_rest(hold: Any, period: float, state: Any, found: Any) -> None:
-    """Write the results for a last period without any motion."""
+    """Write the results of a last period in which nothing moves."""
     x, z = state.x, state.z
     for i in range(x.shape[0]):
         for side in range(2):

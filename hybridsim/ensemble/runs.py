@@ -1,4 +1,4 @@
-"""Run a model for many parameter values and starts, and return the last period of each run.
+"""This module runs a model for many parameters and starts, and returns the last period of each run.
 
 For a single run Python checks and binds the model and decides its start, which takes several times as long as a short
 run of linear modes. Here this is done for all runs together, or in compiled code. The runs are those of
@@ -41,7 +41,7 @@ _run, _opposing = Precompiled(run_ensemble), Precompiled(opposing)
 
 
 class LastPeriods(NamedTuple):
-    """The last periods of some runs."""
+    """The measures of the last forcing periods of some runs."""
 
     numbers: np.ndarray  # numbers (m,) of the runs
     periods: np.ndarray  # lengths (m,) of the periods
@@ -49,7 +49,7 @@ class LastPeriods(NamedTuple):
 
 
 def can_run_together(system: System) -> bool:
-    """Return whether runs of a model can be computed together: only contacts, in modes that are always linear.
+    """Return whether runs of a model can be computed together: only contacts, always linear modes.
 
     Held values must be constants, because states that follow others are not supported here.
     """
@@ -68,7 +68,7 @@ def can_run_together(system: System) -> bool:
 
 
 class Ensemble:
-    """Runs of one system from t = 0 over a number of forcing periods each; each thread needs its own object.
+    """Runs of one system over a number of forcing periods; each thread needs its own object.
 
     Parameters
     ----------
@@ -95,7 +95,7 @@ class Ensemble:
         self.hold = np.array([a.hold for a in system.automata], dtype=np.int64)
 
     def runs(self, parameters: np.ndarray, starts: np.ndarray, periods: int) -> Iterator[LastPeriods]:
-        """Yield the last periods of all supported runs, in any order; runs of a group come together.
+        """Yield the last periods of all supported runs, in any order.
 
         parameters (N, P), in the order of the model; starts (N, n). The iteration ends early if `may_continue` returns
         False.
@@ -151,7 +151,7 @@ class Ensemble:
             )
 
     def _run_group(self, group: EnsembleTables, runs: Runs) -> None:
-        """Run all points of a group, unless `may_continue` returns False."""
+        """Run all points of a group, until `may_continue` returns False."""
         spare = spare_scratch(self.system, "ensemble", group.form)
         try:
             group_scratch = spare.pop()
@@ -169,7 +169,7 @@ class Ensemble:
         spare.append(group_scratch)
 
     def _may_begin(self, starts: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-        """Return a mask (N,) of runs in which each contact opposes its own velocity, as is required."""
+        """Return a mask (N,) of runs in which each contact opposes its own velocity."""
         found = np.empty(len(starts), dtype=np.bool_)
         scratch = np.zeros(len(self.system.surface_of))
         _opposing(self.system.address("effects"), starts, vectors, self.first, scratch, found)
@@ -177,12 +177,12 @@ class Ensemble:
 
 
 def _period(rates: np.ndarray) -> float:
-    """Return the common period of angles with these rates, or NaN."""
+    """Return the common period of angles with given rates, or NaN if there is none."""
     return common_multiple((_FULL_TURN / abs(rates[rates != 0.0])).tolist()) or math.nan
 
 
 class _GroupScratch:
-    """Scratch arrays for runs whose tables have the same shapes, and their packs for the kernel."""
+    """Scratch arrays for runs with tables of equal shapes, and packs of the arrays."""
 
     def __init__(self, ensemble: Ensemble, tables: Any, p: np.ndarray) -> None:
         system = ensemble.system

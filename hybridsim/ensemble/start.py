@@ -1,4 +1,4 @@
-"""Start a run in compiled code: determine the modes of contacts, if the outcome is certain.
+"""This module starts a run in compiled code, if the modes of the contacts are certain.
 
 The rules are those of `hybridsim.engine.events.resolve`, which resolves the other cases and reports problems.
 """
@@ -36,7 +36,7 @@ def plain_start(
     state: Any,
     work: Any,
 ) -> bool:
-    """Decide all modes at `t0`; the parameters are in `state.p`. Return False if the outcome is uncertain.
+    """Choose all modes at `t0`; return False if the outcome is uncertain.
 
     none: empty tables, so that guards are judged by the tape. vector_positions: rates, and the positions of the origin,
     the phases and the pin in p. surfaces: from the tape of the first modes, the constant rows, the rows, the
@@ -68,7 +68,7 @@ def plain_start(
 
 @inline_always
 def _take_sides(automata: Any, inputs: Any, surfaces: Any, pin_at: int, state: Any, work: Any) -> bool:
-    """Set each mode by the component's side, or _UNKNOWN on its surface. Return False if a value is NaN."""
+    """Set each mode by the side of the component's surface; return False if a value is NaN."""
     constant, rows, derivatives, registers, owners = surfaces
     V, E, z, p = work.V, work.E, state.z, state.p
     p[pin_at] = 0.0  # the states as they are, not projected by a holding mode
@@ -90,7 +90,7 @@ def _take_sides(automata: Any, inputs: Any, surfaces: Any, pin_at: int, state: A
 def _choose_cluster(
     automata: Any, tapes: Any, inputs: Any, none: Any, state: Any, first: int, work: Any
 ) -> bool:
-    """Set the modes of the components on their surfaces in one cluster. Return whether they are certain."""
+    """Choose the modes of a cluster's components on their surfaces; return whether they are certain."""
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     members, current, holds, trial, y = work.members, work.current, work.holds, work.trial, work.y
     cluster = cluster_of(automata, first)
@@ -133,7 +133,7 @@ def _choose_cluster(
 
 @kernel
 def keeps_holding(tapes: Any, lin: Any, state: Any, work: Any, c: Any) -> bool:
-    """Return whether nothing moves from here on: all states are constant, and no guard ever passes zero.
+    """Return whether nothing moves any more: all states are constant, and no guard passes zero.
 
     A guard that reaches zero and turns back there, within its rounding, leaves the mode unchanged. Functions of time
     are taken at the origin of the state. c: scratch for modal coordinates.
@@ -172,7 +172,7 @@ def keeps_holding(tapes: Any, lin: Any, state: Any, work: Any, c: Any) -> bool:
 
 @kernel
 def opposing(effects: Any, x: Any, p: Any, z: Any, scratch: Any, out: Any) -> None:
-    """Write to `out` (N,) whether every contact opposes its own velocity at starts x (N, n), p (N, P)."""
+    """Write to `out` (N,) whether every contact opposes its own velocity at the starts of N runs."""
     for i in range(x.shape[0]):
         call(effects, 0.0, x[i], p[i], z, scratch)
         out[i] = True

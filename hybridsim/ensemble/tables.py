@@ -1,4 +1,4 @@
-"""Compute tables of linear modes for many parameter values together, in contiguous arrays."""
+"""This module computes tables of linear modes for many parameter values together."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _COMPUTED = ("rates", "offsets", "weights")  # fields of the atoms that depend o
 
 
 class EnsembleTables:
-    """The tables of `hybridsim.engine.linear.tables.tables_of` for all points of a group.
+    """Tables of linear modes for all points of a group, as `tables_of` makes them for one point.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def _is_shared(name: str) -> bool:
 def ensemble_tables(
     system: System, modes: np.ndarray, parameters: np.ndarray, horizons: np.ndarray
 ) -> list[EnsembleTables]:
-    """Return tables of these vectors of modes (K, components) at many points: parameters (N, P), horizons (N,).
+    """Return tables of some combinations of modes at many points: parameters (N, P), horizons (N,).
 
     There is one group for each order of magnitude of the horizon and each template. Points with tables that are not
     finite are left out.

@@ -1,4 +1,4 @@
-"""This folder turns text into checked expressions, evaluates them, substitutes in them, and converts them to SymPy."""
+"""This package turns text into checked expressions, and evaluates, changes and converts them."""
 
 from hybridsim.expr.evaluate import evaluate, resolve
 from hybridsim.expr.function import FunctionExpression, function_name, of_function

@@ -25,7 +25,7 @@ _KINDS = {
 
 
 class _Checker:
-    """A check of one tree; `number` and `truth` check that a node has the right kind of value."""
+    """Checks one syntax tree: `number` and `truth` check that a node has the right kind of value."""
 
     def __init__(self, text: str, place: Place, columns: bool) -> None:
         self.text = text
@@ -58,14 +58,14 @@ class _Checker:
         return constant
 
     def every(self, check: Callable[[ast.expr], bool], nodes: Iterable[ast.expr]) -> bool:
-        """Check all nodes, and return whether all are constant."""
+        """Check all nodes, and return whether they are all constant."""
         constant = True
         for node in nodes:
             constant = check(node) and constant
         return constant
 
     def any(self, node: ast.expr) -> tuple[bool, bool]:
-        """Check a node and return (is constant, is boolean); a constant must have a finite real value."""
+        """Check a node, and return whether it is constant and whether it is a condition."""
         constant, boolean = self.kind(node)
         if constant and not isinstance(node, ast.Constant):
             try:

@@ -55,7 +55,7 @@ def resolve(expressions: Mapping[str, Expression]) -> dict[str, float]:
 
 
 def dependency_order(expressions: Mapping[str, Expression], kind: str) -> list[str]:
-    """Return the names in an order in which each depends only on earlier ones; other names are ignored.
+    """Return the names in an order in which each name depends only on earlier ones.
 
     Raises
     ------

@@ -44,7 +44,7 @@ class tanh(sympy.tanh):
 
 
 def _only(function: Any, argindex: int) -> Any:
-    """Return the only argument of a function, for its derivative."""
+    """Return the only argument of a function, for use in its derivative."""
     if argindex != 1:
         raise ArgumentIndexError(function, argindex)
     return function.args[0]

@@ -15,19 +15,19 @@ _HEAD = ADDS + " "
 
 @dataclass(frozen=True)
 class Increment(Expression):
-    """An increment: ``names`` and ``tree`` describe the amount, and the text starts with '+= '."""
+    """The amount that a reset adds to a variable, as an expression; its text starts with '+= '."""
 
     def error(
         self, message: str, *, node: ast.expr | None = None, remedy: str | None = None
     ) -> ExpressionError:
-        """Return an error that points at this amount, or at a node of it."""
+        """Return an error that points at this amount, or at a node of its tree."""
         column = None if node is None else getattr(node, "col_offset", None)
         place = (self.place or Place()).at(self.text, None if column is None else column + len(_HEAD))
         return ExpressionError(message, place=place, remedy=remedy)
 
 
 def parse_reset(value: str | float | bool | Expression, place: Place | None = None) -> Expression:
-    """Parse a reset: the new value of a variable, or the amount to add, '+= expression'."""
+    """Parse a reset: a new value of a variable, or an amount to add, '+= expression'."""
     if isinstance(value, str) and value.lstrip().startswith(ADDS):
         return _increment(parse(value.lstrip().removeprefix(ADDS), place))
     return parse(value, place)

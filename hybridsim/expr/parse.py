@@ -52,7 +52,7 @@ _ADVICE = {
 
 @dataclass(frozen=True)
 class Expression:
-    """A checked expression; two expressions are equal if their texts are equal.
+    """An expression that was checked; two expressions are equal if their texts are equal.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ class Expression:
     def error(
         self, message: str, *, node: ast.expr | None = None, remedy: str | None = None
     ) -> ExpressionError:
-        """Return an error that points at this expression, or at a node of it."""
+        """Return an error that points at this expression, or at a node of its tree."""
         column = None if node is None else getattr(node, "col_offset", None)
         place = (self.place or Place()).at(self.text, column)
         return ExpressionError(message, place=place, remedy=remedy)
@@ -170,7 +170,7 @@ def require_names(expr: Expression, known: Iterable[str]) -> None:
 
 
 def substitute(expr: Expression, values: Mapping[str, Expression | str | float]) -> Expression:
-    """Substitute expressions for names simultaneously in the tree, so no parentheses can be lost.
+    """Replace names by expressions in the tree, simultaneously.
 
     The result is checked like a parsed expression, with larger limits of its size, and keeps the place of ``expr``.
     """
@@ -192,7 +192,7 @@ def substitute(expr: Expression, values: Mapping[str, Expression | str | float])
 
 
 def of_tree(tree: ast.expr, place: Place | None = None) -> Expression:
-    """Return an expression of a checked tree; it may contain internal names with two underscores."""
+    """Return an expression from a checked tree, which may contain internal names."""
     identifiers = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
     return Expression(write(tree), frozenset(identifiers - CONSTANTS.keys() - FUNCTIONS.keys()), place, tree)
 

@@ -1,4 +1,4 @@
-"""Expressions as polynomials with exact coefficients, to find out whether two expressions are equal."""
+"""This module converts expressions to polynomials with exact coefficients, to compare expressions."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def polynomial(node: ast.expr) -> Polynomial:
 
 
 def difference(left: ast.expr, right: ast.expr) -> Polynomial:
-    """Return the polynomial of left - right."""
+    """Return the polynomial of the difference of two trees, left - right."""
     return _sum(polynomial(left), scaled(polynomial(right), Fraction(-1)))
 
 
@@ -78,7 +78,7 @@ def scaled(p: Polynomial, factor: Fraction) -> Polynomial:
 
 
 def is_multiple(p: Polynomial, of: Polynomial) -> bool:
-    """Return whether `p` is a polynomial multiple of `of`, apart from denominators that are names."""
+    """Return whether the polynomial `p` is a multiple of `of`, if names in denominators are cleared."""
     rest, divisor = _cleared(p), _cleared(of)
     if not divisor:
         return False

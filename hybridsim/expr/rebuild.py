@@ -1,4 +1,4 @@
-"""Copies of syntax trees with changed parts."""
+"""This module copies syntax trees and changes parts of the copies."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ Change = Callable[[ast.expr], ast.expr]
 
 
 def rebuilt(node: ast.expr, change: Change) -> ast.expr:
-    """Return a copy of the node with its direct parts changed; a leaf is returned unchanged."""
+    """Return a copy of a node with a function applied to its direct parts."""
     match node:
         case ast.UnaryOp(op=op, operand=operand):
             return ast.UnaryOp(op, change(operand))
@@ -28,14 +28,14 @@ def rebuilt(node: ast.expr, change: Change) -> ast.expr:
 
 
 def with_names(node: ast.expr, parts: Mapping[str, ast.expr]) -> ast.expr:
-    """Return the tree with names replaced simultaneously."""
+    """Return a tree in which names are replaced simultaneously by other trees."""
     if isinstance(node, ast.Name):
         return parts.get(node.id, node)
     return rebuilt(node, lambda part: with_names(part, parts))
 
 
 def exchanged(node: ast.expr, old: ast.expr, new: ast.expr) -> ast.expr:
-    """Return the tree with all occurrences of one part replaced."""
+    """Return a tree in which all occurrences of one part are replaced by another."""
     text = ast.dump(old)
 
     def change(part: ast.expr) -> ast.expr:

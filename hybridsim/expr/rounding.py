@@ -1,4 +1,4 @@
-"""Bounds of the rounding error of an expression's value."""
+"""This module bounds the rounding error of the value of an expression."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _OF_FUNCTIONS = 2.0  # error bound of the functions of the math library, in unit
 
 @lru_cache(maxsize=4096)
 def own_roundoff(number: float) -> float:
-    """Return how far a number may be from the intended decimal number: half a unit in the last place.
+    """Return the rounding error of a decimal number: half a unit in the last place of the double.
 
     The error is zero if the shortest decimal form equals the double exactly (3, 0.5).
     """
@@ -74,7 +74,7 @@ def _with_error(node: ast.expr, values: Mapping[str, float], exact: Collection[s
 
 
 def _carried(node: ast.BinOp | ast.Call, arguments: list[tuple[float, float]], value: float) -> float:
-    """Return the error of a function's value: its own rounding and the errors passed on by its arguments."""
+    """Return the error of a function's value: its own rounding, and the errors of its arguments."""
     names = [f"a{k}" for k in range(len(arguments))]
     parts: list[ast.expr] = [ast.Name(name) for name in names]
     again = (

@@ -1,4 +1,4 @@
-"""Simplification of SymPy expressions with limited effort.
+"""This module simplifies SymPy expressions with limited effort.
 
 `sympy.simplify` expands products of sums and functions of sums, which may take minutes for a formula of one line. The
 number of terms after expansion therefore decides which simplification is tried.
@@ -35,7 +35,7 @@ def simplified(e: Any) -> Any:
 
 
 def written_out(e: Any) -> Any:
-    """Return an equal expression over one denominator, expanded to a sum.
+    """Return an equal expression, expanded to a sum over one denominator.
 
     Exponentials are treated as names. Otherwise exp(-t) would become a quotient, and all other terms would be
     multiplied by exp(t).
@@ -67,7 +67,7 @@ def terms_of(e: Any) -> int:
 
 
 def _named(e: Any, names: dict[Any, Any]) -> Any:
-    """Return an expression in which arguments and non-polynomial parts are replaced by names."""
+    """Return an expression in which arguments and parts that are not polynomials are replaced by names."""
     if e.is_Symbol or e.is_number:
         return e
     if e.is_Pow and not e.exp.is_Integer:

@@ -1,4 +1,4 @@
-"""The partial derivative of an expression, as an expression."""
+"""This module differentiates an expression with respect to a name."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def _printer() -> Any:
     from sympy.printing.pycode import PythonCodePrinter
 
     class Printer(PythonCodePrinter):
-        """A printer that uses the function names of expressions and prints all digits."""
+        """Prints SymPy expressions with the function names of expressions and with all digits."""
 
         def __init__(self) -> None:
             super().__init__({"fully_qualified_modules": False, "standard": "python3"})

@@ -13,7 +13,7 @@ from hybridsim.expr.parse import Expression, require_names
 
 
 def _absolute(u: Any) -> Any:
-    """Return |u|, without SymPy's split of possibly complex terms into real and imaginary parts."""
+    """Return |u| without SymPy's split into real and imaginary parts."""
     return sympy.Abs(u) if u.is_extended_real else sympy.Max(u, -u)
 
 
@@ -21,7 +21,7 @@ class exp(sympy.exp):  # SymPy's printers use the name of the class
     """The exponential of a sum without SymPy's split into a product, whose factors may overflow."""
 
     def __new__(cls, arg: Any, **options: Any) -> Any:
-        """Create the exponential; only arguments that are sums are not simplified."""
+        """Create the exponential of an argument; sums are not simplified."""
         return super().__new__(cls, arg, **(options | {"evaluate": False} if arg.is_Add else options))
 
     def as_base_exp(self) -> tuple[Any, Any]:
@@ -86,7 +86,7 @@ def to_sympy(expr: Expression, symbols: Mapping[str, Any]) -> Any:
 
 
 def derivative(e: Any, symbol: Any) -> Any:
-    """Return de/d(symbol); at a corner of abs, min or max it is the derivative from the right."""
+    """Return de/d(symbol); at a corner of abs, min or max, return the derivative from the right."""
     return without_distributions(sympy.diff(e, symbol))
 
 

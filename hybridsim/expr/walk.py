@@ -27,7 +27,7 @@ _COMPARE: dict[type[ast.cmpop], Callable[[float, float], bool]] = {
 
 
 class NoValue(Exception):
-    """A node that has no finite real value, with the reason."""
+    """Raised if a node has no finite real value; the text gives the reason."""
 
     def __init__(self, node: ast.expr, reason: str) -> None:
         super().__init__(reason)

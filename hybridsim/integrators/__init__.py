@@ -1,4 +1,4 @@
-"""This folder contains the integrators: one folder per family of methods, and one registry for all.
+"""This package contains the integrators: one folder per family of methods, and one registry for all.
 
 `contract` defines the interface of an integrator. A new method is a new folder and a line in `registry`.
 """

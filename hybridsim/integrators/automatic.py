@@ -1,4 +1,4 @@
-"""Choose the integrator for integrator="auto", and give the reason."""
+"""This module chooses the integrator for integrator="auto", and gives the reason."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
 
 
 def _for_functions(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float]) -> Choice:
-    """Choose an integrator for rates that are a Python function; closed forms and series cannot use them."""
+    """Choose an integrator for rates that are a Python function."""
     steps = _steps_for_stability(system, x0, z0, span)
     stiff = f"for stability an explicit method would need {steps:.0e} steps" if steps > _MANY else ""
     if isinstance(system.code, PythonCode) and system.code.refused:
@@ -92,7 +92,7 @@ def _modes_at_start(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[
 
 
 def successor_of(name: str, system: System) -> Integrator | None:
-    """Return the method to continue with if the run becomes stiff; None if stiffness is not monitored."""
+    """Return the method that continues if the run becomes stiff, or None if stiffness is not monitored."""
     from hybridsim.integrators.rosenbrock.rodas5p import Rodas5P
 
     return Rodas5P() if name == "dop853" and system.has_tape else None
@@ -104,7 +104,7 @@ def _fastest_decay(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> f
 
 
 def _is_apart(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> bool:
-    """Return whether decays are much faster than all other motions, and so limit the step by stability."""
+    """Return whether some decays are so much faster than all other motions that they limit the step."""
     values = _eigenvalues(system, x, np.maximum(z, 0), t0)
     sizes = np.abs(values)
     stiff = values.real < -_DECAYING * sizes
@@ -124,7 +124,7 @@ def _eigenvalues(system: System, x: np.ndarray, z: np.ndarray, t0: float) -> np.
 
 
 def _jacobian(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Return d(dx/dt)/dx from the tape."""
+    """Return the Jacobian d(dx/dt)/dx of the flow at a state."""
     n, inputs, tape = system.n, system.registers.inputs, system.optimised_tape(z)
     V = np.zeros((system.registers.count, 2))
     V[inputs.constants, 0] = inputs.values[:, 0]

@@ -12,7 +12,7 @@ def __getattr__(name: str) -> Any:
     if name.startswith("_") or not hasattr(contract, name):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     warnings.warn(
-        "hybridsim.integrators.base is deprecated; it will go in version 0.2. Import from "
+        "hybridsim.integrators.base is deprecated; version 0.2 removes it. Import from "
         "hybridsim.integrators.contract",
         DeprecationWarning,
         stacklevel=2,

@@ -105,16 +105,16 @@ class Integrator(metaclass=_IntegratorType):
 
     @property
     def stable_to(self) -> float:
-        """Return the stability limit |h*lambda| of an explicit method on the negative axis; 0 for others."""
+        """Return the limit of |h*lambda| for stable steps of an explicit method, or 0 for other methods."""
         return 0.0
 
     @property
     def rounding(self) -> float:
-        """Return a bound of the rounding error of a step, in units of roundoff of the change of the states."""
+        """Return a bound of the rounding error of a step, relative to the roundoff of the state change."""
         return 100.0
 
     def prepare(self, system: System) -> None:
-        """Compile everything that a run needs beyond the model's functions; it counts as compile time."""
+        """Compile everything that a run needs in addition to the model's functions."""
         return
 
     def start(
@@ -134,5 +134,5 @@ class Integrator(metaclass=_IntegratorType):
         return None
 
     def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
-        """Run a task; by default step by step through the engine's mode loop."""
+        """Run a task, by default step by step through the mode loop of the engine."""
         return run_task(system, self, task, progress)

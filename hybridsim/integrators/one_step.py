@@ -1,4 +1,4 @@
-"""Step control for one-step methods with an error estimate, including first steps and steps up to an event."""
+"""This module controls the step size of one-step methods with an error estimate."""
 
 from __future__ import annotations
 
@@ -24,27 +24,27 @@ _SHORTER = 0.5  # factor on a step whose error up to an event is above the toler
 
 
 class Point:
-    """A state along the run; further quantities are computed on first use."""
+    """A state during the run, with further quantities computed on first use."""
 
     def __init__(self, flow: Flow, s: float, x: np.ndarray) -> None:
         self.flow, self.s, self.x = flow, s, x
 
     @cached_property
     def dx(self) -> np.ndarray:
-        """Return the rates of the states."""
+        """Return the rates (n,) of the states."""
         self.flow.counters.rhs_evaluations += 1
         return self.flow.rhs(self.s, self.x)
 
     @cached_property
     def series(self) -> np.ndarray:
-        """Return Taylor coefficients of the flow to third order (n, 4)."""
+        """Return the Taylor coefficients of the flow up to third order (n, 4)."""
         flow, zero = self.flow, np.zeros(self.flow.n)
         return flow.system.series(self.s, self.x, flow.p, flow.z, zero, 0.0).states
 
 
 @dataclass(frozen=True)
 class Trial:
-    """The end of a trial step, its error in units of the tolerance, and the method's data for dense output."""
+    """The end of a trial step: the state, the scaled error, and the method's data for dense output."""
 
     x: np.ndarray
     error: float
@@ -52,7 +52,7 @@ class Trial:
 
 
 class OneStepStepper(ABC):
-    """Advance a one-step method through one segment.
+    """Advances a one-step method through one segment.
 
     Parameters
     ----------
@@ -85,18 +85,18 @@ class OneStepStepper(ABC):
 
     @abstractmethod
     def _attempt(self, start: Point, h: float) -> Trial:
-        """Try one step of length h, which is negative if time runs backward."""
+        """Try one step of length `h`, which is negative for a run backward in time."""
 
     @abstractmethod
     def _dense(self, start: Point, end: Point, trial: Trial) -> Dense:
         """Return the dense output of an accepted step."""
 
     def _holds(self, start: Point, end: Point, trial: Trial) -> bool:
-        """Return whether the dense output is accurate inside a step that is accurate at its end."""
+        """Return whether the dense output is accurate inside the step."""
         return True
 
     def step(self) -> Step:
-        """Return the next accepted step."""
+        """Take steps until one is accepted, and return it."""
         direction, start = math.copysign(1.0, self.bound), self.here
         while True:
             h = min(self.h, self.tolerances.max_step)
@@ -104,7 +104,7 @@ class OneStepStepper(ABC):
             last = h * LAST_STEP_FACTOR >= abs(self.bound - start.s) - SMALLEST * math.ulp(self.bound)
             h = abs(self.bound - start.s) if last else abs(on_the_grid(start.s, direction * h))
             if not h > 0.0:
-                raise Collapsed(f"the step fell to {h:.3g}")
+                raise Collapsed(f"the step size fell to {h:.3g}")
             trial = self._attempt(start, direction * h)
             self.h = next_length(h, trial.error, self.error_order, self._memory)
             if trial.error <= 1.0:
@@ -118,7 +118,7 @@ class OneStepStepper(ABC):
         return Step(start.s, s, start.x, end.x, self._dense(start, end, trial))
 
     def restep(self, step: Step, s: float) -> Step:
-        """Return one step from the start to exactly s, or a shorter one if its error is too large.
+        """Return one step from the start to exactly the local time `s`, or a shorter one if it is inaccurate.
 
         A law may be steep at an event and flat on both sides, which the stages of the longer step missed. If
         the change of the state is below the tolerance, equal parts are used, because a law with a jump cannot
@@ -138,7 +138,7 @@ class OneStepStepper(ABC):
         return self._in_parts(start, s)
 
     def _in_parts(self, start: Point, s: float) -> Step:
-        """Return a step up to s in equal parts, as many as its error requires within a limit."""
+        """Return a step up to the local time `s`, taken in as many equal parts as the error requires."""
         count = 2
         while True:
             knots = np.linspace(start.s, s, count + 1)
@@ -156,7 +156,7 @@ class OneStepStepper(ABC):
         return Step(start.s, s, start.x, points[-1].x, PiecewiseDense(knots, parts))
 
     def _first_step(self) -> float:
-        """Return the starting step of Hairer, Norsett and Wanner 1993, section II.4."""
+        """Return the starting step by the method of Hairer, Norsett and Wanner 1993, section II.4."""
         x, dx = self.here.x, self.here.dx
         scale = self.tolerances.atol + self.tolerances.rtol * np.abs(x)
         scale = np.where(scale > 0.0, scale, 1.0)

@@ -1,4 +1,4 @@
-"""The options of an integrator: the fields of its dataclass, their kinds in words, and their descriptions."""
+"""This module describes the options of an integrator: names, types and descriptions."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def options_of(cls: type[Any]) -> tuple[Option, ...]:
 
 
 def _texts(cls: type[Any]) -> dict[str, str]:
-    """Return the descriptions of parameters in the docstrings of a class and its bases, nearest first."""
+    """Return the descriptions of parameters in the docstrings of a class and its bases."""
     found: dict[str, str] = {}
     for base in reversed(cls.__mro__):
         document = inspect.cleandoc(base.__doc__ or "") if "__doc__" in vars(base) else ""
@@ -58,7 +58,7 @@ def _texts(cls: type[Any]) -> dict[str, str]:
 
 
 def fits(value: object, kind: Any) -> bool:
-    """Return whether a value matches the annotation `kind` of an option; an integer counts as a number."""
+    """Return whether a value matches the annotation `kind`; an integer is also a valid float."""
     if get_origin(kind) is Literal:
         return value in get_args(kind)
     if get_origin(kind) in (Union, UnionType):
@@ -70,7 +70,7 @@ def fits(value: object, kind: Any) -> bool:
 
 
 def _is_small(value: Any, most: float) -> bool:
-    """Return whether a number is at most `most` in size and in the range of doubles; NaN passes."""
+    """Return whether the size of a number is at most `most`; NaN is accepted."""
     try:
         return not abs(float(value)) > most
     except OverflowError:
@@ -78,7 +78,7 @@ def _is_small(value: Any, most: float) -> bool:
 
 
 def kind_description(kind: Any) -> str:
-    """Return an annotation in words."""
+    """Return an annotation as text for users."""
     if get_origin(kind) is Literal:
         return "one of " + ", ".join(map(str, get_args(kind)))
     if get_origin(kind) in (Union, UnionType):

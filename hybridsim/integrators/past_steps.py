@@ -1,4 +1,4 @@
-"""Interpolate dense output through the ends of the last steps, for stiff modes.
+"""This module interpolates stiff modes through the ends of the last steps.
 
 In a stiff mode a state deviates from its slow motion by a rounding error or a tolerance. Its derivatives are
 this deviation times powers of a rate far above one over the step, and are useless. The values themselves are
@@ -24,7 +24,7 @@ _CONVERGES = 0.1
 
 @kernel
 def converges(series: Any, h: float, x1: Any) -> bool:
-    """Return whether Taylor coefficients (n, k) at one end of a step give the states at the other end."""
+    """Return whether Taylor coefficients at one end of a step give the states at the other end."""
     for i in range(series.shape[0]):
         power, largest, total = 1.0, 0.0, 0.0
         for k in range(series.shape[1]):
@@ -39,7 +39,7 @@ def converges(series: Any, h: float, x1: Any) -> bool:
 
 
 def through(s: np.ndarray, x: np.ndarray) -> Dense:
-    """Return the polynomial for the last step through a suitable number of points; s (m,), x (m, n), m >= 2.
+    """Return a polynomial for the last step through a suitable number of earlier points.
 
     Of the polynomials through the last 2, 3, ... points it is the one for which the next point changes the
     middle of the step least.

@@ -1,4 +1,4 @@
-"""The registry of integrators: built-in ones, and those that third parties add through the entry point."""
+"""This module registers integrators: built-in ones, and those of plug-ins with an entry point."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _registered() -> dict[str, type[Integrator]]:
 
 
 def list_integrators() -> tuple[type[Integrator], ...]:
-    """List all integrators that can be named, built-in ones first.
+    """Return all integrators that can be selected by name, built-in ones first.
 
     Returns
     -------
@@ -76,7 +76,7 @@ def list_integrators() -> tuple[type[Integrator], ...]:
 
 
 def integrator_class(name: str) -> type[Integrator]:
-    """Return the integrator class with this name."""
+    """Return the integrator class with a given name."""
     found = _registered()
     if name not in found:
         remedy = nearest(name, found, kind="integrators")
@@ -89,7 +89,7 @@ def integrator_class(name: str) -> type[Integrator]:
 
 @contextmanager
 def registered(method: str | type[Integrator]) -> Iterator[str]:
-    """Make an integrator class available by name inside the context, even if it is not registered."""
+    """Make an integrator class available by its name within a block, even if it is not registered."""
     if isinstance(method, str):
         yield integrator_class(method).name
         return
@@ -142,18 +142,18 @@ _ELSEWHERE = {
 
 
 def keyword_elsewhere(keyword: str) -> str | None:
-    """Return the remedy for a keyword of another tool that has a counterpart in `simulate`."""
+    """Return the remedy for a keyword of another tool that has a different name in `simulate`."""
     return _ELSEWHERE.get(keyword)
 
 
 class UnknownOption(UsageError):
-    """An error for an option that the chosen integrator does not have."""
+    """The error for an option that the chosen integrator does not have."""
 
     option = integrator = ""
 
 
 def make_integrator(name: str, options: dict[str, Any], keywords: Iterable[str] = ()) -> Integrator:
-    """Return the integrator with this name and options; `keywords` are further names for suggestions."""
+    """Return the integrator with a given name and options."""
     cls = integrator_class(name)
     known = option_names(cls)
     for option in options:

@@ -1,4 +1,4 @@
-"""The length of the next step of a one-step method, from the errors of the last steps."""
+"""This module computes the next step size of a one-step method from the errors of the last steps."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ LAST_STEP_FACTOR = 1.0 + 2.0**-30
 
 @kernel
 def forget(memory: Any) -> None:
-    """Reset the step control; `memory` (3,): last accepted step, its error, and 1 after a rejected step."""
+    """Reset the step control, whose memory is the last accepted step, its error, and a rejection flag."""
     memory[0], memory[1], memory[2] = 0.0, 0.0, 0.0
 
 
 @kernel
 def next_length(h: float, error: float, error_order: int, memory: Any) -> float:
-    """Return the length to try after a step of length h with this error in units of the tolerance.
+    """Return the step size to try after a step of length `h` with a given scaled error.
 
     If errors have been growing from step to step, the growth is extrapolated (K. Gustafsson, ACM Transactions
     on Mathematical Software 20 (1994) 496, doi:10.1145/198429.198437). After a rejected step the length does

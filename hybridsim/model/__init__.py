@@ -1,4 +1,4 @@
-"""This folder declares, reads, checks and writes models; it contains no numerical methods.
+"""This package declares, reads, checks and writes models; it contains no numerical methods.
 
 Start with `parts` (what one declares), then `toml`, `checks`, `laws` and `smoothing`.
 """

@@ -1,4 +1,4 @@
-"""Unused names for quantities that the program adds to a model."""
+"""This module finds unused names for quantities that the program adds to a model."""
 
 from __future__ import annotations
 

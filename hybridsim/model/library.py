@@ -1,4 +1,4 @@
-"""Load models and friction laws by name or path."""
+"""This module loads models and friction laws by name or path."""
 
 from __future__ import annotations
 

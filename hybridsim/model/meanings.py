@@ -1,4 +1,4 @@
-"""The meaning of names in a model: definitions, varying quantities, and quantities that depend on forces."""
+"""This module resolves the names in a model: definitions, varying quantities, and forces."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MOST_PARTS = 2_000  # largest tree with inserted definitions; larger ones are c
 
 
 class Meanings:
-    """The definitions, varying names and force-dependent names of one model."""
+    """The definitions of one model, and the names that vary or depend on forces."""
 
     def __init__(self, model: Model) -> None:
         trees = {name: expr.tree for name, expr in model.definitions}
@@ -35,7 +35,7 @@ class Meanings:
         self.definitions = {name: self.with_single_signs(tree) for name, tree in trees.items()}
 
     def with_single_signs(self, node: ast.expr) -> ast.expr:
-        """Return a tree with the sign of each varying product written as a product of signs."""
+        """Return a tree in which the sign of a product is a product of signs."""
         if not any(isinstance(part, ast.Name) and part.id == "sign" for part in ast.walk(node)):
             return node
         match rebuilt(node, self.with_single_signs):
@@ -49,15 +49,15 @@ class Meanings:
                 return made
 
     def lookup(self, name: str) -> ast.expr | None:
-        """Return the tree of a definition, or None."""
+        """Return the tree of a definition with a given name, or None."""
         return self.definitions.get(name)
 
     def moves(self, node: ast.expr) -> bool:
-        """Return whether a value can change while all modes stay active."""
+        """Return whether the value of a tree can change while all modes stay active."""
         return not names_of(node).isdisjoint(self.moving)
 
     def reached(self, trees: Iterable[ast.expr]) -> set[str]:
-        """Return the definitions that trees depend on."""
+        """Return the definitions on which some trees depend."""
         open_ = {name for tree in trees for name in names_of(tree)} & self.definitions.keys()
         found: set[str] = set()
         while open_:
@@ -67,14 +67,14 @@ class Meanings:
         return found
 
     def depended_on(self, names: Iterable[str]) -> set[str]:
-        """Return the names, and all names that the definitions among them depend on."""
+        """Return some names, and all names on which the definitions among them depend."""
         trees: list[ast.expr] = [ast.Name(name, ast.Load()) for name in names]
         return set().union(
             *map(names_of, trees), *(names_of(self.definitions[name]) for name in self.reached(trees))
         )
 
     def written_out(self, node: ast.expr) -> ast.expr:
-        """Return a tree with its definitions inserted, unless the result is too large."""
+        """Return a tree with its definitions inserted, or the tree itself if the result is too large."""
         inner = node
         while names_of(inner) & self.definitions.keys():
             inner = with_names(inner, self.definitions)
@@ -83,7 +83,7 @@ class Meanings:
         return inner
 
     def family(self, node: ast.expr) -> tuple[Family, int]:
-        """Return the family that an expression shares with its multiples, and its sign relative to it."""
+        """Return the family of an expression, which it shares with its multiples, and its relative sign."""
         p: Polynomial = polynomial(self.written_out(node))
         number = constant_of(p)
         if number is not None:
@@ -92,7 +92,7 @@ class Meanings:
         return frozenset(found), sign
 
     def signs(self, component: Component, mode: Mode) -> Mapping[Family, int]:
-        """Return the known signs in a mode by family: the signs of its guards, and 0 for a held surface."""
+        """Return the known signs in a mode, by family: signs of guards, and 0 for a held surface."""
         surface = component.surface
         known: dict[Family, int] = {}
         for guard in mode.guards:

@@ -1,4 +1,4 @@
-"""The time derivative of a quantity along the flow of a model."""
+"""This module differentiates a quantity with respect to time along the flow of a model."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def rate_along(model: Model, quantity: Expression, what: str) -> Expression:
-    """Return d(quantity)/dt, the partial derivative by t plus the sum of partial derivatives by x times x'.
+    """Return the time derivative of a quantity along the flow, by the chain rule.
 
     Raises
     ------

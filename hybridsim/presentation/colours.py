@@ -12,7 +12,7 @@ PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7
 
 
 def mode_colours(components: Collection[Component]) -> dict[str, str]:
-    """Return a colour for each mode: black for modes that hold a surface, then the palette in order."""
+    """Return a colour for each mode: black for modes that hold a surface, others from the palette."""
     held = {component.surface.hold for component in components if component.surface}
     names = dict.fromkeys(mode.name for component in components for mode in component.modes)
     free = [name for name in names if name not in held]

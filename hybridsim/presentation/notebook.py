@@ -74,7 +74,7 @@ def _dimmed(text: str) -> str:
 def _mode_bars(
     colours: Mapping[str, str], modes: Mapping[str, Sequence[Interval]], t0: float, t1: float
 ) -> Iterator[str]:
-    """Yield one strip of modes per component, the times at both ends, and a legend."""
+    """Yield one strip of modes per component, and the times at both ends with a legend."""
     shown = dict(list(modes.items())[:_MAX_BARS])
     most = _RECTANGLES // len(shown)
     yield '<table style="width:100%;border-collapse:collapse;background:none;margin:.5em 0 0 0">'
@@ -107,7 +107,7 @@ def _mode_bars(
 
 
 def _fill(colour: str) -> str:
-    """Return the fill colour; black becomes the text colour of the page, which is visible on dark pages."""
+    """Return the fill colour; black becomes the text colour of the page, visible on dark pages."""
     return "currentColor" if colour == INK else colour
 
 
@@ -144,7 +144,7 @@ def _rectangles(
 def _shares(
     intervals: Sequence[Interval], names: Sequence[str], t0: float, t1: float, columns: int
 ) -> list[list[float]]:
-    """Return the fraction of each mode in columns of equal duration."""
+    """Return the fraction of time in each mode, for columns of equal duration."""
     number = {mode: i for i, mode in enumerate(names)}
     shares = [[0.0] * len(names) for _ in range(columns)]
     for interval in intervals:
@@ -165,7 +165,7 @@ def _rectangle(x: float, y: float, width: float, height: float, colour: str, tit
 
 
 def _event_table(events: Sequence[Any]) -> Iterator[str]:
-    """Yield a collapsible table of the events; of a long table only the first and the last rows."""
+    """Yield a collapsible table of the events, shortened to the first and last rows if it is long."""
     many = len(events) > _FIRST + _LAST
     yield f"<details><summary>{len(events)} event{'s' if len(events) > 1 else ''}</summary>"
     yield '<table style="border-collapse:collapse;background:none;margin:0"><tr style="background:none">'

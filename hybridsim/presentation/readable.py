@@ -1,4 +1,4 @@
-"""This module defines results that show the same text in a notebook as in `print`."""
+"""This module defines results that show the same text in notebooks as in `print`."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ class Table:
     about: Mapping[str, str]
 
     def mode_names(self, component: str) -> np.ndarray:
-        """Return the names of a component's modes (k,)."""
+        """Return the names of the modes (k,) of a component."""
         names, numbers = self.modes[component]
         return np.array(names, dtype=np.str_)[numbers]
 

@@ -1,4 +1,4 @@
-"""This folder computes independent reference solutions in closed form and multiple precision, without the engine.
+"""This package computes independent reference solutions without the engine.
 
 Start with `trajectory`, the data of an exact motion.
 """

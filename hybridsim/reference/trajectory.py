@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class EventLike(Protocol):
-    """The fields of an event that a comparison reads; `hybridsim.Event` has them."""
+    """The fields of an event that a comparison reads, as in `hybridsim.Event`."""
 
     @property
     def t(self) -> float: ...
@@ -32,7 +32,7 @@ class EventLike(Protocol):
 
 @dataclass(frozen=True)
 class ExactEvent:
-    """A change of mode of a closed form."""
+    """A change of mode of a motion in closed form."""
 
     t: float
     component: str

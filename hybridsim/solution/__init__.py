@@ -1,4 +1,4 @@
-"""This package holds the results of runs: it evaluates and explains them, resumes runs and saves results."""
+"""This package contains the results of runs: it evaluates and explains them, resumes and saves them."""
 
 from hybridsim.solution.event import Event, ModeInterval
 from hybridsim.solution.explain.explanation import Explanation

@@ -1,4 +1,4 @@
-"""This module converts the segments of a run to plain arrays for a file, and restores them."""
+"""This module converts the segments of a run to plain arrays for a file, and back."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ _SEGMENT_FORMS: dict[str, Form] = _ROW_FORMS | {
 
 
 def taken_apart(blocks: Iterable[Any]) -> Iterator[tuple[str, Arrays]]:
-    """Yield the kind and the arrays of each block; tables of closed-form segments are yielded first."""
+    """Yield the kind and the arrays of each block of segments."""
     tables: list[Any] = []
     for block in blocks:
         if isinstance(block, ClosedFormBlock):
@@ -164,7 +164,7 @@ def _check_series(title: str, system: System, arrays: Arrays, sizes: dict[str, i
 
 
 def _not_near_a_start(count: int, unknowns: int) -> Arrays:
-    """Return arrays that files of earlier versions lack, with which modal coordinates are used instead."""
+    """Return arrays that files of earlier versions do not contain."""
     return {"flows": np.zeros((count, unknowns, unknowns)), "near": np.zeros(count)}
 
 
@@ -232,7 +232,7 @@ def _check_segments(title: str, system: System, arrays: Arrays, sizes: dict[str,
 
 
 def _of_segments(segments: list[Segment]) -> Arrays:
-    """Return arrays of N segments: all knots, states and coefficients in order, and the knots per segment."""
+    """Return the step times, states and coefficients of all segments, and the steps per segment."""
     series = []
     for segment in segments:
         sizes = np.abs(segment.x).max(axis=0)

@@ -15,7 +15,7 @@ from hybridsim.solution.states import States
 
 
 class EventsAndModes(States):
-    """The events and modes of a run; see `hybridsim.solution.solution.Solution`."""
+    """The events and modes of a run, as a part of `Solution`."""
 
     @property
     def events(self) -> Sequence[Event]:
@@ -68,7 +68,7 @@ class EventsAndModes(States):
 
     @property
     def components(self) -> Sequence[Any]:
-        """Objects with the names of `modes`, in order.
+        """Objects that describe the components in `modes`, in the same order.
 
         They are the components of a model and those for jumps in its rates, or the contacts and impacts of a
         `MechanicalSystem`.
@@ -77,7 +77,7 @@ class EventsAndModes(States):
 
     @property
     def modes(self) -> dict[str, tuple[ModeInterval, ...]]:
-        """The modes of each component in order, with the time interval of each, in the unit of t."""
+        """The modes of each component in order, each with its time interval."""
         self._require_events()
         return self._trajectory.modes
 
@@ -85,5 +85,5 @@ class EventsAndModes(States):
         if self._save == "nothing":
             raise UsageError(
                 "the run was made with save='nothing', which keeps no events and no modes",
-                remedy="run it with save='events', or 'last-period'",
+                remedy="simulate it with save='events', or 'last-period'",
             )

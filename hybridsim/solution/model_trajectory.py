@@ -1,4 +1,4 @@
-"""This module reads the answers of a solution from the record of a run of a `Model`."""
+"""This module computes the results of a solution from the record of a run of a `Model`."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ if TYPE_CHECKING:
 
 
 def relative_velocity(contact: str) -> str:
-    """Return the name under which `Solution.output` gives the relative velocity of a contact."""
+    """Return the name of the relative velocity of a contact in `Solution.output`."""
     return f"v_rel({contact})"
 
 
 class ModelTrajectory:
-    """The trajectory of a run of a `Model`; see `hybridsim.solution.run_trajectory.RunTrajectory`."""
+    """The trajectory of a run of a `Model`, from which a solution reads its results."""
 
     work = None
 
@@ -48,12 +48,12 @@ class ModelTrajectory:
 
     @property
     def segments(self) -> SegmentBlockList:
-        """Return the stored segments."""
+        """Return the stored segments of the run."""
         return self.record.segments
 
     @property
     def has_states(self) -> bool:
-        """Return whether there is a segment."""
+        """Return whether any segment is stored."""
         return bool(self.segments)
 
     @property
@@ -71,7 +71,7 @@ class ModelTrajectory:
 
     @cached_property
     def frame(self) -> Frame:
-        """Return the times of all segments."""
+        """Return the start and end times of all segments."""
         return Frame.of(self.segments.origins(), self.segments.spans(), self.t_end)
 
     @cached_property
@@ -80,7 +80,7 @@ class ModelTrajectory:
 
     @property
     def own_times(self) -> np.ndarray:
-        """Return the steps (m,), with every event time twice."""
+        """Return the times of the steps (m,), with every event time twice."""
         (index, s, _), (starts, ends, origins, _) = self._knots, self.frame
         times = origins[index, 0] + (s + origins[index, 1])
         counts = np.bincount(index, minlength=len(starts))
@@ -90,16 +90,16 @@ class ModelTrajectory:
 
     @property
     def own_states(self) -> np.ndarray:
-        """Return the states (n, m) at the steps."""
+        """Return the states (n, m) at the steps of the run."""
         return self._knots[2].T
 
     @property
     def x_end(self) -> np.ndarray:
-        """Return the states (n,) at the end."""
+        """Return the states (n,) at the end of the run."""
         return self.segments[-1].x[-1].copy() if self.segments else self.run.task.x0.copy()
 
     def segment_at(self, times: np.ndarray, side: str) -> tuple[np.ndarray, np.ndarray]:
-        """Return the number of the segment that holds each time, and the local time in it."""
+        """Return the index of the segment that contains each time, and the local time in it."""
         sign = 1.0 if self.t_end >= self.t_start else -1.0
         # Right-continuous in time: at an event time take the later segment forward, the earlier one backward.
         later = (side == "+") == (sign > 0)
@@ -108,13 +108,13 @@ class ModelTrajectory:
         return index, s
 
     def states(self, times: np.ndarray, side: str) -> np.ndarray:
-        """Return states (k, n)."""
+        """Return the states (k, n) at given times."""
         return self.segments.states(*self.segment_at(times, side))
 
     def by_segment(
         self, times: np.ndarray, side: str
     ) -> tuple[np.ndarray, list[tuple[Segment, np.ndarray, np.ndarray]]]:
-        """Return states (k, n) at some times, and (segment, indices, local times) for each segment."""
+        """Return states (k, n) at given times, and for each segment the indices and local times."""
         index, s = self.segment_at(times, side)
         parts = [(i, np.flatnonzero(index == i)) for i in np.unique(index)]
         by_segment = [(self.segments[int(i)], chosen, s[chosen]) for i, chosen in parts]
@@ -136,12 +136,12 @@ class ModelTrajectory:
         return {relative_velocity(name): k for k, name in enumerate(components) if name in contacts}
 
     def own_values(self, name: str) -> np.ndarray:
-        """Return a quantity at the steps."""
+        """Return the values of a quantity at the steps of the run."""
         parts = [self.value_at(name, g, g.s, g.x) for g in self.segments]
         return np.concatenate(parts) if parts else np.zeros(0)
 
     def values(self, name: str, times: np.ndarray, side: str) -> np.ndarray:
-        """Return a quantity (k,)."""
+        """Return the values (k,) of a quantity at given times."""
         out = np.empty(len(times))
         x, by_segment = self.by_segment(times, side)
         for segment, chosen, s in by_segment:
@@ -160,7 +160,7 @@ class ModelTrajectory:
     def values_in(
         self, names: Sequence[str], segment: Segment, s: np.ndarray, x: np.ndarray
     ) -> list[np.ndarray]:
-        """Return discrete states and other quantities that are not states, at points of a segment."""
+        """Return the values of quantities other than continuous states, at points of a segment."""
         system = self.system
         discrete = [d.name for d in self.model.discrete]
         known = system.quantities
@@ -178,14 +178,14 @@ class ModelTrajectory:
         return found
 
     def table(self, times: np.ndarray | None) -> Table:
-        """Return states, quantities and modes as columns."""
+        """Return states, quantities and modes at given times as columns."""
         return tabulated(self, times)
 
     # -- events and modes -----------------------------------------------------------------------------------
 
     @property
     def components(self) -> tuple[Component, ...]:
-        """Return the components of the model, and those for jumps in its rates."""
+        """Return the components of the model, including those added for jumps in its rates."""
         return tuple(self.system.model.all_components()[: len(self.system.declared)])
 
     @property
@@ -199,21 +199,21 @@ class ModelTrajectory:
 
     @cached_property
     def events(self) -> tuple[Event, ...]:
-        """Return all events but the corners."""
+        """Return all events except changes of side at corners."""
         return tuple(event for event in self._happened if event.kind != "corner")
 
     @property
     def corners(self) -> tuple[Event, ...]:
-        """Return the instants at which a corner changed its side."""
+        """Return the instants at which corners changed their sides, as events."""
         return tuple(event for event in self._happened if event.kind == "corner")
 
     def event_times(self, component: str, kind: str | None) -> np.ndarray:
-        """Return times (m,)."""
+        """Return the times (m,) of the events of one component."""
         found = [block.times_of(component, kind) for block in self.record.occurrences.blocks]
         return found[0] if len(found) == 1 else np.concatenate([np.empty(0), *found])
 
     def event_states(self, component: str, kind: str | None, side: str) -> np.ndarray:
-        """Return states (m, n)."""
+        """Return the states (m, n) at the events of one component."""
         blocks: list[Any] = self.record.occurrences.blocks
         found = [block.states_of(component, kind, "-+".index(side)) for block in blocks]
         if len(found) == 1 and len(found[0]):
@@ -222,7 +222,7 @@ class ModelTrajectory:
 
     @cached_property
     def modes(self) -> dict[str, tuple[ModeInterval, ...]]:
-        """Return the modes of each component."""
+        """Return the modes of each component in order."""
         if self.save == "events":
             return self._modes_of_events()
         numbers, (starts, ends, *_) = self.segments.modes(), self.frame
@@ -274,11 +274,11 @@ class ModelTrajectory:
 
     @property
     def stats(self) -> dict[str, float]:
-        """Return the cost summed over all restarts."""
+        """Return the cost of the run, summed over all segments."""
         return {**vars(self.record.counters), "wall_time": self.cost[0], "compile_time": self.cost[1]}
 
     def kinds(self) -> Counter[str]:
-        """Count the events of each kind, including corners, without creating event objects."""
+        """Return how many events of each kind happened, including corners."""
         found: Counter[str] = Counter()
         for block in self.record.occurrences.blocks:
             found += block.kinds()

@@ -30,7 +30,7 @@ _REMEDY = "end the run earlier by a monitor, or change the rate so that its deno
 
 
 class _Way:
-    """The states along a run, and the signs of the denominators in its rates."""
+    """The states during a run, and the signs of the denominators in its rates."""
 
     def __init__(self, system: System, segments: list[Segment]) -> None:
         model = system.model
@@ -44,7 +44,7 @@ class _Way:
         return divisor.sign({**self._parameters, "t": t, **states})
 
     def passage(self, divisor: Denominator) -> tuple[int, float, float] | None:
-        """Return where a denominator first crosses zero at a pole: segment, local time and step length."""
+        """Return the first crossing of a pole by a denominator: segment, local time and step length."""
         stride = max(sum(len(segment.s) for segment in self.segments) // _LOOKS, 1)
         for number, segment in enumerate(self.segments):
             last = len(segment.s) - 1
@@ -58,7 +58,7 @@ class _Way:
         return None
 
     def _zero(self, divisor: Denominator, number: int, first: int, last: int) -> tuple[float, float]:
-        """Return the last time before the sign changes between two knots, and the step length at it."""
+        """Return the last time before a sign change between two steps, and the step length there."""
         segment = self.segments[number]
         sign = self.sign(divisor, number, float(segment.s[first]), segment.x[first])
         while last - first > 1:
@@ -74,7 +74,7 @@ class _Way:
         return before, step
 
     def _is_pole(self, segment: Segment, s: float, step: float) -> bool:
-        """Return whether the rates or their derivatives are discontinuous or unbounded at a local time."""
+        """Return whether the rates are discontinuous or unbounded at a local time."""
         flow, low, high = Flow(self.system, segment.p, segment.z, Counters()), *sorted(segment.s[[0, -1]])
         nearest = max(_NEAR * _PART * abs(step), _ULPS * math.ulp(s))
         near = max(_NEAR * abs(step), 10.0 * nearest)
@@ -94,7 +94,7 @@ class _Way:
 
 
 def end_at_pole(system: System, trajectory: Trajectory) -> None:
-    """End a run where a denominator passes zero, if the rates are not continuous at this point."""
+    """End a run at a zero of a denominator, if the rates are not continuous there."""
     every = denominators(system.model)
     if not every or not trajectory.segments or system.n == 0:
         return

@@ -22,7 +22,7 @@ def resumed(
     limits: Mapping[str, float] | None,
     progress: Callable[[float], None] | None,
 ) -> Solution:
-    """Return the solution of the whole run after continuing it; see `Solution.resume`."""
+    """Return the solution of the whole run after continuing it to a later time."""
     run, trajectory = solution._run, solution._of_model.record
     task, checkpoint = run.task, trajectory.checkpoint
     if solution.status not in ("finished", *_EARLY) or checkpoint is None:

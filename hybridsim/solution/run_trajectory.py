@@ -1,4 +1,4 @@
-"""This module defines what a solution reads its answers from: one implementation for each kind of run."""
+"""This module defines the interface from which a solution reads the results of a run."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hybridsim.solution.event import Event, ModeInterval
 
 
 class RunTrajectory(Protocol):
-    """The trajectory of a run; `hybridsim.solution.solution.Solution` checks the arguments of every method."""
+    """The trajectory of a run, which `Solution` evaluates after checking the arguments."""
 
     model: Any  # the Model or MechanicalSystem
     integrator: str
@@ -61,19 +61,19 @@ class RunTrajectory(Protocol):
         """Return states (k, n) at times (k,), just after ("+") or before ("-") events."""
 
     def values(self, name: str, times: np.ndarray, side: str) -> np.ndarray:
-        """Return a state or a quantity (k,) at times (k,)."""
+        """Return the values (k,) of a state or a quantity at times (k,)."""
 
     def own_values(self, name: str) -> np.ndarray:
-        """Return a state or a quantity (m,) at `own_times`."""
+        """Return the values (m,) of a state or a quantity at `own_times`."""
 
     def event_times(self, component: str, kind: str | None) -> np.ndarray:
         """Return the times (m,) of the events of a component."""
 
     def event_states(self, component: str, kind: str | None, side: str) -> np.ndarray:
-        """Return the states (m, n) at these events, in a new array."""
+        """Return the states (m, n) at the events of a component, in a new array."""
 
     def table(self, times: np.ndarray | None) -> Table:
-        """Return states, quantities and modes at these times, or at `own_times`."""
+        """Return states, quantities and modes at given times, or at `own_times`."""
 
     def summary(self) -> list[str]:
-        """Return the lines of a summary between the message and the warnings."""
+        """Return the lines of a summary that come between the message and the warnings."""

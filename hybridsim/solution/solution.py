@@ -62,7 +62,7 @@ class Solution(InTables):
 
     @property
     def _of_model(self) -> ModelTrajectory:
-        """Return the trajectory if a `Model` was simulated, and refuse otherwise."""
+        """Return the trajectory of a run of a `Model`; for other runs, raise an error."""
         if not isinstance(self._trajectory, ModelTrajectory):
             raise UsageError(
                 f"{self.model.name} is a MechanicalSystem, whose runs cannot be saved, resumed, explained or "
@@ -110,7 +110,7 @@ class Solution(InTables):
 
     @property
     def status(self) -> str:
-        """How the run ended: "finished" at t1, "terminated" by a monitor or schedule, else the reason it stopped."""
+        """How the run ended: "finished" at t1, "terminated" by a monitor or schedule, or why it stopped."""
         return self._trajectory.status
 
     @property
@@ -120,7 +120,7 @@ class Solution(InTables):
 
     @property
     def chosen_because(self) -> str:
-        """Why `auto` chose the integrator, as text; empty if the integrator was named or there was no choice."""
+        """Why `auto` chose the integrator, as text; empty if the integrator was named."""
         return self._trajectory.reason
 
     @property
@@ -135,7 +135,7 @@ class Solution(InTables):
 
     @property
     def stats(self) -> dict[str, float]:
-        """Cost summed over all restarts: counts of steps, evaluations, events and restarts; times in seconds.
+        """Cost of the run: numbers of steps, evaluations, events and restarts; times in seconds.
 
         wall_time covers the whole run. kernel_time is the part of it in the compiled mode loop, for methods
         that have one. A `MechanicalSystem` counts steps of the whole system, ``nodes_restarted``, and with ``moreau``
@@ -146,7 +146,7 @@ class Solution(InTables):
 
     @property
     def work(self) -> dict[str, float]:
-        """Energy that a `MechanicalSystem` gets over a run with ``moreau``, in units of force times position.
+        """Energy that a `MechanicalSystem` receives during a run with ``moreau``, by source.
 
         The sources are ``forcing``, ``damping``, ``friction``, ``impacts`` and the moving ``bases`` of its
         contacts. Those of damping, friction and impacts are not positive, up to rounding in a step. With
@@ -162,7 +162,7 @@ class Solution(InTables):
     # -- on disk, and on ------------------------------------------------------------------------------------
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle a solution as it is saved to a file; a model with Python functions cannot be pickled."""
+        """Pickle a solution in the form of its file; models with Python functions cannot be pickled."""
         from hybridsim.solution.files.archive import of_bytes, to_bytes
 
         if not isinstance(self._trajectory, ModelTrajectory):
@@ -228,22 +228,22 @@ class Solution(InTables):
 
     @property
     def sol(self) -> Solution:
-        """The dense output, under SciPy's name."""
+        """The dense output, under its name in SciPy."""
         return self
 
     @property
     def nfev(self) -> int:
-        """Evaluations of the right-hand side, under SciPy's name; a `MechanicalSystem` does not count them."""
+        """Number of evaluations of the right-hand side, under its name in SciPy."""
         return self._measured("nfev", self.stats.get("rhs_evaluations"), "a Model")
 
     @property
     def t_events(self) -> list[np.ndarray]:
-        """Times of each monitor in the order of declaration, under SciPy's name."""
+        """Times of each monitor in the order of declaration, under their name in SciPy."""
         return [self.event_times(name, "monitor") for name in self._monitors]
 
     @property
     def y_events(self) -> list[np.ndarray]:
-        """States (events, n) of each monitor, under SciPy's name."""
+        """States (events, n) of each monitor, under their name in SciPy."""
         found = [
             [e.x_minus for e in self.events if e.component == name and e.kind == "monitor"]
             for name in self._monitors

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class States:
-    """The states of a run over time; see `hybridsim.solution.solution.Solution`."""
+    """The states of a run over time, as a part of `Solution`."""
 
     def __init__(self, trajectory: RunTrajectory) -> None:
         self.model, self.integrator = trajectory.model, trajectory.integrator
@@ -34,7 +34,7 @@ class States:
 
     @cached_property
     def t(self) -> np.ndarray:
-        """Times (m,): the requested grid up to the end of the run, else the steps with every event time twice."""
+        """Times (m,): the requested grid, or the steps with every event time twice."""
         if self._grid is None:
             return self._trajectory.own_times
         if not self._trajectory.has_states:
@@ -73,7 +73,7 @@ class States:
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """Names of what `output` gives in addition to the states.
+        """Names of the quantities that `output` returns in addition to the states.
 
         For a model: outputs, inputs and definitions, discrete states, and relative velocities ``v_rel(f)``. For a
         `MechanicalSystem`: the forces by the names of contacts and impacts, ``v_rel(f)``, and with ``moreau`` the
@@ -113,7 +113,7 @@ class States:
         return values[0] if np.ndim(requested) == 0 else values
 
     def _outside(self, times: np.ndarray) -> np.ndarray | None:
-        """Return a mask of the times that are NaN or outside the kept part of the run; None if there are none."""
+        """Return a mask of the times that are NaN or outside the stored run, or None if there are none."""
         low, high = self.t_start, self.t_end
         if high < low:
             low, high = high, low
@@ -122,7 +122,7 @@ class States:
         return ~((times >= low) & (times <= high))
 
     def _within(self, times: np.ndarray, side: str) -> tuple[np.ndarray, str]:
-        """Return times and side after checking that the run holds the states there."""
+        """Return times and side, after checking that the run stored the states there."""
         side = side_of_event(side)
         if not self._trajectory.has_states:
             raise UsageError(
@@ -131,7 +131,7 @@ class States:
         if self._save in ("events", "nothing"):
             raise UsageError(
                 f"the run was made with save={self._save!r}, which keeps no states between the ends",
-                remedy="run it with save='all', or with save='last-period' or a number for the end of it",
+                remedy="simulate it with save='all', or store the end of it with save='last-period'",
             )
         if (outside := self._outside(times)) is not None:
             bad, (low, high) = times[outside][0], sorted((self.t_start, self.t_end))

@@ -76,7 +76,7 @@ guards.g = {{ expr = "v + 2", then = "b" }}
 """)
     sol = hs.simulate(model, (0.0, 1.0), integrator="exact", limits={"steps": 1000})
     assert sol.status == "step-failure"
-    assert "the step fell" in sol.message or "the rate of x is not a number" in sol.message
+    assert "the step size fell" in sol.message or "the rate of x is not a number" in sol.message
 
 
 def test_a_guard_over_scales_that_no_step_spans_ends_with_its_limit() -> None:

@@ -55,7 +55,7 @@ def test_a_state_that_grows() -> None:
     sol = hs.simulate(model(rate="x**2"), (3.0, 5.0), integrator="dop853")
     assert sol.status == "step-failure" and "may grow without bound" in sol.message
     assert sol.t_end == pytest.approx(4.0, abs=1e-5)
-    assert sol.message.startswith(f"after t = {sol.t_end:.9g}: the step fell to ")
+    assert sol.message.startswith(f"after t = {sol.t_end:.9g}: the step size fell to ")
 
 
 def test_a_start() -> None:

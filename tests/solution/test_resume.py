@@ -235,7 +235,7 @@ def test_files_that_are_none(tmp_path: Path) -> None:
     with pytest.raises(hs.UsageError, match="cannot be read"):
         hs.load_solution(path)
     path.write_text("no solution")
-    with pytest.raises(hs.UsageError, match="is not a saved solution: it is not an archive of arrays"):
+    with pytest.raises(hs.UsageError, match="is not a saved solution: the file is not an archive of arrays"):
         hs.load_solution(path)
     with path.open("wb") as file:
         np.savez(file, x=np.zeros(3))
@@ -244,7 +244,7 @@ def test_files_that_are_none(tmp_path: Path) -> None:
     with path.open("wb") as file:
         np.savez(file, header=np.array([{}], dtype=object))
     with pytest.raises(
-        hs.UsageError, match="is not a saved solution: its array 'header' cannot be read"
+        hs.UsageError, match="is not a saved solution: the array 'header' cannot be read"
     ) as caught:
         hs.load_solution(path)
     assert "pickle" not in str(caught.value)

@@ -1,4 +1,4 @@
-"""Check arrays that were read from a file: their types, shapes, and the indices in them.
+"""This module checks arrays that were read from a file: types, shapes and indices.
 
 Kernels do not check indices, and those in a file may be arbitrary.
 """
@@ -17,7 +17,7 @@ Form = tuple[type, tuple[int | str, ...]]  # type of an array, and its lengths; 
 def check_forms(
     title: str, arrays: Arrays, forms: Mapping[str, Form], sizes: Mapping[str, int]
 ) -> dict[str, int]:
-    """Refuse arrays with wrong types or lengths. Return the sizes, including those found in the arrays.
+    """Check the types and lengths of arrays, and return the sizes, including those found in the arrays.
 
     Raises
     ------
@@ -44,39 +44,39 @@ def check_forms(
 
 
 def check_range(what: str, array: np.ndarray, low: float, high: float) -> None:
-    """Refuse numbers outside a range; NaN is outside."""
+    """Raise an error for numbers outside a range; NaN is outside every range."""
     if array.size and not (array.min() >= low and array.max() <= high):
         raise ValueError(f"{what} is not within {low} to {high}")
 
 
 def check_finite(what: str, *arrays: np.ndarray) -> None:
-    """Refuse numbers that are not finite."""
+    """Raise an error for numbers that are not finite."""
     if not all(np.isfinite(array).all() for array in arrays):
         raise ValueError(f"{what} is not finite")
 
 
 def check_ascending(what: str, array: np.ndarray, *, strictly: bool = False) -> None:
-    """Refuse numbers that decrease, or with strictly=True do not increase."""
+    """Raise an error for numbers that decrease, or with `strictly` that do not increase."""
     steps = np.diff(array)
     if not ((steps > 0).all() if strictly else (steps >= 0).all()):
         raise ValueError(f"{what} is not in ascending order")
 
 
 def check_modes(what: str, modes: np.ndarray, counts: Sequence[int], lowest: int = 0) -> None:
-    """Refuse mode numbers (..., C) that the components do not have; `counts` (C,): number of modes per component."""
+    """Raise an error for mode numbers that the components do not have."""
     if not ((modes >= lowest) & (modes < np.asarray(counts, dtype=np.int64))).all():
         raise ValueError(f"{what} is not a mode of its component")
 
 
 def check_instant(what: str, instant: object) -> tuple[float, float]:
-    """Return a time given as two finite doubles; refuse anything else."""
+    """Return a time given as two finite doubles, or raise an error."""
     if not isinstance(instant, list | tuple) or len(instant) != 2:
         raise ValueError(f"{what} is not a time")
     return check_number(what, instant[0]), check_number(what, instant[1])
 
 
 def check_number(what: str, value: object, low: float = -math.inf, *, is_finite: bool = True) -> float:
-    """Return a number not below `low`; refuse anything else."""
+    """Return a number that is at least `low`, or raise an error."""
     if type(value) not in (int, float):
         raise ValueError(f"{what} is {value!r}")
     found = float(value)  # type: ignore[arg-type]  # it is a number
@@ -86,7 +86,7 @@ def check_number(what: str, value: object, low: float = -math.inf, *, is_finite:
 
 
 def check_count(what: str, value: object, most: float = 2**62) -> int:
-    """Return a whole number that is not negative; refuse anything else."""
+    """Return a whole number that is not negative, or raise an error."""
     if type(value) is not int or not 0 <= value <= most:
         raise ValueError(f"{what} is {value!r}")
     return value

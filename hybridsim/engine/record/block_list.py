@@ -1,4 +1,4 @@
-"""Store all segments and all events of a run in blocks, and discard old ones."""
+"""This module stores all segments and all events of a run in blocks, and discards old ones."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _LOOSE = 16  # items in a list that is discarded as a whole
 
 
 class BlockList(Sequence[Item]):
-    """All items of a run in order, in blocks.
+    """All segments or all events of a run in order, in blocks.
 
     Parameters
     ----------
@@ -37,7 +37,7 @@ class BlockList(Sequence[Item]):
         self.forgotten = 0  # number of discarded blocks
 
     def append(self, item: Item) -> None:
-        """Add one item."""
+        """Add one item, a segment or an event."""
         if self.window is None and not self._least:
             return
         limit = math.inf if self.window == math.inf else max(_LOOSE, self._least // 4)
@@ -48,19 +48,19 @@ class BlockList(Sequence[Item]):
         self._forget()
 
     def extend(self, items: Iterable[Item]) -> None:
-        """Add items."""
+        """Add several items, segments or events."""
         for item in items:
             self.append(item)
 
     def add(self, block: Block[Item]) -> None:
-        """Add a whole block."""
+        """Add a block of items."""
         if (self.window is not None or self._least) and len(block):
             self.blocks.append(block)
             if len(self.blocks) > 1:
                 self._forget()
 
     def _forget(self) -> None:
-        """Discard the blocks that are older than the window."""
+        """Discard the blocks that are older than the part of the run to store."""
         if self.window == math.inf or len(self.blocks) == 1:
             return
         now, window, spare = self.blocks[-1].until, self.window or 0.0, len(self) - self._least
@@ -72,32 +72,32 @@ class BlockList(Sequence[Item]):
             self.forgotten += 1
 
     def set_end(self, item: Item) -> None:
-        """Replace all items by a single item."""
+        """Replace all stored items by one item."""
         self.forgotten += len(self.blocks)
         last = self._loose()
         last.append(item)
         self.blocks = [last]
 
     def drop(self, count: int) -> None:
-        """Discard the first items."""
+        """Discard a number of items at the start."""
         while self.blocks and count >= len(self.blocks[0]):
             count -= len(self.blocks.pop(0))
         if count:
             self.blocks[0] = self.blocks[0].since(count)
 
     def mark(self) -> tuple[int, int]:
-        """Return a position after the last item, for `since_mark`."""
+        """Return the position after the last item, for `since_mark`."""
         blocks = self.blocks
         return self.forgotten + len(blocks), len(blocks[-1]) if blocks else 0
 
     def since_mark(self, mark: tuple[int, int]) -> int:
-        """Return the number of items added after a mark."""
+        """Return how many items were added after a mark."""
         number, length = mark[0] - self.forgotten, mark[1]
         rest = len(self.blocks[number - 1]) - length if number > 0 else 0
         return rest + sum(map(len, self.blocks[max(number, 0) :]))
 
     def without_last(self, count: int) -> list[Any]:
-        """Return the blocks without the last `count` items, as a start for further items."""
+        """Return a list without the last `count` items, to which other items can be added."""
         blocks = list(self.blocks)
         while blocks and count >= len(blocks[-1]):
             count -= len(blocks.pop())
@@ -112,7 +112,7 @@ class BlockList(Sequence[Item]):
         return blocks
 
     def starts(self) -> np.ndarray:
-        """Return the number of the first item of each block, and the total number."""
+        """Return the index of the first item of each block, followed by the number of items."""
         return np.cumsum([0, *map(len, self.blocks)])
 
     def __bool__(self) -> bool:
@@ -175,7 +175,7 @@ class SegmentBlockList(BlockList[Segment]):
             self.set_end(last.at_end())
 
     def cut(self, instant: Instant) -> None:
-        """Discard everything before an instant, also the first part of the segment at this instant."""
+        """Discard all results before an instant, including the first part of the segment at this instant."""
         origins, spans = self.origins(), self.spans()
         moved = (origins[:, 0] - instant.high) + (origins[:, 1] - instant.low) + spans[:, 0]
         sign = 1.0 if spans[-1, 1] >= spans[-1, 0] else -1.0
@@ -205,7 +205,7 @@ class SegmentBlockList(BlockList[Segment]):
         return out
 
     def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the steps of the run: numbers of segments (m,), local times (m,), states (m, n)."""
+        """Return the steps of the run: segment numbers (m,), local times (m,) and states (m, n)."""
         index, s, x = [np.empty(0, dtype=np.int64)], [np.empty(0)], [np.empty((0, self._shape[0]))]
         for block, start in zip(self.blocks, self.starts().tolist(), strict=False):
             numbers, times, states = block.knots()
@@ -216,5 +216,5 @@ class SegmentBlockList(BlockList[Segment]):
 
 
 def _joined(pairs: list[np.ndarray]) -> np.ndarray:
-    """Return the pairs of all blocks (N, 2), without a copy for a single block."""
+    """Return the pairs of numbers of all blocks as one array (N, 2)."""
     return pairs[0] if len(pairs) == 1 else np.concatenate([np.empty((0, 2)), *pairs])

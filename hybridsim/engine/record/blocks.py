@@ -1,4 +1,4 @@
-"""Store segments and events of a run in blocks: lists of single items, and arrays of many items.
+"""This module stores segments and events of a run in blocks: lists of items, or arrays of many items.
 
 A compiled loop passes hundreds of events in the time in which Python makes a few objects. It commits one block of
 segments and one of events for each of its calls, with the arrays that it wrote. Objects are made on demand.
@@ -32,11 +32,11 @@ class Block(Protocol[Item]):
         """Return the instant of the last item: the end of a segment, or the time of an event."""
 
     def since(self, first: int) -> Block[Item]:
-        """Return a block of the items from the given number on."""
+        """Return a block of the items from a given number on."""
 
 
 class SegmentBlock(Sequence[Segment]):
-    """N consecutive segments in arrays with one row for each. `hybridsim.engine.record.series_block` is an example.
+    """Consecutive segments of a run in arrays, with one row for each segment.
 
     1. ``block[i]`` is the i-th segment as a `Segment`, with held states at its knots on their constraints.
     2. Times and states are those that the run used. The states at both ends of a segment are bit for bit the x+ and x-
@@ -57,35 +57,35 @@ class SegmentBlock(Sequence[Segment]):
 
     @abstractmethod
     def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return knots (m + 1,), states at starts of steps (m or more, n), run-time vector and modes of a segment."""
+        """Return the step times, the states at steps, the run-time vector and the modes of a segment."""
 
     @abstractmethod
     def motion(self, i: int) -> tuple[np.ndarray, np.ndarray, Dense]:
-        """Return knots (m + 1,), states (m + 1, n) and dense output of a segment."""
+        """Return the step times (m + 1,), the states (m + 1, n) and the dense output of a segment."""
 
     @abstractmethod
     def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return all steps: ascending numbers of segments (m,), local times (m,), states (m, n), with ends."""
+        """Return all steps: segment numbers (m,), local times (m,) and states (m, n), including ends."""
 
     @abstractmethod
     def since(self, first: int) -> SegmentBlock:
-        """Return a block of the segments from the given number on."""
+        """Return a block of the segments from a given number on."""
 
     @property
     @abstractmethod
     def last(self) -> np.ndarray:
-        """Return the states x- (n,) at the end of the last segment."""
+        """Return the states (n,) just before the end of the last segment."""
 
     def __len__(self) -> int:
         return len(self.origins)
 
     @property
     def until(self) -> Instant:
-        """Return the end of the last segment."""
+        """Return the instant at which the last segment ends."""
         return Instant(*self.origins[-1].tolist()).plus(float(self.spans[-1, 1]))
 
     def at_end(self) -> Segment:
-        """Return the end of the last segment as a segment of zero length, in its own arrays."""
+        """Return the end of the last segment as a segment of zero length with its own arrays."""
         return end_point(self.until, self.modes[-1], self.vectors[-1], self.last)
 
     def __getitem__(self, i: Any, /) -> Any:
@@ -96,7 +96,7 @@ class SegmentBlock(Sequence[Segment]):
 
 
 class SegmentList(list[Segment]):
-    """Segments as objects; see `SegmentBlock`."""
+    """Segments of a run as a list of objects."""
 
     def __init__(self, system: System, segments: Iterable[Segment] = ()) -> None:
         super().__init__(segments)
@@ -145,23 +145,23 @@ class SegmentList(list[Segment]):
         return end_point(last.end, last.z, last.p, last.x[-1])
 
     def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return knots, states, run-time vector and modes of one segment."""
+        """Return the step times, the states, the run-time vector and the modes of one segment."""
         segment = self[i]
         return segment.s, segment.x, segment.p, segment.z
 
     def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return numbers of segments, local times, and states of all steps."""
+        """Return the segment numbers, the local times and the states of all steps."""
         index = np.repeat(np.arange(len(self)), [len(segment.s) for segment in self])
         s, x = [segment.s for segment in self], [segment.x for segment in self]
         return index, np.concatenate(s), np.concatenate(x)
 
     def since(self, first: int) -> SegmentList:
-        """Return a block of the segments from the given number on."""
+        """Return a block of the segments from a given number on."""
         return SegmentList(self._system, self[first:])
 
 
 class OccurrenceList(list[Occurrence]):
-    """Events as objects; see `hybridsim.engine.record.event_block.EventBlock`."""
+    """Events of a run as a list of objects."""
 
     @property
     def until(self) -> Instant:
@@ -174,7 +174,7 @@ class OccurrenceList(list[Occurrence]):
         return np.array([float(o.instant) for o in self])
 
     def times_of(self, component: str, kind: str | None) -> np.ndarray:
-        """Return the times of the events of a component and kind."""
+        """Return the times of the events of one component and one kind."""
         return np.array([float(o.instant) for o in self._of(component, kind)])
 
     def states_of(self, component: str, kind: str | None, side: int) -> np.ndarray:
@@ -190,12 +190,12 @@ class OccurrenceList(list[Occurrence]):
         return Counter(o.kind for o in self)
 
     def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return instants (k, 2) and states (k, 2, n) of the transitions from the given number on."""
+        """Return instants (k, 2) and states (k, 2, n) of the transitions from a given event on."""
         chosen = [o for o in self[first:] if o.kind == "transition"]
         if not chosen:
             return np.empty((0, 2)), np.empty((0, 2, 0))
         return np.array([o.instant for o in chosen]), np.array([(o.x_minus, o.x_plus) for o in chosen])
 
     def since(self, first: int) -> OccurrenceList:
-        """Return a block of the events from the given number on."""
+        """Return a block of the events from a given number on."""
         return OccurrenceList(self[first:])

@@ -1,4 +1,4 @@
-"""Convert dense output to Chebyshev series, so that any interpolant can be stored in arrays.
+"""This module converts dense output to Chebyshev series, so that any interpolant is stored as arrays.
 
 The series through the values at the Chebyshev points of a step is as accurate as its last coefficients are small. The
 degree is doubled until they are at rounding level (J. P. Boyd, Chebyshev and Fourier Spectral Methods, 2nd ed., Dover
@@ -18,7 +18,7 @@ _TAIL = 3  # last coefficients that must be negligible; one or two may be small 
 
 
 def chebyshev_dense(a: float, b: float, coefficients: np.ndarray) -> Dense:
-    """Return the states (k, n) at local times (k,) of a step from a to b; coefficients (d, n) of its series."""
+    """Return the states (k, n) at local times (k,) in a step, from its Chebyshev series."""
 
     def dense(s: np.ndarray) -> np.ndarray:
         return chebyshev.chebval((2.0 * s - (a + b)) / (b - a), coefficients).T
@@ -27,7 +27,7 @@ def chebyshev_dense(a: float, b: float, coefficients: np.ndarray) -> Dense:
 
 
 def chebyshev_series(dense: Dense, a: float, b: float, sizes: np.ndarray) -> np.ndarray:
-    """Return Chebyshev coefficients (d, n) of dense output on [a, b]; sizes (n,): least sizes of the states."""
+    """Return the Chebyshev coefficients (d, n) of dense output on [a, b]."""
     middle, half = 0.5 * (a + b), 0.5 * (b - a)
     for degree in _DEGREES:
         points = chebyshev.chebpts1(degree + 1)

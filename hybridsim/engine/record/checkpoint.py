@@ -1,4 +1,4 @@
-"""The state of a run just after an event, with all data to continue from there bit for bit."""
+"""This module defines a checkpoint: the state just after an event, from which a run can continue."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hybridsim.errors import UsageError
 
 
 class Pace(NamedTuple):
-    """The intervals between the events of one component, as the detection of accumulations stores them."""
+    """The intervals between events of one component, as the detection of accumulations stores them."""
 
     last: Instant | None  # the last event
     intervals: tuple[float, ...]  # intervals before it
@@ -39,7 +39,7 @@ class Checkpoint:
 
 
 def damaged(what: str) -> UsageError:
-    """Return the error for a run that cannot continue from a damaged file."""
+    """Return the error for a run that cannot continue because its file is damaged."""
     return UsageError(
         f"the run cannot be resumed: its file is damaged in {what}",
         remedy="start a new run from sol.y[:, -1]",

@@ -1,4 +1,4 @@
-"""Counters of the work of a run."""
+"""This module counts the work of a run, such as steps and evaluations."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass
 class Counters:
-    """The work of a run, summed over all restarts."""
+    """Counts of the work of a run, summed over all segments."""
 
     steps: int = 0
     rejected: int = 0

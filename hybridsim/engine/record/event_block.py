@@ -1,4 +1,4 @@
-"""The events of a compiled loop or of fixed steps, in arrays."""
+"""This module stores the events of a compiled loop or of fixed steps in arrays."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hybridsim.engine.system.system import System
 def _taking_part(
     fired: Any, before: Any, after: Any, owner: Any, has_surface: Any, participants: Any
 ) -> tuple[int, bool]:
-    """Count the components that change mode or are reset; return also whether each event has exactly one.
+    """Return how many components change mode or are reset, and whether each event has exactly one.
 
     participants (2, m): receives event and component of each, up to its length.
     """
@@ -37,7 +37,7 @@ def _taking_part(
 
 @kernel
 def _times_at(instants: Any, participants: Any, first: int, component: int, times: Any) -> int:
-    """Write the times of a component's events from a given event on, and return their count."""
+    """Write the times of a component's events from a given event on, and return how many there are."""
     count = 0
     for i in range(first, participants.shape[1]):
         if participants[1, i] == component:
@@ -49,7 +49,7 @@ def _times_at(instants: Any, participants: Any, first: int, component: int, time
 
 @kernel
 def _states_at(states: Any, participants: Any, first: int, component: int, side: int, out: Any) -> int:
-    """Write the states on one side of a component's events, and return the number of events."""
+    """Write the states on one side of a component's events, and return how many events there are."""
     count = 0
     for i in range(first, participants.shape[1]):
         if participants[1, i] == component:
@@ -63,7 +63,7 @@ _take_part, _times_of_one = Precompiled(_taking_part), Precompiled(_times_at)
 
 
 class EventBlock(Sequence[Occurrence]):
-    """E events in arrays. Each one is an event of every component that changes its mode or is reset.
+    """Events in arrays, each with one entry for every component that changes its mode or is reset.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ class EventBlock(Sequence[Occurrence]):
 
     @property
     def _participants(self) -> np.ndarray:
-        """Return the event number and the component of each recorded participant, as two rows."""
+        """Return the event and the component of each recorded change, as two rows of numbers."""
         return self._all_participants[:, self._first :]
 
     @property
@@ -113,7 +113,7 @@ class EventBlock(Sequence[Occurrence]):
         return times[self._first :] if self._is_plain else times[self._participants[0]]
 
     def times_of(self, component: str, kind: str | None) -> np.ndarray:
-        """Return the times of the events of a component; all are transitions or changes of a corner."""
+        """Return the times of a component's events, which are all transitions or changes at a corner."""
         for c, automaton in enumerate(self._system.automata):
             if automaton.name == component and kind in (None, automaton.kind):
                 times = np.empty(len(self))
@@ -139,7 +139,7 @@ class EventBlock(Sequence[Occurrence]):
         return +found
 
     def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return instants (k, 2) and states (k, 2, n) of the transitions from the given number on."""
+        """Return instants (k, 2) and states (k, 2, n) of the transitions from a given event on."""
         has_corners = len(self._system.declared) < len(self._system.automata)
         if self._is_plain and not has_corners:
             return self._instants[self._first + first :], self._states[self._first + first :]
@@ -149,7 +149,7 @@ class EventBlock(Sequence[Occurrence]):
         return self._instants[events], self._states[events]
 
     def since(self, first: int) -> EventBlock:
-        """Return a block of the events from the given number on."""
+        """Return a block of the events from a given number on."""
         later = copy(self)
         later._first += first
         return later

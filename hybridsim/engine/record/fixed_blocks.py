@@ -1,4 +1,4 @@
-"""Blocks of fixed steps: the rows that a kernel wrote, converted to segments and events on demand."""
+"""This module stores blocks of fixed steps, which are converted to segments and events on demand."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hybridsim.engine.system.system import System
 
 
 class StepSegments(SegmentBlock):
-    """The segments of one series of fixed steps, one for each sequence of rows in the same modes.
+    """The segments of a series of fixed steps, one segment for consecutive steps in the same modes.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ class StepSegments(SegmentBlock):
         self.modes = z[self._first]
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Return all arrays of the block by name; see `of_arrays`."""
+        """Return all arrays of the block by name, for `of_arrays`."""
         used = slice(int(self._first[0]), int(self._last[-1]) + 1)
         rows = {"s": self._s[used], "x": self._x[used], "z": self._z[used]}
         return rows | {
@@ -60,7 +60,7 @@ class StepSegments(SegmentBlock):
 
     @classmethod
     def of_arrays(cls, system: System, arrays: dict[str, np.ndarray]) -> StepSegments:
-        """Return a block with the given arrays."""
+        """Return a block made of the given arrays."""
         origin = Instant(*arrays["origin"].tolist())
         return cls(system, origin, *(arrays[name] for name in ("p", "s", "x", "z", "cuts")))
 
@@ -75,7 +75,7 @@ class StepSegments(SegmentBlock):
         return SegmentList(self._system, (self[i] for i in distinct.tolist())).states(place, s)
 
     def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return numbers of segments, local times and states of all steps; a row between two segments occurs twice."""
+        """Return segment numbers, local times and states of all steps; ends of segments occur twice."""
         counts = self._last - self._first + 1
         starts = np.cumsum(counts) - counts
         index = np.repeat(np.arange(len(self)), counts)
@@ -88,19 +88,19 @@ class StepSegments(SegmentBlock):
         return self._x[int(self._last[-1])]
 
     def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return knots, states, run-time vector and modes of one segment."""
+        """Return the step times, the states, the run-time vector and the modes of one segment."""
         rows = slice(int(self._first[i]), int(self._last[i]) + 1)
         return self._s[rows], self._x[rows], self.vectors[i], self.modes[i]
 
     def since(self, first: int) -> StepSegments:
-        """Return a block of the segments from the given number on."""
+        """Return a block of the segments from a given number on."""
         later = copy(self)
         for name in ("_first", "_last", "origins", "vectors", "modes"):
             setattr(later, name, getattr(self, name)[first:])
         return later
 
     def motion(self, i: int) -> tuple[np.ndarray, np.ndarray, Dense]:
-        """Return knots, states and dense output of a segment, without the rows of the others."""
+        """Return the step times, the states and the dense output of a segment."""
         s, x, p, z = self.steps_of(i)
         s, x = s.copy(), x.copy()
         return s, x, StepDense(self._system, p, z, s, x)
@@ -108,7 +108,7 @@ class StepSegments(SegmentBlock):
 
 @kernel
 def _write_instants(high: float, low: float, s: Any, instants: Any) -> None:
-    """Write the instants (E, 2) at local times (E,), as `Instant.plus` gives them."""
+    """Write the instants (E, 2) of local times (E,), with the rounding of `Instant.plus`."""
     for i in range(s.shape[0]):
         total, error = two_sum(high, s[i])
         instants[i, 0], instants[i, 1] = two_sum(total, error + low)
@@ -117,7 +117,7 @@ def _write_instants(high: float, low: float, s: Any, instants: Any) -> None:
 def step_events(
     system: System, origin: Instant, s: np.ndarray, before: np.ndarray, after: np.ndarray, x: np.ndarray
 ) -> EventBlock:
-    """Return changes of modes (E, C) between fixed steps at local times (E,), at which the states (E, n) go on."""
+    """Return the changes of modes between fixed steps, at which the states are continuous, as events."""
     instants = np.empty((len(s), 2))
     _write_instants(*origin, s, instants)
     no_guard = np.full(len(s), -1, dtype=np.int64)

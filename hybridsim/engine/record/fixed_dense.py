@@ -1,4 +1,4 @@
-"""Dense output of fixed steps: cubic Hermite polynomials with slopes evaluated on demand."""
+"""This module defines the dense output of fixed steps: cubic Hermite polynomials."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hybridsim.engine.system.system import System
 
 @dataclass(frozen=True)
 class StepDense:
-    """Rows of steps in one mode: local times s (m+1,), states x (m+1, n)."""
+    """Steps in one mode, with local times (m + 1,), states (m + 1, n) and cubic dense output."""
 
     system: System
     p: np.ndarray

@@ -1,4 +1,4 @@
-"""Two-point Hermite interpolation: dense output of any order from the derivatives at both ends of a step."""
+"""This module interpolates a step of any order from the derivatives at both of its ends."""
 
 from __future__ import annotations
 
@@ -17,20 +17,20 @@ _DEFECT = 100.0  # largest defect between the ends of a step, integrated over it
 
 @cache
 def right_system(count: int) -> np.ndarray:
-    """Return the inverse of the map from coefficients of theta**count * q to derivatives (over k!) at theta = 1."""
+    """Return the matrix that maps derivatives at theta = 1 to the coefficients of a Hermite correction."""
     rows = [[comb(count + j, k) for j in range(count)] for k in range(count)]
     return np.linalg.inv(np.array(rows, dtype=float))
 
 
 @cache
 def shift_matrix(count: int) -> np.ndarray:
-    """Return the Taylor shift by one: from coefficients at theta = 0 to those at theta = 1."""
+    """Return the matrix that maps Taylor coefficients at theta = 0 to Taylor coefficients at theta = 1."""
     return np.array([[comb(j, k) for k in range(count)] for j in range(count)], dtype=float)
 
 
 @cache
 def bernstein_weights(count: int) -> np.ndarray:
-    """Return the matrix from Taylor coefficients at an end to `count` Bernstein coefficients at this end.
+    """Return the matrix that maps Taylor coefficients at an end to Bernstein coefficients at this end.
 
     At the right end the signs of odd coefficients change, because theta runs backward from there.
     """
@@ -39,7 +39,7 @@ def bernstein_weights(count: int) -> np.ndarray:
 
 
 class Hermite(NamedTuple):
-    """The matrices for one K: `shift_matrix`, `right_system`, `bernstein_weights`, `middle_weights`."""
+    """The matrices of Hermite interpolation with K derivatives at each end."""
 
     shift: np.ndarray
     inverse: np.ndarray
@@ -49,7 +49,7 @@ class Hermite(NamedTuple):
 
 @kernel
 def fit(left: Any, right: Any, h: float, shift: Any, inverse: Any, lack: Any, out: Any) -> None:
-    """Write coefficients (n, 2 K) of the polynomial in theta: the left series, plus theta**K times a correction.
+    """Write the coefficients (n, 2 K) of the Hermite polynomial in theta.
 
     shift, inverse: `shift_matrix` and `right_system` of K. lack (K,): scratch.
     """
@@ -72,7 +72,7 @@ def fit(left: Any, right: Any, h: float, shift: Any, inverse: Any, lack: Any, ou
 
 @kernel
 def fit_in_time(left: Any, right: Any, h: float, shift: Any, inverse: Any, lack: Any, out: Any) -> bool:
-    """Write the polynomial in powers of the time since the left end; return whether it is finite."""
+    """Write the Hermite polynomial in powers of the time since the step's start; return if it is finite."""
     fit(left, right, h, shift, inverse, lack, out)
     power, total = 1.0, 0.0
     for k in range(out.shape[1]):
@@ -85,7 +85,7 @@ def fit_in_time(left: Any, right: Any, h: float, shift: Any, inverse: Any, lack:
 
 @cache
 def middle_weights(count: int) -> np.ndarray:
-    """Return weights of the terms of the left series in the value and slope of the polynomial at theta = 1/2.
+    """Return weights of the left derivatives in the value and the slope of the polynomial at theta = 1/2.
 
     The terms of the right series, with theta backward from there, have the same weights, with opposite signs in the
     slope.
@@ -113,7 +113,7 @@ def holds_between(
     x: Any,
     dx: Any,
 ) -> bool:
-    """Return whether the polynomial satisfies the flow within the tolerances in the middle of a step.
+    """Return whether the polynomial satisfies the differential equation in the middle of a step.
 
     The ends do not show this. If a step ends before a sharp bend of the flow, such as friction smoothed over a small
     velocity, its last derivatives are those of the bend. The polynomial is then wrong between correct ends. tolerances:
@@ -141,7 +141,7 @@ def holds_between(
 
 @allocating_kernel
 def fit_all(steps: Any, ends: Any, shift: Any, inverse: Any, out: Any) -> None:
-    """Apply `fit_in_time` to many steps: steps (m, 2) with lengths last, ends (m, n, 2 K) left and right series."""
+    """Apply `fit_in_time` to many steps, given their lengths and the derivatives at both ends."""
     count = shift.shape[0]
     lack = np.empty(count)
     for i in range(ends.shape[0]):
@@ -152,7 +152,7 @@ def fit_all(steps: Any, ends: Any, shift: Any, inverse: Any, out: Any) -> None:
 def _evaluate(
     c: np.ndarray, s0: float, s1: float, left: np.ndarray, right: np.ndarray, s: np.ndarray
 ) -> np.ndarray:
-    """Return values (k, n) at local times s (k,), with the ends bit for bit."""
+    """Return the states (k, n) at local times (k,), which are exact at both ends."""
     n, size = c.shape
     out = np.empty((s.shape[0], n))
     for m in range(s.shape[0]):
@@ -170,7 +170,7 @@ def _evaluate(
 
 
 def hermite(s0: float, s1: float, left: np.ndarray, right: np.ndarray) -> Dense:
-    """Return the polynomial of degree 2 K - 1 with K Taylor coefficients `left` at s0 and `right` at s1.
+    """Return the polynomial of degree 2 K - 1 with given Taylor coefficients at both ends of a step.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""A block of segments whose steps have Taylor series of the flow at both ends."""
+"""This module stores segments whose steps have Taylor series at both ends."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ TERMS = 4  # coefficients of the flow at each end of a step: the dense output ha
 
 
 class HermiteBlock(SeriesBlock):
-    """Segments whose steps have the Taylor series of the flow at both ends: series (steps, n, 2 K), left then right."""
+    """Segments whose steps have Taylor series at both ends, stored as (steps, n, 2 K)."""
 
     @cached_property
     def polynomials(self) -> np.ndarray:
-        """Return the two-point Hermite polynomials, computed on demand."""
+        """Return the Hermite polynomials of all steps, computed on demand."""
         out = np.empty_like(self.series)
         fit_all(self.steps, self.series, shift_matrix(TERMS), right_system(TERMS), out)
         return out

@@ -1,4 +1,4 @@
-"""Limits on the cost of a run; a run that exceeds one stops and keeps its results."""
+"""This module limits the cost of a run; a run that exceeds a limit stops and keeps its results."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ _OFTEN = 64  # checks of the clock and the counters per check of the memory, whi
 
 
 class LimitReached(Exception):
-    """A limit of the run is exceeded; the message names it."""
+    """Raised when a limit of the run is exceeded; the message names the limit."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """The limits of one call."""
+    """The limits on the cost of one run, such as steps and seconds."""
 
     events: float = inf
     steps: float = inf
@@ -32,7 +32,7 @@ UNLIMITED = Limits()
 
 
 class LimitMonitor:
-    """Checks one run against its limits."""
+    """Compares the cost of one run with its limits."""
 
     def __init__(self, limits: Limits, counters: Counters) -> None:
         self.limits, self.counters = limits, counters
@@ -42,7 +42,7 @@ class LimitMonitor:
         self._looks = 0
 
     def check(self) -> None:
-        """Raise LimitReached if a limit is exceeded."""
+        """Raise LimitReached if the run has exceeded a limit."""
         limits, counters = self.limits, self.counters
         if counters.events - self._events >= limits.events:
             raise LimitReached(
@@ -64,7 +64,7 @@ class LimitMonitor:
 
 
 def resident_megabytes() -> float:
-    """Return the memory of this process: the present one on Linux, else the peak."""
+    """Return the memory of this process in megabytes: the current use on Linux, elsewhere the peak."""
     try:
         with open("/proc/self/statm") as file:
             pages = int(file.read().split()[1])

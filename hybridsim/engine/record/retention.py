@@ -1,4 +1,4 @@
-"""The part of a run that is stored after the run has ended."""
+"""This module defines which part of a run is stored after the run has ended."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 class Retention(NamedTuple):
-    """How long before its end a run stores segments and events, in the unit of t; None: nothing."""
+    """The length of time before the end of a run for which segments and events are stored."""
 
     segments: float | None = math.inf
     events: float | None = math.inf

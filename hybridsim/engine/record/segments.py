@@ -1,4 +1,4 @@
-"""The parts of a trajectory: segments with dense output, and events."""
+"""This module defines the parts of a trajectory: segments with dense output, and events."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Dense = Callable[[np.ndarray], np.ndarray]  # local times (k,) -> states (k, n)
 
 @dataclass(frozen=True)
 class Segment:
-    """One segment of a trajectory in constant modes."""
+    """One segment of a trajectory, in which the modes are constant."""
 
     origin: Instant  # instant at local time zero
     z: np.ndarray  # modes (C,)
@@ -37,7 +37,7 @@ class Segment:
 
 @dataclass(frozen=True)
 class PiecewiseDense:
-    """Dense output with one interpolant for each step: knots (m + 1,) and m functions of the local time."""
+    """Dense output with one interpolant (a function of local time) for each step."""
 
     knots: np.ndarray
     interpolants: Sequence[Dense]
@@ -59,7 +59,7 @@ class PiecewiseDense:
 
 
 class Occurrence(NamedTuple):
-    """An event as the engine records it; the solution resolves its names."""
+    """An event as the engine records it, with numbers that the solution converts to names."""
 
     instant: Instant
     kind: str  # transition, monitor, scheduled, near-grazing
@@ -73,7 +73,7 @@ class Occurrence(NamedTuple):
 
 
 def end_point(origin: Instant, z: np.ndarray, p: np.ndarray, x: np.ndarray) -> Segment:
-    """Return a segment of zero length: the state after an event at which a run ends."""
+    """Return a segment of zero length for the state after an event at which a run ends."""
     states = x[None].copy()
     return Segment(
         origin, z.copy(), p.copy(), np.zeros(1), states, lambda s: np.repeat(states, len(s), axis=0)

@@ -1,4 +1,4 @@
-"""Segments with Taylor series as dense output, in the arrays that the compiled mode loop wrote."""
+"""This module stores segments with Taylor series as dense output, as the compiled loop wrote them."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hybridsim.engine.system.system import System
 
 
 def _series_dense(coefficients: np.ndarray, start: float) -> Dense:
-    """Return the states (k, n) at local times (k,) of a step; coefficients (n, order + 1) of its series."""
+    """Return the states (k, n) at local times (k,) in a step, from its Taylor series."""
 
     def dense(s: np.ndarray) -> np.ndarray:
         out = np.empty((len(s), len(coefficients)))
@@ -29,7 +29,7 @@ def _series_dense(coefficients: np.ndarray, start: float) -> Dense:
 
 @inlined
 def _step_at(steps: Any, first: int, last: int, s: float) -> int:
-    """Return the step of a segment, between the first and the last, that contains a local time."""
+    """Return the step of a segment that contains a local time."""
     while first < last:
         middle = (first + last + 1) // 2
         if steps[middle, 0] <= s:
@@ -43,7 +43,7 @@ def _step_at(steps: Any, first: int, last: int, s: float) -> int:
 def series_states(
     project: Any, pinned: bool, index: Any, s: Any, ends: Any, steps: Any, series: Any, record: Any, out: Any
 ) -> None:
-    """Write the states at local times s of the segments of these numbers; see `SeriesBlock`.
+    """Write the states at local times in the segments with the given numbers.
 
     Up to eight consecutive times in one step are evaluated together.
     """
@@ -92,7 +92,7 @@ def series_states(
 
 @kernel
 def _spans_of(ends: Any, steps: Any, spans: Any) -> None:
-    """Write first and last local times of segments."""
+    """Write the first and the last local time of each segment."""
     for i in range(spans.shape[0]):
         last = ends[i + 1] - 1
         spans[i, 0], spans[i, 1] = steps[ends[i], 0], steps[last, 0] + steps[last, 1]
@@ -100,7 +100,7 @@ def _spans_of(ends: Any, steps: Any, spans: Any) -> None:
 
 @dataclass(frozen=True)
 class SeriesBlock(SegmentBlock):
-    """N segments of several steps each; see `hybridsim.engine.record.blocks.SegmentBlock`.
+    """Consecutive segments of several steps each, with Taylor series as dense output.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class SeriesBlock(SegmentBlock):
 
     @property
     def polynomials(self) -> np.ndarray:
-        """Return coefficients (steps, n, degree + 1) of the dense output in the time since each step's start."""
+        """Return the coefficients (steps, n, degree + 1) of the dense output of each step."""
         return self.series
 
     @cached_property
@@ -133,7 +133,7 @@ class SeriesBlock(SegmentBlock):
 
     @property
     def last(self) -> np.ndarray:
-        """Return the states x- at the end of the last segment."""
+        """Return the states just before the end of the last segment."""
         return self.jumps[-1, 0]
 
     def states(self, index: np.ndarray, s: np.ndarray) -> np.ndarray:
@@ -145,7 +145,7 @@ class SeriesBlock(SegmentBlock):
         return out
 
     def knots(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return numbers of segments, local times and states at starts of steps and at ends of segments."""
+        """Return segment numbers, local times and states at the starts of steps and the ends of segments."""
         count = len(self)
         index = np.repeat(np.arange(count), np.diff(self.ends) + 1)
         s = np.empty(len(index))
@@ -156,23 +156,23 @@ class SeriesBlock(SegmentBlock):
         return index, s, self.states(index, s)
 
     def since(self, first: int) -> SeriesBlock:
-        """Return a block of the segments from the given number on."""
+        """Return a block of the segments from a given number on."""
         return self._part(first, len(self))
 
     def _part(self, first: int, last: int) -> SeriesBlock:
-        """Return a block of some of the segments."""
+        """Return a block of the segments in a range of numbers."""
         ends, rows = self.ends[first : last + 1], slice(self.ends[first], self.ends[last])
         part = (r[first:last] for r in (self.origins, self.modes, self.vectors, self.jumps))
         return type(self)(self.system, ends - ends[0], self.steps[rows], self.series[rows], *part)
 
     def motion(self, i: int) -> tuple[np.ndarray, np.ndarray, Dense]:
-        """Return knots, states and dense output of a segment."""
+        """Return the step times, the states and the dense output of a segment."""
         one, (s, *_) = self._part(i, i + 1) if len(self) > 1 else self, self.steps_of(i)
         interpolants = [_series_dense(*step) for step in zip(one.polynomials, s.tolist(), strict=False)]
         return s, one.states(np.zeros(len(s), dtype=np.int64), s), PiecewiseDense(s, interpolants)
 
     def steps_of(self, i: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return knots (m + 1,), states at starts of steps (m, n), run-time vector and modes of a segment."""
+        """Return step times (m + 1,), states at step starts (m, n), run-time vector and modes."""
         steps, first, last = self.steps, self.ends[i], self.ends[i + 1]
         s = np.append(steps[first:last, 0], steps[last - 1, 0] + steps[last - 1, 1])
         return s, self.series[first:last, :, 0], self.vectors[i], self.modes[i]

@@ -1,4 +1,4 @@
-"""Find the segment and the local time of each of many times."""
+"""This module finds the segment and the local time of each of many times."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hybridsim.engine.native.kernels import inlined, kernel
 
 
 class Frame(NamedTuple):
-    """The times of the segments of a run, in order.
+    """The start and end times of all segments of a run, in order.
 
     starts, ends (N,): times at which each segment starts and ends; an end equals the next start bit for bit. origins,
     spans (N, 2): the instants from which local times are counted, and the first and last local times.
@@ -24,7 +24,7 @@ class Frame(NamedTuple):
 
     @classmethod
     def of(cls, origins: np.ndarray, spans: np.ndarray, t_end: float) -> Frame:
-        """Return the times of segments, the last of which ends at t_end."""
+        """Return the frame of some segments, the last of which ends at `t_end`."""
         starts, ends = np.empty(len(spans)), np.empty(len(spans))
         _lay_out(origins, spans, t_end, starts, ends)
         return cls(starts, ends, origins, spans)
@@ -32,7 +32,7 @@ class Frame(NamedTuple):
 
 @kernel
 def _lay_out(origins: Any, spans: Any, t_end: float, starts: Any, ends: Any) -> None:
-    """Write the starts and ends of segments, each rounded once."""
+    """Write the start and end times of segments, each rounded once."""
     last = starts.shape[0] - 1
     for i in range(last + 1):
         high, low, s = origins[i, 0], origins[i, 1], spans[i, 0]
@@ -75,7 +75,7 @@ def locate_times(
     index: Any,
     s: Any,
 ) -> None:
-    """Write to index and s (m,) the numbers of segments and the local times of times (m,).
+    """Write the segment number and the local time (m,) of each of many times.
 
     starts, ends, origins, spans: see `Frame`. sign: -1 backward in time. is_later: whether a time at which one segment
     ends and the next one starts belongs to the next one. A time equal to the rounded time of an event means the event.

@@ -1,4 +1,4 @@
-"""The record of a run: segments with dense output, events, and how it ended."""
+"""This module stores the record of a run: segments with dense output, events, and how it ended."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ __all__ = ["LOOKED_BACK_ON", "Occurrence", "PiecewiseDense", "Segment", "Task", 
 
 
 class Trajectory:
-    """The record of a run.
+    """The record of a run: its segments, its events, and how it ended.
 
     segments and occurrences are sequences of `Segment` and `Occurrence`. Objects can be appended, and blocks
     (`hybridsim.engine.record.blocks`) of a compiled loop added. Items that are not to be kept are discarded during the
@@ -55,7 +55,7 @@ class Trajectory:
         self._mark: tuple[Made, tuple[int, int], tuple[int, int], dict[str, int]] | None = None
 
     def stop_early(self, status: str, why: str, start: float) -> None:
-        """Set status and message of a run that stopped before its end; `start`: time at which it began."""
+        """Store the status and message of a run that stopped before its end."""
         head = f"{why}; stopped" if why else "interrupted"
         reached = float(self.segments[-1].end) if self.segments else start
         self.status = status
@@ -66,7 +66,7 @@ class Trajectory:
     def finish(
         self, instant: Instant, t0: float, z: np.ndarray, p: np.ndarray, x: np.ndarray, discrete: slice
     ) -> None:
-        """Store the state after an event at the end of the run, because no segment begins there.
+        """Store the state after an event at the end of the run, where no segment begins.
 
         A segment to this instant ends there up to the rounding of its length, which is less than the time since t0.
         """
@@ -79,7 +79,7 @@ class Trajectory:
         self.segments.append(end_point(instant, z, p, x))
 
     def close(self, retention: Retention) -> None:
-        """Discard results that are not to be stored, at exact times."""
+        """Discard results outside the part of the run to store."""
         if retention == ALL or not self.segments:
             return
         if retention.segments is None:
@@ -105,11 +105,11 @@ class Trajectory:
             self.occurrences.drop(first)
 
     def mark(self, checkpoint: Made) -> None:
-        """Store a function that makes a checkpoint here; the last stored function is called after the run."""
+        """Store a function that creates a checkpoint here; only the last stored function is called."""
         self._mark = (checkpoint, self.segments.mark(), self.occurrences.mark(), dict(self.warnings))
 
     def seal(self) -> None:
-        """Make the last mark the checkpoint, because the run records nothing more."""
+        """Create the checkpoint of the last mark, because the run records nothing more."""
         if self._mark is not None:
             checkpoint, segments, occurrences, self.warnings_there = self._mark
             since = self.segments.since_mark(segments), self.occurrences.since_mark(occurrences)
@@ -117,7 +117,7 @@ class Trajectory:
 
     @property
     def checkpoint(self) -> Checkpoint | None:
-        """Return the last checkpoint from which the run can continue, made on demand."""
+        """Return the last checkpoint from which the run can continue, created on demand."""
         if callable(self._checkpoint):
             self._checkpoint = self._checkpoint()
         return self._checkpoint
@@ -127,11 +127,11 @@ class Trajectory:
         self._checkpoint = checkpoint
 
     def forget_checkpoint(self) -> None:
-        """Remove the checkpoint."""
+        """Delete the checkpoint of this run."""
         self._checkpoint = self._mark = None
 
     def up_to_checkpoint(self, system: System) -> Trajectory:
-        """Return a copy that ends at the checkpoint, to continue from there."""
+        """Return a copy of the record that ends at the checkpoint, from which the run can continue."""
         assert self.checkpoint is not None
         earlier = Trajectory(system)
         for items, others, count in (
@@ -153,13 +153,13 @@ class Trajectory:
 
 
 def _before(end: Instant, length: float, forward: bool) -> Instant:
-    """Return the instant at a distance before the end, rounded to a double."""
+    """Return the instant at a given time before the end of the run."""
     return Instant(float(end.plus(-length if forward else length)))
 
 
 @dataclass(frozen=True)
 class Task:
-    """The definition of a run: span, initial state and modes, accuracy, and stored results."""
+    """The definition of a run: time span, initial state and modes, tolerances, and results to store."""
 
     t0: float
     t1: float
@@ -185,5 +185,5 @@ class Task:
 
     @cached_property
     def beginning(self) -> tuple[Any, ...]:
-        """Return a key for the start, equal for runs of one system that start alike."""
+        """Return a key of the start, which is equal for runs of one system with the same start."""
         return self.t0, self.forward, self.x0.tobytes(), self.z0.tobytes(), self.discrete.tobytes()

@@ -1,4 +1,4 @@
-"""Taylor polynomials of a guard with a bound of the remainder, which give certain positive intervals and zeros.
+"""This module bounds Taylor polynomials of a guard, to prove where the guard is positive.
 
 Coefficients and bounds are those of `hybridsim.engine.linear.motion.guard_terms`.
 """
@@ -36,7 +36,7 @@ _BERNSTEIN = np.array(
 
 @polynomial_kernel
 def value_and_slope(backward: Any, count: int, d: float, start: float) -> tuple[float, float]:
-    """Evaluate a polynomial, `start` plus coefficients from the highest down, and its derivative."""
+    """Evaluate a polynomial and its derivative, from the highest coefficient down."""
     square = d * d
     even, odd = (start, 0.0) if count % 2 == 0 else (0.0, start)
     even_rate = odd_rate = 0.0
@@ -52,7 +52,7 @@ def value_and_slope(backward: Any, count: int, d: float, start: float) -> tuple[
 
 @inlined
 def safe_step(terms: Any, first: int, rest: float, longest: float, error: float, lower: Any) -> float:
-    """Return a step over which sum terms[first + i] d**i - rest d**m stays positive; terms[first] is positive.
+    """Return a step over which a polynomial with a bounded remainder certainly stays positive.
 
     m is the number of terms. Positive terms after the first negative one are omitted. The bound then has one
     zero (Descartes' rule) and is positive before it. lower: scratch space for the terms. error: error of a
@@ -83,7 +83,7 @@ def safe_step(terms: Any, first: int, rest: float, longest: float, error: float,
 
 @inlined
 def _to_the_terms(d: float) -> float:
-    """Return d**BOUND_TERMS by repeated squaring."""
+    """Return `d` to the power BOUND_TERMS by repeated squaring."""
     for _ in range(_SQUARES):
         d *= d
     return d
@@ -91,7 +91,7 @@ def _to_the_terms(d: float) -> float:
 
 @inlined
 def zero_of_terms(terms: Any, rest: float, size: float, backward: Any) -> float:
-    """Return the next zero of a falling guard from its Taylor polynomial; NaN if it is not accurate to rounding."""
+    """Return the next zero of a falling guard from its Taylor polynomial, or NaN if it is inaccurate."""
     if not terms[1] < 0.0:
         return math.nan
     d = -terms[0] / terms[1]
@@ -125,7 +125,7 @@ def _term(terms: Any, i: int, power: float) -> float:
 
 @inlined
 def stays_positive(terms: Any, first: int, rest: float, d: float, error: float) -> bool:
-    """Return whether sum terms[first + i] x**i - rest x**m is certainly positive on (0, d], with m the number of terms.
+    """Return whether a polynomial with a bounded remainder is certainly positive on (0, d].
 
     The test uses the coefficients in Bernstein form, which are two vectors. error: error of the guard itself,
     which is this sum times x**first; its value at the end of the interval is used.
@@ -156,7 +156,7 @@ def stays_positive(terms: Any, first: int, rest: float, d: float, error: float) 
 
 @inlined
 def past_dip(terms: Any, first: int, longest: float, error: float, backward: Any) -> float:
-    """Return a point past the minimum of a guard that falls and rises; 0 if there is no clear minimum."""
+    """Return a point after the minimum of a guard that falls and rises, or 0 if there is none."""
     a, b, c = terms[first], terms[first + 1], terms[first + 2]
     if not (b < 0.0 < c and b * b < _DIPS * a * c):
         return 0.0

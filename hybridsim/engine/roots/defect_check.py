@@ -1,4 +1,4 @@
-"""The end of a Taylor step of length d: the state there, its rates, and whether the series are still accurate.
+"""This module evaluates the end of a Taylor step, and checks the accuracy of the series there.
 
 The results are in one array: the powers d**k, k = 0..order; for n states their values, their rates, the
 slopes of their series times d, and sum_k |c_k| d**k, k > 0; for the guards their values and those
@@ -25,14 +25,14 @@ def ahead_size(order: int, n: int, guards: int) -> int:
 
 @inlined
 def parts_of(ahead: Any, order: int, n: int, count: int) -> tuple[Any, Any, Any, Any]:
-    """Return the parts of `look_ahead`'s array: states, rates, function values, and sums of their series."""
+    """Return the parts of the array of `look_ahead`: states, rates, function values and sums of series."""
     x, f = order + 1, order + 1 + 4 * n
     return ahead[x : x + n], ahead[x + n : x + 2 * n], ahead[f : f + count], ahead[f + count : f + 2 * count]
 
 
 @inlined
 def sum_at(U: Any, r: int, order: int, powers: Any) -> float:
-    """Evaluate the series in a row of U from the powers of a distance.
+    """Evaluate the Taylor series in one row of `U` from the powers of a distance.
 
     The order of summation is that of `sum_sizes` in `hybridsim.engine.series.interpreter`.
     """
@@ -58,7 +58,7 @@ def values_at(
     values: Any,
     rates: Any,
 ) -> None:
-    """Compute rates of the states and values of the guards at (s, x), by compiled code if available."""
+    """Compute rates of the states and values of the guards, by compiled code if available."""
     if code != 0:
         call_series(code, s, 0.0, x, values, W, rates)
     else:
@@ -69,7 +69,7 @@ def values_at(
 def _interpreted_values(
     rows: Any, flow_registers: Any, s: float, x: Any, guard_registers: Any, W: Any, values: Any, rates: Any
 ) -> None:
-    """Compute the values of `values_at` with the interpreter of tapes."""
+    """Compute rates of the states and values of the guards with the interpreter of tapes."""
     time, states, derivatives = flow_registers
     if time >= 0:
         W[time, 0] = s
@@ -84,7 +84,7 @@ def _interpreted_values(
 
 @inlined
 def _together(four: tuple[float, float, float, float]) -> float:
-    """Return the sum of four numbers, added like the halves of a vector."""
+    """Return the sum of four numbers, added in the order of vector instructions."""
     return (four[0] + four[2]) + (four[1] + four[3])
 
 
@@ -102,7 +102,7 @@ def look_ahead(
     W: Any,
     ahead: Any,
 ) -> None:
-    """Fill the array `ahead` at a distance d from the start of series of the states and guards.
+    """Fill the array `ahead` for a distance from the start of the Taylor series of states and guards.
 
     code: address of a function that does the same; 0 for none. W: the registers of the tape with its
     constants.
@@ -140,7 +140,7 @@ def look_ahead(
 
 @inlined
 def flow_holds(ahead: Any, order: int, n: int, d: float, x0: Any, rtol: float, atol: Any) -> bool:
-    """Return whether the series of the states from x0 still satisfy their differential equation."""
+    """Return whether the Taylor series of the states still satisfy the differential equation."""
     x = order + 1
     for i in range(x, x + n):
         rate, slope, change = ahead[i + n], ahead[i + 2 * n], ahead[i + 3 * n]
@@ -152,7 +152,7 @@ def flow_holds(ahead: Any, order: int, n: int, d: float, x0: Any, rtol: float, a
 
 @inlined
 def seems_straight(computed: Any, series: Any, order: int, powers: Any, rtol: float, atol: Any) -> bool:
-    """Return whether the rate of a state hardly changes according to its series, though it may change later.
+    """Return whether the rate of a state is almost constant in its Taylor series.
 
     computed (n,): see `hybridsim.engine.system.programs.mode_tables`. For a rate such as 1 + sin(t)**20 all
     terms but the first vanish at the start. They do not limit the step, at whose end they may vanish again.
@@ -168,7 +168,7 @@ def seems_straight(computed: Any, series: Any, order: int, powers: Any, rtol: fl
 
 @kernel
 def keeps_up(U: Any, monitored: Any, order: int, powers: Any, rtol: float, values: Any, sums: Any) -> bool:
-    """Return whether the series of the guards still agree with their values."""
+    """Return whether the Taylor series of the guards still agree with the values of the guards."""
     share = _DEFECT * rtol + 64.0 * UNIT
     for j in range(monitored.shape[0]):
         r = monitored[j]

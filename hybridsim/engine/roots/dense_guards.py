@@ -1,4 +1,4 @@
-"""Expand guards along a polynomial dense output in series, and find the first guard that becomes negative."""
+"""This module finds the first guard that becomes negative along a polynomial dense output."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _MAX_SUBINTERVALS = 4096
 
 @inlined
 def shifted(coefficients: Any, q: float, out: Any) -> None:
-    """Compute polynomials (n, m) about a shifted origin q; higher coefficients of out are zero."""
+    """Shift polynomials (n, m) to another origin; missing higher coefficients are zero."""
     n, m = coefficients.shape
     for i in range(n):
         for j in range(m):
@@ -40,7 +40,7 @@ def shifted(coefficients: Any, q: float, out: Any) -> None:
 def series_along(
     code: int, rows: Any, inputs: Any, s: float, x: Any, guard_registers: Any, V: Any, W: Any, out: Any
 ) -> None:
-    """Compute one row of series coefficients per guard from local time s, along states with coefficients x.
+    """Compute the Taylor coefficients of each guard along states that are given as polynomials.
 
     rows: tape rows that the functions need. V, W: registers that hold the tape's constants. code: address of
     a function that does the same (`along` of `hybridsim.engine.series.emit_series`); 0 for none.
@@ -65,7 +65,7 @@ def series_along(
 def guards_at(
     code: int, rows: Any, inputs: Any, s: float, x: Any, guard_registers: Any, W: Any, rates: Any, out: Any
 ) -> None:
-    """Compute the values of the guards at (s, x), by compiled code if available.
+    """Compute the values of the guards at a time and state, by compiled code if available.
 
     The code also writes rates, as `values` of `hybridsim.engine.series.emit_series` does.
     """
@@ -84,14 +84,14 @@ def guards_at(
 
 @inlined
 def begin_positive(sides: Any, orders: Any, floors: Any) -> None:
-    """Return whether every guard is positive at the start of the next step or piece."""
+    """Return whether every guard is positive at the start of the next step or part of a step."""
     for g in range(sides.shape[0]):
         sides[g], orders[g], floors[g] = 1, 0, 0.0
 
 
 @kernel
 def stays_positive(left: Any, right: Any, order: int, floor: float, d: float, weights: Any) -> bool:
-    """Return whether a polynomial of degree 2 K - 1 has positive Bernstein coefficients on (0, d], so stays positive.
+    """Return whether a polynomial is positive on (0, d] because its Bernstein coefficients are.
 
     left, right (K,): its Taylor coefficients at both ends. The first `order` of them are set to zero on the
     left, with an uncertainty `floor`. weights (K, K): from these to the K Bernstein coefficients next to an
@@ -118,7 +118,7 @@ def stays_positive(left: Any, right: Any, order: int, floor: float, d: float, we
 def first_linear_guard(
     tapes: Any, k: int, count: int, d: float, hermite: Any, scratch: Any
 ) -> tuple[int, int, float]:
-    """Do the same as `first_guard` for guards that are linear in states and time, which are polynomials along a step.
+    """Find the first guard that becomes negative, for guards that are linear in states and time.
 
     scratch: the indices of the active guards, their Taylor coefficients at the ends of the step, `guards_left`
     and `guards_right` (G, K), and their sides, orders and floors.
@@ -168,7 +168,7 @@ def first_linear_guard(
 
 @kernel
 def likely_reach(V: Any, guard_registers: Any, order: int, rtol: float) -> float:
-    """Return a length somewhat beyond the range of the functions' series; the search for the range starts there."""
+    """Return a length at which the search for the accurate range of the guards' series starts."""
     longest = math.inf
     for j in range(guard_registers.shape[0]):
         r = guard_registers[j]
@@ -194,7 +194,7 @@ def first_guard(
     guard_registers: Any,
     scratch: Any,
 ) -> tuple[int, int, float]:
-    """Find the guard of mode row k that first becomes negative on a step: (FOUND, guard, time), (NEVER, -1, d), OPEN.
+    """Find the guard that becomes negative first in a step; return FOUND, NEVER or OPEN with the time.
 
     The time counts from s. rows: tape rows that the guards need; codes: `EndsCodes`. scratch: `polynomial` (n,
     m), the states in powers of the time from s; V and W with the constants of the tape in their registers;

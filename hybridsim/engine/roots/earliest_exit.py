@@ -1,4 +1,4 @@
-"""The first zero of all guards of a mode along one step."""
+"""This module finds the first zero of all guards of a mode in one Taylor step."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hybridsim.engine.series.bounded import UNIT
 
 @inlined
 def parts_for_exit(scratch: Any) -> Any:
-    """Return the scratch arrays of `earliest_exit`, such as sides, orders and floors of guards."""
+    """Return the scratch arrays of `earliest_exit`."""
     return (scratch.sides, scratch.orders, scratch.floors), (scratch.a, scratch.b, scratch.stack)
 
 
@@ -21,7 +21,7 @@ def earliest_exit(
     tapes: Any, k: int, order: int, h: float, U: Any, monitored: Any, powers: Any, totals: Any, parts: Any,
     bernstein: Any,
 ) -> tuple[int, int, float]:  # fmt: skip
-    """Find the guard of the mode that first becomes negative in a step h: (FOUND, guard, time) or (NEVER, -1, h).
+    """Find the guard that becomes negative first in a step; return FOUND or NEVER, guard and time.
 
     monitored: rows of U with the series of the mode's guards. powers (order + 1,): h**k. totals: see `reach`.
     parts: see `parts_for_exit`. bernstein: functions for `first_exit`, by the number of leading zeros.

@@ -1,4 +1,4 @@
-"""The first time at which a polynomial becomes negative, isolated in Bernstein form with an error bound.
+"""This module finds the first time at which a polynomial becomes negative, with an error bound.
 
 In Bernstein form on [0, 1] the coefficients of a power series are sums of its own with weights in [0, 1], so
 that the change of basis loses no accuracy. There is no root if the coefficients share a sign (R. T. Farouki,
@@ -21,7 +21,7 @@ _NEAR = 1e-6  # relative change in Halley's third-order method below which the r
 
 @kernel
 def to_bernstein(a: Any, b: Any) -> None:
-    """Compute the Bernstein coefficients b_j = sum_{k<=j} C(j, k)/C(n, k) a_k of sum_k a_k theta**k of degree n."""
+    """Compute the Bernstein coefficients on [0, 1] of a polynomial."""
     n = a.shape[0] - 1
     b[0] = a[0]
     share = 1.0  # 1/C(n, k)
@@ -35,7 +35,7 @@ def to_bernstein(a: Any, b: Any) -> None:
 
 @inlined
 def halve(stack: Any, top: int, m: int, b: Any) -> None:
-    """Split the piece in a row of the stack into two halves, the left half on top; b (m,): scratch space."""
+    """Split the interval on top of the stack into two halves, with the left half on top."""
     left, width = stack[top, m], 0.5 * stack[top, m + 1]
     for i in range(m):
         b[i] = stack[top, i]
@@ -52,7 +52,7 @@ def halve(stack: Any, top: int, m: int, b: Any) -> None:
 def first_exit(
     a: Any, error: float, floor: float, order: int, b: Any, stack: Any, code: int
 ) -> tuple[int, float]:
-    """Find where p(theta) = sum_k a_k theta**k first becomes negative on (0, 1].
+    """Find the first theta in (0, 1] at which a polynomial becomes negative.
 
     The first `order` coefficients are set to zero and the next is positive. error bounds the distance of p
     from the function that it approximates, and floor bounds its deviation from zero at the start. p is
@@ -112,7 +112,7 @@ def first_exit(
 
 @kernel
 def signs_of(b: Any, error: float) -> int:
-    """Classify the signs of a piece from its Bernstein coefficients.
+    """Classify the signs of a polynomial on an interval from its Bernstein coefficients.
 
     POSITIVE, NEGATIVE: all coefficients are, beyond the error. WITHIN: none is beyond the error. ONCE: the
     piece certainly begins positive, ends negative and has one zero, since the coefficients change their sign
@@ -140,7 +140,7 @@ def signs_of(b: Any, error: float) -> int:
 
 @kernel
 def dips(b: Any) -> bool:
-    """Return whether Bernstein coefficients fall below half the first one and rise again."""
+    """Return whether Bernstein coefficients fall below half of the first one and rise again."""
     lowest = b[0]
     for i in range(1, b.shape[0]):
         if b[i] > lowest and lowest < 0.5 * b[0]:
@@ -151,7 +151,7 @@ def dips(b: Any) -> bool:
 
 @kernel
 def change_of_sign(b: Any) -> float:
-    """Return where on [0, 1] the polygon of the Bernstein coefficients first becomes negative."""
+    """Return where in [0, 1] the polygon of the Bernstein coefficients first becomes negative."""
     i = 1
     while b[i] >= 0.0:
         i += 1
@@ -160,7 +160,7 @@ def change_of_sign(b: Any) -> float:
 
 @polynomial_kernel
 def _expanded(a: Any, order: int, theta: float) -> tuple[float, float, float]:
-    """Evaluate the polynomial without its first `order` coefficients, its slope, and half its second derivative.
+    """Evaluate a polynomial without its first `order` coefficients, its slope and half its curvature.
 
     With q = theta**2 they are E(q) + theta O(q): the even and odd powers are independent sums.
     """
@@ -183,7 +183,7 @@ def _expanded(a: Any, order: int, theta: float) -> tuple[float, float, float]:
 
 @kernel
 def polished(a: Any, order: int, left: float, right: float, start: float) -> float:
-    """Compute the zero of the deflated polynomial between a point where it is positive and one where it is negative.
+    """Compute the zero of a polynomial between a point with a positive and one with a negative value.
 
     Halley's method (W. Gander, American Mathematical Monthly 92 (1985) 131) starts from a guess between them;
     bisection replaces a step that leaves the interval.

@@ -1,4 +1,4 @@
-"""All real roots of a guard along a step: Chebyshev pieces with a measured error bound, isolated in Bernstein form.
+"""This module finds all real roots of a guard in a step, with a measured error bound.
 
 On a piece [a, b] the guard is sampled at 17 Chebyshev points. The polynomial of degree 8 through every second
 point is the representation; its largest misfit at the other points, doubled, is the error bound. Pieces whose
@@ -44,7 +44,7 @@ POINTS = 0.5 - 0.5 * np.cos(np.pi * np.arange(SAMPLES) / (SAMPLES - 1))
 
 
 def _transforms() -> tuple[np.ndarray, np.ndarray]:
-    """Return matrices that map values at every second point to Bernstein coefficients and to other points."""
+    """Return matrices that map values at sample points to Bernstein coefficients and to other points."""
     nodes = POINTS[::2]
     basis = np.array(
         [[comb(DEGREE, i) * x**i * (1 - x) ** (DEGREE - i) for i in range(DEGREE + 1)] for x in POINTS]
@@ -63,7 +63,7 @@ _GROWTH = float(
 
 @dataclass(frozen=True)
 class Crossing:
-    """A change of side of a guard in (left, right) of the step's parameter theta in [0, 1]; +1 is upward."""
+    """A change of sign of a guard in the part (left, right) of a step; +1 is upward."""
 
     left: float
     right: float
@@ -72,7 +72,7 @@ class Crossing:
 
 @dataclass(frozen=True)
 class Grazing:
-    """A minimum of |guard| within the error bound, with no certain change of side."""
+    """A minimum of |guard| within the error bound, at which the sign does not certainly change."""
 
     theta: float
     distance: float
@@ -80,7 +80,7 @@ class Grazing:
 
 @allocating_kernel
 def _halve(b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the two halves of a polynomial in Bernstein form (de Casteljau)."""
+    """Return the two halves of a polynomial in Bernstein form, by de Casteljau's algorithm."""
     n = b.shape[0]
     left, right, work = np.empty(n), np.empty(n), b.copy()
     for k in range(n):
@@ -93,7 +93,7 @@ def _halve(b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @kernel
 def _sign(b: np.ndarray, bound: np.ndarray) -> int:
-    """Return +1 or -1 if all coefficients are beyond their bounds on one side, 0 if the sign is undecided."""
+    """Return +1 or -1 if all coefficients have one sign beyond their error bounds, otherwise 0."""
     positive, negative = True, True
     for i in range(b.shape[0]):
         positive = positive and b[i] > bound[i]
@@ -105,7 +105,7 @@ def _sign(b: np.ndarray, bound: np.ndarray) -> int:
 
 @kernel
 def _within(b: np.ndarray, bound: np.ndarray) -> bool:
-    """Return whether the whole piece lies inside its bounds, so that halving gives no more information."""
+    """Return whether a polynomial lies within its error bounds, so that halving gives no information."""
     for i in range(b.shape[0]):
         if abs(b[i]) > bound[i]:
             return False
@@ -114,7 +114,7 @@ def _within(b: np.ndarray, bound: np.ndarray) -> bool:
 
 @allocating_kernel
 def sign_pattern(b: np.ndarray, bound: np.ndarray) -> tuple[np.ndarray, int]:
-    """Return intervals of certain and undecided sign: rows (left, right, sign), neighbours of one sign merged."""
+    """Return intervals with certain or undecided sign as rows (left, right, sign)."""
     n = b.shape[0]
     rows = np.empty((1024, 3))
     count = 0
@@ -147,7 +147,7 @@ def sign_pattern(b: np.ndarray, bound: np.ndarray) -> tuple[np.ndarray, int]:
 
 @kernel
 def _represent(samples: np.ndarray, coefficients: np.ndarray) -> tuple[float, float]:
-    """Compute the Bernstein coefficients of the piece sampled at `POINTS`; return its error bound and largest value."""
+    """Compute the Bernstein coefficients of a sampled function, its error bound and its largest value."""
     misfit, largest = 0.0, 0.0
     for i in range(DEGREE + 1):
         coefficients[i] = 0.0
@@ -166,7 +166,7 @@ def _represent(samples: np.ndarray, coefficients: np.ndarray) -> tuple[float, fl
 
 @kernel
 def _deflated(coefficients: np.ndarray, bounds: np.ndarray, order: int, side: int) -> int:
-    """Divide out theta**order in place; return how many coefficients are left.
+    """Divide a polynomial by theta**order in place, and return how many coefficients remain.
 
     The first `order` coefficients are zero. The sign of the new leading coefficient is set too, regardless of
     its rounding error.
@@ -187,7 +187,7 @@ def _deflated(coefficients: np.ndarray, bounds: np.ndarray, order: int, side: in
 def quiet(
     values: np.ndarray, numbers: np.ndarray, sides: np.ndarray, orders: np.ndarray, floors: np.ndarray
 ) -> np.ndarray:
-    """Return which functions certainly keep their side over a whole step, from their samples (17, functions)."""
+    """Return which functions certainly keep their signs over a whole step, from samples (17, functions)."""
     result = np.zeros(numbers.shape[0], dtype=np.bool_)
     coefficients, bounds = np.empty(DEGREE + 1), np.empty(DEGREE + 1)
     samples = np.empty(SAMPLES)
@@ -210,7 +210,7 @@ def quiet(
 def _before(
     sample: Callable[[np.ndarray], np.ndarray], theta: float, side: int, rounding: Callable[[], float]
 ) -> float:
-    """Return a point up to theta at which a function that starts from zero is still on its side, or theta itself.
+    """Return a point before theta at which a function that starts at zero still has its sign, or theta.
 
     The sign of the leading coefficient is known. If the coefficient is within the error bound of the
     polynomial, a zero close to the start is lost, and only the function's values give information.
@@ -225,7 +225,7 @@ def _before(
 def _with_touches(
     coefficients: np.ndarray, bounds: np.ndarray, rows: np.ndarray, is_first: bool, is_last: bool
 ) -> np.ndarray:
-    """Return the pattern of a piece, with undecided intervals at values within their rounding errors.
+    """Return the sign intervals, with undecided ones where values are within their rounding errors.
 
     The misfit only shows roundings that differ from sample to sample. A common one, such as that of the steps
     before, shifts the dip and stays hidden. The ends of a step have their own rules for rounding. Where the
@@ -263,7 +263,7 @@ def find_roots(
     floor: float = 0.0,
     begins: bool = False,
 ) -> tuple[list[Crossing], list[Grazing], int, float]:
-    """Find all changes of side of one guard over a step, theta in (0, 1].
+    """Find all sign changes of one guard over a step, as theta in (0, 1].
 
     Parameters
     ----------
@@ -292,7 +292,7 @@ def find_roots(
     touching = _TOUCHING * np.abs(first[np.isfinite(first)]).max(initial=0.0)
 
     def has_left(theta: float) -> bool:
-        """Return whether a function that starts from zero exceeded rounding before theta, so that it left this zero."""
+        """Return whether a function that starts at zero exceeds its rounding error before theta."""
         bound = max(floor, _ROUNDINGS_BEFORE * rounding(), before(theta))
         return bool((side * sample(theta * POINTS) > bound).any())
 
@@ -303,8 +303,8 @@ def find_roots(
         subdivisions += 1
         if subdivisions > _MAX_SUBDIVISIONS:
             raise StepFailure(
-                f"the zeros in one step could not be separated with {subdivisions} subintervals: lower max_step, or "
-                "write the function without poles, and so that the function is defined on both sides of each zero"
+                f"the zeros in one step could not be separated with {subdivisions} subintervals: reduce max_step, or "
+                "write the function without poles, so that it is defined on both sides of each zero"
             )
         coefficients = np.empty(DEGREE + 1)
         error, largest = _represent(samples, coefficients)

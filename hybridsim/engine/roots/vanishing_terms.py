@@ -1,4 +1,4 @@
-"""Places where a Taylor step must end because its series does not show a vanishing exponential or root.
+"""This module finds where a Taylor step must end because a vanishing exponential or root is hidden.
 
 For a rate such as exp(-((t - 1)/w)**2) or 1 + exp(-(v/w)**2) all terms are below rounding far away. This may
 be so at the start and at the end of a step that contains the whole pulse. The series of the argument u has no
@@ -55,7 +55,7 @@ def _slope(u: Any, order: int, d: float) -> float:
 
 @inlined
 def _sizes(u: Any, order: int, h: float) -> tuple[float, float, float]:
-    """Return bounds of |u(d) - u(0)| and |h (u'(d) - u'(0))| for d in a step h, and the size of the last two terms."""
+    """Return bounds of the changes of a Taylor series and of its slope in a step, and its last terms."""
     size, power = abs(u[1] * h), h
     change, turn, before = size, 0.0, 0.0
     for k in range(2, order + 1):
@@ -68,13 +68,13 @@ def _sizes(u: Any, order: int, h: float) -> tuple[float, float, float]:
 
 @inlined
 def may_end(u: Any, kind: int, size: float) -> bool:
-    """Return whether a step h may have to end for a function of u, by a cheap test; `size`: sum_k |u_k| h**k."""
+    """Return whether a step may have to end because of a function of u, by a fast test."""
     return kind == ROOT or size - abs(u[0]) > _SEEN
 
 
 @kernel
 def where_it_ends(u: Any, kind: int, order: int, h: float, a: Any, stack: Any, code: int) -> float:
-    """Return the length up to h of a step that is safe for a function of this kind; u (order + 1,): a series.
+    """Return the longest safe step up to h for a given kind of function of a Taylor series u.
 
     h may be negative; order >= 2. a (order,) or longer, stack (STACK_ROWS, order + 2) or larger: scratch space.
     code: address of a function that does `to_bernstein` for as many coefficients as the order
@@ -104,7 +104,7 @@ def where_it_ends(u: Any, kind: int, order: int, h: float, a: Any, stack: Any, c
 
 @kernel
 def where_a_root_ends(u: Any, order: int, h: float, a: Any, stack: Any, code: int) -> float:
-    """Return the safe step length for sqrt(u), before u falls below a hundredth and rises again."""
+    """Return the longest safe step for sqrt(u), before u comes close to zero and rises again."""
     change, _, _ = _sizes(u, order, h)
     high, low = _FAR_SHARE * u[0], _NEAR_SHARE * u[0]
     if not (u[0] > 0.0 and u[0] - change < low):
@@ -116,7 +116,7 @@ def where_a_root_ends(u: Any, order: int, h: float, a: Any, stack: Any, code: in
 def _first_place(
     u: Any, order: int, h: float, kind: int, high: float, low: float, a: Any, stack: Any, code: int
 ) -> float:
-    """Return the first place in a step h at which the step has to end, or h.
+    """Return the first point in a step at which the step has to end, or the end of the step.
 
     The step is divided into pieces on which u rises or falls. The slope is isolated in Bernstein form: if its
     coefficients change their sign at most once, so does the slope.
@@ -165,7 +165,7 @@ def _first_place(
 
 @inlined
 def _changes(b: Any) -> tuple[int, bool]:
-    """Return how often Bernstein coefficients change their sign, without zeros, and whether they begin positive."""
+    """Return how often Bernstein coefficients change their sign, and whether the first is positive."""
     changes, last, first = 0, 0.0, 0.0
     for i in range(b.shape[0]):
         if b[i] != 0.0:
@@ -178,7 +178,7 @@ def _changes(b: Any) -> tuple[int, bool]:
 
 @inlined
 def _extremum(u: Any, order: int, near: float, far: float, rises: bool) -> float:
-    """Find the sign change of the slope of u between two places, by Newton's method with bisection."""
+    """Find the sign change of the slope of u between two points, by Newton's method with bisection."""
     d = 0.5 * (near + far)
     for _ in range(_POLISHED):
         slope, bend = 0.0, 0.0
@@ -202,7 +202,7 @@ def _extremum(u: Any, order: int, near: float, far: float, rises: bool) -> float
 
 @kernel
 def _becomes_near(u: Any, order: int, sign: float, high: float, low: float, far: float, near: float) -> float:
-    """Find a place where |u| is between low and high, by bisection between a larger and a smaller |u|."""
+    """Find a point at which |u| is between two bounds, by bisection."""
     d = near
     for _ in range(_HALVED):
         d = 0.5 * (far + near)

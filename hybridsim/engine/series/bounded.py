@@ -1,4 +1,4 @@
-"""Taylor coefficients of states and guards along a flow, each with a running bound of its rounding error.
+"""This module computes Taylor coefficients of states and guards with rounding error bounds.
 
 The recurrences are those of `hybridsim.engine.series.interpreter`; each error bound follows its recurrence to first
 order in the unit roundoff (N. J. Higham, Accuracy and Stability of Numerical Algorithms, 2nd ed., 2002, section 3.3).
@@ -55,7 +55,7 @@ ORDER = EXACTLY
 
 @inlined
 def _pair(V: Any, E: Any, a: int, b: int, i: int, j: int, u: float, v: float) -> tuple[float, float]:
-    """Compute u a_i b_j + v a_j b_i and its error bound, for integers u and v whose products are also rounded."""
+    """Compute u a_i b_j + v a_j b_i with its error bound, for integers u and v."""
     first, second = u * V[a, i] * V[b, j], v * V[a, j] * V[b, i]
     error = u * (abs(V[a, i]) * E[b, j] + E[a, i] * (abs(V[b, j]) + E[b, j]))
     error += v * (abs(V[a, j]) * E[b, i] + E[a, j] * (abs(V[b, i]) + E[b, i]))
@@ -65,7 +65,7 @@ def _pair(V: Any, E: Any, a: int, b: int, i: int, j: int, u: float, v: float) ->
 
 @kernel
 def _inner(V: Any, E: Any, a: int, b: int, k: int, weighted: bool) -> tuple[float, float]:
-    """Compute sum_{i=1}^{k-1} a_i b_{k-i}, or the sum of i a_i b_{k-i} if weighted, and its error bound.
+    """Compute the sum of a_i b_{k-i}, or of i a_i b_{k-i}, for 0 < i < k, with its error bound.
 
     The order of summation is that of `hybridsim.engine.series.interpreter`.
     """
@@ -84,7 +84,7 @@ def _inner(V: Any, E: Any, a: int, b: int, k: int, weighted: bool) -> tuple[floa
 
 @inlined
 def _product(V: Any, E: Any, a: int, b: int, k: int) -> tuple[float, float]:
-    """Compute sum_{i=0}^{k} a_i b_{k-i} and its error bound."""
+    """Compute the sum of a_i b_{k-i} for i from 0 to k, with its error bound."""
     if k == 0:
         total = V[a, 0] * V[b, 0]
         error = abs(V[a, 0]) * E[b, 0] + E[a, 0] * (abs(V[b, 0]) + E[b, 0]) + UNIT * abs(total)
@@ -97,7 +97,7 @@ def _product(V: Any, E: Any, a: int, b: int, k: int) -> tuple[float, float]:
 
 @inlined
 def _slope(V: Any, E: Any, a: int, b: int, k: int) -> tuple[float, float]:
-    """Compute sum_{i=1}^{k} i a_i b_{k-i} and its error bound; the sum is k times the integral of a' b."""
+    """Compute the sum of i a_i b_{k-i} for i from 1 to k, with its error bound."""
     inner, error = call_noinline(_inner, (V, E, a, b, k, True))
     last = k * V[a, k] * V[b, 0]
     error += k * (abs(V[a, k]) * E[b, 0] + E[a, k] * (abs(V[b, 0]) + E[b, 0])) + 2.0 * UNIT * abs(last)
@@ -106,7 +106,7 @@ def _slope(V: Any, E: Any, a: int, b: int, k: int) -> tuple[float, float]:
 
 @kernel
 def _first_sign(V: Any, a: int, k: int) -> float:
-    """Return the sign of a series just after its origin, from its leading non-zero coefficient up to order k."""
+    """Return the sign of a Taylor series just after its origin, from its first non-zero coefficient."""
     for i in range(k + 1):
         if V[a, i] > 0.0:
             return 1.0
@@ -131,7 +131,7 @@ def _put(V: Any, E: Any, out: int, k: int, value: float, error: float) -> None:
 
 @inlined
 def _divide(V: Any, E: Any, out: int, k: int, numerator: float, error: float, b: int) -> None:
-    """Compute V[out, k] = numerator / b_0 with the error bound of a quotient."""
+    """Compute coefficient k of a quotient from its numerator, with its error bound."""
     divisor = V[b, 0]
     value = numerator / divisor
     V[out, k] = value
@@ -140,7 +140,7 @@ def _divide(V: Any, E: Any, out: int, k: int, numerator: float, error: float, b:
 
 @inlined
 def _multiply(V: Any, E: Any, out: int, k: int, factor: float, error: float, b: int) -> None:
-    """Compute V[out, k] = factor (1 / b_0) with the error bound of a quotient with rounded reciprocal."""
+    """Compute coefficient k of a quotient with a rounded reciprocal, with its error bound."""
     divisor = V[b, 0]
     value = factor * (1.0 / divisor)
     V[out, k] = value
@@ -149,7 +149,7 @@ def _multiply(V: Any, E: Any, out: int, k: int, factor: float, error: float, b: 
 
 @kernel
 def _leading(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int) -> None:
-    """Compute order 0 of operations whose higher orders follow from a differential equation."""
+    """Compute coefficient 0 of operations whose other coefficients follow from a differential equation."""
     u, du = V[a, 0], E[a, 0]
     if op == EXP:
         y = math.inf if u >= 709.0 else math.exp(u)  # math.exp raises an exception if it overflows
@@ -189,7 +189,7 @@ def _leading(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int) -> None:
 
 @kernel
 def _higher(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) -> None:
-    """Compute order k >= 1 of operations whose coefficients follow from a differential equation."""
+    """Compute coefficient k >= 1 of operations whose coefficients follow from a differential equation."""
     part = 1.0 / k
     if op == EXP:
         y, e = _slope(V, E, a, out, k)
@@ -232,7 +232,7 @@ def _higher(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) -
 
 @kernel
 def _logic(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) -> None:
-    """Compute order k of comparisons, choices and corners; a corner takes the side to which its argument moves."""
+    """Compute coefficient k of comparisons, choices and corners, on the side to which the argument moves."""
     if op == ABS:
         sign = _first_sign(V, a, k)
         _put(V, E, out, k, sign * V[a, k], E[a, k])
@@ -267,7 +267,7 @@ def _logic(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) ->
 
 @kernel
 def _with_constant(op: int, V: Any, E: Any, a: int, b: int, out: int, k: int) -> None:
-    """Compute order k of an operation on a series and a constant, or of the sine of a linear angle."""
+    """Compute coefficient k of an operation on a Taylor series and a constant."""
     u, du, v, dv = V[a, k], E[a, k], V[b, 0], E[b, 0]
     if op == SCALE:
         y = u * v
@@ -296,7 +296,7 @@ def _with_constant(op: int, V: Any, E: Any, a: int, b: int, out: int, k: int) ->
 
 @kernel
 def _advance(row: Any, V: Any, E: Any, k: int) -> None:
-    """Compute order k of one operation."""
+    """Compute coefficient k of one operation, with its error bound."""
     op, a, b, c, out = row[0], row[1], row[2], row[3], row[4]
     if op == COPY:
         _put(V, E, out, k, V[a, k], E[a, k])
@@ -344,7 +344,7 @@ def _advance(row: Any, V: Any, E: Any, k: int) -> None:
 
 @kernel
 def run_tape(rows: Any, order: int, states: Any, derivatives: Any, V: Any, E: Any) -> None:
-    """Compute the Taylor coefficients V[register, k] and error bounds E for k = 0..order along the flow.
+    """Compute all Taylor coefficients along the flow, and their error bounds, up to an order.
 
     `rows` (m, 5) int64. The caller sets the registers of constants, time and parameters and order 0 of the
     states. states[i] is the register of x_i, derivatives[i] that of dx_i/dt.
@@ -373,7 +373,7 @@ def run_series(
     V: Any,
     E: Any,
 ) -> None:
-    """Set the inputs of an optimised tape and run it up to the order for which V and E have columns.
+    """Set the inputs of an optimised tape, and compute all Taylor coefficients with error bounds.
 
     inputs: see `hybridsim.engine.system.system.Inputs`. derivatives: registers of the states' rates.
     """

@@ -1,4 +1,4 @@
-"""Dual numbers, for the functions of a model that run as plain Python: resets, projections and rates.
+"""This module defines dual numbers, for functions of a model that run as plain Python.
 
 Each number carries a row of derivatives. A generated function is run on dual numbers with mathematical
 functions that accept them.
@@ -15,7 +15,7 @@ import numpy as np
 
 
 class Dual:
-    """A value with its derivatives (D,)."""
+    """A dual number: a value with its derivatives (D,)."""
 
     __slots__ = ("slope", "value")
 
@@ -89,7 +89,7 @@ def _parts(other: Any) -> tuple[float, Any]:
 def _smooth(
     function: Callable[[float], float], slope: Callable[[float, float], float]
 ) -> Callable[[Any], Any]:
-    """Return a function of one dual number; slope computes its derivative from argument and value."""
+    """Return a function of one dual number from a function and its derivative `slope`."""
 
     def lifted(u: Any) -> Any:
         if not isinstance(u, Dual):
@@ -141,12 +141,12 @@ def with_slopes(values: Any, slopes: np.ndarray) -> list[Dual]:
 
 
 def differentiated(function: FunctionType) -> Callable[..., Any]:
-    """Return a version of a generated function that accepts dual numbers."""
+    """Return a generated function that accepts dual numbers."""
     return FunctionType(function.__code__, function.__globals__ | _FUNCTIONS, function.__name__)
 
 
 def values_and_slopes(numbers: list[Any], directions: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the values (n,) and derivatives (n, D) of numbers, some of which may be plain."""
+    """Return the values (n,) and derivatives (n, D) of plain or dual numbers."""
     values = np.array([float(n) for n in numbers])
     slopes = [n.slope if isinstance(n, Dual) else np.zeros(directions) for n in numbers]
     return values, np.array(slopes).reshape(len(numbers), directions)

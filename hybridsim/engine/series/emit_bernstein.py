@@ -1,4 +1,4 @@
-"""Straight-line code that converts power series to Bernstein form, for the few degrees of series of one order.
+"""This module writes code that converts power series of a few degrees to Bernstein form.
 
 The sums equal those of `to_bernstein` in `hybridsim.engine.roots.first_exit` to the last bit, without the
 loops.
@@ -18,7 +18,7 @@ LEADING = 4  # number of cases for the count of leading coefficients set to zero
 
 @cache
 def bernstein_code(order: int) -> tuple[list[int], Any]:
-    """Return the addresses of conversion functions for series of one order, and the object that keeps them alive.
+    """Return the addresses of conversion functions, and an object that keeps them alive.
 
     There is one function per count of omitted leading coefficients. The functions are void f(., ., a, ., .,
     b), as for series: a are the power coefficients, b the Bernstein coefficients.

@@ -1,4 +1,4 @@
-"""Straight-line code for the short series of the guards of one vector of modes, with bounds of their rounding errors.
+"""This module writes code for short Taylor series of guards, with bounds of their rounding errors.
 
 The kernels of `hybridsim.engine.series.bounded` write it (`hybridsim.engine.series.trace`), so that both give the same
 to the last bit if values are finite. Exact values carry no bound and add nothing to other bounds.
@@ -28,7 +28,7 @@ _ASKED = frozenset((LESS, LESS_EQUAL))  # comparisons, here only between constan
 
 @dataclass(frozen=True)
 class ConstantSources:
-    """Values of a tape's constants: numbers with errors, indices into the parameter vector, and phases."""
+    """The sources of a tape's constants: numbers with errors, parameters, and phases."""
 
     numbers: Mapping[int, tuple[float, float]]
     sources: Mapping[int, int]
@@ -36,7 +36,7 @@ class ConstantSources:
 
 
 class _Bounded(Trace):
-    """The coefficients 0..ORDER of every register with their error bounds."""
+    """The Taylor coefficients of every register up to ORDER, with their error bounds."""
 
     def __init__(
         self, tape: ModeTape, constant_rows: Sequence[tuple[int, ...]], constant_sources: ConstantSources
@@ -59,7 +59,7 @@ class _Bounded(Trace):
         self.on_all_paths(self.run._advance, row, (V, E), k)
 
     def _constant(self, r: int, k: int) -> Any:
-        """Return coefficient k of a constant."""
+        """Return coefficient k of a constant as text."""
         if k > 0:
             return 0.0
         if r in self.constant_sources.sources:
@@ -67,7 +67,7 @@ class _Bounded(Trace):
         return Value(self, number(self.constant_sources.numbers.get(r, (0.0, 0.0))[0]))
 
     def _error(self, r: int, k: int) -> Any:
-        """Return the bound of the error of a constant."""
+        """Return the error bound of a constant as text."""
         if k > 0 or r in self.constant_sources.sources:
             is_phase = k == 0 and r in self.constant_sources.phases
             return 2.0 * UNIT * abs(self._constant(r, k)) if is_phase else 0.0
@@ -76,7 +76,7 @@ class _Bounded(Trace):
 
 
 def can_bound(tape: ModeTape, constant_rows: Sequence[tuple[int, ...]]) -> bool:
-    """Return whether every operation can be written as straight-line code."""
+    """Return whether every operation of a tape can be written as straight-line code."""
     return tape.is_known and all(row[0] in KNOWN | _ASKED for row in constant_rows)
 
 
@@ -87,7 +87,7 @@ def bounds_text(
     numbers: Sequence[int],
     guards: int,
 ) -> str:
-    """Return a module with the function bounds_0; `numbers`: indices of the active guards.
+    """Return the text of a module with the function bounds_0 for the active guards.
 
     Raise TooLong if it would take too long to compile.
     """

@@ -1,4 +1,4 @@
-"""Straight-line code for the series of one vector of modes: every operation of its optimised tape, order by order.
+"""This module writes machine code for Taylor series in one combination of modes.
 
 An interpreter of a tape spends more time on dispatch than on arithmetic. Here each coefficient is a value
 of its own, equal values are computed once, and unused values are omitted. The kernels of
@@ -63,13 +63,13 @@ KNOWN = frozenset(
 
 
 def _results(op: int) -> int:
-    """Return the number of registers that an operation fills."""
+    """Return how many registers an operation fills."""
     return 2 if op in WITH_COMPANION else 1
 
 
 @dataclass(frozen=True)
 class ModeTape:
-    """The parts of a mode vector's optimised tape that the code needs.
+    """The parts of the optimised tape of one combination of modes that the code needs.
 
     These are its rows, the rows of high orders, the registers of time, states, rates, active guards and
     arguments of fading functions, and the conditions that stay constant as time passes.
@@ -86,12 +86,12 @@ class ModeTape:
 
     @property
     def is_known(self) -> bool:
-        """Return whether every operation can be written as straight-line code."""
+        """Return whether every operation of a tape can be written as straight-line code."""
         return all(row[0] in KNOWN for row in self.rows)
 
 
 class _Expansion(Trace):
-    """The coefficients 0..order of every register; `is_known`: order 0 of sines, roots etc. is loaded."""
+    """The Taylor coefficients of every register up to an order, as values of the code."""
 
     def __init__(self, tape: ModeTape, order: int, stride: int, is_known: bool = False) -> None:
         super().__init__("v" if is_known else "u", interpreter, advance=self.advance)
@@ -99,7 +99,7 @@ class _Expansion(Trace):
         self.V = Coefficients(order, self._constant)
 
     def expand(self, s: Value, x: list[Value], order: int) -> _Expansion:
-        """Compute all coefficients, starting from a local time and a state."""
+        """Write code for all Taylor coefficients from a local time and a state."""
         tape = self.tape
         states, rates = (np.array(registers, dtype=object) for registers in (tape.states, tape.rates))
         rows, high = (np.array(rows, dtype=object).reshape(-1, 5) for rows in (tape.rows, tape.high))
@@ -107,7 +107,7 @@ class _Expansion(Trace):
         return self
 
     def advance(self, rows: np.ndarray, V: Coefficients, k: int) -> None:
-        """Compute coefficient k of every operation, in order."""
+        """Write code for Taylor coefficient k of every operation, in order."""
         for r, (op, a, b, _, out) in enumerate(rows):
             if k == 0 and op in _COSTLY and self.is_known:
                 for register in (out, out + 1)[: _results(op)]:
@@ -118,13 +118,13 @@ class _Expansion(Trace):
                 self.on_all_paths(self.run.advance, rows[r : r + 1], (V,), k)
 
     def _constant(self, r: int, k: int) -> Value | float:
-        """Return coefficient k of a constant."""
+        """Return coefficient k of a constant, as a value of the code."""
         if (r, 0) in self.V.known and r != self.tape.time:
-            raise LookupError(f"order {k} of register {r} is not computed")
+            raise LookupError(f"coefficient {k} of register {r} is not computed")
         return self.read("%c", r * self.stride) if k == 0 else 0.0
 
     def write(self, array: str, registers: Iterable[int], size: int) -> None:
-        """Write the first coefficients of some registers, one register after another."""
+        """Write code that stores the first coefficients of some registers, one register after another."""
         for i, r in enumerate(registers):
             for k in range(size):
                 self.store(written(self.V[r, k]), array, i * size + k)
@@ -137,7 +137,7 @@ def _expanded(tape: ModeTape, order: int, stride: int, is_known: bool = False) -
 
 
 def series_function(name: str, tape: ModeTape, order: int) -> str:
-    """Return a function that writes series (order + 1 columns) of states, guards and fading functions."""
+    """Return a function that writes the Taylor series of states, guards and vanishing functions."""
     size = order + 1
     code = _expanded(tape, order, size, is_known=True)
     code.write("%out", tape.states, size)
@@ -166,7 +166,7 @@ def values_function(name: str, tape: ModeTape, stride: int) -> str:
 
 
 def ahead_function(name: str, tape: ModeTape, order: int) -> str:
-    """Return the function `ahead` for series of an order; see `hybridsim.engine.roots.defect_check`.
+    """Return the function `ahead`, which evaluates Taylor series at the end of a step.
 
     It has rates and guards at a distance %e from the origin of the series, and sums of these series there.
     """
@@ -191,7 +191,7 @@ def ahead_function(name: str, tape: ModeTape, order: int) -> str:
 
 
 def along_function(name: str, tape: ModeTape, order: int) -> str:
-    """Return the function that writes guard series (guards, order + 1) from given state series (n, order + 1)."""
+    """Return the function that writes guard series (guards, order + 1) for given state series."""
     size = order + 1
     code = _Expansion(tape, order, size)
     for i, r in enumerate(tape.states):
@@ -206,7 +206,7 @@ def along_function(name: str, tape: ModeTape, order: int) -> str:
 
 
 def sizes_function(name: str, guards: int, order: int) -> str:
-    """Return the function of h that writes its powers, and for each guard sum_k |c_k| h**k."""
+    """Return the function that writes the powers of h, and for each guard the sum of |c_k| h**k."""
     code, size = Lines(), order + 1
     powers = Powers(code, "%s", order)
     powers.store("%out")
@@ -217,12 +217,12 @@ def sizes_function(name: str, guards: int, order: int) -> str:
 
 
 def _start(tape: ModeTape, stride: int) -> _Expansion:
-    """Return code that computes order 0 in the order of the tape, and keeps costly values for later use."""
+    """Return code for coefficient 0 in the order of the tape, which keeps costly values for later use."""
     return _in_fixed_order(_expanded(tape, 0, stride))
 
 
 def _in_fixed_order(code: _Expansion) -> _Expansion:
-    """Return the code with stores of the costly values of order 0."""
+    """Return the code with instructions that store the costly values of coefficient 0."""
     tape, stride = code.tape, code.stride
     for op, *_, out in tape.rows:
         if op in _COSTLY:
@@ -248,7 +248,7 @@ def ends_text(tape: ModeTape, terms: int, first: int, order: int) -> str:
 
 
 def series_text(tape: ModeTape, order: int) -> str:
-    """Return a module with series_0, values_0, ahead_0 and sizes_0; raise TooLong if it is too long to compile."""
+    """Return a module with series_0, values_0, ahead_0 and sizes_0; raise TooLong if it is too long."""
     parts = (
         series_function("series_0", tape, order),
         values_function("values_0", tape, order + 1),

@@ -1,4 +1,4 @@
-"""Rows for the high orders of an optimised tape, in which the rates follow from shorter chains of operations.
+"""This module rewrites tapes for high orders, in which rates follow from shorter operation chains.
 
 A coefficient depends on the one before it through every operation between a state and its rate. With a
 compiled tape this latency is most of a step's time. Successive constants become one factor, a sum adds its
@@ -45,14 +45,14 @@ _EARLY = -(10**6)  # cycle of a value that does not depend on a state
 
 @dataclass(frozen=True)
 class _Scaled:
-    """A register as a multiple of another register: constant factors, constant divisors and a sign."""
+    """A register that is a multiple of another register, by constant factors, divisors and a sign."""
 
     base: int
     constants: tuple[tuple[int, bool], ...] = ()
     is_negative: bool = False
 
     def row(self, kind: int, out: int) -> Row:
-        """Return the row that computes the multiple."""
+        """Return the row of the tape that computes the multiple."""
         operands, flags = [0, 0], NEGATIVE if self.is_negative else 0
         for i, (register, divides) in enumerate(self.constants):
             operands[i] = register
@@ -65,14 +65,14 @@ class _Scaled:
 def high_rows(
     rows: Sequence[Row], states: Sequence[int], rates: Sequence[int], guard_registers: Iterable[int]
 ) -> list[Row]:
-    """Return the rows that compute the states and the registers of guards at high orders."""
+    """Return the rows that compute the states and the guards at high orders."""
     made = _Rewriting(rows, states, rates, set(guard_registers))
     integrals = [made.scaled(rate).row(INTEGRATE, state) for state, rate in zip(states, rates, strict=True)]
     return [*live_rows(made.rows, made.guard_registers | {row[1] for row in integrals}), *integrals]
 
 
 class _Rewriting:
-    """Rewrite operations to shorten sequences of scalings and sums, except those that guards need."""
+    """Rewrites operations to shorten sequences of scalings and sums, except those that guards need."""
 
     def __init__(
         self, rows: Sequence[Row], states: Sequence[int], rates: Sequence[int], guard_registers: set[int]
@@ -101,7 +101,7 @@ class _Rewriting:
         return self._forms.get(register, _Scaled(register))
 
     def _cycles_after(self, cycles: dict[int, int]) -> dict[int, int]:
-        """Return the cycle at which each register has its coefficient, with the states given at the start."""
+        """Return the cycle at which each register is computed, with the states given at the start."""
         for row in self._of.values():
             op, out = row[0], row[4]
             wait = _EARLY if op == SINCOS_LINEAR else 0 if op in _SAME else _WAITS.get(op, _PRODUCT)
@@ -129,7 +129,7 @@ class _Rewriting:
             self.rows.append(row)
 
     def _reciprocal(self, b: int, out: int) -> Row:
-        """Return a row for a constant over a register."""
+        """Return a row that computes a constant divided by a register."""
         form = self.scaled(b)
         if len(form.constants) > 1:
             form = _Scaled(b)
@@ -139,7 +139,7 @@ class _Rewriting:
         return (RECIPROCAL + flags, form.base, b, register, out)
 
     def _sum(self, out: int, terms: Sequence[tuple[int, bool]], inner: Sequence[int]) -> None:
-        """Append rows of a sum that adds its latest term last; they reuse the registers of the inner sums."""
+        """Append rows of a sum that adds its latest term last, in the registers of the inner sums."""
         (total, is_negative), *others = sorted(terms, key=lambda term: self._cycles.get(term[0], _EARLY))
         for (register, turns), to in zip(others, (*inner, out), strict=True):
             if turns == is_negative:
@@ -151,7 +151,7 @@ class _Rewriting:
             total = to
 
     def _take_apart(self, row: Row) -> None:
-        """Record the terms of a sum with their signs, and the inner sums that no other operation reads.
+        """Record the terms of a sum with their signs, and inner sums that no other operation reads.
 
         A sum that has only negative terms stays unchanged.
         """
@@ -173,7 +173,7 @@ class _Rewriting:
             self._free_registers.update(inner)
 
     def _is_inner(self, register: int, operations: tuple[int, ...]) -> bool:
-        """Return whether a register is the result of one of these operations and is read only once."""
+        """Return whether a register is the result of given operations and is read only once."""
         row = self._of.get(register)
         return (
             row is not None

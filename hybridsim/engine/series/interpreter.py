@@ -1,4 +1,4 @@
-"""Taylor coefficients of any order along a flow, and the step size for which they are accurate.
+"""This module computes Taylor coefficients of any order, and the step for which they are accurate.
 
 The recurrences are those of automatic differentiation (A. Jorba and M. Zou, Experimental Mathematics 14
 (2005) 99, doi:10.1080/10586458.2005.10128904). They use the optimised tape, without the error bounds of
@@ -86,7 +86,7 @@ _LEAST, _MANTISSA, _ONE = 1e-300, (1 << 52) - 1, 1023 << 52  # bit fields of a d
 
 @kernel
 def _inner(V: Any, a: int, b: int, k: int) -> float:
-    """Compute sum_{i=1}^{k-1} a_i b_{k-i}."""
+    """Compute the sum of a_i b_{k-i} for i from 1 to k - 1."""
     total = V[a, k // 2] * V[b, k // 2] if k > 0 and k % 2 == 0 else 0.0
     if k <= EXACTLY:
         for i in range((k - 1) // 2, 0, -1):
@@ -104,7 +104,7 @@ def _inner(V: Any, a: int, b: int, k: int) -> float:
 
 @inlined
 def _product(V: Any, a: int, b: int, k: int) -> float:
-    """Compute sum_{i=0}^{k} a_i b_{k-i}."""
+    """Compute the sum of a_i b_{k-i} for i from 0 to k."""
     if k == 0:
         return V[a, 0] * V[b, 0]
     inner = call_noinline(_inner, (V, a, b, k))
@@ -117,7 +117,7 @@ def _product(V: Any, a: int, b: int, k: int) -> float:
 
 @kernel
 def _weighted(V: Any, a: int, b: int, k: int) -> float:
-    """Compute sum_{i=1}^{k-1} i a_i b_{k-i}."""
+    """Compute the sum of i a_i b_{k-i} for i from 1 to k - 1."""
     total = k // 2 * V[a, k // 2] * V[b, k // 2] if k % 2 == 0 else 0.0
     if k <= EXACTLY:
         for i in range((k - 1) // 2, 0, -1):
@@ -132,7 +132,7 @@ def _weighted(V: Any, a: int, b: int, k: int) -> float:
 
 @inlined
 def _rise(V: Any, a: int, b: int, k: int) -> float:
-    """Compute coefficient k of the integral of a' b; at high orders the newest product is added last."""
+    """Compute coefficient k of the integral of a' b."""
     if k <= EXACTLY:
         return _slope(V, a, b, k) * (1.0 / k)
     return fused(V[a, k], V[b, 0], call_noinline(_weighted, (V, a, b, k)) * (1.0 / k))
@@ -140,13 +140,13 @@ def _rise(V: Any, a: int, b: int, k: int) -> float:
 
 @inlined
 def _slope(V: Any, a: int, b: int, k: int) -> float:
-    """Compute sum_{i=1}^{k} i a_i b_{k-i}, which is coefficient k - 1 of a' b."""
+    """Compute coefficient k - 1 of a' b, the sum of i a_i b_{k-i} for i from 1 to k."""
     return call_noinline(_weighted, (V, a, b, k)) + k * V[a, k] * V[b, 0]
 
 
 @kernel
 def _leading(op: int, V: Any, a: int, b: int, c: int, out: int) -> None:
-    """Compute order 0 of operations whose higher orders follow from a differential equation."""
+    """Compute coefficient 0 of operations whose other coefficients follow from a differential equation."""
     u = V[a, 0]
     if op == EXP:
         V[out, 0] = math.inf if u >= 709.0 else math.exp(u)  # math.exp raises an exception if it overflows
@@ -174,7 +174,7 @@ def _leading(op: int, V: Any, a: int, b: int, c: int, out: int) -> None:
 
 @kernel
 def _higher(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
-    """Compute order k >= 1 of operations whose coefficients follow from a differential equation."""
+    """Compute coefficient k >= 1 of operations whose coefficients follow from a differential equation."""
     if op == EXP:
         V[out, k] = _rise(V, a, out, k)
     elif op == SINCOS:
@@ -198,7 +198,7 @@ def _higher(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
 
 @kernel
 def _logic(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
-    """Compute order k of comparisons, choices and corners; a corner takes the side to which its argument moves."""
+    """Compute coefficient k of comparisons, choices and corners, on the side to which the argument moves."""
     if op in (ABS, MIN, MAX):
         sign = 0.0
         for i in range(k + 1):
@@ -237,7 +237,7 @@ def _logic(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
 
 @inlined
 def _factor(flags: int, V: Any, b: int, c: int) -> float:
-    """Combine two constants according to flags; see `hybridsim.engine.series.high_orders`."""
+    """Combine two constants into a factor, according to flags of an operation."""
     f = 1.0
     if flags & HAS_B:
         f = 1.0 / V[b, 0] if flags & OVER_B else V[b, 0]
@@ -248,7 +248,7 @@ def _factor(flags: int, V: Any, b: int, c: int) -> float:
 
 @kernel
 def advance(rows: Any, V: Any, k: int) -> None:
-    """Compute coefficient k of every operation, in order."""
+    """Compute Taylor coefficient k of every operation, in order."""
     for r in range(rows.shape[0]):
         op, a, b, c, out = rows[r, 0], rows[r, 1], rows[r, 2], rows[r, 3], rows[r, 4]
         if op == SCALE:
@@ -308,7 +308,7 @@ def advance(rows: Any, V: Any, k: int) -> None:
 
 @kernel
 def expand(rows: Any, high: Any, flow_registers: Any, order: int, s: float, x: Any, V: Any) -> None:
-    """Compute the coefficients 0..order along the flow from x at local time s, of all registers or of those in `high`.
+    """Compute all Taylor coefficients up to an order along the flow from x at local time s.
 
     high: rows for the orders beyond `EXACTLY` (`hybridsim.engine.series.high_orders`); if empty, all orders
     use the same rows. flow_registers: registers of time (-1: none), of the states and of their derivatives. The
@@ -332,7 +332,7 @@ def expand(rows: Any, high: Any, flow_registers: Any, order: int, s: float, x: A
 
 @inlined
 def tabulate(h: float, order: int, powers: Any) -> None:
-    """Compute powers[k] = h**k for k = 0..order, order >= 1; from the fifth on four at a time."""
+    """Compute the powers of h up to an order, four at a time from the fifth on."""
     powers[0], powers[1] = 1.0, h
     for k in range(2, min(order, 4) + 1):
         powers[k] = powers[k // 2] * powers[k - k // 2]
@@ -342,7 +342,7 @@ def tabulate(h: float, order: int, powers: Any) -> None:
 
 @inlined
 def sum_sizes(U: Any, r: int, order: int, powers: Any) -> float:
-    """Compute sum_k |U[r, k]| h**k from given powers, as four interleaved sums that begin with the last terms."""
+    """Compute the sum of |U[r, k]| h**k over k from given powers of h."""
     a, b, c, d = 0.0, 0.0, 0.0, 0.0
     for k in range(order - 3, 0, -4):
         a, b = fused(abs(U[r, k]), powers[k], a), fused(abs(U[r, k + 1]), powers[k + 1], b)
@@ -355,7 +355,7 @@ def sum_sizes(U: Any, r: int, order: int, powers: Any) -> float:
 
 @inlined
 def measure(code: int, U: Any, monitored: Any, order: int, h: float, powers: Any, totals: Any) -> None:
-    """Compute the powers of h and, for the series in the monitored rows of U, the sums of `sum_sizes`.
+    """Compute the powers of h, and the sums of `sum_sizes` for the monitored rows of U.
 
     code: address of a function that does so for all rows, with the totals after the powers in memory (`sizes`
     of `hybridsim.engine.series.emit_series`); 0 for none.
@@ -370,13 +370,13 @@ def measure(code: int, U: Any, monitored: Any, order: int, h: float, powers: Any
 
 @inlined
 def _root(x: float, n: int) -> float:
-    """Approximate x**(1/n) for x >= 0 to a few digits, faster than a power."""
+    """Approximate x**(1/n) for x >= 0 to a few digits, faster than by a power."""
     return math.exp(math.log(x) / n) if 0.0 < x < math.inf else x
 
 
 @polynomial_kernel
 def rough_inverse_root(x: float, n: int) -> float:
-    """Approximate x**(-1/n) for x >= 0 to three digits, faster than a power.
+    """Approximate x**(-1/n) for x >= 0 to three digits, faster than by a power.
 
     Exponent and mantissa are read from the bits of a double. Between powers of two the logarithm and the
     exponential are cubics with errors of 8e-4 / n and 1e-4.
@@ -395,7 +395,7 @@ def rough_inverse_root(x: float, n: int) -> float:
 
 @inlined
 def shorter_reach(U: Any, r: int, order: int, rtol: float, h: float, is_before: bool) -> float:
-    """Return a step below h over which the last term is below rtol times one of the first four terms, or h/2.
+    """Return a step below h over which the last term of a Taylor series is below the tolerance, or h/2.
 
     is_before: use the last term but one, which is larger. Over a useful step one of the first four terms is
     the largest, or not much smaller; for exp(w t) with rtol = 1e-12 and order 24 it is the fourth. These
@@ -425,7 +425,7 @@ def reach(
     powers: Any,
     totals: Any,
 ) -> float:
-    """Return the step h, at most `longest`, up to which the series meet the tolerance.
+    """Return the step, at most `longest`, over which the Taylor series meet the tolerance.
 
     On return powers (order + 1,) are h**k and totals are those of `sum_sizes` for the functions; code: see
     `measure`.
@@ -472,7 +472,7 @@ def reach(
 
 @polynomial_kernel
 def polynomials(coefficients: Any, d: Any, out: Any) -> None:
-    """Compute out[j, i] = sum_k coefficients[i, k] d[j]**k.
+    """Evaluate the polynomials with given coefficients at the points d.
 
     The result equals that of `hybridsim.engine.record.series_block` to the last bit.
     """

@@ -1,4 +1,4 @@
-"""Layout of the run-time vector p: parameters, discrete states, time origin, phases and input coefficients."""
+"""This module defines the run-time vector p: parameters, discrete states, time origin, inputs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ SIGNAL_SLOTS = 6  # with d = t - c4: c0 + d (c1 + d (c2 + d c3)), or c5 + c3 sin
 
 @dataclass(frozen=True)
 class Layout:
-    """Offsets of quantities in the run-time vector p, for a model with these counts."""
+    """The offsets of quantities in the run-time vector p of a model."""
 
     parameters: int
     discrete: int
@@ -29,17 +29,17 @@ class Layout:
 
     @cached_property
     def origin_at(self) -> int:
-        """Return the offset of the origin of local time, as a double (for expressions in plain t)."""
+        """Return the offset of the origin of local time, for expressions in absolute time."""
         return self.parameters + self.discrete
 
     @cached_property
     def pin_at(self) -> int:
-        """Return the offset of a flag: 1 if held states follow from their constraint, 0 if they are integrated."""
+        """Return the offset of a flag: 1 if held states follow from constraints, 0 if they are integrated."""
         return self.origin_at + 1
 
     @cached_property
     def phases_at(self) -> int:
-        """Return the offset of the angles rate*origin modulo 2 pi, one per rate of an angle that grows in time."""
+        """Return the offset of the angles rate*origin modulo 2 pi, one for each angular rate."""
         return self.pin_at + 1
 
     @cached_property
@@ -49,5 +49,5 @@ class Layout:
 
     @cached_property
     def size(self) -> int:
-        """Return the length of p."""
+        """Return the length of the run-time vector."""
         return self.signals_at + SIGNAL_SLOTS * self.signals

@@ -1,4 +1,4 @@
-"""The optimised tape of one vector of modes, without copies and with its constants in time computed once.
+"""This module optimises the tape of one combination of modes: no copies, constants computed once.
 
 The rows of a tape (see `hybridsim.engine.series.tape`) are sorted by their operands. A row over constants has
 one coefficient and runs once. A product with a constant, and the sine of an angle that grows linearly, cost
@@ -57,7 +57,7 @@ _LINEAR_OPERATIONS = (ADD, SUB, NEG)
 
 @dataclass(frozen=True)
 class OptimisedTape:
-    """Rows (operation, a, b, c, out) over the registers of the tape from which they are made.
+    """An optimised tape: rows (operation, a, b, c, out) over the registers of the original tape.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class OptimisedTape:
 
 
 def separate_registers(tape: dict[str, Any]) -> dict[int, int]:
-    """Return separate registers for values that are constant in some modes and vary in other modes.
+    """Return separate registers for values that are constant in some modes and not in others.
 
     A compiled loop keeps its registers from mode to mode and writes only the leading coefficient of a
     constant. Without separate registers, the higher coefficients of another mode would remain.
@@ -119,7 +119,7 @@ def optimised(
     active: Iterable[int],
     separate: Mapping[int, int] = MappingProxyType({}),
 ) -> OptimisedTape:
-    """Return the optimised form of one mode vector's rows and active guards; `separate`: of `separate_registers`."""
+    """Return the optimised rows of one combination of modes and its active guards."""
     kind = dict.fromkeys(tape["states"], SERIES) | {tape["time"]: LINEAR}
     same: dict[int, int] = {}  # copy -> original register
     constant_rows: list[tuple[int, ...]] = []
@@ -156,7 +156,7 @@ def optimised(
 
 
 def has_corners(tape: dict[str, Any]) -> bool:
-    """Return whether a corner or a jump (abs, min, max, sign, a condition) depends on a state or time, in any mode."""
+    """Return whether a corner or a jump depends on a state or time in any mode."""
     kind = dict.fromkeys(tape["states"], SERIES) | {tape["time"]: LINEAR}
     agreeing = set()
     for _, branches in tape["parts"]:
@@ -180,7 +180,7 @@ def _array(rows: list[tuple[int, ...]]) -> np.ndarray:
 
 
 def _registers(op: int) -> int:
-    """Return how many of a, b, c are registers; the others are flags of the operation."""
+    """Return how many of a, b and c in a row are registers; the others are flags of the operation."""
     return 1 if op in _ONE else 3 if op == SELECT else 2
 
 
@@ -193,7 +193,7 @@ def _kind(op: int, kinds: list[int]) -> int:
 
 
 def _special(op: int, a: int, b: int, c: int, kinds: list[int]) -> tuple[int, int, int, int]:
-    """Return the cheaper operation for a constant operand or a linear angle."""
+    """Return a cheaper operation for a constant operand or an angle linear in time."""
     if op == SINCOS and kinds[0] == LINEAR:
         return SINCOS_LINEAR, a, b, c
     if len(kinds) == 2 and kinds[1] == CONSTANT:
@@ -206,12 +206,12 @@ def _special(op: int, a: int, b: int, c: int, kinds: list[int]) -> tuple[int, in
 
 
 def arguments_of(row: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the registers whose series a row reads."""
+    """Return the registers whose Taylor series a row reads."""
     return row[1 : 2 if row[0] >= ADD_CONSTANT else 1 + _registers(row[0])]
 
 
 def live_rows(rows: list[tuple[int, ...]], live: set[int]) -> list[tuple[int, ...]]:
-    """Return the rows on which the live registers depend, in order."""
+    """Return the rows on which the given registers depend, in order."""
     live = set(live)
     selected = []
     for row in reversed(rows):

@@ -1,4 +1,4 @@
-"""Registers of the inputs of a tape, as index arrays for kernels."""
+"""This module lists the registers of the inputs of a tape, as index arrays for kernels."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hybridsim.expr import own_roundoff
 
 
 class Inputs(NamedTuple):
-    """Numbers of the registers of a tape's inputs, one index array for each kind of input.
+    """The registers of a tape's inputs, with one index array for each kind of input.
 
     These are constants with values and error bounds (m, 2), parameters and their places in p, phases, time
     (1,) (-1: none) and states.
@@ -29,7 +29,7 @@ class Inputs(NamedTuple):
 
 
 class Registers:
-    """The registers of one structure's tape: their count, and the inputs that kernels read."""
+    """The registers of a tape: their count, and the inputs that kernels read."""
 
     def __init__(self, tape: dict[str, Any], layout: Layout) -> None:
         self.separate = separate_registers(tape)
@@ -47,7 +47,7 @@ class Registers:
         self._rounded: tuple[bytes, Inputs] | None = None  # last values of parameters, and their inputs
 
     def with_roundoff(self, p: np.ndarray) -> Inputs:
-        """Return the inputs with the roundoff of each number; parameters become constants that have an error."""
+        """Return the inputs with the rounding error of each number."""
         known: Inputs = self.inputs
         values_now = p[known.sources]
         key, last = values_now.tobytes(), self._rounded

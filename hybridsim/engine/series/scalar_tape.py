@@ -1,4 +1,4 @@
-"""A function of a few arguments as an optimised tape; each argument varies in time or is constant per instance."""
+"""This module converts a function of a few arguments to an optimised tape."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from hybridsim.expr.symbolic import to_sympy
 
 @dataclass(frozen=True)
 class ScalarTape:
-    """Rows of an optimised tape (see `hybridsim.engine.series.optimise`), registers of its arguments and of its value.
+    """The optimised tape of one function: its rows, and the registers of its arguments and of its value.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class ScalarTape:
 def scalar_tape(
     expression: Expression, moving: tuple[str, ...], constants: tuple[str, ...], positive: str
 ) -> ScalarTape:
-    """Return the tape of an expression.
+    """Return the optimised tape of an expression.
 
     Parameters
     ----------

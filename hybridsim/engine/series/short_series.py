@@ -1,4 +1,4 @@
-"""Short Taylor series along a flow, by which events are decided."""
+"""This module computes the short Taylor series that decide events."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 
 class Series(NamedTuple):
-    """Taylor coefficients of states, guards, surfaces and monitors (., 4), with bounds of their rounding errors."""
+    """Taylor coefficients of states, guards, surfaces and monitors up to third order, with error bounds."""
 
     states: np.ndarray
     state_bounds: np.ndarray

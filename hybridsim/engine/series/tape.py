@@ -1,4 +1,4 @@
-"""A tape stores expressions as rows (operation, a, b, c, out) over numbered registers for a pre-compiled interpreter.
+"""This module converts expressions to a tape: rows (operation, a, b, c, out) over registers.
 
 The tape is data. It is built once from SymPy expressions when a model is first lowered, stored beside the
 generated source, and run by `hybridsim.engine.series.bounded` to compute Taylor coefficients with error
@@ -27,7 +27,7 @@ _MAX_INTEGER_POWER = 4096
 
 
 class TapeBuilder:
-    """Convert SymPy expressions over named registers to rows; equal subexpressions share a register.
+    """Converts SymPy expressions to rows of a tape; equal subexpressions share a register.
 
     Parameters
     ----------
@@ -41,13 +41,13 @@ class TapeBuilder:
         self.count = 0
 
     def register(self, name: str) -> int:
-        """Return the register of a name, allocated on first use."""
+        """Return the register of a name, which is allocated on first use."""
         if name not in self.registers:
             self.registers[name] = self._new()
         return self.registers[name]
 
     def rows(self, assignments: list[tuple[str, Any]], known: dict[Any, int]) -> list[tuple[int, ...]]:
-        """Return rows that put each expression into the register of its name; `known` shares subexpressions."""
+        """Return rows that compute each expression in the register of its name."""
         rows: list[tuple[int, ...]] = []
         for name, expression in assignments:
             source = self._emit(expression, known, rows)
@@ -127,7 +127,7 @@ class TapeBuilder:
     def _emit_power(
         self, base: Any, exponent: Any, known: dict[Any, int], rows: list[tuple[int, ...]]
     ) -> int:
-        """Emit integer and half-integer powers as products of the base or its root, defined at 0 and below."""
+        """Emit integer and half-integer powers as products, which are defined at 0 and below."""
         import sympy as sp
 
         if _grows_without_bound(base, exponent):
@@ -157,13 +157,13 @@ class TapeBuilder:
         return self._whole(source, self._emit(exponent, known, rows), power, known, rows)
 
     def _unless_zero(self, rows: list[tuple[int, ...]], power: int, base: int, exponent: int) -> int:
-        """Emit a power that is 0 at a zero base if the exponent is positive; it has no series there."""
+        """Emit a power that is 0 at a zero base if the exponent is positive."""
         nothing = self._constant(0.0)
         value_at_0 = self._op(rows, SELECT, self._op(rows, LESS, nothing, exponent), nothing, power)
         return self._op(rows, SELECT, self._op(rows, LESS, nothing, base), power, value_at_0)
 
     def _over(self, base: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
-        """Emit 1/(c + d e^u) and 1/cosh(u), which are 0 if the exponential is infinite, by q = e^-|u|."""
+        """Emit 1/(c + d e^u) and 1/cosh(u) without overflow of the exponential."""
         found = _with_exponential(base)
         rest, factor, u = found or (None, None, base.args[0])
         exponent, one = self._emit(u, known, rows), self._constant(1.0)
@@ -184,7 +184,7 @@ class TapeBuilder:
     def _whole(
         self, source: int, exponent: int, power: int, known: dict[Any, int], rows: list[tuple[int, ...]]
     ) -> int:
-        """Emit a power whose exponent may be an integer at run time; it is then defined at 0 and below."""
+        """Emit a power whose exponent may be an integer at run time."""
         one = self._constant(1.0)
         for n in WHOLE_POWERS:
             product = self._products(source, abs(n), known, rows) if n else one
@@ -299,7 +299,7 @@ def _with_exponential(base: Any) -> tuple[Any, Any, Any] | None:
 
 
 def _grows_without_bound(base: Any, exponent: Any) -> bool:
-    """Return whether a power is the reciprocal of a base that becomes infinite with an exponential in it."""
+    """Return whether a power is the reciprocal of a base that contains an unbounded exponential."""
     import sympy as sp
 
     is_below = exponent.is_Integer and exponent.is_negative

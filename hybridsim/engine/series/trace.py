@@ -1,4 +1,4 @@
-"""Write straight-line code by running kernels on values that stand for numbers, so that each recurrence is stated once.
+"""This module writes straight-line code by running kernels on symbolic values.
 
 An operator on a `Value` appends its line to the text of a function. If a kernel branches on a value, it is run for both
 branches, and the code selects between the results.
@@ -29,12 +29,12 @@ def _is(other: Any, constant: float) -> bool:
 
 
 def written(value: Any) -> str:
-    """Return the text of a value, or of a Python number."""
+    """Return the text of a symbolic value or of a Python number."""
     return value.text if isinstance(value, Value) else number(value)
 
 
 class Value:
-    """A value of a function; its other operands may be Python numbers."""
+    """A symbolic value in generated code; operands may be Python numbers."""
 
     __slots__ = ("code", "text")
     __hash__ = None  # type: ignore[assignment]  # as usual in Python for a class with ==
@@ -95,7 +95,7 @@ class Value:
 
 
 class Size(Value):
-    """A value that is finite and not negative, such as a bound of an error: zero terms and products are left out."""
+    """A symbolic value that is finite and not negative, such as an error bound; zero terms are omitted."""
 
     __slots__ = ()
 
@@ -110,7 +110,7 @@ class Size(Value):
 
 
 class _Condition:
-    """A comparison of a value, whose truth is that of the path on which its code is."""
+    """A comparison of symbolic values, whose result depends on the current path of the code."""
 
     def __init__(self, name: str, value: Value, other: Any) -> None:
         self.code, self.operands = value.code, (name, value.text, written(other))
@@ -120,14 +120,14 @@ class _Condition:
 
 
 class _Undecided(Exception):
-    """The path does not say whether a condition holds."""
+    """Raised if the current path does not determine the result of a condition."""
 
     def __init__(self, condition: _Condition) -> None:
         self.condition = condition
 
 
 class Coefficients:
-    """The coefficients of registers by register and order; unknown ones are those of `otherwise`."""
+    """The Taylor coefficients of registers, by register and order."""
 
     def __init__(self, order: int, otherwise: Callable[[int, int], Any]) -> None:
         self.shape = (0, order + 1)
@@ -144,7 +144,7 @@ class Coefficients:
 
 
 class Trace(Lines):
-    """The lines of one function, made by kernels of a module.
+    """The lines of one generated function, written by kernels that run on symbolic values.
 
     Parameters
     ----------
@@ -172,11 +172,11 @@ class Trace(Lines):
         names |= replaced
 
     def read(self, array: str, i: int) -> Value:
-        """Return an element of an array that the function never writes."""
+        """Return an element of an array that the generated function never writes."""
         return Value(self, self.load(array, i))
 
     def branch(self, condition: _Condition) -> bool:
-        """Return whether a condition holds on the current path."""
+        """Return whether a condition holds on the current path of the code."""
         if not self._truths:
             raise _Undecided(condition)
         return self._truths.pop(0)
@@ -184,7 +184,7 @@ class Trace(Lines):
     def on_all_paths(
         self, step: Callable[..., Any], row: Any, tables: tuple[Coefficients, ...], k: int
     ) -> None:
-        """Run a kernel for one row and order, and choose between the results of its paths."""
+        """Run a kernel for one row and order on all paths, and choose between the results."""
         for table, new in zip(tables, self._results(step, row, tables, k, ()), strict=True):
             table.new = table.known
             table.known.update(new)
@@ -192,7 +192,7 @@ class Trace(Lines):
     def _results(
         self, step: Any, row: Any, tables: tuple[Coefficients, ...], k: int, path: tuple[bool, ...]
     ) -> list[dict[tuple[int, int], Any]]:
-        """Return what the kernel writes to each table on a path."""
+        """Return the results that the kernel writes to each table on one path."""
         self._truths = list(path)
         for table in tables:
             table.new = {}

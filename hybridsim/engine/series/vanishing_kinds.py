@@ -1,4 +1,4 @@
-"""Codes of functions, such as exponentials, that may vanish in a series although they change later."""
+"""This module encodes functions that may vanish in a Taylor series although they change later."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ MAX_POWER = 64  # largest power that is distinguished
 
 @inlined
 def register_of(number: int) -> int:
-    """Return the register in a code made by `hybridsim.engine.system.programs.mode_code.fading`."""
+    """Return the register from the code of a function that may vanish."""
     return number // (KINDS * MAX_POWER)
 
 
 @inlined
 def power_of(number: int) -> int:
-    """Return the largest power to which the fading function is raised."""
+    """Return the largest power of a function that may vanish."""
     return number // KINDS % MAX_POWER + 1

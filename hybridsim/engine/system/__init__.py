@@ -1,4 +1,4 @@
-"""A `System` is a model with parameter values: compiled functions, a run-time vector, and scheduled times.
+"""This package binds a model to parameter values: compiled functions, run-time vector, schedules.
 
 Start with `system`, then `instant` (times as two doubles) and `timetable`.
 """

@@ -1,4 +1,4 @@
-"""Compute Taylor series of Python functions by finite differences along the flow, with error bounds.
+"""This module computes Taylor series of Python functions by finite differences, with error bounds.
 
 With x_1 = f(s, x), the rate of f along the straight path x + x_1 h is 2 x_2, and its second derivative along
 x + x_1 h + x_2 h**2 is 6 x_3, because higher terms of the path do not enter. No integration is needed, only derivatives
@@ -42,7 +42,7 @@ _SMALLEST = 2.0**-40  # shift of a state of unknown size
 
 @kernel
 def _at(function: Any, s: float, moving: float, C: Any, h: float, p: Any, z: Any, x: Any, out: Any) -> None:
-    """Evaluate a function at the point h of a path: states C[:, 0] + C[:, 1] h + ..., time s + moving h."""
+    """Evaluate a function at the point h of a path, on which states and time change."""
     for i in range(C.shape[0]):
         total = C[i, 3]
         for k in range(2, -1, -1):
@@ -53,7 +53,7 @@ def _at(function: Any, s: float, moving: float, C: Any, h: float, p: Any, z: Any
 
 @allocating_kernel
 def _noise(function: Any, s: float, t: float, C: Any, p: Any, z: Any, x: Any, low: Any, high: Any) -> Any:
-    """Return the rounding error (m,) of a function's values, including that of its arguments; `t`: absolute time."""
+    """Return the rounding error (m,) of a function's values, including the rounding of its arguments."""
     m, n = low.shape[0], C.shape[0]
     noise = np.zeros(m)
     x[:] = C[:, 0]
@@ -79,7 +79,7 @@ def _noise(function: Any, s: float, t: float, C: Any, p: Any, z: Any, x: Any, lo
 def along(
     function: Any, s: float, t: float, moving: float, C: Any, p: Any, z: Any, D: Any, B: Any, H: Any
 ) -> None:
-    """Write Taylor coefficients D (m, 4) of a function along a path, their bounds B, and the steps H used.
+    """Write the Taylor coefficients (m, 4) of a function along a path, with bounds and step sizes.
 
     C (n, 4): the path, as in `_at`. moving: 1 if time advances along the path, else 0.
     """
@@ -149,7 +149,7 @@ def along(
 
 @allocating_kernel
 def _path(flow: Any, s: float, t: float, x: Any, p: Any, z: Any, C: Any, E: Any, H: Any) -> None:
-    """Write Taylor coefficients C (n, 4) of the states along the flow, bounds E, and steps H (n, 4) of their rates."""
+    """Write the Taylor coefficients (n, 4) of the states along the flow, with bounds and step sizes."""
     D, B = np.empty_like(C), np.empty_like(C)
     C[:], E[:], H[:] = 0.0, 0.0, 0.0
     C[:, 0] = x
@@ -177,7 +177,7 @@ def _series(
     G: Any,
     GE: Any,
 ) -> None:
-    """Write coefficients of the states and guards and monitors along the flow, with bounds for rounding and steps."""
+    """Write the Taylor coefficients of states, guards and monitors along the flow, with bounds."""
     _path(flow, s, t, x, p, z, C, E, H)
     if G.shape[0]:
         along(guards_and_monitors, s, t, 1.0, C, p, z, G, GE, np.empty_like(G))
@@ -188,7 +188,7 @@ def run_differences(
     flow: Any, guards_and_monitors: Any, s: float, t: float, s_error: float, x: Any, x_error: Any, p: Any, z: Any,
     C: Any, G: Any, GE: Any,
 ) -> None:  # fmt: skip
-    """Write coefficients C (n, 4) of the states and G (m, 4) of guards and monitors along the flow, with bounds GE.
+    """Write the Taylor coefficients of states (n, 4), and of guards and monitors (m, 4) with bounds.
 
     s: local time, t: absolute time. s_error, x_error: errors of time and states. Their effect on each coefficient is
     measured by small shifts. Without them the bounds contain only step and rounding errors.
@@ -232,7 +232,7 @@ def run_differences(
 
 @allocating_kernel
 def run_jacobian(flow: Any, s: float, t: float, x: Any, p: Any, z: Any, out: Any) -> None:
-    """Write d(dx/dt)/dx (n, n) to out."""
+    """Write the Jacobian d(dx/dt)/dx (n, n) to `out`."""
     n = x.shape[0]
     D, B, H = np.empty((n, ORDER + 1)), np.empty((n, ORDER + 1)), np.empty((n, ORDER + 1))
     C = np.zeros((n, ORDER + 1))

@@ -1,4 +1,4 @@
-"""Times in double-double precision: an instant is the unevaluated sum of two doubles, (high, low).
+"""This module computes with times in double-double precision, as unevaluated sums of two doubles.
 
 Error-free sums and products after T. J. Dekker, Numer. Math. 18 (1971) 224, doi:10.1007/BF01397083.
 """
@@ -24,7 +24,7 @@ class Instant(NamedTuple):
     low: float = 0.0
 
     def plus(self, step: float) -> Instant:
-        """Return this instant plus a double, rounded to the pair."""
+        """Return this instant plus a number of type double, rounded to double-double precision."""
         high, error = two_sum(self.high, step)
         return Instant(*two_sum(high, error + self.low))
 
@@ -39,7 +39,7 @@ class Instant(NamedTuple):
 
 @inlined
 def two_sum(a: float, b: float) -> tuple[float, float]:
-    """Return the rounded sum and its exact error."""
+    """Return the rounded sum of two numbers and its exact rounding error."""
     s = a + b
     v = s - a
     return s, (a - (s - v)) + (b - v)
@@ -47,7 +47,7 @@ def two_sum(a: float, b: float) -> tuple[float, float]:
 
 @inlined
 def two_product(a: float, b: float) -> tuple[float, float]:
-    """Return the rounded product and its exact error (barring overflow and underflow)."""
+    """Return the rounded product of two numbers and its exact rounding error."""
     product = a * b
     t = _SPLITTER * a
     a_high = t - (t - a)
@@ -59,26 +59,26 @@ def two_product(a: float, b: float) -> tuple[float, float]:
 
 
 def times(instant: Instant, factor: float) -> Instant:
-    """Return an instant times a double, as a pair."""
+    """Return an instant times a double, in double-double precision."""
     high, error = two_product(instant.high, factor)
     return Instant(*two_sum(high, error + instant.low * factor))
 
 
 def multiple(start: float, k: int, period: float) -> Instant:
-    """Return the k-th scheduled time, start + k*period, without a running sum."""
+    """Return the k-th scheduled time, start + k*period, without a sum of rounding errors."""
     high, error = two_product(float(k), period)
     total, rest = two_sum(start, high)
     return Instant(*two_sum(total, rest + error))
 
 
 def phase(instant: Instant, rate: float, offset: float) -> float:
-    """Return (rate*instant + offset) modulo 2 pi, accurate for any number of turns; see `phase_of`."""
+    """Return the phase (rate*instant + offset) modulo 2 pi, accurate for any number of turns."""
     return float(phase_of(instant.high, instant.low, rate, offset))
 
 
 @kernel
 def phase_of(high: float, low: float, rate: float, offset: float) -> float:
-    """Return (rate*(high + low) + offset) modulo 2 pi, accurate for any number of turns.
+    """Return the phase (rate*(high + low) + offset) modulo 2 pi, accurate for any number of turns.
 
     The result is in [-pi, pi], or outside by the rounding of the whole angle if that is half a turn. The product and
     the reduction use two doubles. After 1e6 turns the angle is accurate to one ulp, while a plain ``rate*t`` would have

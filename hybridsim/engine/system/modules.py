@@ -1,4 +1,4 @@
-"""Load the generated module of a model: find it on disk by the hash of the model's structure, or generate it."""
+"""This module loads the generated module of a model from disk, or generates it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Compiled:
-    """The functions of a model: compiled ones with addresses for kernels, and Python ones for use at events."""
+    """The functions of a model: compiled ones for kernels, and Python ones for events."""
 
     module: ModuleType
     seconds: float  # time of lowering; 0 if the module was cached
@@ -35,7 +35,7 @@ class Compiled:
 
     @property
     def data(self) -> dict[str, Any]:
-        """Return all data about the model that is not in the functions."""
+        """Return all data of the generated module that are not functions."""
         return self.module.DATA
 
     def lengths_to_compile(self) -> list[int]:
@@ -45,7 +45,7 @@ class Compiled:
         return [len(text) for text in texts_to_compile(self.module)]
 
     def address(self, name: str) -> Any:
-        """Return the address of a function: flow, tangent, project, guards, surfaces, monitors or quantities."""
+        """Return the address of a compiled function by its name, such as flow or guards."""
         if name not in self._compiled:
             from hybridsim.engine.native.kernels import compile_model_function
 
@@ -62,7 +62,7 @@ _lock = SharedLock()  # for both dictionaries
 
 
 def compiled(model: Model) -> Compiled | PythonCode:
-    """Return the compiled form of a model, from memory or disk, or by lowering it."""
+    """Return the compiled form of a model from memory or disk, or by lowering the model."""
     if model.flow is not None:
         return _code_of_functions(model)
     name: str = model.once("module", lambda: _name(model))
@@ -127,13 +127,13 @@ class _FromDisk(SourceFileLoader):
 
 
 class _FromMemory(InspectLoader):
-    """Loads the module of a model if nothing is stored on disk."""
+    """Loads the module of a model from its text if nothing is stored on disk."""
 
     def __init__(self, name: str, text: str) -> None:
         self.name, self._text = name, text
 
     def get_source(self, fullname: str) -> str:
-        """Return its source text."""
+        """Return the source text of the module."""
         return self._text
 
 

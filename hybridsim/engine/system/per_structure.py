@@ -1,4 +1,4 @@
-"""Values that depend on a model's structure alone, made once for all systems that share it."""
+"""This module stores values that depend on a model's structure only, once for all systems with it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Made = TypeVar("Made")
 
 
 def per_structure(make: Callable[[Any, *Key], Made], most: int = sys.maxsize) -> Callable[[Any, *Key], Made]:
-    """Keep what a function of a system makes, for each key of further arguments, as long as the system's code lives.
+    """Cache the results of a function of a system, for as long as the code of the system is in use.
 
     If several threads make a value at the same time, all get the value of the first one. most: number of keys after
     which all values are made again, for keys such as the values of parameters.

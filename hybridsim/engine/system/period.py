@@ -1,4 +1,4 @@
-"""Determine the period of a model's forcing."""
+"""This module determines the period of a model's forcing."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _MAX_PERIOD_RATIO = 64  # longest common period, in units of the longest single 
 
 
 def system_period(system: System) -> float | None:
-    """Return the period of all known time dependence: the longest, if the others divide it; else None."""
+    """Return the longest period of all known time dependence if the others divide it, else None."""
     periods = forcing_periods(system)
     return _multiple_of_all(periods, 1) if periods else None
 
@@ -33,7 +33,7 @@ def common_multiple(periods: list[float]) -> float | None:
 
 
 def all_periods(system: System) -> list[float]:
-    """Return the periods of all forcing, inputs and clocks; an empty list if one forcing has no period."""
+    """Return the periods of all forcing, inputs and clocks, or an empty list if one has no period."""
     periods = forcing_periods(system)
     if periods is None:
         return []
@@ -42,7 +42,7 @@ def all_periods(system: System) -> list[float]:
 
 
 def forcing_periods(system: System) -> list[float] | None:
-    """Return the period of each sine of time and of each input; None if one of them has no period."""
+    """Return the period of each sine of time and of each input, or None if one has no period."""
     values = system.values
     periods = [2.0 * math.pi / abs(float(rate)) for rate in system.rates if rate != 0.0]
     for declared in system.model.inputs:
@@ -62,7 +62,7 @@ def _multiple_of_all(periods: list[float], most: int) -> float | None:
 
 
 def forcing_period(model: Model) -> float | None:
-    """Return the period of a model's forcing at its parameter values, or None if it has no single one."""
+    """Return the period of a model's forcing at its parameter values, or None if there is no single one."""
     from hybridsim.engine.native.kernels import announce_compilation
     from hybridsim.engine.system.system import System
 

@@ -1,4 +1,4 @@
-"""Expand Taylor series of one segment, with the optimised tape of its modes and its constants."""
+"""This module expands Taylor series at points of one segment, in fixed modes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LARGEST_TERM, _MODERATE = 1e250, 1e100
 
 
 def short_order(rtol: float) -> int:
-    """Return the cheapest order of series if convolutions dominate the cost: 1 - ln(rtol)/2.
+    """Return the cheapest order of Taylor series if convolutions dominate the cost: 1 - ln(rtol)/2.
 
     The number of convolutions grows with the square of the order (Jorba and Zou 2005, section 3).
     """
@@ -42,7 +42,7 @@ def series_order(rtol: float, linear: bool = False) -> int:
 
 
 class SeriesRun:
-    """Expands the flow of fixed modes and inputs at one point after another."""
+    """Expands the flow with fixed modes and inputs in Taylor series at successive points."""
 
     def __init__(self, system: System, p: np.ndarray, z: np.ndarray, tolerances: Tolerances) -> None:
         tape, self.optimised = system.code.data["tape"], system.optimised_tape(z)
@@ -61,7 +61,7 @@ class SeriesRun:
         self.monitored_registers = np.concatenate([self.guards, self.optimised.monitors])
 
     def expand(self, s: float, x: np.ndarray, longest: float) -> tuple[float, np.ndarray]:
-        """Return the reach of the series from (s, x), at most `longest`, and coefficients of the states (n, order + 1).
+        """Return the range of the Taylor series at (s, x), and the coefficients (n, order + 1) of the states.
 
         There are fewer terms if the unit of time is so far from the time scale of the motion that the rest would
         overflow.
@@ -75,7 +75,7 @@ class SeriesRun:
         return float(h), self.V[self.states, : order + 1]
 
     def _representable(self) -> int:
-        """Return the order up to which the coefficients of states of moderate size stay within range."""
+        """Return the order up to which Taylor coefficients do not overflow or underflow."""
         sizes = np.abs(self.V[self.states])
         if not len(sizes):
             return self.order

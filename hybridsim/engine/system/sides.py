@@ -1,4 +1,4 @@
-"""Find the modes of components that depend on the state alone: corners, jumps, and pieces of tables."""
+"""This module finds modes that the state alone determines: corners, jumps, and pieces of tables."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 def modes_by_state(
     system: System, components: Iterable[int], s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray
 ) -> np.ndarray:
-    """Return the modes z with some components set to the mode that is valid at x.
+    """Return the modes `z`, in which some components get the mode that is valid at `x`.
 
     A component on a border keeps its mode if that is one of the two; on a surface it holds if possible. An argument may
     have corners itself, so the modes are computed again until none changes.
@@ -22,21 +22,21 @@ def modes_by_state(
     z, row, numbers = z.copy(), np.ascontiguousarray(x)[None, :], tuple(components)
 
     def violated(c: int, mode: int) -> int | None:
-        """Return the first guard of a mode that is negative at x, or None."""
+        """Return the first guard of a mode that is negative at `x`, or None."""
         z[c] = mode
         values = system.rows("guards", system.guard_count, np.array([s]), row, p, z)[0]
         guards = system.automata[c].guards[mode]
         return next((k for k, number in enumerate(guards) if not values[number] >= 0.0), None)
 
     def on_surface(c: int, automaton: Automaton) -> int:
-        """Return the mode of a surface: above, below, or the holding one if it is admissible."""
+        """Return the mode of a surface: above, below, or holding if the holding mode is admissible."""
         above, below = violated(c, automaton.above) is None, violated(c, automaton.below) is None
         if above and below and violated(c, automaton.hold) is None:
             return automaton.hold
         return automaton.above if above else automaton.below
 
     def on_side(c: int, automaton: Automaton) -> int:
-        """Return the mode of a corner or a table at x, by steps from each mode to a neighbouring mode."""
+        """Return the mode of a corner or table at `x`, found from mode to neighbouring mode."""
         mode = int(z[c])
         for _ in automaton.modes:
             k = violated(c, mode)

@@ -1,4 +1,4 @@
-"""Evaluate inputs at run time: the piece of a table, wave or chirp that holds from an instant on, and the next knot."""
+"""This module evaluates inputs at run time: the current piece of a table, wave or chirp."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _SHAPES = {
 
 
 class Signal:
-    """One input with its parameter values: pieces and knots."""
+    """One input with its parameter values: its pieces and knots."""
 
     def __init__(self, declared: Input, values: Mapping[str, float]) -> None:
         self.kind = declared.kind
@@ -39,7 +39,7 @@ class Signal:
             self._corners = square if self.shape == "square" else _SHAPES[str(self.shape)]
 
     def piece(self, origin: Instant, forward: bool) -> tuple[float, ...]:
-        """Return the six numbers of the piece just after `origin`, or just before it backward in time."""
+        """Return the six numbers of the piece just after an instant, or backward in time just before it."""
         if self.kind == "table":
             return self._table_piece(origin, forward)
         if self.kind == "step":
@@ -54,7 +54,7 @@ class Signal:
         return self._wave_piece(origin, forward)
 
     def next_knot(self, after: Instant, forward: bool) -> Instant | None:
-        """Return the first knot strictly after an instant (before it, backward in time), or None."""
+        """Return the first knot after an instant, or backward in time before it, or None."""
         if self.kind == "table":
             # pairs compare in order of time, so bisection works for long tables
             index = bisect_right(self._knots, after) if forward else bisect_left(self._knots, after) - 1
@@ -74,7 +74,7 @@ class Signal:
         return min(ahead_of, key=float) if forward else max(ahead_of, key=float)
 
     def _step_turns(self, near: Instant) -> list[tuple[Instant, float]]:
-        """Return the changes of a step input near an instant, each with the value that follows it."""
+        """Return the changes of a step input near an instant, each with the new value."""
         if self._period == 0.0:
             return [(Instant(time), value) for time, value in self._turns]
         k0 = math.floor(float(near) / self._period)
@@ -144,7 +144,7 @@ class Signal:
 def step_turns(
     number: Mapping[str, float], declared: Input
 ) -> tuple[float, list[tuple[float, float]], float]:
-    """Return the value of a step before all its changes, the changes with their new values, and the period (or 0).
+    """Return the value of a step input before all its changes, its changes, and its period (or 0).
 
     Raises
     ------
@@ -161,7 +161,7 @@ def step_turns(
     if shift == amplitude == 0.0:
         title = getattr(declared, "title", declared.name)
         raise ModelError(
-            f"'{title}' is zero at all times: a condition on its sign is meaningless",
+            f"'{title}' is zero at all times: a condition on its sign has no effect",
             remedy="correct the numbers, or write the intended branch without a condition",
         )
     if abs(shift) >= abs(amplitude):  # a wave that only touches zero has no sign change
@@ -181,7 +181,7 @@ def _exact(instant: Instant) -> Fraction:
 
 
 def _table(declared: Input) -> tuple[list[Instant], list[tuple[float, float, float, float]]]:
-    """Return knots, and the cubic after each (index 0: before the first); end values hold beyond the table."""
+    """Return the knots of a table, and the cubic polynomials before, between and after the knots."""
     times, values = np.array(declared.times), np.array(declared.values)
     if declared.interpolation == "cubic":
         from scipy.interpolate import CubicSpline

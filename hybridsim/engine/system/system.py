@@ -1,4 +1,4 @@
-"""A model bound to parameter values: its compiled functions, its run-time vector, and series with error bounds."""
+"""This module binds a model to parameter values: compiled functions, run-time vector, series."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ CORNER = "corner"  # kind of the event in which a corner changes its side
 
 @dataclass(frozen=True)
 class Automaton:
-    """One component as the engine represents it; modes and guards are numbers."""
+    """One component as the engine represents it, with numbers for modes and guards."""
 
     name: str
     modes: tuple[str, ...]
@@ -122,7 +122,7 @@ class _Frame:
         self.guard_table = self._guard_table()
 
     def _guard_table(self) -> np.ndarray:
-        """Return guard numbers (components, modes, widest) of every mode, padded with -1."""
+        """Return the guard numbers of every mode (components, modes, widest), padded with -1."""
         most = max((len(a.modes) for a in self.automata), default=0)
         widest = max((len(g) for a in self.automata for g in a.guards), default=0)
         table = np.full((len(self.automata), most, max(widest, 1)), -1, dtype=np.int64)
@@ -237,17 +237,17 @@ class System:
         return bool(self.pins or self.projected)
 
     def holds(self, z: np.ndarray) -> bool:
-        """Return whether a mode in the vector z holds states on a surface."""
+        """Return whether a mode in the combination `z` holds states on a surface."""
         return any(z[c] == self.automata[c].hold for c in (*self.pins, *self.projected))
 
     def evaluated(self, z: np.ndarray) -> list[int]:
-        """Return the states that the modes z evaluate exactly from their constraints."""
+        """Return the states that the modes `z` compute from their constraints."""
         return [i for c, held in self.pins.items() if z[c] == self.automata[c].hold for i in held]
 
     # -- values ---------------------------------------------------------------------------------------------
 
     def start_state(self, overrides: Mapping[str, float]) -> np.ndarray:
-        """Return the initial states in order."""
+        """Return the initial states in the order of the state vector."""
         values = self._start | dict(overrides)
         return np.array([float(values[n]) for n in self.names])
 
@@ -257,12 +257,12 @@ class System:
 
     @cached_property
     def discrete_start(self) -> np.ndarray:
-        """Return the initial discrete states in order."""
+        """Return the initial discrete states in the order of the state vector."""
         values = self.model.discrete_values()
         return np.array([values[d.name] for d in self.model.discrete], dtype=float)
 
     def vector(self, origin: Instant, discrete: np.ndarray, forward: bool = True) -> np.ndarray:
-        """Return the run-time vector p of a segment whose local time starts at `origin`."""
+        """Return the run-time vector of a segment whose local time starts at `origin`."""
         p = self._base.copy()
         at = self.layout
         p[at.discrete_slice] = discrete
@@ -275,7 +275,7 @@ class System:
         return p
 
     def discrete(self, p: np.ndarray) -> np.ndarray:
-        """Return the discrete states in p."""
+        """Return the discrete states from a run-time vector."""
         return p[self.layout.discrete_slice]
 
     def mode_names(self, z: np.ndarray) -> dict[str, str]:
@@ -295,19 +295,19 @@ class System:
         return self.code.address(name)
 
     def rates_at(self, p: np.ndarray) -> np.ndarray:
-        """Return the rates at which angles grow in time, at the parameter values in p."""
+        """Return the rates at which angles grow in time, at the parameter values in `p`."""
         out = np.zeros(self.layout.phases)
         self.code.module.rates(0.0, np.zeros(0), p, np.zeros(0, dtype=np.int64), out)
         return out
 
     def flow(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return dx/dt (n,)."""
+        """Return the rates dx/dt (n,) of the states."""
         out = np.empty(self.n)
         evaluate(self.address("flow"), s, x, p, z, out)
         return out
 
     def project(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return x with every held state evaluated from its constraint."""
+        """Return the states x with every held state computed from its constraint."""
         if not self.can_hold:
             return x
         out = np.empty(self.n)
@@ -317,7 +317,7 @@ class System:
     def rows(
         self, name: str, count: int, s: np.ndarray, x: np.ndarray, p: np.ndarray, z: np.ndarray
     ) -> np.ndarray:
-        """Evaluate a function at many points: s (k,), x (k, n) -> (k, count)."""
+        """Evaluate a function at k points, given by times (k,) and states (k, n), as rows (k, count)."""
         out = np.empty((len(s), count))
         evaluate_rows(self.address(name), s, x, p, z, out)
         return out
@@ -329,7 +329,7 @@ class System:
         return out
 
     def effects(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> dict[int, float]:
-        """Return the effect of each unknown on the rate of its own surface; negative if it opposes the rate."""
+        """Return the effect of each unknown on the rate of its own surface; a negative effect opposes it."""
         out = np.zeros(len(self.surface_of))
         self._in_python("effects", s, x, p, z, out)
         return {c: float(out[k]) for k, c in enumerate(self.surface_of)}
@@ -337,7 +337,7 @@ class System:
     def impulses(
         self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return slopes of surface rates u (m, n), changes of states by impulses (m, n), and loads (2, m, m).
+        """Return surface slopes (m, n), the effects of impulses on the states, and loads (2, m, m).
 
         u is the rate of a gap, or a relative velocity; see `hybridsim.engine.lowering.impulse_rows`.
         """
@@ -351,7 +351,7 @@ class System:
         )
 
     def gap_slopes(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return d(gap)/dx (m, n) of the m surfaces; zero for surfaces that are not gaps."""
+        """Return d(gap)/dx (m, n) of the surfaces, or zero for surfaces that are not gaps."""
         out = np.zeros(len(self.surface_of) * self.n)
         self._in_python("gap_slopes", s, x, p, z, out)
         return out.reshape(-1, self.n)
@@ -359,7 +359,7 @@ class System:
     def restitutions(
         self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray, speeds: np.ndarray
     ) -> np.ndarray:
-        """Return the coefficient of restitution (m,) at the approach speeds (m,); 0 for other surfaces."""
+        """Return the coefficients of restitution (m,) at given approach speeds (m,)."""
         out = np.zeros(len(self.surface_of))
         self._in_python("restitutions", s, np.concatenate([x, speeds]), p, z, out)
         return out
@@ -373,7 +373,7 @@ class System:
     def apply_reset(
         self, key: tuple[Any, ...], s: float, x: Any, p: Any, z: Any, x_plus: Any, p_plus: Any
     ) -> None:
-        """Write the values that one reset sets, all evaluated at (s, x, p, z)."""
+        """Write the values that one reset sets, evaluated at (s, x, p, z)."""
         if key in self.resets:
             at = self.layout.discrete_slice
             out = np.concatenate([x_plus, p_plus[at]])
@@ -383,7 +383,7 @@ class System:
             x_plus[:], p_plus[at] = out[: self.n], out[self.n :]
 
     def _in_python(self, name: str, s: float, x: Any, p: Any, z: Any, out: np.ndarray) -> bool:
-        """Evaluate a rarely called function of the module in Python. Return whether it has a value.
+        """Evaluate a rarely called function in Python; return whether it has a value.
 
         Outside the domain of a function of the standard library there is none, and out is filled with NaN.
         """
@@ -399,32 +399,32 @@ class System:
     # -- series ---------------------------------------------------------------------------------------------
 
     def guards_of(self, z: np.ndarray) -> np.ndarray:
-        """Return active guard numbers (components, widest), padded with -1."""
+        """Return the numbers of the active guards (components, widest), padded with -1."""
         return np.asarray(self._frame.guard_table[self._frame.component_numbers, z])
 
     def guard_title(self, guard: int, z: np.ndarray) -> str:
-        """Return the name of a guard in the modes z, for messages."""
+        """Return the name of a guard in the modes `z`, for messages."""
         automaton, mode = self.automata[self.owner[guard]], int(z[self.owner[guard]])
         name = automaton.guard_names[mode][automaton.guards[mode].index(guard)]
         of = "" if automaton.name == SINGLE else f" of {automaton.name}"
         return f"guard {name}{of} in mode {automaton.modes[mode]}"
 
     def active(self, z: np.ndarray) -> np.ndarray:
-        """Return a mask of the guards that are active in the modes z."""
+        """Return a mask of the guards that are active in the modes `z`."""
         mask = np.zeros(self.guard_count, dtype=np.bool_)
         numbers = self.guards_of(z)
         mask[numbers[numbers >= 0]] = True
         return mask
 
     def mode_rows(self, z: np.ndarray) -> list[tuple[int, ...]]:
-        """Return the rows of the tape in the modes z."""
+        """Return the rows of the tape in the modes `z`."""
         rows: list[tuple[int, ...]] = []
         for component, branches in self.code.data["tape"]["parts"]:
             rows += branches[0 if component < 0 else z[component]]
         return rows
 
     def optimised_tape(self, z: np.ndarray) -> OptimisedTape:
-        """Return the tape of the modes z for series of any order."""
+        """Return the optimised tape of the modes `z`, for series of any order."""
         return _optimised_tape(self, z.tobytes())
 
     def high_rows(self, z: np.ndarray) -> list[tuple[int, ...]]:
@@ -441,7 +441,7 @@ class System:
         s_error: float,
         with_numbers: bool = False,
     ) -> Series:
-        """Return coefficients up to third order of guards, surfaces, monitors and states along the flow of z.
+        """Return Taylor coefficients up to third order of guards, surfaces, monitors and states.
 
         with_numbers: whether the bounds include the roundoff of the numbers in the model.
         """
@@ -465,7 +465,7 @@ class System:
     def _differences(
         self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray, x_error: np.ndarray, s_error: float
     ) -> Series:
-        """Return the series by finite differences, for models of Python functions."""
+        """Return the Taylor series by finite differences, for models of Python functions."""
         guards = self.guard_count
         shape = (guards + len(self.monitor_names), ORDER + 1)
         C, G, E = np.empty((self.n, ORDER + 1)), np.empty(shape), np.empty(shape)
@@ -488,14 +488,14 @@ class System:
         )
 
     def jacobian(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return d(dx/dt)/dx (n, n) by differences, for models of Python functions."""
+        """Return the Jacobian d(dx/dt)/dx (n, n) by differences, for models of Python functions."""
         out = np.empty((self.n, self.n))
         t = float(p[self.layout.origin_at]) + s
         run_jacobian(self.address("flow"), s, t, x, self._probing(p), z, out)
         return out
 
     def _probing(self, p: np.ndarray) -> np.ndarray:
-        """Return p for differences, which suppresses notes on errors that Python functions raise far from the run."""
+        """Return the run-time vector for finite differences, with a flag that exceptions are not reported."""
         p = p.copy()
         p[self.layout.pin_at] = 0.0
         return p

@@ -1,4 +1,4 @@
-"""Cache the systems of recent models, so that a model run repeatedly is validated and bound once."""
+"""This module caches the systems of recent models, so that repeated runs bind a model once."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def known_system(model: Model) -> System | None:
 
 
 def system_of(model: Model) -> System:
-    """Return the system of a valid model, cached by identity. Models are frozen, and systems keep no state of runs.
+    """Return the system of a valid model from the cache, or bind the model to a new system.
 
     Raises
     ------

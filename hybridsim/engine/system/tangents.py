@@ -1,4 +1,4 @@
-"""Compute first derivatives of rates, guards, surfaces and monitors by everything they depend on.
+"""This module computes first derivatives of rates, guards, surfaces and monitors.
 
 This is forward automatic differentiation of the tape (A. Griewank and A. Walther, Evaluating Derivatives, 2nd ed., SIAM
 2008, chapter 3). Each register has its value and its derivatives in D directions, and each operation has its own rule.
@@ -45,7 +45,7 @@ from hybridsim.engine.system.system import System
 
 @inlined
 def _combine(D: Any, out: int, first: float, a: int, second: float, b: int) -> None:
-    """Set D[out] = first D[a] + second D[b]. Zero tangents contribute zero, even with infinite factors."""
+    """Set D[out] = first D[a] + second D[b], where zero derivatives times infinite factors are zero."""
     for j in range(D.shape[1]):
         total = 0.0
         if D[a, j] != 0.0:
@@ -57,7 +57,7 @@ def _combine(D: Any, out: int, first: float, a: int, second: float, b: int) -> N
 
 @kernel
 def _tangent(op: int, a: int, b: int, c: int, out: int, V: Any, D: Any) -> None:
-    """Apply the rule of one operation. All values V[register, 0] are known."""
+    """Apply the differentiation rule of one operation; all values V[register, 0] are known."""
     u, v, y = V[a, 0], V[b, 0], V[out, 0]
     if op in (ADD, ADD_CONSTANT):
         _combine(D, out, 1.0, a, 1.0, b)
@@ -118,7 +118,7 @@ def run_tangents(
     values: Any,
     tangents: Any,
 ) -> None:
-    """Write values (m, W) and tangents (m, W, D) of registers (W,) at local times s (m,) and states x (m, n).
+    """Write values and derivatives of some registers at times s (m,) and states x (m, n).
 
     seeds (n + 1 + P, D): directions of the states, of local time, and of each entry of p.
     """
@@ -152,14 +152,14 @@ def run_tangents(
 
 
 class Tangents(NamedTuple):
-    """Values (m, W) and derivatives (m, W, D) of some functions of a mode."""
+    """Values (m, W) and derivatives (m, W, D) of W functions of a mode."""
 
     values: np.ndarray
     slopes: np.ndarray
 
 
 class TangentTape:
-    """The tape of one vector of modes for rates and further functions with their derivatives.
+    """The tape of one combination of modes for rates and other functions with derivatives.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ class TangentTape:
         return np.array_equal(self._rows, other._rows) and np.array_equal(self._outputs, other._outputs)
 
     def __call__(self, s: np.ndarray, x: np.ndarray, p: np.ndarray, seeds: np.ndarray) -> Tangents:
-        """Evaluate at times s (m,) and states x (m, n), with derivatives along the D columns of `seeds`."""
+        """Evaluate values and derivatives at times (m,) and states (m, n), along the columns of `seeds`."""
         count, outputs, directions = self._registers.count, len(self._outputs), seeds.shape[1]
         values, slopes = np.empty((len(s), outputs)), np.empty((len(s), outputs, directions))
         run_tangents(

@@ -1,4 +1,4 @@
-"""Schedule the events at known times: scheduled resets, clock ticks, and knots of inputs."""
+"""This module finds the events at known times: scheduled resets, clock ticks, knots of inputs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hybridsim.expr import evaluate
 
 @dataclass(frozen=True)
 class Appointment:
-    """An instant to step to exactly, and the schedules due then (none for a knot of an input).
+    """A scheduled time that a step must reach exactly, and the schedules that are due then.
 
     A schedule that lists this time several times occurs as often. At a renewal only the local time is restarted.
     """
@@ -48,7 +48,7 @@ class Timetable:
         self.settled = instant
 
     def due_at_start(self, start: Instant) -> tuple[int, ...]:
-        """Return the schedules whose first time is the start of the run, such as a clock at its offset."""
+        """Return the schedules that are due at the start of the run, such as a clock with zero offset."""
         return tuple(
             k
             for k in range(len(self._schedules))
@@ -57,7 +57,7 @@ class Timetable:
         )
 
     def next(self, after: Instant, forward: bool) -> Appointment | None:
-        """Return the nearest appointment strictly after an instant. Times that agree within rounding are merged.
+        """Return the nearest scheduled time after an instant; times equal within rounding are merged.
 
         Two clocks with rounded periods may differ by two ulps at a common time. The last time may coincide with the end
         of the run in the same way. The result is None if no time is left before the end.
@@ -87,7 +87,7 @@ class Timetable:
         return Appointment(latest, tuple(k for k in due for _ in range(self._count(k, nearest))))
 
     def _count(self, k: int, instant: Instant) -> int:
-        """Return how many times in a due schedule's list equal an instant within rounding; 1 for a clock."""
+        """Return how many times of a due schedule are equal to an instant within rounding; 1 for a clock."""
         times, slack = self._schedules[k][0], self._slack(instant)
         if not times:
             return 1
@@ -120,6 +120,6 @@ class Timetable:
         return None if not ahead else (ahead[0] if forward else ahead[-1])
 
     def _is_settled(self, instant: Instant) -> bool:
-        """Return whether an instant is within rounding of the last completed appointment."""
+        """Return whether an instant is within rounding of the last completed scheduled time."""
         settled = self.settled
         return settled is not None and abs(instant.minus(settled)) <= self._slack(settled)

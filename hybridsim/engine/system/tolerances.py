@@ -1,4 +1,4 @@
-"""The error control of a run: relative and absolute tolerances and bounds of the step."""
+"""This module defines the tolerances of a run and the bounds of its step size."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Tolerances:
-    """Error control of a run: tolerances and bounds of the step."""
+    """The tolerances of a run and the bounds of its step size."""
 
     rtol: float
     atol: np.ndarray  # (n,)

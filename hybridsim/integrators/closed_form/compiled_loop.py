@@ -1,4 +1,4 @@
-"""The part of closed forms in the compiled loop of a run: tables, arrays and record."""
+"""This module contains the part of the method `exact` in the compiled loop: tables, arrays, record."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from hybridsim.integrators.closed_form.segments import ClosedFormArrays, ClosedF
 
 
 class ClosedFormKernels(MethodKernels):
-    """The part of linear modes in closed form."""
+    """The part of the method `exact` in the compiled loop of a run."""
 
     loop = staticmethod(closed_form_loop)
     rows = ClosedFormRows
@@ -45,7 +45,7 @@ class ClosedFormKernels(MethodKernels):
     def tables(
         self, tapes: Tapes, state: HybridState, origin: Instant, target: Instant
     ) -> tuple[Any, deque[Any]] | None:
-        """Return the tables of the modes met so far, and reusable arrays for tables of this shape."""
+        """Return the tables of the modes so far, and reusable arrays for tables of this shape."""
         self._reach = max(self.horizon, min(target.minus(origin), self.longest))
         found = tables_of(self.system, tapes.modes, state.p, self._reach)
         if found is None:
@@ -55,7 +55,7 @@ class ClosedFormKernels(MethodKernels):
         return found
 
     def arrays(self) -> Any:
-        """Return new arrays of the kernel for one call, as a pack."""
+        """Return new packed arrays of the segment kernel for one call."""
         tables, widest = self.lin, self.lin.values.shape[1]
         return packed(
             ClosedFormArrays(
@@ -72,11 +72,11 @@ class ClosedFormKernels(MethodKernels):
         )
 
     def fields(self) -> Sequence[tuple[Any, tuple[int, ...]]]:
-        """Return the dtype and the shape of a row of each array in `rows`."""
+        """Return the dtype and the row shape of each array in `rows`."""
         return (float, ()), (np.int64, ()), (complex, (self.columns,))
 
     def begin(self, own: Any, tapes: Tapes) -> Any:
-        """Write the last zeros of guards in this run to the arrays."""
+        """Write the last zeros of guards in this run to the arrays, as initial guesses."""
         known = len(self.hints)
         own.hints[known:] = 0.0
         if known:
@@ -84,11 +84,11 @@ class ClosedFormKernels(MethodKernels):
         return own
 
     def end(self, own: Any, tapes: Tapes, lin: Any) -> Any:
-        """Return the tables of the call, the horizon for which they were made, and the last zeros of guards."""
+        """Return the tables of the call, their segment length, and the last zeros of guards."""
         return lin, self._reach, own.hints.copy()
 
     def take(self, result: Any) -> None:
-        """Keep the horizon and the last zeros of guards."""
+        """Store the segment length of the tables and the last zeros of guards for the next call."""
         _, self.horizon, self.hints = result
 
     def block(
@@ -98,12 +98,12 @@ class ClosedFormKernels(MethodKernels):
         last_steps: np.ndarray,
         *record: np.ndarray,
     ) -> ClosedFormBlock:
-        """Return the committed segments of a call."""
+        """Return the segments of a call as one block."""
         return ClosedFormBlock(self.system, result[0], rows.rows, rows.ends, rows.coordinates, *record)
 
     @property
     def place(self) -> tuple[np.ndarray, ...]:
-        """Return the horizon of the tables and the last zeros of guards, which affect later zeros slightly.
+        """Return the segment length of the tables and the last zeros of guards, for a checkpoint.
 
         The hints are stored with their mode vectors, because another process has these in other rows.
         """

@@ -1,4 +1,4 @@
-"""The integrator `exact`, which computes linear modes in closed form."""
+"""This module defines the integrator `exact`, which computes linear modes in closed form."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from hybridsim.integrators.taylor.method import TaylorStepper
 
 
 def _kernels(system: System, tolerances: Tolerances, longest: float) -> ClosedFormKernels:
-    """Return the part of the compiled loop; tolerances are not used."""
+    """Return the part of the method in the compiled loop; tolerances are not used."""
     return ClosedFormKernels(system, longest)
 
 
 @dataclass(frozen=True)
 class Exact(Integrator):
-    """Closed-form motion of each linear mode, x(t) = Re(T exp(B t) c), with zeros of guards isolated by an error bound.
+    """Closed-form motion of each linear mode, x(t) = Re(T exp(B t) c), with certain zeros of guards.
 
     It applies to modes that are linear in the states with constant, polynomial, exponential or sinusoidal
     forcing, and to guards that are linear in states and forcing. The model's declaration decides this, and
@@ -54,7 +54,7 @@ class Exact(Integrator):
     has_compiled_loop: ClassVar[bool] = True
 
     def prepare(self, system: System) -> None:
-        """Compile the mode loop; refuse a model that is not piecewise linear."""
+        """Compile the event loop; raise an error for a model that is not piecewise linear."""
         refuse_nonlinear(system)
         compile_loops(system, _kernels)
 
@@ -72,6 +72,6 @@ class Exact(Integrator):
         first_step: float | None,
         watch: Watch,
     ) -> Stepper:
-        """Begin a smooth segment in the general mode loop, by Taylor series with a tight tolerance."""
+        """Begin a smooth segment in the mode loop, by Taylor series with a tight tolerance."""
         tight = Tolerances(TIGHTEST, 1e-3 * tolerances.atol, tolerances.max_step)
         return TaylorStepper(flow, x0, s_bound, tight, first_step)

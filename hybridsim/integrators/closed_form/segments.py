@@ -1,4 +1,4 @@
-"""The segment of linear modes in the compiled event loop: one closed form up to the first event."""
+"""This module follows a segment of linear modes in closed form up to the first event."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ _DONE = -1.0  # replaces a guard's size if its first zero is known
 
 
 class ClosedFormArrays(NamedTuple):
-    """Arrays of the kernel, for J modal coordinates and K vectors of modes."""
+    """The arrays of the segment kernel, for J modal coordinates and K combinations of modes."""
 
     points: np.ndarray  # (1,) number of points from which guards were followed
     c: np.ndarray  # (J,) modal coordinates
@@ -61,7 +61,7 @@ class ClosedFormArrays(NamedTuple):
 
 
 class ClosedFormRows(NamedTuple):
-    """The committed segments."""
+    """The rows of the stored segments."""
 
     ends: np.ndarray  # end in local time
     rows: np.ndarray  # row of the tables
@@ -70,7 +70,7 @@ class ClosedFormRows(NamedTuple):
 
 @inline_always
 def first_exit_of(lin: Any, tapes: Any, k: int, bound: float, state: Any, own: Any) -> tuple[int, float]:
-    """Find the guard of the modes in row k that first becomes negative, and when; (_NO_GUARD, bound), or (_OPEN, time).
+    """Find the guard that becomes negative first in the modes of row `k`, and its time.
 
     Waves have their zeros in closed form. Of the other guards the one with the earliest zero in the last
     visit of these modes comes first, or else the one that falls fastest. The rest need to be followed no
@@ -122,7 +122,7 @@ def first_exit_of(lin: Any, tapes: Any, k: int, bound: float, state: Any, own: A
 
 @inlined
 def stopped(hints: Any, k: int, former: Any) -> SegmentEnd:
-    """Restore the initial guesses of zeros for the current segment, because the segment is not committed."""
+    """Restore the initial guesses of zeros for a segment that is not stored."""
     put(former, hints[k])
     return not_followed(STOPPED)
 
@@ -131,7 +131,7 @@ def stopped(hints: Any, k: int, former: Any) -> SegmentEnd:
 def closed_form_segment(
     start: Any, model: Any, loop: Any, state: Any, work: Any, own: Any, rows: Any
 ) -> SegmentEnd:
-    """Follow one segment in closed form; see `hybridsim.engine.run.method_kernels.MethodKernels`.
+    """Follow one segment in closed form, as the kernel of the event loop for the method `exact`.
 
     The result is FULL also after POINTS evaluations of guards; the rest of the run then begins in another call.
     """
@@ -187,5 +187,5 @@ def closed_form_segment(
 
 
 def closed_form_loop(model: Any, call: Any, state: Any, work: Any, record: Any, own: Any, rows: Any) -> int:
-    """Run from event to event over segments in closed form."""
+    """Run from event to event, with segments in closed form."""
     return event_loop(closed_form_segment, model, call, state, work, record, own, rows)

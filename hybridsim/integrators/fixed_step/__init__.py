@@ -1,1 +1,1 @@
-"""Methods with a fixed step, which decide events themselves: the published ones and Moreau-Jean time stepping."""
+"""This package contains the fixed-step methods: the published ones and Moreau-Jean time stepping."""

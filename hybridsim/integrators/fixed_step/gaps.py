@@ -1,4 +1,4 @@
-"""Find the signs of the gaps of unilateral contacts at a step, as far as rounding allows."""
+"""This module finds the signs of the gaps of unilateral contacts at a step."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hybridsim.engine.system.system import System
 
 
 def gaps(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> dict[int, tuple[int, bool]]:
-    """Return the sign of each unilateral component's gap, and whether its rate is not zero, at local time 0.
+    """Return the sign of each gap, and whether the rate of the gap is not zero.
 
     p : run-time vector with its pin off, so that the states are used unchanged.
     """

@@ -1,4 +1,4 @@
-"""Kernels that all fixed-step methods share: reasons to return to Python, and sign changes in a step."""
+"""This module contains the kernels that all fixed-step methods share."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def leaves_side(before: float, after: float) -> bool:
 def brought_to_zero(
     address: Any, s: float, x: Any, p: Any, z: Any, fresh: Any, is_first: bool, before: Any, after: Any
 ) -> bool:
-    """Return whether the modes at the start of a step, rather than the motion, set a monitor to zero.
+    """Return whether the modes at the start of a step set a monitor to zero, instead of the motion.
 
     address: the monitors' function, whose values are written to before; after: their values at the end of the
     last step. Monitors for which this holds are marked in fresh.
@@ -53,7 +53,7 @@ def passed(
     after: Any,
     counts: Any,
 ) -> int:
-    """Return the reason to end the loop after a step to (s1, x1), or CONTINUES.
+    """Return the reason to end the loop after a step, or CONTINUES.
 
     functions: addresses of guards and monitors. guard_numbers: guards that must not be negative. fresh: monitors
     that have just fired, whose remaining zero on the first step is not a new one. before: monitor values at
@@ -83,7 +83,7 @@ def passed(
 
 @kernel
 def _changed_rows(before: Any, modes: Any, rows: Any) -> int:
-    """Write the rows at which modes change, and return their number."""
+    """Write the indices of the rows at which modes change, and return how many there are."""
     count, components, flat = 0, before.shape[0], modes.reshape(modes.size)
     for k in range(flat.shape[0]):
         source = before[k] if k < components else flat[k - components]
@@ -97,6 +97,6 @@ _write_rows = Precompiled(_changed_rows)
 
 
 def changed_rows(before: np.ndarray, modes: np.ndarray) -> np.ndarray:
-    """Return the rows at which modes change; before: modes before the first row."""
+    """Return the indices of the rows at which modes change; `before` contains the earlier modes."""
     rows = np.empty(len(modes), dtype=np.int64)
     return rows[: _write_rows(before, modes, rows)].copy()

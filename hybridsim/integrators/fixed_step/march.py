@@ -1,4 +1,4 @@
-"""The interface of a fixed-step method: its kernels, bound to one run."""
+"""This module defines the interface of a fixed-step method: its kernels for one run."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 
 
 class March(Protocol):
-    """The kernels of one method for one run.
+    """The kernels of one fixed-step method for one run.
 
     step, halvings: length of a step, and how often it is halved to locate the zero of a guard or monitor.
     pinned: whether held states are evaluated from their constraints. has_sides_only: whether there is no
@@ -30,7 +30,7 @@ class March(Protocol):
         fresh: np.ndarray,
         rows: tuple[np.ndarray, np.ndarray, np.ndarray],
     ) -> tuple[int, int]:
-        """Step from local time 0 in start = (x, z) up to the bound, or until Python has to act.
+        """Take steps from local time 0 up to the bound, or until Python has to act.
 
         guard_numbers: guards of components without a surface. fresh: monitors that have just fired. Row k of rows =
         (times, states, modes) holds the start of step k and the modes during it; the last row is the end.
@@ -39,13 +39,13 @@ class March(Protocol):
         ...
 
     def trial(self, s: float, tau: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return the state after one step of length tau."""
+        """Return the state after one step of length `tau`."""
         ...
 
     def refused(self) -> str:
-        """Return the message for a last call that ended with RESTITUTION."""
+        """Return the message for a call that ended because a restitution is invalid."""
         ...
 
     def warnings(self) -> list[str]:
-        """Return warnings about the run."""
+        """Return the warnings of this method about the run."""
         ...

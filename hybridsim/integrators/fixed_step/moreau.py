@@ -1,4 +1,4 @@
-"""Moreau-Jean time stepping, which locates no events and solves the force laws at the end of each step."""
+"""This module defines Moreau-Jean time stepping, which does not locate events."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _HALVINGS = 16  # halvings of a step in which a declared guard or monitor crosse
 
 @dataclass(frozen=True)
 class Moreau(Integrator):
-    """Moreau-Jean time stepping: a fixed step, implicit in the forces of contacts, without located events.
+    """Moreau-Jean time stepping: a fixed step, implicit in the contact forces, without located events.
 
             X = x + h (theta a(t + h, X) + (1 - theta) a(t, x)) + h sum_k B_k f_k,   f_k in the law of contact
             k at v_k(X)
@@ -106,7 +106,7 @@ class Moreau(Integrator):
                 raise UsageError(f"{self.name}: `{option}` cannot be {value!r}", remedy=remedy)
 
     def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
-        """Run a task with fixed steps."""
+        """Run a task with steps of fixed length."""
         step = fixed_step_length(system, self.step, self.period, self.steps_per_period, self.name)
         refuse_longer(step, task.tolerances.max_step, self.name)
         refuse_loads_of_friction(system.model, self.name)
@@ -115,7 +115,7 @@ class Moreau(Integrator):
 
 
 class MoreauMarch:
-    """The kernels of one run; see `hybridsim.integrators.fixed_step.march.March`."""
+    """The kernels of Moreau-Jean time stepping for one run."""
 
     halvings, pinned, has_sides_only = _HALVINGS, True, False
 
@@ -153,7 +153,7 @@ class MoreauMarch:
         fresh: np.ndarray,
         rows: tuple[np.ndarray, np.ndarray, np.ndarray],
     ) -> tuple[int, int]:
-        """Step up to the bound, or until Python has to act."""
+        """Take steps up to the bound, or until Python has to act."""
         x, z = start
         count, why = moreau_steps(
             self._functions, self._settings, self.step, self._table, guard_numbers, bound, p, x.copy(), z.copy(), fresh,
@@ -162,7 +162,7 @@ class MoreauMarch:
         return count, why
 
     def trial(self, s: float, tau: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return the state after one step of length tau."""
+        """Return the state after one step of length `tau`."""
         out = np.empty(len(x))
         moreau_step(
             self._functions,
@@ -180,7 +180,7 @@ class MoreauMarch:
         return out
 
     def refused(self) -> str:
-        """Return a message about the gap whose restitution is outside [0, 1], with its value."""
+        """Return a message about the gap whose restitution is outside [0, 1]."""
         scratch, system = self._scratch, self.system
         for k in np.flatnonzero(scratch.active):
             e = float(scratch.restitution[k])

@@ -1,4 +1,4 @@
-"""Kernels of time stepping with impacts: closing gaps, rebounds, and loads on friction."""
+"""This module contains kernels of time stepping with impacts: closing gaps, rebounds, and loads."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _STEPPED = 6  # index of the function ``stepped`` among the functions of a step
 
 @kernel
 def add_impacts(functions: Any, table: Any, s: float, x: Any, p: Any, scratch: Any) -> None:
-    """Compute rates u of the surfaces with their gradients at (s, x), effects of unit forces, and loads of friction.
+    """Compute the rates of the surfaces, the effects of unit forces, and the loads of friction.
 
     The loads are evaluated at the same point as the forces, see `take_apart`: `scratch.sides` are the modes at x
     with all gaps open, and `scratch.y1` are the surface functions.
@@ -55,7 +55,7 @@ def _store_loads(scratch: Any, n: int, m: int, k: int, bound: int) -> None:
 
 @kernel
 def approach(restitutions: Any, table: Any, s: float, h: float, x: Any, p: Any, z: Any, scratch: Any) -> bool:
-    """Find gaps that may push in a step, and minimum rebound speeds; return False for a bad restitution.
+    """Find the gaps that may exert a force in a step, and rebound speeds; return False if invalid.
 
     A gap takes part if it is closed, or would be closed by the middle of the step at its present rate. A
     closed gap has no approach speed, because rounding must not make it rebound.
@@ -82,7 +82,7 @@ def approach(restitutions: Any, table: Any, s: float, h: float, x: Any, p: Any, 
 
 @kernel
 def gap_rates(table: Any, X: Any, free: Any, scratch: Any) -> None:
-    """Compute the rates of the surfaces without forces, `scratch.y`, and the effects of unit forces, `scratch.G`.
+    """Compute the rates of the surfaces without forces, and the effects of unit forces on the rates.
 
     The rates are linearised about X, the last iterate, and are exact when the iteration ends.
     """

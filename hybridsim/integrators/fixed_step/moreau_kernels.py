@@ -1,4 +1,4 @@
-"""Kernels of time stepping: separation of forces from a flow, one implicit step, and its forces."""
+"""This module contains kernels of time stepping: one implicit step and its contact forces."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def scratch_for(
 def take_apart(
     functions: Any, table: Any, s: float, x: Any, p: Any, z: Any, scratch: Any, counts: Any, has_impacts: bool
 ) -> None:
-    """Compute rates without the forces, the effect of each unit force, and the bounds of each force, at (s, x).
+    """Compute the rates without contact forces, the effect of each unit force, and the force limits.
 
     The rates are linear in the forces: the difference of the rates above and below a surface is the effect of
     its force times the difference of the two forces. A slip force is evaluated at x if the surface is on its
@@ -186,7 +186,7 @@ def take_apart(
 def implicit_matrix(
     flow: Any, theta: float, h: float, s: float, x: Any, p: Any, scratch: Any, counts: Any
 ) -> bool:
-    """Factorise I - h theta da/dx from difference quotients; `scratch.a` and `scratch.sides` are at (s, x)."""
+    """Factorise the matrix I - h theta da/dx, with difference quotients for the derivatives."""
     n = x.shape[0]
     put(x, scratch.nudged)
     call(flow, s, x, p, scratch.sides, scratch.rates)
@@ -210,7 +210,7 @@ def implicit_matrix(
 
 @inlined
 def forces(table: Any, scratch: Any, m: int, tolerance: float, has_impacts: bool) -> bool:
-    """Compute the forces at the end of a step by projected Gauss-Seidel sweeps; return whether they converged.
+    """Compute the forces at the end of a step by projected Gauss-Seidel; return whether they converged.
 
     Each force holds its surface at zero if its limits allow; otherwise it is the slip force. The force of a
     gap is the smallest one with the required rebound.
@@ -268,7 +268,7 @@ def moreau_step(
     scratch: Any,
     counts: Any,
 ) -> int:
-    """Take one step of the theta scheme, implicit in the forces; write the resulting modes to z; return how it ended.
+    """Take one step of the theta scheme, implicit in the forces; write the modes and return the outcome.
 
             X = x + h (theta a(s + h, X) + (1 - theta) a(s, x)) + h sum_k B_k f_k,   f_k in the law of k at
             y_k(X)
@@ -372,7 +372,7 @@ def moreau_steps(
     out: Any,
     counts: Any,
 ) -> tuple[int, int]:
-    """Step from local time 0 in (x, z) up to the bound; see `hybridsim.integrators.fixed_step.march.March`.
+    """Take steps of Moreau-Jean time stepping from local time 0 up to the bound.
 
     counts: rates, guards, steps that did not converge. out (n,): scratch space.
     """

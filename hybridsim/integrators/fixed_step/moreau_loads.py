@@ -1,4 +1,4 @@
-"""Detection of friction limits that depend on another friction force, which time stepping does not support."""
+"""This module rejects friction loads that depend on friction, which time stepping does not support."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from hybridsim.model.smoothing.one_sided import names_of
 
 
 def refuse_loads_of_friction(model: Model, integrator: str) -> None:
-    """Refuse a contact whose load or law uses the friction force of another contact.
+    """Raise an error for a contact whose load or law uses the friction force of another contact.
 
     The sweeps treat each limit as given, except for normal forces. A limit that depends on another friction
     force would be evaluated at the slip force of that contact.

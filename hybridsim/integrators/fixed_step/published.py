@@ -1,4 +1,4 @@
-"""The published fixed-step methods: RK4 with bisection to the zero-velocity interval, and RK4 with a sign function."""
+"""This module defines the published fixed-step methods: RK4 with bisection, and RK4 with a sign function."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _FIXED = {
 
 @dataclass(frozen=True)
 class Rk4Dichotomy(Integrator):
-    """The published method: classic RK4 with step T/h0; a step in which the velocity changes sign is bisected.
+    """The published method: classic RK4 with bisection of steps in which a velocity changes its sign.
 
     The friction force follows Eq. 4 of the paper: outside the zero-velocity interval it is the slip force;
     inside it the force that holds the body, up to its limit. Bisection ends when |v| <= eps_v or after 16
@@ -88,7 +88,7 @@ class Rk4Dichotomy(Integrator):
             )
 
     def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
-        """Run a task with fixed steps."""
+        """Run a task with steps of fixed length."""
         step = fixed_step_length(system, self.step, self.period, self.steps_per_period, self.name)
         refuse_longer(step, task.tolerances.max_step, self.name)
         settings = FixedStep(
@@ -107,7 +107,7 @@ class Rk4Dichotomy(Integrator):
 
 @dataclass(frozen=True)
 class Rk4Sign(Integrator):
-    """Classic RK4 with the force mu N sgn(v) and no stick: the paper's "not considering stick-slip".
+    """Classic RK4 with the force mu N sgn(v) and without stick, for comparison with the published method.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ class Rk4Sign(Integrator):
         _one_of(self.name, "friction", self.friction, ("step", "stage"))
 
     def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
-        """Run a task with fixed steps."""
+        """Run a task with steps of fixed length."""
         step = fixed_step_length(system, self.step, self.period, self.steps_per_period, self.name)
         refuse_longer(step, task.tolerances.max_step, self.name)
         settings = FixedStep(step, SIGN, self.friction == "stage", False, False, False, False, 0.0, 16)

@@ -1,4 +1,4 @@
-"""Kernels of the published methods: the classic Runge-Kutta step, the force law by zone, the bisection."""
+"""This module contains the kernels of the published methods: RK4 step, force law, and bisection."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hybridsim.integrators.fixed_step.kernels import BOUND, CONTINUES, FULL, RES
 
 @inlined
 def _any_held(table: Any, z: Any) -> bool:
-    """Return whether a surface component is in its holding mode."""
+    """Return whether any contact or switching surface is in its holding mode."""
     for k in range(table.shape[0]):
         if z[table[k, 0]] == table[k, 3]:
             return True
@@ -20,7 +20,7 @@ def _any_held(table: Any, z: Any) -> bool:
 
 
 def workspace(n: int, surfaces: int, guards: int, monitors: int, rows: int) -> tuple[np.ndarray, ...]:
-    """Allocate the arrays of the kernels.
+    """Allocate the work arrays of the kernels.
 
     Surface values and eps; results of a step (see `step_code`); guard values; monitor values at both ends of a step.
     """
@@ -31,7 +31,7 @@ def workspace(n: int, surfaces: int, guards: int, monitors: int, rows: int) -> t
 
 @inlined
 def _reversed_surface(before: Any, after: Any, table: Any, z: Any) -> int:
-    """Return the row of the first slipping surface component whose sign changed over the step, or -1."""
+    """Return the row of the first slipping contact whose velocity changed sign in the step, or -1."""
     for k in range(table.shape[0]):
         if z[table[k, 0]] != table[k, 3] and before[k] * after[k] < 0.0:
             return k
@@ -40,7 +40,7 @@ def _reversed_surface(before: Any, after: Any, table: Any, z: Any) -> int:
 
 @inlined
 def _released(values: Any, table: Any, z: Any) -> bool:
-    """Return whether a held component is beyond its limit."""
+    """Return whether a sticking contact is beyond its stick limit."""
     for k in range(table.shape[0]):
         if z[table[k, 0]] == table[k, 3] and (values[table[k, 4]] < 0.0 or values[table[k, 5]] < 0.0):
             return True
@@ -49,7 +49,7 @@ def _released(values: Any, table: Any, z: Any) -> bool:
 
 @kernel
 def rk4_step(address: Any, s: float, x: Any, p: Any, z: Any, out: Any) -> None:
-    """Take one step; see `step_code`."""
+    """Take one step with the functions that `step_code` writes."""
     call(address, s, x, p, z, out)
 
 
@@ -70,7 +70,7 @@ def _halve_step(
     guards: Any,
     counters: Any,
 ) -> float:
-    """Bisect a step of length h until surface `row` is within eps or, for row < 0, until a limit is passed.
+    """Bisect a step until surface `row` is within `eps`, or for row < 0 until a stick limit is passed.
 
     Write the results of the last step to `out` and return its length.
     """
@@ -118,7 +118,7 @@ def run_steps(
     work: Any,
     counters: Any,
 ) -> tuple[int, int]:
-    """Take fixed steps from local time 0 in (states[0], z) towards the bound, until Python has to act.
+    """Take fixed steps from local time 0 towards the bound, until Python has to act.
 
     addresses: choose, step, march (see `step_code`), guards, monitors, project, surfaces. settings: step, halvings,
     eps. flags: bisection, zeroed, located release, rest of step, whether march can be used. counters: rhs, guards,

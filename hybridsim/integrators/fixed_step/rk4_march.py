@@ -1,4 +1,4 @@
-"""The kernels of the published methods, bound to one run."""
+"""This module binds the kernels of the published methods to one run."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _run_steps = Precompiled(run_steps)
 
 @dataclass(frozen=True)
 class FixedStep:
-    """Settings that both methods pass to the kernel."""
+    """The settings that both published methods pass to the kernel."""
 
     step: float
     rule: int
@@ -33,7 +33,7 @@ class FixedStep:
 
 
 class Rk4March:
-    """The kernels of one run; see `hybridsim.integrators.fixed_step.march.March`."""
+    """The kernels of a published method for one run."""
 
     def __init__(self, system: System, settings: FixedStep) -> None:
         self.step, self.halvings, self.pinned = settings.step, settings.halvings, settings.zeroed
@@ -69,7 +69,7 @@ class Rk4March:
         fresh: np.ndarray,
         rows: tuple[np.ndarray, np.ndarray, np.ndarray],
     ) -> tuple[int, int]:
-        """Step up to the bound, or until Python has to act."""
+        """Take steps up to the bound, or until Python has to act."""
         x, z = start
         rows[1][0] = x
         count, why = _run_steps(
@@ -79,7 +79,7 @@ class Rk4March:
         return count, why
 
     def trial(self, s: float, tau: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Return the state after one step of length tau."""
+        """Return the state after one step of length `tau`."""
         out = self._work[1]
         out[-2:] = tau, self._settings[2]
         rk4_step(self._addresses[1], s, x, p, z, out)
@@ -91,5 +91,5 @@ class Rk4March:
         return ""
 
     def warnings(self) -> list[str]:
-        """Return no warnings: the results show the errors of these methods."""
+        """Return no warnings, because the results show the errors of the published methods."""
         return []

@@ -1,4 +1,4 @@
-"""The run of a fixed-step method: steps by the kernel, declared events, and mode changes."""
+"""This module runs a fixed-step method: steps, declared events, and changes of mode."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ ROWS = 8192  # most steps per kernel call; each call has a new time origin, so t
 
 
 def _left(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-    """Apply `hybridsim.integrators.fixed_step.kernels.leaves_side` to all monitors."""
+    """Return which monitors leave their side in a step, by `leaves_side`."""
     return ((before > 0.0) & (after <= 0.0)) | ((before < 0.0) & (after >= 0.0))
 
 
@@ -55,12 +55,12 @@ def _scale(states: np.ndarray) -> np.ndarray:
 def _checkpoint(
     instant: Instant, arrays: dict[str, np.ndarray], states: np.ndarray, *others: Any
 ) -> Checkpoint:
-    """Return a checkpoint, whose scale is computed only if it is asked for."""
+    """Return a checkpoint, whose scale is computed on demand."""
     return Checkpoint(instant, arrays | {"scale": _scale(states)}, *others)
 
 
 def surface_table(system: System) -> np.ndarray:
-    """Return a row per component with a surface: its number, modes above, below, hold, and guards of the hold mode.
+    """Return a row for each component with a surface: its number, its modes, and guards of the holding mode.
 
     The entries of a gap that do not exist are -1.
     """
@@ -75,7 +75,7 @@ def surface_table(system: System) -> np.ndarray:
 
 
 class FixedStepRun:
-    """One run with fixed steps: the kernel treats surface components, this class everything else."""
+    """One run with fixed steps: the kernel handles surfaces, and this class handles everything else."""
 
     def __init__(
         self, system: System, task: Task, march: March, progress: Callable[[float], None] | None
@@ -96,7 +96,7 @@ class FixedStepRun:
         self.turned = False  # whether an input may just have jumped
 
     def run(self) -> Trajectory:
-        """Step to the end; results up to a failure are kept."""
+        """Take steps to the end of the run; the results up to a failure are kept."""
         record = self.record
         try:
             self._run()
@@ -148,7 +148,7 @@ class FixedStepRun:
 
     def _go_on_from(self, checkpoint: Checkpoint) -> None:
         if not checkpoint.arrays.keys() >= {*_STATE, "scale"}:
-            raise damaged("the place at which it continues")
+            raise damaged("the position from which the run continues")
         self.origin = checkpoint.instant
         if checkpoint.settled is not None:
             self.timetable.mark_done(checkpoint.settled)
@@ -163,7 +163,7 @@ class FixedStepRun:
         return p
 
     def _run_kernel(self, appointment: Appointment | None, target: Instant) -> bool:
-        """Call the kernel once and resolve its end; return True if the run stops."""
+        """Call the kernel once and handle the reason for its end; return True if the run stops."""
         system = self.system
         p, bound = self._vector(), target.minus(self.origin)
         times, states = np.empty(ROWS), np.empty((ROWS, system.n))
@@ -219,7 +219,7 @@ class FixedStepRun:
         return self._declared_event(s, p, why)
 
     def _sides_taken(self) -> np.ndarray:
-        """Return the modes after a jump of an input, which may move held components to a side."""
+        """Return the modes after a jump of an input, which may release held components."""
         z, p = self.z.copy(), self._vector()
         p[self.system.layout.pin_at] = 0.0
         values = self.system.rows(
@@ -235,7 +235,7 @@ class FixedStepRun:
         return z
 
     def _gaps(self) -> dict[int, tuple[int, bool]]:
-        """Return the signs of all gaps at the present states; see `hybridsim.integrators.fixed_step.gaps`."""
+        """Return the signs of all gaps at the present states."""
         if not self.system.is_unilateral.any():
             return {}
         p = self._vector()
@@ -243,7 +243,7 @@ class FixedStepRun:
         return gaps(self.system, self.x, p, self.z)
 
     def _overlaps(self, of: Iterable[int]) -> bool:
-        """Return whether a gap of these components has an invalid negative value, which ends the run."""
+        """Return whether a gap of some components has an invalid negative value, which ends the run."""
         below = [c for c, (gap, _) in self._gaps().items() if gap < 0 and c in of]
         if below:
             names = ", ".join(self.system.automata[c].name for c in below)
@@ -305,7 +305,7 @@ class FixedStepRun:
         return self.march.trial(s, tau, self.x, p, self.z)
 
     def _monitors(self, s: float, x: np.ndarray, p: np.ndarray) -> np.ndarray:
-        """Return the monitors at the integrated states; held states are not evaluated from constraints."""
+        """Return the values of the monitors at the integrated states, without projection of held states."""
         free = p.copy()
         free[self.system.layout.pin_at] = 0.0
         names = self.system.monitor_names
@@ -350,7 +350,7 @@ class FixedStepRun:
         seen: Sequence[tuple[str, int]] = (),
         starting: bool = False,
     ) -> bool:
-        """Resolve transitions and resets by the event contract, for all components without a surface.
+        """Resolve transitions and resets of all components without a surface.
 
         monitors: indices of those that reset; seen: names and directions of all that crossed, to be recorded
         first.
@@ -403,7 +403,7 @@ class FixedStepRun:
     # -- the record -----------------------------------------------------------------------------------------
 
     def _store(self, p: np.ndarray, s: np.ndarray, x: np.ndarray, z: np.ndarray, before: np.ndarray) -> None:
-        """Store the rows of one kernel call as segments of constant modes with the mode changes between them."""
+        """Store the rows of one kernel call as segments of constant modes, with mode changes between them."""
         record = self.record
         record.counters.steps += len(s) - 1
         if self.march.has_sides_only:
@@ -418,7 +418,7 @@ class FixedStepRun:
             record.occurrences.add(events)
 
     def _side_of_zeros(self, z: np.ndarray) -> None:
-        """Give rows with zero velocity the mode of the following row, because sgn has no third mode."""
+        """Give rows with zero velocity the mode of the next row, because sgn has no third mode."""
         for c, _, _, hold, *_ in surface_table(self.system):
             for k in np.flatnonzero(z[:-1, c] == hold)[::-1]:
                 z[k, c] = z[k + 1, c]

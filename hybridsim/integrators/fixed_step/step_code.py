@@ -1,4 +1,4 @@
-"""Write the steps of the published methods for one model, as functions to compile.
+"""This module writes the step functions of the published methods for one model.
 
 In the text, states x are followed by the values of the model's forcing at their time, such as sin(p[6]*t + p[9]): those
 at the end of a step are those at the start of the next one.
@@ -29,7 +29,7 @@ _STRUCTURES = 64  # most recently used structures whose functions stay in memory
 
 @dataclass(frozen=True)
 class StepCode:
-    """The parts of a model's structure and of the options on which the functions depend.
+    """The properties of a model and the options on which the step functions depend.
 
     table: see `hybridsim.integrators.fixed_step.run.surface_table`. forcing: number of values of the forcing.
     """
@@ -46,16 +46,16 @@ class StepCode:
 
     @property
     def width(self) -> int:
-        """Return the number of states and values of the forcing."""
+        """Return the number of states plus the number of forcing values."""
         return self.n + self.forcing
 
     @property
     def surfaces(self) -> int:
-        """Return the number of surface components."""
+        """Return the number of components with a surface."""
         return len(self.table)
 
     def text(self) -> str:
-        """Return the text of all functions; the ones before choose are internal."""
+        """Return the text of all step functions; functions before `choose` are internal."""
         prefix = "forced_" if self.forcing else ""
         parts = [("select", self._select()), ("classic", self._classic())]
         if self.rule == ZONE:
@@ -72,11 +72,11 @@ class StepCode:
         return text
 
     def _held(self, modes: str = "z") -> str:
-        """Return the condition that a surface component is in its holding mode."""
+        """Return the text of the condition that a surface component is in its holding mode."""
         return " or ".join(f"{modes}[{c}] == {hold}" for c, _, _, hold, *_ in self.table) or "0 > 1"
 
     def _release(self) -> Iterator[str]:
-        """Yield the release of held components beyond their limits; out[0] is 1 if there are any."""
+        """Yield code that releases held components beyond their limits."""
         yield f"values = doubles({max(self.guards, 1)})"
         yield "FORCED_guards(t, x, p, z, values)"
         yield "out[0] = 0.0"
@@ -90,7 +90,7 @@ class StepCode:
             yield "        out[0] = 1.0"
 
     def _select(self) -> Iterator[str]:
-        """Yield the choice of modes; out: surface values, eps."""
+        """Yield code that chooses the modes from the surface values."""
         eps = f"out[{self.surfaces}]"
         yield "FORCED_surfaces(t, x, p, z, out)"
         for k, (c, above, below, hold, *_) in enumerate(self.table):
@@ -108,7 +108,7 @@ class StepCode:
                 yield "    release(t, x, p, z, changed)"
 
     def _slope(self, prefix: str) -> Iterator[str]:
-        """Yield the rates; at exactly zero velocity the mean of both sides, i.e. sgn(0) = 0 for a symmetric law."""
+        """Yield code of the rates; at zero velocity, the rates are the mean of both sides."""
         yield f"if {self._held()}:"
         yield f"    sides = integers({max(self.components, 1)})"
         yield f"    other = doubles({self.n})"
@@ -125,7 +125,7 @@ class StepCode:
         yield f"    {prefix}flow(t, x, p, z, out)"
 
     def _classic(self) -> Iterator[str]:
-        """Yield a classic Runge-Kutta step; out: state and forcing at the end, surface values there, h, eps."""
+        """Yield code of a classic Runge-Kutta step."""
         n, width, end = self.n, self.width, self.width + self.surfaces
         rates = "flow" if self.rule == ZONE else "slope"
         yield f"h = out[{end}]"
@@ -155,7 +155,7 @@ class StepCode:
         yield from (f"out[{width + k}] = values[{k}]" for k in range(self.surfaces))
 
     def _here(self) -> Iterator[str]:
-        """Yield a copy of the states with the forcing at their time."""
+        """Yield code that copies the states and the forcing at their time."""
         yield f"here = doubles({self.width})"
         yield from (f"here[{i}] = x[{i}]" for i in range(self.n))
         if self.forcing:
@@ -217,7 +217,7 @@ class StepCode:
 
 @lru_cache(maxsize=_STRUCTURES)
 def step_functions(module: ModuleType, code: StepCode) -> tuple[list[Any], Any]:
-    """Return choose, step and march for a model's module, and the object that keeps them alive.
+    """Return the functions choose, step and march for a model, and an object that keeps them alive.
 
     Each is called with (t, x, p, z, out). choose sets the modes z from the state: outside eps the mode of that side;
     inside it (ZONE, Eq. 4 of the paper) the holding mode while the unknown stays within its limits, else the side to
@@ -259,7 +259,7 @@ def _machine_text(module: Any, code: StepCode) -> str:
 
 
 class _Pin(ast.NodeTransformer):
-    """Replace an element of p by its value."""
+    """Replaces an element of the run-time vector by its value."""
 
     def __init__(self, pin_at: int, value: float) -> None:
         self.text, self.value = f"p[{pin_at}]", value
@@ -269,7 +269,7 @@ class _Pin(ast.NodeTransformer):
 
 
 class _Forcing(ast.NodeTransformer):
-    """Replace the functions of time and parameters alone by elements of x from n on."""
+    """Replaces functions of time and parameters by precomputed forcing values."""
 
     def __init__(self, n: int) -> None:
         self.n = n

@@ -1,4 +1,4 @@
-"""Rosenbrock methods defined by a tableau: stiff modes without iterations, with the exact Jacobian."""
+"""This module defines Rosenbrock methods by a tableau, for stiff modes and with the exact Jacobian."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _DEFECT = 100.0  # largest defect in the middle of a step, in tolerances, as for
 
 @dataclass(frozen=True)
 class StageDense:
-    """Dense output from the stages of one step, a polynomial in theta = (s - s0)/(s1 - s0); see `RosenbrockTableau`.
+    """Dense output from the stages of one Rosenbrock step, as a polynomial in theta on [0, 1].
 
     K (order - 1, n) are the combinations of stages. The values at both ends are exact.
     """
@@ -35,7 +35,7 @@ class StageDense:
         return self._at((np.asarray(s, dtype=float) - self.s0) / (self.s1 - self.s0))
 
     def _at(self, theta: np.ndarray) -> np.ndarray:
-        """Return states (k, n) at these fractions of the step (k,)."""
+        """Return the states (k, n) at given fractions of the step (k,)."""
         theta = theta[:, None]
         inner = np.zeros((len(theta), len(self.x0)))
         for row in self.K[::-1]:
@@ -46,18 +46,18 @@ class StageDense:
         return out
 
     def middle(self) -> np.ndarray:
-        """Return the state (n,) at theta = 1/2, which may lie between two doubles of time."""
+        """Return the state (n,) in the middle of the step."""
         return self._at(np.array([0.5]))[0]
 
     def middle_slope(self) -> np.ndarray:
-        """Return the rate of change (n,) at theta = 1/2."""
+        """Return the rate of change (n,) of the dense output in the middle of the step."""
         orders = np.arange(len(self.K))
         inner = (orders * 0.5 ** (orders - 1.0)) @ self.K
         return ((self.x1 - self.x0) + 0.25 * inner) / (self.s1 - self.s0)
 
 
 class RosenbrockStepper(OneStepStepper):
-    """Advance a Rosenbrock method through one segment; event times are refined by repeating the step."""
+    """Advances a Rosenbrock method through one segment; event times are refined by repeating the step."""
 
     def __init__(
         self,
@@ -112,7 +112,7 @@ class RosenbrockStepper(OneStepStepper):
         return Trial(out, error, stages)
 
     def _holds(self, start: Point, end: Point, trial: Trial) -> bool:
-        """Return whether the dense output satisfies the flow at the middle of the step within the tolerances.
+        """Return whether the dense output satisfies the differential equation in the middle of the step.
 
         The defect is weighted like an error of the step, h (1 - gamma h J)^-1 (f(x) - x'). The weight is
         small for a stiff component that the flow damps immediately.
@@ -133,7 +133,7 @@ class RosenbrockStepper(OneStepStepper):
 
 
 class RosenbrockPoint(Point):
-    """A point with the flow's linearisation: Jacobian (n, n) and derivative with respect to time (n,)."""
+    """A point with the linearisation of the flow: Jacobian (n, n) and time derivative (n,)."""
 
     def __init__(
         self,
@@ -147,5 +147,5 @@ class RosenbrockPoint(Point):
 
     @cached_property
     def linear(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the linearisation, computed on first use."""
+        """Return the linearisation of the flow, computed on first use."""
         return self._linearised(self.s, self.x)

@@ -1,4 +1,4 @@
-"""Steinebach's Rosenbrock method Rodas5P, for stiff modes, on the compiled engine."""
+"""This module defines Steinebach's Rosenbrock method Rodas5P, for stiff modes."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Rodas5P(Integrator):
 
     @property
     def rounding(self) -> float:
-        """Return three times the root sum of squares of the rounding errors of the stages."""
+        """Return three times the root of the sum of squares of the rounding errors of the stages."""
         return 2500.0
 
     def start(

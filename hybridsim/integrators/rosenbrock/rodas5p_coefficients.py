@@ -1,4 +1,4 @@
-"""Coefficients of the Rosenbrock method Rodas5P with its embedded method and its dense output.
+"""This module contains the coefficients of Rodas5P, with its embedded method and dense output.
 
 Published in G. Steinebach, BIT Numerical Mathematics 63 (2023) 27, doi:10.1007/s10543-023-00967-x, here in
 the variables in which no product with the Jacobian is needed (E. Hairer, G. Wanner, Solving Ordinary
@@ -15,7 +15,7 @@ STAGES = 8
 
 
 def _lower(*rows: tuple[float, ...]) -> np.ndarray:
-    """Return a strictly lower triangular matrix from its rows below the first."""
+    """Return a strictly lower triangular matrix, given its rows below the first."""
     out = np.zeros((STAGES, STAGES))
     for i, row in enumerate(rows, 1):
         out[i, : len(row)] = row

@@ -1,4 +1,4 @@
-"""One trial step of a Rosenbrock method: stages as linear systems with one matrix, and the error estimate."""
+"""This module takes one trial step of a Rosenbrock method, and estimates its error."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hybridsim.engine.series.interpreter import advance
 
 @dataclass(frozen=True)
 class RosenbrockTableau:
-    """A Rosenbrock method with s stages U_i, in the form without products of the Jacobian J and a vector.
+    """A Rosenbrock method with s stages, in the form without Jacobian-vector products.
 
             (1/(gamma h) - J) U_i = f(t + nodes_i h, x + sum_j a_ij U_j) + sum_j c_ij U_j/h + d_i h df/dt
             x1 = x + sum_i m_i U_i, error = sum_i e_i U_i
@@ -37,13 +37,13 @@ class RosenbrockTableau:
 
     @property
     def arrays(self) -> tuple[Any, ...]:
-        """Return the arrays for `rosenbrock_attempt`."""
+        """Return the coefficients of the tableau as arrays for `rosenbrock_attempt`."""
         return self.gamma, self.a, self.c, self.m, self.e, self.nodes, self.d
 
 
 @kernel
 def linearise(rows: Any, flow_registers: Any, s: float, x: Any, V: Any, jacobian: Any, rate: Any) -> None:
-    """Compute the Jacobian (n, n) and the derivative with respect to time (n,) of the flow at (s, x).
+    """Compute the Jacobian (n, n) and the time derivative (n,) of the flow at (s, x).
 
     Both come from the tape at first order, one direction at a time; V (registers, 2) holds its constants.
     """
@@ -90,7 +90,7 @@ def factor(a: Any, pivots: Any) -> bool:
 
 @kernel
 def solve(a: Any, pivots: Any, b: Any) -> None:
-    """Solve in place with the factors and pivots from `factor`."""
+    """Solve a linear system in place with the factors and pivots from `factor`."""
     n = a.shape[0]
     for k in range(n):
         p = pivots[k]
@@ -121,7 +121,7 @@ def rosenbrock_attempt(
     stages: Any,
     out: Any,
 ) -> float:
-    """Try one step of length h from (s, x); write its end to `out`, return its error in units of the tolerance.
+    """Try one step of length `h` from (s, x); write its end to `out` and return its scaled error.
 
     tableau: see `RosenbrockTableau`. tolerances: rtol, atol. matrix, pivots, slope: scratch space. stages (s,
     n): output.

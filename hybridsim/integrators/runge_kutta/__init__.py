@@ -1,4 +1,4 @@
-"""This folder contains explicit embedded Runge-Kutta methods, each of which is a tableau and a name.
+"""This package contains explicit embedded Runge-Kutta methods, each of which is a tableau and a name.
 
 Start with `method`, then `dop853` or `tsit5`. `segments` is the compiled loop.
 """

@@ -1,4 +1,4 @@
-"""The part of Runge-Kutta methods in the compiled loop of a run: arrays, record and cost."""
+"""This module contains the part of Runge-Kutta methods in the compiled loop: arrays, record, cost."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ _HERMITE = packed(
 
 
 class RungeKuttaSettings(NamedTuple):
-    """The method and the settings of a run."""
+    """The coefficients of a Runge-Kutta method, and the settings of a run."""
 
     tableau: Any  # `hybridsim.integrators.runge_kutta.step.Coefficients`
     hermite: Any  # `hybridsim.engine.record.hermite.Hermite`
@@ -45,7 +45,7 @@ class RungeKuttaSettings(NamedTuple):
 
 
 class RungeKuttaArrays(NamedTuple):
-    """Arrays of the kernel: settings, series of all registers, of guards, of the states at both ends, vectors."""
+    """The arrays of the segment kernel: settings, Taylor series, and work vectors."""
 
     settings: Any  # `RungeKuttaSettings`
     parts: Any  # `hybridsim.engine.system.programs.guard_parts.Parts` of the tapes
@@ -86,14 +86,14 @@ class RungeKuttaArrays(NamedTuple):
 
 
 class RungeKuttaRows(NamedTuple):
-    """The committed steps."""
+    """The rows of the stored steps."""
 
     steps: np.ndarray  # start and length (S, 2)
     series: np.ndarray  # Taylor coefficients (S, n, 2 TERMS) of the states at both ends
 
 
 class RungeKuttaKernels(MethodKernels):
-    """The part of an explicit Runge-Kutta method."""
+    """The part of an explicit Runge-Kutta method in the compiled loop of a run."""
 
     loop = staticmethod(runge_kutta_loop)
     rows = RungeKuttaRows
@@ -123,7 +123,7 @@ class RungeKuttaKernels(MethodKernels):
         self.first_step = tolerances.first_step or 0.0
 
     def arrays(self) -> Any:
-        """Return new arrays of the kernel for one call, as a pack."""
+        """Return new packed arrays of the segment kernel for one call."""
         system, n, columns, tapes = (
             self.system,
             self.system.n,
@@ -168,11 +168,11 @@ class RungeKuttaKernels(MethodKernels):
         )
 
     def fields(self) -> Sequence[tuple[Any, tuple[int, ...]]]:
-        """Return the dtype and the shape of a row of each array in `rows`."""
+        """Return the dtype and the row shape of each array in `rows`."""
         return (float, (2,)), (float, (self.system.n, 2 * TERMS))
 
     def begin(self, own: Any, tapes: Tapes) -> Any:
-        """Put the settings of the run and the code of the tapes into the arrays."""
+        """Write the settings of the run and the code of the tapes to the arrays."""
         own.first_step[0], own.counts[:] = self.first_step, 0
         return replaced(own, settings=self.settings, parts=self.parts.of(tapes), codes=self.codes.of(tapes))
 
@@ -182,18 +182,18 @@ class RungeKuttaKernels(MethodKernels):
         return (*own.counts.tolist(), float(own.first_step[0]))
 
     def count(self, counters: Counters, steps: int, result: Any) -> None:
-        """Add the cost of the steps to the counters."""
+        """Add the cost of the steps to the counters of the run."""
         tries, rejected, _ = result
         counters.rejected += rejected
         # the series include the slope; one more in the middle
         counters.rhs_evaluations += tries * (len(self.tableau.c) - 1) + 2 * steps
 
     def take(self, result: Any) -> None:
-        """Keep the length of the next step, if a call ended within a segment."""
+        """Store the length of the next step if a call ended within a segment."""
         self.first_step = result[2]
 
     def block(
         self, result: Any, rows: RungeKuttaRows, last_steps: np.ndarray, *record: np.ndarray
     ) -> HermiteBlock:
-        """Return the committed segments of a call."""
+        """Return the segments of a call as one block."""
         return HermiteBlock(self.system, last_steps, *rows, *record)

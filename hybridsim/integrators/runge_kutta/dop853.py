@@ -1,4 +1,4 @@
-"""Dormand and Prince's method of order 8 on the compiled engine."""
+"""This module defines the method of order 8 by Dormand and Prince."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hybridsim.integrators.runge_kutta.method import RungeKuttaIntegrator, Table
 
 @dataclass(frozen=True)
 class Dop853(RungeKuttaIntegrator):
-    """Dormand and Prince's method of order 8(5,3) in a compiled mode loop, with event location by hybridsim.
+    """Dormand and Prince's method of order 8(5,3) in a compiled loop, with event location by hybridsim.
 
     It is the method of `scipy-dop853` at about a hundredth of the cost. The dense output is the two-point
     Hermite polynomial of degree 7 on Taylor coefficients; a step that contains an event is repeated up to it.

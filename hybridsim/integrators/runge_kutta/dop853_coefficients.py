@@ -1,4 +1,4 @@
-"""Coefficients of the Runge-Kutta method of order 8 of Dormand and Prince with its two error estimates.
+"""This module contains the coefficients of Dormand and Prince's method of order 8.
 
 Published in E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed., 1993, section
 II.10 (code DOP853), doi:10.1007/978-3-540-78862-1.

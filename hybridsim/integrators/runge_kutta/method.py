@@ -1,4 +1,4 @@
-"""Explicit embedded Runge-Kutta methods defined by a tableau: a new method is a tableau and a name."""
+"""This module defines explicit embedded Runge-Kutta methods by a tableau and a name."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["RungeKuttaIntegrator", "RungeKuttaStepper", "Tableau"]
 
 
 class RungeKuttaStepper(OneStepStepper):
-    """Advance a method through one segment, with local extrapolation and dense output of degree 7.
+    """Advances a Runge-Kutta method through one segment, with dense output of degree 7.
 
     The dense output is the Hermite polynomial on the Taylor coefficients of the flow at both ends, with an
     error of h**8 x^(8)/(256 8!); event times are refined by repeating the step.
@@ -83,7 +83,7 @@ class RungeKuttaStepper(OneStepStepper):
 
 @dataclass(frozen=True)
 class RungeKuttaIntegrator(Integrator):
-    """An explicit embedded method in compiled code; class variables hold the tableau and the description.
+    """The base class of explicit embedded methods; class variables contain tableau and description.
 
     Segments and ordinary events go through the compiled mode loop if the model permits it. Jumps inside a
     mode and Python functions do not, since the loop follows guards by their series.
@@ -100,7 +100,7 @@ class RungeKuttaIntegrator(Integrator):
 
     @property
     def rounding(self) -> float:
-        """Return the rounding error of a step, from the sums of the stages and the sums inside each stage."""
+        """Return the rounding error of a step, from the rounding of all sums in the stages."""
         return self.tableau.rounding
 
     @classmethod
@@ -108,12 +108,12 @@ class RungeKuttaIntegrator(Integrator):
         return RungeKuttaKernels(system, tolerances, longest, cls.tableau)
 
     def prepare(self, system: System) -> None:
-        """Compile the mode loop."""
+        """Compile the event loop of the method."""
         if system.has_tape and not system.has_corners:
             compile_loops(system, self._kernels)
 
     def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> CompiledLoop | None:
-        """Return the compiled mode loop; None for a model with corners or Python functions."""
+        """Return the compiled event loop, or None for a model with corners or Python functions."""
         has_compiled_loop = system.has_tape and not system.has_corners
         return CompiledLoop(self._kernels(system, tolerances, longest)) if has_compiled_loop else None
 

@@ -1,4 +1,4 @@
-"""The segment of explicit Runge-Kutta methods in the compiled event loop: steps up to the first event.
+"""This module follows a segment by explicit Runge-Kutta steps up to the first event.
 
 The dense output of a step is the two-point Hermite polynomial on the Taylor coefficients of the flow at its ends; a
 step in which a guard becomes negative is repeated up to the event.
@@ -44,7 +44,7 @@ _PASSES = 3  # error of a first step in tolerances that still passes; its length
 
 @kernel
 def first_length(leading: Any, x: Any, tolerances: Any, series: Any, longest: float) -> float:
-    """Return the step length at which the error estimate meets the tolerance, from a series (n, q + 2).
+    """Return the step length at which the error estimate meets the tolerance, from a Taylor series.
 
     leading: q, the coefficients of the main estimate at h**q x^(q)/q! and h**(q + 1) x^(q + 1)/(q + 1)!, then
     q and one such coefficient of the low estimate, with q = 0 if there is none; see `leading_terms`.
@@ -86,7 +86,7 @@ def gather(registers: Any, W: Any, out: Any) -> None:
 
 @inlined
 def is_finite(series: Any) -> bool:
-    """Return whether all coefficients are finite."""
+    """Return whether all Taylor coefficients are finite."""
     total = 0.0
     for i in range(series.shape[0]):
         for k in range(series.shape[1]):
@@ -96,7 +96,7 @@ def is_finite(series: Any) -> bool:
 
 @kernel
 def expand_ends(rows: Any, guard_rows: Any, flow_registers: Any, s: float, x: Any, W: Any, out: Any) -> None:
-    """Compute the coefficients of the states (n, K) and of all registers (W) along the flow from (s, x).
+    """Compute the Taylor coefficients of the states and of all registers along the flow from (s, x).
 
     rows: tape rows of the flow and of further wanted functions; guard_rows: those of them that guards need.
     """
@@ -128,7 +128,7 @@ def series_of(
     out: Any,
     guards: Any,
 ) -> bool:
-    """Compute coefficients of the states (n, K) and of the guards (one row each) along the flow from (s, x).
+    """Compute the Taylor coefficients of the states and of the guards along the flow from (s, x).
 
     code: address of a function that does so; 0 for none. Return whether those of the states are finite.
     """
@@ -171,7 +171,7 @@ def land(
     scratch: Any,
     work: Any,
 ) -> tuple[int, float]:
-    """Repeat the step of length h up to a guard's zero, which the dense output locates at d.
+    """Repeat a step up to the zero of a guard that was located on the dense output.
 
     place: index of the function. The step starts from work.y; its end is in work.x_after, the series there
     are in scratch.right and scratch.guards_right. code: see `series_of`. Newton's method corrects the time until it
@@ -228,7 +228,7 @@ def land(
 
 @inlined
 def is_zero(model: Any, fired: int, s: float, scale: Any, state: Any, work: Any) -> bool:
-    """Return whether a guard at the present state is zero within twice its error by rounding and time."""
+    """Return whether a guard is zero within twice its error bound at the present state."""
     s_error, y = 8.0 * 2.0**-52 * s, work.y
     call(called_by(work).flow, s, y, state.p, state.z, work.slopes)
     state_errors(model.automata, s_error, y, scale, state.x_error, state.z, work.slopes, work.y_error)
@@ -242,7 +242,7 @@ def is_zero(model: Any, fired: int, s: float, scale: Any, state: Any, work: Any)
 def runge_kutta_segment(
     start: Any, model: Any, loop: Any, state: Any, work: Any, own: Any, rows: Any
 ) -> SegmentEnd:
-    """Follow one segment by Runge-Kutta steps; see `hybridsim.engine.run.method_kernels.MethodKernels`.
+    """Follow one segment by Runge-Kutta steps, as the kernel of the event loop.
 
     own: `hybridsim.integrators.runge_kutta.compiled_loop.RungeKuttaArrays`.
     """
@@ -405,5 +405,5 @@ def runge_kutta_segment(
 
 
 def runge_kutta_loop(model: Any, call: Any, state: Any, work: Any, record: Any, own: Any, rows: Any) -> int:
-    """Run from event to event over segments of Runge-Kutta steps."""
+    """Run from event to event, with segments of Runge-Kutta steps."""
     return event_loop(runge_kutta_segment, model, call, state, work, record, own, rows)

@@ -1,4 +1,4 @@
-"""One trial step of an explicit embedded Runge-Kutta method, and its error."""
+"""This module takes one trial step of an explicit embedded Runge-Kutta method."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _NOTHING = 1e-9  # rounding of a coefficient that order conditions make zero
 
 
 class Coefficients(NamedTuple):
-    """The arrays of a tableau: nodes, matrix, and rows of weights, error weights and low error weights."""
+    """The coefficients of a tableau as arrays: nodes, matrix, weights and error weights."""
 
     c: np.ndarray
     a: np.ndarray
@@ -49,7 +49,7 @@ class Tableau:
 
     @cached_property
     def leading_terms(self) -> tuple[int, float, float, int, float]:
-        """Return the first terms of the error estimates for a linear problem, as multiples of x^(k)/k!.
+        """Return the first terms of the error estimates for a linear problem.
 
         On a linear problem a combination e of the stages is sum_k (e . A**(k - 1) 1) k! h**k x_k. Return the
         order q of the main estimate, its coefficients at q and q + 1, then order and coefficient of the low
@@ -61,12 +61,12 @@ class Tableau:
 
     @cached_property
     def rounding(self) -> float:
-        """Return the rounding error of a step, in roundings of h*f: sum |b_i| (1 + sum |a_ij|)."""
+        """Return the rounding error of a step, relative to the rounding of h times the rates."""
         return float(np.abs(self.b) @ (1.0 + np.abs(self.a).sum(axis=1)))
 
     @cached_property
     def real_stability(self) -> float:
-        """Return the largest z with |R(-w)| <= 1 on 0 <= w <= z, for R(z) = 1 + b.1 z + b.A 1 z**2 + ..."""
+        """Return the stability limit of the method on the negative real axis."""
         power, terms = np.ones(len(self.c)), [1.0]
         for _ in self.c:
             terms.append(float(self.b @ power))
@@ -101,7 +101,7 @@ def attempt(
     k: Any,
     out: Any,
 ) -> float:
-    """Try one step of length h from (s, x) with slope dx; write its end to `out`, return its scaled error.
+    """Try one step of length `h` from (s, x); write its end to `out` and return its scaled error.
 
     tableau: `Coefficients`. tolerances: rtol, atol.
     """

@@ -1,4 +1,4 @@
-"""Tsitouras' pair of order 5(4) on the compiled engine."""
+"""This module defines the method of order 5(4) by Tsitouras."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _E = np.array(
 
 @dataclass(frozen=True)
 class Tsit5(RungeKuttaIntegrator):
-    """Tsitouras' pair of order 5(4) in a compiled mode loop, with event location by hybridsim.
+    """Tsitouras' pair of order 5(4) in a compiled loop, with event location by hybridsim.
 
     It has seven stages. The last one is at the end of the step, with the weights of order 5. The dense output
     is the two-point Hermite polynomial of degree 7 on Taylor coefficients; a step that contains an event is

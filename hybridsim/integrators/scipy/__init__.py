@@ -1,1 +1,1 @@
-"""This folder runs SciPy's solvers, with events located by the engine or by `solve_ivp` itself."""
+"""This package runs SciPy's solvers, with events located by the engine or by `solve_ivp` itself."""

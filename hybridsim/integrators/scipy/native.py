@@ -1,4 +1,4 @@
-"""SciPy's own event location: `solve_ivp` with terminal events, called again after each of them."""
+"""This module uses the event location of SciPy's `solve_ivp`, called again after each event."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _DIRECTIONS = {"up": 1.0, "down": -1.0, "both": 0.0}
 
 
 class NativeStepper:
-    """One call of `solve_ivp` for a whole segment, returned step by step.
+    """One call of `solve_ivp` for a whole segment, whose result is returned step by step.
 
     Its limitations are those of `solve_ivp`:
 
@@ -107,7 +107,7 @@ class NativeStepper:
         return event
 
     def _cut(self, result: Any, guards: list[int], monitors: list[int]) -> list[Step]:
-        """Yield the steps of the call, divided at the events found in them."""
+        """Yield the steps of a call of `solve_ivp`, divided at its events."""
         found: dict[float, list[Root]] = {}
         for g, times in zip(guards, result.t_events, strict=False):
             for s in times:
@@ -136,7 +136,7 @@ class NativeStepper:
         return steps
 
     def _direction(self, monitor: int, result: Any, s: float) -> int:
-        """Return +1 if a monitor rises at a zero, else -1, from its values at the ends of the step."""
+        """Return +1 if a monitor rises at a zero, otherwise -1."""
         ends = np.abs(result.t)
         right = int(np.clip(np.searchsorted(ends, abs(s), side="left"), 1, len(ends) - 1))
         pair = result.t[[right - 1, right]]
@@ -144,14 +144,14 @@ class NativeStepper:
         return 1 if after > before else -1
 
     def step(self) -> Step:
-        """Return the next step of the call."""
+        """Return the next step of the call of `solve_ivp`."""
         step = next(self.steps, None)
         if step is None:
             raise StepFailure(f"solve_ivp: {self.failure}")
         return step
 
     def restep(self, step: Step, s: float) -> Step:
-        """Raise an error: the step already ends at the event."""
+        """Raise an error, because the step already ends at the event."""
         raise NotImplementedError("solve_ivp already ends at its event")
 
 

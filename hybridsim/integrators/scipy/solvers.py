@@ -1,4 +1,4 @@
-"""SciPy's six initial value solvers, with events located by the engine or by `solve_ivp` itself."""
+"""This module runs SciPy's six initial value solvers."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class ScipyIntegrator(Integrator):
 
     @property
     def stable_to(self) -> float:
-        """Return the stability limit of the explicit solvers."""
+        """Return the stability limit of SciPy's explicit solvers."""
         return _STABLE.get(self.solver, 0.0)
 
     def start(

@@ -1,4 +1,4 @@
-"""SciPy's solvers advanced one step at a time, with events located by the engine on their dense output."""
+"""This module advances SciPy's solvers step by step; the engine locates events on the dense output."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def _dense(interpolant: Any) -> Dense:
 
 
 class SolverStepper:
-    """Advance an instance of `scipy.integrate.OdeSolver` through one segment."""
+    """Advances an instance of `scipy.integrate.OdeSolver` through one segment."""
 
     def __init__(
         self,
@@ -67,7 +67,7 @@ class SolverStepper:
         return rate
 
     def _jacobian(self, s: float, x: np.ndarray) -> np.ndarray:
-        """Return the Jacobian, or zeros if it is not finite, which makes SciPy try a shorter step."""
+        """Return the Jacobian, or zeros if it is not finite, so that SciPy tries a shorter step."""
         jacobian = self.flow.jacobian(s, x)
         return jacobian if np.isfinite(jacobian).all() else np.zeros_like(jacobian)
 
@@ -88,7 +88,7 @@ class SolverStepper:
         return self._advance(self.solver)
 
     def restep(self, step: Step, s: float) -> Step:
-        """Return one step from the start to exactly s, or the shorter step that the solver accepted."""
+        """Return one step from the start to exactly the local time `s`, or the shorter step of the solver."""
         solver = self._solver(step.s0, step.x0, s, abs(s - step.s0))
         part = self._advance(solver)
         if solver.status != "running":
@@ -114,7 +114,7 @@ class SolverStepper:
 
 
 def series_step(flow: Flow, x0: np.ndarray, bound: float, tolerances: Tolerances) -> float:
-    """Return a first step over which second- and third-order terms of the states are below the tolerance."""
+    """Return a first step over which the higher Taylor terms of the states are below the tolerance."""
     series = flow.system.series(0.0, x0, flow.p, flow.z, np.zeros(flow.n), 0.0).states
     scale = tolerances.atol + tolerances.rtol * np.abs(x0)
     step = min(abs(bound), _SHARE_OF_A_TURN / max(map(abs, flow.system.rates), default=1e-300))

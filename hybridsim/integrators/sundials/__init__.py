@@ -1,1 +1,1 @@
-"""This folder runs CVODE of SUNDIALS, restarted after every event."""
+"""This package runs CVODE of SUNDIALS, which is restarted after every event."""

@@ -1,4 +1,4 @@
-"""CVODE of SUNDIALS through scikit-sundae, restarted at every event; the engine locates events on its steps."""
+"""This module runs CVODE of SUNDIALS through scikit-sundae; the engine locates events."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _SMALLEST = 2e-14  # smallest rtol that CVODE accepts
 
 @cache
 def _leave_stdout_alone() -> None:
-    """Make SUNDIALS write its warnings to standard error, unless the user has chosen another output.
+    """Make SUNDIALS write its warnings to stderr, unless the user has chosen another output.
 
     Otherwise they go to C's standard output, among the caller's data. SUNDIALS reads these variables when a
     solver is created. Redirecting the file descriptor around its calls would also redirect the output of
@@ -41,7 +41,7 @@ def _leave_stdout_alone() -> None:
 
 
 class CvodeStepper:
-    """Advance CVODE through one segment.
+    """Advances CVODE through one segment.
 
     CVODE's step control depends only on the states. While a mode holds them, a step would grow over many
     periods of a forcing that only the guards contain. Therefore the sine of every angle that grows in time is
@@ -99,7 +99,7 @@ class CvodeStepper:
         return rhs
 
     def _jacobian(self) -> Callable[[float, np.ndarray, np.ndarray, np.ndarray], None]:
-        """Return the model's Jacobian; CVODE's differences would miss corners narrower than their increments."""
+        """Return the model's Jacobian, because CVODE's differences would miss narrow corners."""
         flow, n = self.flow, self.flow.n
 
         def jacobian(s: float, x: np.ndarray, dx: np.ndarray, out: np.ndarray) -> None:
@@ -111,7 +111,7 @@ class CvodeStepper:
         return jacobian
 
     def _dense(self, s0: float, s1: float, x0: np.ndarray, x1: np.ndarray) -> Dense:
-        """Return dense output that is computed at first use."""
+        """Return dense output that is computed on first use."""
         made: list[Dense] = []
         self.past_times, self.past_states = (
             [*self.past_times, s1][-MAX_PAST_POINTS:],
@@ -135,7 +135,7 @@ class CvodeStepper:
         return self.flow.system.series(s, x, self.flow.p, self.flow.z, zero, 0.0).states
 
     def step(self) -> Step:
-        """Return one internal step of CVODE, cut at the bound."""
+        """Return one internal step of CVODE, shortened at the bound of the segment."""
         result = self.solver.step(self.bound, method="onestep", tstop=self.bound)
         if not result.success:
             raise StepFailure(f"CVODE: {result.message}")
@@ -147,12 +147,12 @@ class CvodeStepper:
         return Step(s0, s1, x0, x1, self._dense(s0, s1, x0, x1))
 
     def restep(self, step: Step, s: float) -> Step:
-        """Raise an error: the dense output is as accurate as the method."""
+        """Raise an error, because the dense output is as accurate as the method."""
         raise NotImplementedError("events of CVODE are located on its dense output")
 
 
 class _Cvode(Integrator):
-    """The common part of both CVODE integrators."""
+    """The common base class of both CVODE integrators."""
 
     formulas: ClassVar[str]
     dense_is_accurate: ClassVar[bool] = True
@@ -179,7 +179,7 @@ class _Cvode(Integrator):
 
 @dataclass(frozen=True)
 class CvodeBDF(_Cvode):
-    """Backward differentiation formulas of orders 1 to 5, variable step, Newton iteration.
+    """CVODE's backward differentiation formulas of orders 1 to 5, for stiff modes.
 
     When to choose it: stiff modes, such as regularised laws and laws with fast internal states. It restarts
     at order 1 after each event. Events are located on its dense output, the two-point Hermite polynomial of
@@ -197,7 +197,7 @@ class CvodeBDF(_Cvode):
 
 @dataclass(frozen=True)
 class CvodeAdams(_Cvode):
-    """Adams-Moulton formulas of orders 1 to 12, variable step.
+    """CVODE's Adams-Moulton formulas of orders 1 to 12, for modes that are not stiff.
 
     When to choose it: long smooth segments between events at tight tolerances. Events are handled as by
     `cvode-bdf`.

@@ -1,1 +1,1 @@
-"""This folder contains the integrator `taylor`: Taylor series with an order that depends on the tolerance."""
+"""This package contains the integrator `taylor`: Taylor series whose order depends on the tolerance."""

@@ -1,4 +1,4 @@
-"""The part of Taylor's method in the compiled loop of a run: arrays, record and cost."""
+"""This module contains the part of Taylor's method in the compiled loop: arrays, record, cost."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from hybridsim.integrators.taylor.segments import taylor_loop
 
 
 class TaylorSettings(NamedTuple):
-    """The settings of a run."""
+    """The settings of one run by Taylor's method."""
 
     control: np.ndarray  # rtol, longest step
     atol: np.ndarray  # (n,)
 
 
 class TaylorArrays(NamedTuple):
-    """Arrays of the kernel, for R registers, order + 1 terms, and G guards."""
+    """The arrays of the segment kernel, for R registers, order + 1 terms and G guards."""
 
     codes: Any  # `hybridsim.engine.system.programs.series_code.Codes` of the tapes
     settings: Any  # `TaylorSettings`
@@ -52,14 +52,14 @@ class TaylorArrays(NamedTuple):
 
 
 class TaylorRows(NamedTuple):
-    """The committed steps."""
+    """The rows of the stored steps."""
 
     steps: np.ndarray  # start and length (S, 2)
     series: np.ndarray  # Taylor coefficients (S, n, order + 1)
 
 
 class TaylorKernels(MethodKernels):
-    """The part of Taylor's method."""
+    """The part of Taylor's method in the compiled loop of a run."""
 
     loop = staticmethod(taylor_loop)
     rows = TaylorRows
@@ -74,7 +74,7 @@ class TaylorKernels(MethodKernels):
         self.codes = series_codes(system, self.order)
 
     def arrays(self) -> Any:
-        """Return new arrays of the kernel for one call, as a pack."""
+        """Return new packed arrays of the segment kernel for one call."""
         system, order, n = self.system, self.order, self.system.n
         registers, guards, fading = system.registers.count, system.guard_count, most_fading(system)
         return packed(
@@ -97,23 +97,23 @@ class TaylorKernels(MethodKernels):
         )
 
     def fields(self) -> Sequence[tuple[Any, tuple[int, ...]]]:
-        """Return the dtype and the shape of a row of each array in `rows`."""
+        """Return the dtype and the row shape of each array in `rows`."""
         return (float, (2,)), (float, (self.system.n, self.order + 1))
 
     def begin(self, own: Any, tapes: Tapes) -> Any:
-        """Put the settings of the run and the code of the tapes into the arrays."""
+        """Write the settings of the run and the code of the tapes to the arrays."""
         return replaced(own, settings=self.settings, codes=self.codes.of(tapes))
 
     def end(self, own: Any, tapes: Tapes, lin: Any) -> None:
-        """Prepare machine code for modes with many steps."""
+        """Compile machine code for modes in which many steps were taken."""
         self.codes.look(tapes, own.codes)
 
     def count(self, counters: Counters, steps: int, result: Any) -> None:
-        """Add the cost of the steps to the counters."""
+        """Add the cost of the steps to the counters of the run."""
         counters.rhs_evaluations += 2 * steps  # one series and one check per step
 
     def block(
         self, result: Any, rows: TaylorRows, last_steps: np.ndarray, *record: np.ndarray
     ) -> SeriesBlock:
-        """Return the committed segments of a call."""
+        """Return the segments of a call as one block."""
         return SeriesBlock(self.system, last_steps, *rows, *record)

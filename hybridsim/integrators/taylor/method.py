@@ -1,4 +1,4 @@
-"""Taylor series of the flow, with an order that depends on the tolerance; they are also the dense output."""
+"""This module integrates by Taylor series of the flow, which are also the dense output."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _CREEPING, _OFTEN = 1000, 4
 
 
 class TaylorStepper:
-    """Advance the series through one segment."""
+    """Advances Taylor's method through one segment."""
 
     def __init__(
         self,
@@ -56,7 +56,7 @@ class TaylorStepper:
         self.creeping, self.since, self.shortest = 0, 0.0, 0.0
 
     def step(self) -> Step:
-        """Return the next step, over which the series are accurate."""
+        """Return the next step, over which the Taylor series are accurate."""
         direction = math.copysign(1.0, self.bound)
         left = abs(self.bound - self.s)
         longest = min(left, self.tolerances.max_step)
@@ -96,7 +96,7 @@ class TaylorStepper:
                 self.since,
             )
         if not h > 0.0:
-            raise Collapsed(f"the step fell to {h:.3g}")
+            raise Collapsed(f"the step size fell to {h:.3g}")
         s0, x0 = self.s, self.x
         self.s = self.bound if last else s0 + direction * h
         self.x = self.flow.landed(self.s, x1)
@@ -108,7 +108,7 @@ class TaylorStepper:
         return Step(s0, self.s, x0, x1, dense, holds=holds)
 
     def _holds_between(self, coefficients: np.ndarray, h: float) -> bool:
-        """Check the equation at points inside the step, if the rate of a state seems constant."""
+        """Return whether the series satisfy the equation inside the step, if a rate seems constant."""
         moves = np.abs(coefficients[:, 2:]) @ np.abs(h) ** np.arange(2, coefficients.shape[1])
         still = moves <= self.tolerances.atol + self.series.rtol * np.abs(self.x)
         if not (still & self.computed).any():
@@ -121,7 +121,7 @@ class TaylorStepper:
         )
 
     def _holds(self, coefficients: np.ndarray, x0: np.ndarray, x1: np.ndarray, s0: float, d: float) -> bool:
-        """Return whether the series from s0 satisfy the equation at a distance d, at which the state is x1.
+        """Return whether the series satisfy the differential equation at a distance `d` from their origin.
 
         The terms of a series do not show effects below rounding at its origin: a saturated tanh, the other
         branch of a root, or a friction that is larger only near rest.
@@ -136,7 +136,7 @@ class TaylorStepper:
         return bool((defect <= _DEFECT * (scale + self.series.rtol * change)).all())
 
     def restep(self, step: Step, s: float) -> Step:
-        """Prepare a shorter repetition of a step whose series is inaccurate at s."""
+        """Prepare a shorter repetition of a step whose Taylor series is inaccurate at the local time `s`."""
         self.flow.counters.rejected += 1
         self.s, self.x, self.longest = step.s0, step.x0, _SHORTER * abs(s - step.s0)
         return self.step()
@@ -177,11 +177,11 @@ class Taylor(Integrator):
     has_compiled_loop: ClassVar[bool] = True
 
     def prepare(self, system: System) -> None:
-        """Compile the mode loop."""
+        """Compile the event loop of the method."""
         compile_loops(system, TaylorKernels)
 
     def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> CompiledLoop:
-        """Return the compiled mode loop."""
+        """Return the compiled event loop of the method."""
         return CompiledLoop(TaylorKernels(system, tolerances, longest))
 
     def start(

@@ -1,4 +1,4 @@
-"""The segment of Taylor's method in the compiled event loop: steps up to the first event."""
+"""This module follows a segment by Taylor steps up to the first event."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def series_at(
     U: Any,
     out: Any,
 ) -> None:
-    """Write coefficients of the states to out, and of guards and vanishing functions to U, from x at local time s.
+    """Write the Taylor coefficients of states, guards and vanishing functions at (s, x).
 
     code: address of a compiled function that does the same; 0 for none. is_known: `values_at` was called last at this
     state.
@@ -84,7 +84,7 @@ def series_at(
 def taylor_segment(
     start: Any, model: Any, loop: Any, state: Any, work: Any, own: Any, rows: Any
 ) -> SegmentEnd:
-    """Follow one segment by Taylor steps; see `hybridsim.engine.run.method_kernels.MethodKernels`.
+    """Follow one segment by Taylor steps, as the kernel of the event loop.
 
     own: `hybridsim.integrators.taylor.compiled_loop.TaylorArrays`.
     """
@@ -231,5 +231,5 @@ def taylor_segment(
 
 
 def taylor_loop(model: Any, call: Any, state: Any, work: Any, record: Any, own: Any, rows: Any) -> int:
-    """Run from event to event over segments of Taylor steps."""
+    """Run from event to event, with segments of Taylor steps."""
     return event_loop(taylor_segment, model, call, state, work, record, own, rows)

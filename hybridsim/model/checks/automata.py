@@ -1,4 +1,4 @@
-"""Check components: modes, guards, choices, variables, initial mode, surface."""
+"""This module checks components: modes, guards, choices, variables, initial mode and surface."""
 
 from __future__ import annotations
 

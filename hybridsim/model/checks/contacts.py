@@ -1,4 +1,4 @@
-"""Check contacts and their friction laws."""
+"""This module checks contacts and their friction laws."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def check_law(scope: Scope, law: FrictionLaw) -> None:
 
 
 def _own_names(scope: Scope, law: FrictionLaw) -> frozenset[str]:
-    """Return the names that the law declares, and report invalid and duplicate ones."""
+    """Return the names that a law declares, and report invalid and duplicate names."""
     seen: dict[str, str] = {}
     named = [("parameter", name) for name in law.parameters]
     named += [("definition", name) for name in law.definitions]

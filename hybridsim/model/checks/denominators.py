@@ -1,4 +1,4 @@
-"""Find denominators in rates that may become zero, because an integration step can miss a pole or a 0/0."""
+"""This module finds denominators in rates that may become zero, which an integration step can miss."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ class Denominator:
 
     @property
     def text(self) -> str:
-        """The source text."""
+        """The text of the denominator as written in the model."""
         return ast.unparse(self.tree)
 
     def sign(self, values: Mapping[str, float]) -> int:
-        """Return the sign for given parameters, states and time, or 0 if the value is zero or undefined."""
+        """Return the sign of the denominator at a state and time, or 0 if it is zero or undefined."""
         known = dict(values)
         try:
             for name, tree in self.definitions.items():
@@ -46,7 +46,7 @@ class Denominator:
 
 
 def denominators(model: Model) -> tuple[Denominator, ...]:
-    """Return denominators in rates that depend only on states, parameters and t and can change their sign.
+    """Return denominators in rates that depend on states, parameters and t and may change their sign.
 
     Denominators inside a condition are omitted, because the condition may exclude the zero. Denominators that are never
     negative by their form are omitted too.
@@ -77,7 +77,7 @@ def _denominators(model: Model) -> Iterator[Denominator]:
 
 
 def _divisors(node: ast.expr) -> Iterator[ast.expr]:
-    """Yield the divisors and the bases of negative powers outside conditions."""
+    """Yield divisors and bases of negative powers in an expression, without those inside conditions."""
     match node:
         case ast.IfExp():
             return
@@ -91,7 +91,7 @@ def _divisors(node: ast.expr) -> Iterator[ast.expr]:
 
 
 def _in_order(node: ast.expr, meanings: Meanings) -> dict[str, ast.expr]:
-    """Return the definitions that an expression uses, in order of dependency."""
+    """Return the definitions that an expression uses, sorted by their dependencies."""
     found: dict[str, ast.expr] = {}
 
     def visit(tree: ast.expr) -> None:

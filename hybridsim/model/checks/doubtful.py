@@ -1,4 +1,4 @@
-"""Warnings about valid models: guards that cannot fire, pulses and jumps in a flow, missing units."""
+"""This module warns about valid models: guards that cannot fire, jumps in a flow, missing units."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from hybridsim.model.smoothing.one_sided import names_of, never_negative, number
 
 @dataclass(frozen=True)
 class Caution:
-    """A warning about a valid model: message, place and remedy."""
+    """A warning about a valid model, with its message, place and remedy."""
 
     message: str
     place: Place | None
@@ -59,7 +59,7 @@ def warnings_of(model: Model) -> tuple[Caution, ...]:
 
 
 def forces_of(model: Model) -> tuple[Caution, ...]:
-    """Return warnings about loads and friction forces of the wrong sign."""
+    """Return warnings about loads and friction forces with the wrong sign."""
     return tuple(Caution(message, contact.place, remedy) for contact, message, remedy in wrong_signs(model))
 
 
@@ -79,7 +79,7 @@ def jumps_of(model: Model) -> tuple[Caution, ...]:
 
 
 class _Reading:
-    """The definitions and variables in one mode of a component, and the set of varying quantities."""
+    """The definitions and variables in one mode of a component, and the quantities that vary."""
 
     def __init__(self, model: Model, component: Component | None = None, mode: Mode | None = None) -> None:
         self.numbers = model.parameter_values()
@@ -98,11 +98,11 @@ class _Reading:
                 self._moving.add(state.name)
 
     def lookup(self, name: str) -> ast.expr | None:
-        """Return the tree of a definition or variable, or None."""
+        """Return the tree of a definition or variable with a given name, or None."""
         return self._trees.get(name)
 
     def changes(self, expr: Expression) -> bool:
-        """Return whether the value of an expression can change while the mode is active."""
+        """Return whether the value of an expression can change while a mode is active."""
         open_, seen = set(names_of(expr.tree)), set()
         while open_:
             name = open_.pop()
@@ -115,7 +115,7 @@ class _Reading:
         return False
 
     def one_sided(self, expr: Expression) -> tuple[str, str] | None:
-        """Return the sign that an expression cannot have ("negative" or "positive") and the reason."""
+        """Return the sign that an expression cannot have ("negative" or "positive"), and the reason."""
         reason = never_negative(expr.tree, self.numbers, self.lookup)
         if reason:
             return "negative", reason
@@ -125,7 +125,7 @@ class _Reading:
 
 
 def _reset_names(model: Model, own: Component | None) -> set[str]:
-    """Return the states that resets change, except resets that end the component's own mode."""
+    """Return the states that resets change; resets that end the component's own mode do not count."""
     resets = [*(monitor.reset for monitor in model.monitors), *(one.reset for one in model.schedules)]
     for component in model.components:
         if component is not own:
@@ -161,7 +161,7 @@ def _event_functions(model: Model) -> Iterator[_EventFunction]:
 
 
 def _of_signs(model: Model) -> Iterator[Caution]:
-    """Yield warnings about guards and monitors that are constant or of one sign."""
+    """Yield warnings about guards and monitors that are constant or have only one sign."""
     for item in _event_functions(model):
         meant = "at the end of the mode" if item.is_guard else "at the event"
         remedy = f"write an expression that changes its sign {meant}"

@@ -1,4 +1,4 @@
-"""Check all expressions: names, kinds of values, cyclic definitions, size."""
+"""This module checks all expressions: names, kinds of values, cyclic definitions and size."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def check_before_run(scope: Scope) -> None:
 
 
 def _of_parameters(scope: Scope) -> Iterator[tuple[str, Expression]]:
-    """Yield the expressions that are evaluated before a run and may use only parameters."""
+    """Yield the expressions that are evaluated before a run, which may use only parameters."""
     model = scope.model
     for parameter in model.parameters:
         yield f"parameter {parameter.name}", parameter.value
@@ -127,7 +127,7 @@ def _circles(scope: Scope) -> None:
 
 
 def _over_modes(exprs: list[Expression]) -> Expression:
-    """Return an expression together with the dependencies that it has in any mode."""
+    """Return an expression with the dependencies that it has in any of the modes."""
     first = exprs[0]
     return Expression(first.text, frozenset().union(*(expr.names for expr in exprs)), first.place, first.tree)
 
@@ -141,7 +141,7 @@ def _size(expr: Expression, sizes: dict[str, int]) -> int:
 
 
 def _constants(scope: Scope, items: list[Item]) -> None:
-    """Report expressions that exceed a limit, such as the largest power, after constants are inserted."""
+    """Report expressions that exceed a limit after constants are inserted, such as a large power."""
     known: dict[str, Expression | str | float] = {}
     definitions = dict(scope.model.definitions)
     for name in dependency_order(definitions, "definitions"):

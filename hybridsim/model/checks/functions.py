@@ -1,4 +1,4 @@
-"""Check models with Python functions: functions and expressions must not be mixed."""
+"""This module checks models with Python functions, which must not be mixed with expressions."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def check_functions(scope: Scope) -> None:
 
 
 def _uses(scope: Scope) -> Iterator[tuple[Declared, str, Expression]]:
-    """Yield each possible place of a function: the part, a description of the place, and the expression."""
+    """Yield each place at which a model can have a function, with its description and expression."""
     model = scope.model
     for component in model.components:
         if component.limit is not None:

@@ -1,4 +1,4 @@
-"""Check impacts: gap and restitution."""
+"""This module checks impacts: the gap and the coefficient of restitution."""
 
 from __future__ import annotations
 

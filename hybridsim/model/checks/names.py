@@ -1,4 +1,4 @@
-"""Check names: valid, not reserved, and unique."""
+"""This module checks that names are valid, not reserved, and unique."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def check_names(scope: Scope) -> None:
 
 
 def _made_labels(scope: Scope) -> None:
-    """Report name conflicts of automata that contacts create for lift-off, copies and tables."""
+    """Report conflicts with names of automata that contacts create for lift-off, copies and tables."""
     model = scope.model
     kinds: dict[str, tuple[Any, ...]] = {
         "contact": model.contacts, "surface": model.surfaces, "impact": model.impacts, "component": model.components,
@@ -61,7 +61,7 @@ def _made_labels(scope: Scope) -> None:
 
 
 def _events(scope: Scope, seen: Mapping[str, str]) -> None:
-    """Report monitors and schedules with the name of another part, since `event_times` looks up names."""
+    """Report monitors and schedules with the name of another part, because events are found by name."""
     model = scope.model
     taken = {name: kind for name, kind in seen.items() if kind not in ("parameter", "definition")}
     parts: tuple[Any, ...] = (*model.contacts, *model.surfaces, *model.impacts, *model.components)

@@ -1,4 +1,4 @@
-"""Pulses and smooth steps in time t inside expressions, which an integration step can miss."""
+"""This module finds pulses and smooth steps in time, which an integration step can miss."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def pulse_in(node: ast.expr, lookup: Lookup) -> ast.expr | None:
 
 
 def degree_in_time(node: ast.expr, lookup: Lookup) -> int:
-    """Return the degree in t: 0 without t or inside a sine or cosine, 9 if it is not a polynomial."""
+    """Return the degree of an expression in t, or 9 if the expression is not a polynomial in t."""
     match node:
         case ast.Name(id=name):
             tree = lookup(name)

@@ -1,4 +1,4 @@
-"""The names of a model by kind, and the errors that the checks collect."""
+"""This module stores the names of a model by kind, and the errors that the checks find."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Scope:
             return ()
 
     def _expanded(self) -> Iterator[Component]:
-        """Yield all components that could be built; failures have been reported."""
+        """Yield all components that can be built; errors in others have been reported."""
         for parts in self.made:
             yield from parts
         yield from (surface.component() for surface in self.model.surfaces)
@@ -58,7 +58,7 @@ class Scope:
         return {name: kind for kind, name, _ in self.declarations()}
 
     def declarations(self) -> Iterator[tuple[str, str, Declared]]:
-        """Yield (kind, name, part) of everything that expressions can use."""
+        """Yield kind, name and part of all declarations that expressions can use."""
         model = self.model
         yield from (("parameter", part.name, part) for part in model.parameters)
         yield from (("state", part.name, part) for part in model.states)
@@ -132,7 +132,7 @@ class Scope:
             self.errors.append(ExpressionError(f"{what}: {fault.message}", place=place, remedy=fault.remedy))
 
     def _require(self, expr: Expression, allowed: frozenset[str]) -> None:
-        """Check that every name is known; the remedy explains friction forces to models without contacts."""
+        """Check that every name is known; models without contacts get a hint on friction forces."""
         try:
             require_names(expr, allowed)
         except ExpressionError as fault:
@@ -144,7 +144,7 @@ class Scope:
             ) from None
 
     def need_own(self, expr: Expression, what: str, known: Iterable[str]) -> None:
-        """Report names of the model and conditions inside an expression of a friction law."""
+        """Report names of the model and conditions in an expression of a friction law."""
         foreign = sorted(expr.names - frozenset(known))
         if foreign or expr.is_boolean:
             reason = f"unknown name '{foreign[0]}'" if foreign else f"'{expr.text}' is a condition"
@@ -170,7 +170,7 @@ class Scope:
 
 
 def _instead(output: Output) -> str:
-    """Return the remedy for an expression that uses an output."""
+    """Return the remedy for an expression that uses the name of an output."""
     if output.modes:
         return f"write '{output.expr.text}' instead, since the output depends on the mode"
     return f"declare '{output.name}' under [definitions] (definitions=) instead; sol.output returns definitions too"

@@ -1,4 +1,4 @@
-"""Check monitors, schedules and inputs without evaluating them."""
+"""This module checks monitors, schedules and inputs without evaluating them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Check gaps and switching functions: smooth, with a state, and independent of modes."""
+"""This module checks gaps and switching functions: smooth, with a state, independent of modes."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hybridsim.model.smoothing.one_sided import names_of
 
 
 class Remedies(NamedTuple):
-    """The remedies for the three possible errors of a function."""
+    """The remedies for the three possible errors of a gap or a switching function."""
 
     switched: str
     not_smooth: str

@@ -1,4 +1,4 @@
-"""Facts about a valid model that decide events: guards that are zero at the start, loads that can be zero."""
+"""This module finds guards that are zero at the start, and loads that can become zero."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _ULP = 2.0**-52  # relative spacing of doubles: the uncertainty of a start value
 
 
 def starting_facts(model: Model) -> tuple[str, ...]:
-    """Return a sentence for each guard, surface or gap at its limit at the start, and each load that can be zero."""
+    """Return a sentence for each guard, surface or gap that is zero at the start, and each vanishing load."""
     if model.flow is not None:
         return ()
     meanings = Meanings(model)
@@ -26,7 +26,7 @@ def starting_facts(model: Model) -> tuple[str, ...]:
 
 
 def _starts(model: Model, component: Component, meanings: Meanings) -> Iterator[str]:
-    """Yield the facts about a component if one of its guards or its surface is zero at the start."""
+    """Yield sentences on a component if one of its guards or its surface is zero at the start."""
     name, surface = component.name, component.surface
     if isinstance(component, Corner):
         return
@@ -89,7 +89,7 @@ def _is_zero_at_start(model: Model, expr: Expression, meanings: Meanings) -> boo
 
 
 def _loads(model: Model, meanings: Meanings) -> Iterator[str]:
-    """Yield the facts about normal loads that can reach zero."""
+    """Yield sentences on normal loads that can reach zero."""
     numbers = model.parameter_values()
     for contact in model.contacts:
         tree = meanings.written_out(contact.normal.tree)

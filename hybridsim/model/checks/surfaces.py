@@ -1,4 +1,4 @@
-"""Check switching surfaces: switching function and variables."""
+"""This module checks switching surfaces: switching functions and variables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Units of the quantities of a model; a contact force has the unit of its load."""
+"""This module determines the units of a model's quantities."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ def units_of(model: Model) -> dict[str, str]:
 
 
 def unit_of(model: Model, expression: Expression) -> str:
-    """Return the unit of an expression if it equals the unit of one of its terms, otherwise ""."""
+    """Return the unit of an expression if one of its terms has a known unit, otherwise ""."""
     units = units_of(model) | {q.name: q.unit for q in model.parameters}
     return _unit(expression.tree, units, {name: e.tree for name, e in model.definitions})
 
 
 def rate_of(unit: str, time: str, order: int) -> str:
-    """Return the unit of a time derivative."""
+    """Return the unit of a time derivative of a quantity."""
     if not unit or not time or order == 0:
         return unit
     known = re.fullmatch(rf"(.*)/{re.escape(time)}(?:\^(\d+))?", unit)
@@ -39,7 +39,7 @@ def rate_of(unit: str, time: str, order: int) -> str:
 
 
 def _of_forces(model: Model, contacts: list[Contact]) -> dict[str, str]:
-    """Return the unit of each friction force, from its load or, for a numeric load, from a coefficient."""
+    """Return the unit of each friction force, from its load or from a coefficient."""
     known = {q.name: q.unit for q in model.states} | {q.name: q.unit for q in model.parameters}
     known |= {q.name: q.unit for q in model.discrete}
     definitions = {name: expression.tree for name, expression in model.definitions}
@@ -86,7 +86,7 @@ def _unit(node: ast.expr, known: Mapping[str, str], definitions: Mapping[str, as
 
 
 def _has_bare_number(node: ast.expr, definitions: Mapping[str, ast.expr]) -> bool:
-    """Return whether a product contains a numeric factor that may have a unit, also through definitions."""
+    """Return whether a product contains a numeric factor that may have a unit."""
     match node:
         case ast.Constant(value=int() | float() as value):
             return bool(abs(value) > _COUNT or (4 * value) % 1)

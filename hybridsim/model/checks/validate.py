@@ -1,4 +1,4 @@
-"""Run all checks of a model and collect the errors."""
+"""This module runs all checks of a model and collects the errors."""
 
 from __future__ import annotations
 

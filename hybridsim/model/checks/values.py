@@ -1,4 +1,4 @@
-"""Check values for the current parameters: finite numbers, positive periods, nonnegative loads and limits."""
+"""This module checks values for the current parameters: finite numbers, positive periods, loads."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def checked_names(model: Model) -> frozenset[str]:
 
 
 def _value(scope: Scope, expr: Expression, values: dict[str, float]) -> float | None:
-    """Return the value of an expression; if it has none, report the error and return None."""
+    """Return the value of an expression, or None after reporting that it has no value."""
     try:
         return evaluate(expr, values)
     except ModelError as fault:

@@ -1,4 +1,4 @@
-"""Check that no fractional power of a contact velocity is undefined in a slip mode."""
+"""This module checks that no fractional power of a contact velocity is undefined in a slip mode."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Warnings about loads and friction forces of the wrong sign at the start or at nominal speed."""
+"""This module warns about loads and friction forces with the wrong sign."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _FRICTION = "a friction force must not be negative: correct the sign"
 
 
 def wrong_signs(model: Model) -> Iterator[tuple[Contact, str, str]]:
-    """Yield each contact whose load or friction force has the wrong sign, with a message and a remedy.
+    """Yield each contact with a load or friction force of the wrong sign, with a message and a remedy.
 
     Expressions are evaluated at the start, t = 0. Those that depend on an input or a mode are not checked.
     """
@@ -37,13 +37,13 @@ def wrong_signs(model: Model) -> Iterator[tuple[Contact, str, str]]:
 
 
 def wrong_reactions(model: Model) -> Iterator[tuple[Contact, str, str]]:
-    """Yield each contact whose force drives a state of its velocity where it should oppose it, at the start."""
+    """Yield each contact whose force drives its velocity instead of opposing it, at the start."""
     numbers = model.parameter_values() | model.start_values() | model.discrete_values() | {TIME: 0.0}
     numbers |= dict.fromkeys((contact.name for contact in model.contacts), 0.0)
     trees = {name: expr.tree for name, expr in model.definitions}
 
     def slope(expr: Expression, name: str) -> float:
-        """Return how an expression grows with a name; 0 if it has no value."""
+        """Return the slope of an expression with respect to a name, or 0 if it has no value."""
         ends = [number_of(expr.tree, numbers | {name: numbers[name] + d}, trees.get) for d in (0.0, 1.0)]
         return 0.0 if None in ends else ends[1] - ends[0]  # type: ignore[operator]  # neither is None
 

@@ -1,4 +1,4 @@
-"""Friction laws: the force as a function of velocity, load and optional internal states."""
+"""This module defines friction laws: the force as a function of velocity, load and internal states."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Functions of one argument defined by points, with monotone cubic interpolation."""
+"""This module defines functions of one argument by points, with monotone cubic interpolation."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ class LawTable(Declared):
         return found
 
     def _slopes(self) -> list[float]:
-        """Return weighted harmonic means of the slopes of adjacent intervals, or zero at a sign change."""
+        """Return the slopes at the points: weighted harmonic means of the slopes of adjacent intervals."""
         h = [b - a for a, b in zip(self.at, self.at[1:], strict=False)]
         chord = [(b - a) / w for a, b, w in zip(self.values, self.values[1:], h, strict=False)]
         if len(h) == 1:
@@ -107,7 +107,7 @@ class LawTable(Declared):
         return [first, *inner, last]
 
     def component(self, name: str, argument: Expression, from_zero: bool) -> Corner:
-        """Return a continuous automaton with one mode for each piece, which sets the variable `name`.
+        """Return an automaton with one mode for each piece of the table, which sets the variable `name`.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""States and automata of contacts with a single-valued friction law, in the names of the model."""
+"""This module creates the states and automata of contacts with a single-valued friction law."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ SINGLE = "smooth"  # name of the only mode of a law without declared modes
 
 @dataclass(frozen=True)
 class ContactState(State):
-    """A state that the friction law of a contact adds; TOML files declare it with the contact."""
+    """A state that the friction law of a contact adds to the model."""
 
 
 def states_of(contact: Contact, values: Mapping[str, Expression]) -> tuple[State, ...]:
-    """Return the states of all copies, in the order of the copies."""
+    """Return the states of all copies of a contact, in the order of the copies."""
     found = []
     for index in _indices(contact, values):
         names = _names(contact, values, index)
@@ -44,7 +44,7 @@ def states_of(contact: Contact, values: Mapping[str, Expression]) -> tuple[State
 def components_of(
     contact: Contact, values: Mapping[str, Expression], loaded: tuple[Guard, ...]
 ) -> Iterator[Component]:
-    """Yield the automaton of the law, or for copies one automaton per copy and one that adds the forces."""
+    """Yield the automata of a law: one, or for several copies one for each and one for the sum."""
     law, name, parts = contact.law, contact.name, []
     for index in _indices(contact, values):
         names = _names(contact, values, index)

@@ -1,4 +1,4 @@
-"""Message for a run that fails because a friction law divides by a load near zero."""
+"""This module explains runs that fail because a friction law divides by a load near zero."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def vanishing_load(
     start: tuple[float, Sequence[float]],
     now: tuple[float, Sequence[float]],
 ) -> str:
-    """Return the remedy for the first contact whose load vanishes between the start and now, or "".
+    """Return the remedy for the first contact whose load vanishes during the run, or an empty text.
 
     A load that depends on other names than parameters, states and time is reported if a state of its law is not finite.
     """
@@ -50,7 +50,7 @@ def vanishing_load(
 
 
 def _divides_by_load(contact: Contact) -> bool:
-    """Return whether a law with states divides by the load, directly or through definitions."""
+    """Return whether a law with states divides by the load, directly or in a definition."""
     law, loaded = contact.law, {NORMAL}
     for _ in law.definitions:
         loaded |= {name for name, expr in law.definitions.items() if expr.names & loaded}

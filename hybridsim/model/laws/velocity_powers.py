@@ -1,4 +1,4 @@
-"""Fractional powers of a contact velocity, which are undefined below zero or not differentiable at zero."""
+"""This module finds fractional powers of a contact velocity, which have no derivative at zero."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class VelocityPower:
 
 @dataclass(frozen=True)
 class _Candidate:
-    """A root or power in a flow; an exponent of None is 1/2, `families` are the possible velocities."""
+    """A root or power in a flow, which may be a fractional power of a contact velocity."""
 
     node: ast.expr
     base: ast.expr

@@ -1,4 +1,4 @@
-"""This folder defines the parts of a model: states, contacts, impacts, automata, events and inputs.
+"""This package defines the parts of a model: states, contacts, impacts, automata, events and inputs.
 
 Start with `model`.
 """

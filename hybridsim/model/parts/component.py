@@ -1,4 +1,4 @@
-"""Hybrid automata: components with modes, guards, choices of the next mode, and surfaces."""
+"""This module defines hybrid automata: components with modes, guards, choices and surfaces."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hybridsim.model.parts.frozen_map import FrozenMap
 
 @dataclass(frozen=True)
 class Choice(Declared):
-    """A transition of a guard to the mode ``to`` if ``when`` is true; the new state is given by ``reset``.
+    """A transition of a guard to the mode ``to`` if ``when`` is true; ``reset`` sets the new state.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class Choice(Declared):
 
 @dataclass(frozen=True)
 class Guard(Declared):
-    """A scalar that stays >= 0 while its mode lasts.
+    """A scalar function that stays >= 0 while its mode is active.
 
     Parameters
     ----------
@@ -251,7 +251,7 @@ class Component(Declared):
         return tuple(dict.fromkeys(unknown + [name for mode in self.modes for name in mode.set]))
 
     def mode(self, name: str) -> Mode:
-        """Return the mode with this name, or raise KeyError."""
+        """Return the mode with a given name, or raise KeyError."""
         for mode in self.modes:
             if mode.name == name:
                 return mode

@@ -1,4 +1,4 @@
-"""Frictional contacts, which expand to automata and to the states of their friction law."""
+"""This module defines frictional contacts, which expand to automata and states."""
 
 from __future__ import annotations
 

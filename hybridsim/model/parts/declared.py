@@ -1,4 +1,4 @@
-"""The base class of all parts of a model, which converts and checks the constructor arguments."""
+"""This module defines the base class of all parts of a model, which checks constructor arguments."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hybridsim.model.parts.frozen_map import FrozenMap
 
 
 class _Refusing(type):
-    """Metaclass that turns wrong constructor arguments into `UsageError` with the list of arguments."""
+    """The metaclass that turns wrong constructor arguments into `UsageError` with a list of arguments."""
 
     @property
     def __signature__(cls) -> Signature:
@@ -127,7 +127,7 @@ class Declared(metaclass=_Refusing):
             object.__setattr__(self, name, bool(value))
 
     def _parts(self, field: str, kind: type[Declared]) -> None:
-        """Convert a field to a tuple of parts of one class; a single part becomes a tuple of one."""
+        """Convert a field to a tuple of parts of one class; a single part becomes a tuple."""
         parts = as_tuple(getattr(self, field))
         for part in parts:
             if not isinstance(part, kind):
@@ -152,16 +152,16 @@ class Declared(metaclass=_Refusing):
         return f"{type(self).__name__} {name}" if isinstance(name, str) else type(self).__name__
 
     def _fault(self, message: str, remedy: str) -> UsageError:
-        """Return the error for a wrong constructor argument."""
+        """Return the error for a wrong argument of a constructor."""
         return UsageError(f"{self._title}: {message}", place=self.place, remedy=remedy)
 
     def error(self, message: str, remedy: str | None = None) -> ModelError:
-        """Return an error about this part, at its place."""
+        """Return an error about this part, with the place of its declaration."""
         return ModelError(message, place=self.place, remedy=remedy)
 
 
 def as_tuple(value: Any) -> tuple[Any, ...]:
-    """Return a tuple; a single object, including a string or a scalar array, becomes a tuple of one."""
+    """Return a tuple; a single object becomes a tuple with one element."""
     if isinstance(value, Iterable) and not isinstance(value, (str, bytes, Mapping)):
         try:
             return tuple(value)

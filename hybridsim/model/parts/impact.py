@@ -1,4 +1,4 @@
-"""Unilateral contacts: a gap that cannot become negative, its normal force, and impacts with restitution."""
+"""This module defines unilateral contacts: a gap, its normal force, and impacts with restitution."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ROUNDING = 8.0 * 2.0**-52
 
 @dataclass(frozen=True)
 class Impact(Declared):
-    """A unilateral contact; its name p is the normal force, which pushes the bodies apart and never pulls.
+    """A unilateral contact; its name is the normal force, which pushes the bodies apart.
 
     ::
 

@@ -1,4 +1,4 @@
-"""Known signals: tables over time, periodic waves and chirps, whose jumps and knots are scheduled events."""
+"""This module defines known inputs: tables over time, periodic waves and chirps."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ class Input(Declared):
 
     @property
     def expressions(self) -> dict[str, Expression]:
-        """The expressions of parameters by field name."""
+        """The expressions of parameters in the input, by field name."""
         fields = ("amplitude", "period", "phase", "offset", "duty", "f0", "f1", "duration", "value")
         return {name: getattr(self, name) for name in fields if getattr(self, name) is not None}
 

@@ -1,4 +1,4 @@
-"""The class Model: states, parameters, automata, contacts, inputs, events and outputs, all immutable."""
+"""This module defines the class Model, with states, parameters, automata, contacts and events."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ class Model(Declared):
             object.__setattr__(self, "discrete", (*self.discrete, *(i.as_held() for i in held)))
 
     def _with_those_of_laws(self) -> Iterable[State]:
-        """Yield the states, including those that the laws of contacts add, with their current values."""
+        """Yield the states with their current values, including the states that laws of contacts add."""
         brought: dict[str, State] = {}
         for contact in self.contacts:
             try:
@@ -263,7 +263,7 @@ class Model(Declared):
         return self._valued(states=states, parameters=other.parameters, discrete=other.discrete)
 
     def _valued(self, **parts: Any) -> Model:
-        """Return a copy that differs only in values and shares everything that does not depend on them."""
+        """Return a copy that differs only in values and shares all other results with the model."""
         copy: Model = object.__new__(type(self))
         vars(copy).update(vars(self), **parts, _common=self._common)
         vars(copy).pop("_values", None)
@@ -274,13 +274,13 @@ class Model(Declared):
         return {}
 
     def once(self, name: str, make: Callable[[], Any]) -> Any:
-        """Return a result that depends only on the structure; it is computed once for all copies."""
+        """Return a result that depends only on the structure, computed once for all copies of the model."""
         if name not in self._common:
             self._common[name] = make()
         return self._common[name]
 
     def _started(self, contact: Contact, changes: Mapping[str, Any]) -> Contact:
-        """Return the contact with new initial values for the states of its law."""
+        """Return the contact with new initial values for the states of its friction law."""
         own = {name for name in changes if name.startswith(contact.variable(""))}
         if not (own and contact.law.states):
             return contact
@@ -373,7 +373,7 @@ class Model(Declared):
         return names
 
     def _never_negative_names(self) -> frozenset[str]:
-        """Return names that need no guard as a load: constants and the normal forces of impacts."""
+        """Return names that cannot be negative: constants and the normal forces of impacts."""
         return self.constant_names() | {impact.name for impact in self.impacts}
 
     def _constant_names(self) -> frozenset[str]:
@@ -383,11 +383,11 @@ class Model(Declared):
         return frozenset(constants)
 
     def variables(self) -> dict[str, Component]:
-        """Return the variables that components set, contact forces included, each with its component."""
+        """Return the variables that components set, each with its component; contact forces are included."""
         return {name: component for component in self.all_components() for name in component.variables}
 
     def structure(self) -> str:
-        """Return the canonical text of everything that generated code depends on.
+        """Return the text of all declarations on which generated code depends.
 
         It excludes parameter values, initial values, units, titles and the numbers of tables, so that models that
         differ only in these share their code.
@@ -399,7 +399,7 @@ class Model(Declared):
 
     @property
     def is_known_to_be_sound(self) -> bool:
-        """Whether this model, or a copy with other values, has passed all checks except those of values."""
+        """Whether this model, or a copy with other values, has passed all checks of its structure."""
         return "is sound" in self._common
 
     def validate(self) -> Model:
@@ -469,7 +469,7 @@ def _content(model: Model) -> tuple[object, ...]:
 
 
 def _changed_value(changes: Mapping[str, Any], name: str) -> Expression:
-    """Return a changed value as an expression; an error names the changed quantity."""
+    """Return a changed value as an expression, or raise an error that names the changed quantity."""
     try:
         return parse(changes[name])
     except ExpressionError as error:

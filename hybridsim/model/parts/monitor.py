@@ -1,4 +1,4 @@
-"""Monitors, events that change no mode: they record, reset or end the run at a zero of a scalar."""
+"""This module defines monitors, which record, reset or end a run at a zero of a scalar."""
 
 from __future__ import annotations
 

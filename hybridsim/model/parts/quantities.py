@@ -1,4 +1,4 @@
-"""Parameters, states, discrete states and outputs of a model."""
+"""This module defines parameters, states, discrete states and outputs of a model."""
 
 from __future__ import annotations
 

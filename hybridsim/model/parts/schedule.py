@@ -1,4 +1,4 @@
-"""Events at known times: a list of times, or a periodic clock."""
+"""This module defines events at known times: a list of times, or a periodic clock."""
 
 from __future__ import annotations
 

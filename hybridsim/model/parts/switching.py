@@ -1,4 +1,4 @@
-"""Switching surfaces: rates that differ on the two sides, with sliding by Filippov's convention."""
+"""This module defines switching surfaces, at which rates jump, with Filippov sliding."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ class SwitchingSurface(Declared):
         return Component(self.name, modes, surface=surface, place=self.place)
 
     def blends(self) -> dict[str, Expression]:
-        """Return further variables in sliding; for u = +1 and u = -1 they equal the values on the sides."""
+        """Return the variables of the two sides as functions of u, equal to the sides for u = +1 and -1."""
         return {
             name: of_tree(blend(value.tree, self.below[name].tree, self.name), self.place)
             for name, value in self.above.items()
@@ -120,5 +120,5 @@ class SwitchingSurface(Declared):
 
 
 def blend(above: ast.expr, below: ast.expr, unknown: str) -> ast.expr:
-    """Return the expression that interpolates linearly from below (unknown -1) to above (unknown +1)."""
+    """Return the expression that interpolates linearly between the values below and above."""
     return with_names(_BLEND, {"above": above, "below": below, "u": ast.Name(unknown, ast.Load())})

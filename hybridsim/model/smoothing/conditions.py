@@ -1,4 +1,4 @@
-"""Split conditionals with Boolean conditions into conditionals of single comparisons.
+"""This module splits conditions with and, or, not into single comparisons.
 
 `a if p and q else b` becomes `(a if q else b) if p else b`; `or`, `not`, chains and nested conditions are split too.
 A comparison with a corner or jump inside is replaced by comparisons of smooth expressions: `abs(u) < d` becomes
@@ -20,7 +20,7 @@ _MOST_COMPARISONS = 64
 
 
 class TooManyConditions(Exception):
-    """A conditional would become too many single comparisons."""
+    """Raised if a condition would become too many single comparisons."""
 
 
 def single_comparisons(meanings: Meanings, node: ast.IfExp) -> ast.expr:
@@ -35,13 +35,13 @@ def single_comparisons(meanings: Meanings, node: ast.IfExp) -> ast.expr:
 
 
 class _Conditions:
-    """The conversion of one conditional."""
+    """Converts one conditional expression."""
 
     def __init__(self, meanings: Meanings) -> None:
         self.meanings, self.count = meanings, 0
 
     def chosen(self, test: ast.expr, yes: ast.expr, no: ast.expr, whole: ast.IfExp | None = None) -> ast.expr:
-        """Return an expression that is `yes` if the test is true, otherwise `no`; `whole` is reused."""
+        """Return an expression that is `yes` if the test is true, otherwise `no`."""
         match test:
             case ast.Constant(value=bool() as holds):
                 return yes if holds else no
@@ -76,7 +76,7 @@ class _Conditions:
         return whole if whole is not None and whole.test is test else ast.IfExp(test, yes, no)
 
     def _compared(self, apart: ast.expr, op: ast.cmpop, yes: ast.expr, no: ast.expr) -> ast.expr | None:
-        """Split a comparison of a non-smooth expression with zero; return None for a smooth expression."""
+        """Split a comparison of a non-smooth expression with zero, or return None for a smooth one."""
         tree = self.meanings.written_out(apart)
         match tree:
             case ast.BinOp(
@@ -114,7 +114,7 @@ class _Conditions:
         return self.chosen(test, first, second)
 
     def _rough(self, tree: ast.expr) -> tuple[ast.expr | None, Sides | None]:
-        """Return the first varying non-smooth part of a tree, and the values of this part on its sides."""
+        """Return the first non-smooth part of a tree that varies, and its values on both sides."""
         for part in ast.walk(tree):
             if isinstance(part, ast.Call | ast.IfExp) and self.meanings.moves(part):
                 if isinstance(part, ast.Call) and len(part.args) > 2:
@@ -126,7 +126,7 @@ class _Conditions:
         return None, None
 
     def corner(self, node: ast.IfExp) -> ast.expr | None:
-        """Return a conditional with a non-smooth comparison as abs or max, or None if it equals neither.
+        """Return a conditional expression as abs or max, or None if it equals neither.
 
         The condition is that the branches differ by a multiple of the compared expression.
         """
@@ -149,7 +149,7 @@ class _Conditions:
         return ast.BinOp(below, ast.Add(), ast.BinOp(number_tree(factor), ast.Mult(), larger))
 
     def _factor(self, tree: ast.expr, node: ast.expr) -> float:
-        """Return the factor of an abs, min or max if the tree is linear in this part, otherwise 0."""
+        """Return the factor of an abs, min or max in a tree, or 0 if the tree is not linear in it."""
         if not (isinstance(node, ast.Call) and ast.unparse(node.func) in ("abs", "min", "max")):
             return 0.0
         slopes = [

@@ -1,4 +1,4 @@
-"""Detection of conditionals and signs whose products are continuous, by comparison of polynomials."""
+"""This module detects conditionals and signs whose products are continuous."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _POWER_OF_ZERO = re.compile(r"\(0\)\*\*\((?!-)")
 
 
 def is_continuous(meanings: Meanings, border: ast.expr, body: ast.expr, orelse: ast.expr) -> bool:
-    """Return whether `body` equals `orelse` wherever `border` is zero, as far as polynomials can show it.
+    """Return whether two expressions are equal wherever `border` is zero, as far as polynomials show.
 
     They agree if their difference is a multiple of the border, or vanishes when the border is solved for one of its
     names. A power of zero with a parameter as exponent counts as zero.
@@ -30,7 +30,7 @@ def is_continuous(meanings: Meanings, border: ast.expr, body: ast.expr, orelse: 
 
 
 def _solved(border: ast.expr) -> Iterator[dict[str, ast.expr]]:
-    """Yield solutions of border = 0 for each name that is linear in it with a numeric coefficient."""
+    """Yield solutions of border = 0 for each name in which it is linear."""
     p = difference(border, ast.Constant(0))
     for name in sorted({factor for monomial in p for factor, _ in monomial}):
         if not name.isidentifier():
@@ -44,7 +44,7 @@ def _solved(border: ast.expr) -> Iterator[dict[str, ast.expr]]:
 
 
 def sides_of_product(meanings: Meanings, node: ast.expr, left: Set[Family] = frozenset()) -> Sides | None:
-    """Return the sides of a product with a sign that is continuous, such as sign(v)*v**2, or None.
+    """Return the two sides of a continuous product with a sign, such as sign(v)*v**2, or None.
 
     Signs with borders in `left` are ignored.
     """
@@ -57,7 +57,7 @@ def sides_of_product(meanings: Meanings, node: ast.expr, left: Set[Family] = fro
 
 
 def rooted_in(meanings: Meanings, node: ast.expr) -> frozenset[Family]:
-    """Return signs that a continuous product multiplies by a root with the same zero, by their arguments.
+    """Return the signs that a continuous product multiplies by a root with the same zero.
 
     An example is sign(d)*sqrt(abs(d)), which has no Taylor series at d = 0 on either side.
     """
@@ -89,7 +89,7 @@ def _bases_in(meanings: Meanings, node: ast.expr) -> list[ast.expr]:
 
 
 def has_root_beside_sign(meanings: Meanings, node: ast.expr) -> bool:
-    """Return whether a product with a sign contains a root or fractional power that is zero at the jump."""
+    """Return whether a product with a sign contains a root that is zero at the jump of the sign."""
     parts = list(ast.walk(meanings.written_out(node)))
     borders = [p.args[0] for p in parts if isinstance(p, ast.Call) and ast.unparse(p.func) == "sign"]
     if not borders:
@@ -99,6 +99,6 @@ def has_root_beside_sign(meanings: Meanings, node: ast.expr) -> bool:
 
 
 def _depends(p: Polynomial, name: str) -> bool:
-    """Return whether a name occurs in a polynomial, also inside factors that are not names."""
+    """Return whether a polynomial depends on a name, also inside factors that are not names."""
     factors = {factor for monomial in p for factor, _ in monomial}
     return any(name == factor or (not factor.isidentifier() and name in factor) for factor in factors)

@@ -1,4 +1,4 @@
-"""Replace the corners and jumps of a model by components, so that every mode is smooth.
+"""This module replaces the corners and jumps of a model by components.
 
 Corners are `abs`, `min`, `max` and conditionals whose branches agree at the change. If the mode of a component implies
 the active side (v >= 0 in slip+), this side replaces the corner. Any other corner becomes a component with two modes
@@ -30,7 +30,7 @@ IN_MODE = "it is in a mode of a component"
 
 @dataclass(frozen=True)
 class Smoothed:
-    """The model with replaced corners and jumps, and the treatment of each primitive."""
+    """A model with its corners and jumps replaced, and the treatment of each non-smooth function."""
 
     model: Model
     primitives: tuple[Primitive, ...]
@@ -51,7 +51,7 @@ def _smoothed(model: Model) -> Model | None:
 
 
 def smoothing_of(model: Model) -> Smoothed:
-    """Return the smoothed model and the treatment of every non-smooth primitive and fractional power.
+    """Return the smoothed model, and how each non-smooth function and fractional power is treated.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def smoothing_of(model: Model) -> Smoothed:
 
 
 class _Smoothing:
-    """One pass over a model."""
+    """Replaces the corners and jumps of one model."""
 
     def __init__(self, model: Model, work: Rewriting) -> None:
         self.model, self.work = model, work
@@ -95,7 +95,7 @@ class _Smoothing:
     # -- the model ------------------------------------------------------------------------------------------
 
     def run(self) -> tuple[Model, list[Family]]:
-        """Rewrite everything that is integrated or monitored; return the model itself if nothing changed.
+        """Rewrite all rates, guards and monitors; return the model itself if nothing changed.
 
         The second result contains the families of jumps that enter the rates nonlinearly.
         """

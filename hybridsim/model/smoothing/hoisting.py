@@ -1,4 +1,4 @@
-"""Jumps inside nonlinear expressions: the value of the whole expression jumps between its two sides.
+"""This module finds jumps inside nonlinear expressions, whose whole value jumps.
 
 `exp(sign(x))` is `exp(1)` above and `exp(-1)` below x = 0. While a motion slides along x = 0, the term is a convex
 combination of these two values, by Filippov's convention, and not the exponential of an intermediate value.
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def jump_inside(work: Rewriting, node: ast.expr, here: Here) -> ast.expr | None:
-    """Return the argument of a jump in which a node is nonlinear, or None if the node is linear in all jumps.
+    """Return the argument of a jump in which a tree is nonlinear, or None if there is none.
 
     Jumps that depend on time alone are excluded, because the modes or signals for them have only two values.
     """
@@ -42,7 +42,7 @@ def jump_inside(work: Rewriting, node: ast.expr, here: Here) -> ast.expr | None:
 
 
 def open_jumps(work: Rewriting, node: ast.expr, here: Here) -> Mapping[Family, ast.expr]:
-    """Return by family the arguments at which a tree has a jump that a switching surface can replace."""
+    """Return by family the arguments at which a tree jumps and a surface can replace the jump."""
     if not work.has_jumps:
         return {}
     found: dict[Family, ast.expr] = {}
@@ -59,7 +59,7 @@ def open_jumps(work: Rewriting, node: ast.expr, here: Here) -> Mapping[Family, a
 
 
 def _parts(meanings: Meanings, tree: ast.expr) -> Iterator[ast.expr]:
-    """Yield all parts of a tree that may be non-smooth, with conditions split into single comparisons."""
+    """Yield all parts of a tree that may be non-smooth."""
     for part in ast.walk(tree):
         if isinstance(part, ast.IfExp) and meanings.moves(part.test):
             try:
@@ -75,7 +75,7 @@ def _parts(meanings: Meanings, tree: ast.expr) -> Iterator[ast.expr]:
 
 
 def resolved(meanings: Meanings, node: ast.expr, signs: Mapping[Family, int]) -> ast.expr:
-    """Return a tree with inserted definitions, in which known signs select the active sides."""
+    """Return a tree with definitions inserted and with the sides selected by known signs."""
 
     def side(part: ast.expr) -> ast.expr:
         sides = sides_of(part)

@@ -1,4 +1,4 @@
-"""Jumps in a flow as components: switching surfaces, or switching at known times.
+"""This module replaces jumps in a flow by switching surfaces, or by events at known times.
 
 `sign(v)`, or a conditional whose branches differ, in a rate becomes a switching surface. The motion on the surface
 follows A. F. Filippov's convention (see `SwitchingSurface`).
@@ -31,7 +31,7 @@ _WORD = re.compile(r"[A-Za-z_]\w*")
 
 @dataclass
 class Jump:
-    """A jump: the name of its component, the variable of its sign, and the expression that changes sign.
+    """A replaced jump: its component, the variable of its sign, and the expression that changes sign.
 
     `values` contains variables with their values above, below and on the border. `blended` names the variables that
     jump and are interpolated on the border. `is_timed` is True if the border depends on time alone.
@@ -46,12 +46,12 @@ class Jump:
     blended: set[str] = field(default_factory=set)
 
     def signed(self, sign: int) -> ast.expr:
-        """Return the sign variable, or its negative, for an argument with the given sign in its family."""
+        """Return the sign variable, or its negative, for an argument with a given relative sign."""
         unknown = ast.Name(self.unknown, ast.Load())
         return unknown if sign == self.sign else ast.UnaryOp(ast.USub(), unknown)
 
     def component(self) -> Component:
-        """Return the automaton: three modes for a surface, or two modes that alternate in time."""
+        """Return the automaton: three modes for a surface, or two alternating modes in time."""
         argument = of_tree(self.argument)
         if self.is_timed:
             minus = of_tree(ast.UnaryOp(ast.USub(), self.argument))
@@ -68,7 +68,7 @@ class Jump:
 
 
 class Borders:
-    """Tests whether a component can represent the jumps of a model."""
+    """Tests whether components can represent the jumps of a model."""
 
     def __init__(self, model: Model, meanings: Meanings) -> None:
         self._meanings = meanings
@@ -90,7 +90,7 @@ class Borders:
         self._of_gaps = positions.union(*speeds) & self._moving
 
     def refusal(self, argument: ast.expr) -> str:
-        """Return the reason why a jump at the zeros of an argument is kept, or an empty string."""
+        """Return why a jump at the zeros of an argument is not replaced, or an empty text."""
         tree = self._meanings.written_out(argument)
         names = names_of(tree)
         if names & self._switched:
@@ -114,7 +114,7 @@ class Borders:
         return not any(names_of(rate) & self._switched or _jumps(rate) for rate in rates)
 
     def conflict(self, argument: ast.expr, jumps: Iterable[Jump]) -> str:
-        """Return the reason why a border conflicts with other surfaces and jumps, or an empty string."""
+        """Return why a border conflicts with other surfaces and jumps, or an empty text."""
         if self.is_timed(argument) or self.is_only_passed(argument):
             return ""
         others = [*self._surfaces, *(jump.argument for jump in jumps if not jump.is_timed)]
@@ -136,7 +136,7 @@ class Borders:
         )
 
     def _slopes(self, argument: ast.expr) -> list[Fraction] | None:
-        """Return the coefficients of the states in a border at sample parameters; None if nonlinear."""
+        """Return the coefficients of the states in a border, or None if it is not linear."""
         slopes = dict.fromkeys(sorted(self._moving), Fraction(0))
         for monomial, coefficient in polynomial(self._meanings.written_out(argument)).items():
             moved = [factor for factor in monomial if not self._moving.isdisjoint(_WORD.findall(factor[0]))]
@@ -150,7 +150,7 @@ class Borders:
         return list(slopes.values())
 
     def is_timed(self, argument: ast.expr) -> bool:
-        """Return whether a border depends on time alone."""
+        """Return whether a border depends on time only."""
         return not names_of(self._meanings.written_out(argument)) & self._moving
 
 
@@ -160,7 +160,7 @@ def _jumps(tree: ast.expr) -> bool:
 
 
 def _rank(rows: list[list[Fraction]]) -> int:
-    """Return the rank of rows, by elimination."""
+    """Return the rank of a list of rows, by elimination."""
     left, rank = [row for row in rows if any(row)], 0
     while left:
         first, *others = left
@@ -175,7 +175,7 @@ def _rank(rows: list[list[Fraction]]) -> int:
 def apart_by(
     meanings: Meanings, first: ast.expr, second: ast.expr
 ) -> tuple[Polynomial, Polynomial, Polynomial]:
-    """Return `n`, `d` and the constant `g` = n*first - d*second for parallel borders, else empty polynomials.
+    """Return n, d and the constant g = n*first - d*second for parallel borders, else empty polynomials.
 
     n and d are numbers times products of parameters, n / d the ratio of the slopes of the second to those of the first.
     """
@@ -203,7 +203,7 @@ def apart_by(
 
 
 def _times(one: Monomial, other: Monomial, power: int = 1) -> Monomial:
-    """Return the product of a monomial with a power of another one."""
+    """Return the product of a monomial and a power of another monomial."""
     powers = dict(one)
     for name, count in other:
         powers[name] = powers.get(name, 0) + power * count
@@ -211,7 +211,7 @@ def _times(one: Monomial, other: Monomial, power: int = 1) -> Monomial:
 
 
 def product_of_signs(meanings: Meanings, first: ast.expr, second: ast.expr) -> ast.expr | None:
-    """Return sign(first)*sign(second) as a linear function of both signs, or None without parallel borders.
+    """Return sign(first)*sign(second) as a linear function of both signs, or None if not parallel.
 
     With n, d and g of `apart_by` and n', d', g' their signs, the product is n' d' - d' g' u + n' g' w. Where n or d has
     the value 0, one border is constant, and has the sign that this gives it.
@@ -224,7 +224,7 @@ def product_of_signs(meanings: Meanings, first: ast.expr, second: ast.expr) -> a
 
 
 def not_linear(trees: Iterable[tuple[str, ast.expr]], carried: Mapping[str, Set[str]]) -> set[str]:
-    """Return the signs in which an expression is nonlinear, with all other signs held fixed.
+    """Return the signs in which an expression is not linear.
 
     `trees` contains the expressions of names, and of rates without a name. `carried` maps signs, forces and variables
     that jump with them to these signs.

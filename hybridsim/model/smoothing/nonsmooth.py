@@ -1,4 +1,4 @@
-"""Non-smooth primitives in expressions (abs, min, max, sign, conditionals) and their treatment."""
+"""This module finds non-smooth functions in expressions: abs, min, max, sign, conditionals."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _HOLDS = {  # truth of a comparison for a positive, zero and negative difference
 
 @dataclass(frozen=True)
 class Primitive:
-    """A non-smooth primitive whose argument varies, and its treatment.
+    """A non-smooth function with a varying argument, and its treatment.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ class Primitive:
 
 
 def uses_primitives(model: Model) -> bool:
-    """Return whether an integrated or monitored expression contains a non-smooth primitive."""
+    """Return whether an integrated or monitored expression contains a non-smooth function."""
     return any(_WORD.search(expr.text) for expr in _expressions(model))
 
 
@@ -66,7 +66,7 @@ def uses_conditions(model: Model) -> bool:
 
 
 def has_word(expr: Expression) -> bool:
-    """Return whether the expression itself contains a non-smooth function; definitions in it are not expanded."""
+    """Return whether an expression itself contains a non-smooth function, without its definitions."""
     return bool(_WORD.search(expr.text))
 
 
@@ -88,7 +88,7 @@ def _expressions(model: Model) -> Iterator[Expression]:
 
 
 def limited(node: ast.expr, meanings: Meanings) -> Iterator[ast.expr]:
-    """Yield the arguments of functions with a limited domain: roots, logarithms and powers."""
+    """Yield the arguments of functions with a limited domain, such as roots, logarithms and powers."""
     for part in ast.walk(node):
         match part:
             case ast.Call(func=ast.Name(id=name), args=[argument]) if name in _LIMITED:
@@ -119,7 +119,7 @@ def is_whole(exponent: ast.expr, meanings: Meanings) -> bool:
 
 
 def is_clear_of_zero(node: ast.expr, numbers: dict[str, float], meanings: Meanings) -> bool:
-    """Return whether the form of an expression shows that it is positive, as in 1 + v**2 or exp(v)."""
+    """Return whether an expression is certainly positive by its form, as 1 + v**2 or exp(v)."""
     match node:
         case ast.Name(id=name) if (tree := meanings.lookup(name)) is not None:
             return is_clear_of_zero(tree, numbers, meanings)
@@ -141,7 +141,7 @@ Sides = tuple[ast.expr, ast.expr, ast.expr, ast.expr]
 
 
 def sides_of(node: ast.expr) -> Sides | None:
-    """Return the argument and the sides of a primitive, or None for any other node."""
+    """Return the argument and the two sides of a non-smooth function, or None for other nodes."""
     match node:
         case ast.Call(func=ast.Name(id="abs"), args=[u]):
             return u, u, ast.UnaryOp(ast.USub(), u), u

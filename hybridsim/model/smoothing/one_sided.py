@@ -1,4 +1,4 @@
-"""Detection of expressions that cannot be negative by their form, such as squares and absolute values."""
+"""This module detects expressions that cannot be negative, such as squares."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def never_negative(node: ast.expr, numbers: Mapping[str, float], lookup: Lookup)
 def _factors(
     reasons: list[str] | None, parts: list[ast.expr], numbers: Mapping[str, float], lookup: Lookup
 ) -> str | None:
-    """Return the reason for a product: that of its only varying factor, or that of all factors."""
+    """Return the reason why a product is never negative, from its factors."""
     if not reasons:
         return None
     varying = [r for r, part in zip(reasons, parts, strict=True) if number_of(part, numbers, lookup) is None]

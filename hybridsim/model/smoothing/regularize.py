@@ -1,4 +1,4 @@
-"""Regularised friction: a copy of a model with single-valued friction forces."""
+"""This module replaces the friction of a model by regularised, single-valued friction forces."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def regularized(model: Model, kind: str, v0: Expression | str | float) -> Model:
 
 
 def _smooth(model: Model, contact: Contact, v0: str, kind: str) -> Component:
-    """Return a component with one mode, f = slip(|v|) g(v/v0), with g odd and rising from -1 to 1."""
+    """Return a component with the smooth force f = slip(|v|) g(v/v0), where g rises from -1 to 1."""
     _refuse_static(model, contact, kind)
     if contact.law.slip_backward is not None:
         raise UsageError(
@@ -232,7 +232,7 @@ def _stopping(model: Model, contact: Contact) -> dict[str, Expression]:
 
 
 def _loaded(model: Model, contact: Contact) -> tuple[Guard, ...]:
-    """Return the guard that ends the run if the normal load becomes negative, if there is one."""
+    """Return the guard that ends the run at a negative normal load, if the contact has one."""
     guards = contact.component(model.constant_names()).modes[0].guards
     return tuple(guard for guard in guards if guard.fatal)
 

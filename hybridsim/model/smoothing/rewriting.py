@@ -1,4 +1,4 @@
-"""Rewrite the expressions of a model: replace corners by variables of components, and insert known sides."""
+"""This module rewrites the expressions of a model, with variables of components for corners."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ VARIABLE = "__corner_"  # declared names cannot start with two underscores
 
 @dataclass(frozen=True)
 class Here:
-    """The context of a tree: its place in words, the signs known in its mode, and the allowed replacements.
+    """The context of a tree: its place in the model, the known signs, and the allowed replacements.
 
     `untouched` is the reason why nothing may be replaced here, or empty. `jumps` is the reason why jumps of states are
     kept; it is empty in a rate, where a motion may slide along a jump. `is_passing` allows jumps that a motion can only
@@ -70,7 +70,7 @@ class Here:
 
 @dataclass
 class Found:
-    """A corner: the name of its component, its argument, and its variables with their values per side."""
+    """A replaced corner: its component, its argument, and its variables with their values."""
 
     name: str
     argument: ast.expr
@@ -79,7 +79,7 @@ class Found:
 
 
 class Rewriting:
-    """One pass over the expressions of a model, with results in `corners`, `jumps`, `implied`, `primitives`.
+    """Rewrites the expressions of a model once, and stores the corners and jumps.
 
     Parameters
     ----------
@@ -123,12 +123,12 @@ class Rewriting:
         self._walked: dict[tuple[object, ...], tuple[ast.expr, Here, ast.expr]] = {}
 
     def primitives(self) -> tuple[Primitive, ...]:
-        """Return the treatment of each primitive, in order of appearance."""
+        """Return the treatment of each non-smooth function, in order of appearance."""
         found = self._accounts.items()
         return tuple(Primitive(*key[:1], tuple(where), *key[1:], place) for key, (where, place) in found)
 
     def single_signs(self, tree: ast.expr) -> ast.expr:
-        """Return a tree with signs of products split; equal calls return the same tree."""
+        """Return a tree in which signs of products are products of signs."""
         if not self._has_sign:
             return tree
         if id(tree) not in self._single:
@@ -136,7 +136,7 @@ class Rewriting:
         return self._single[id(tree)][1]
 
     def walk(self, node: ast.expr, here: Here) -> ast.expr:
-        """Return the tree with non-smooth parts replaced, or the same tree if there are none.
+        """Return a tree in which non-smooth parts are replaced, or the same tree if there are none.
 
         Results are cached, because both sides of a corner contain its argument and nested corners would be visited
         twice per level.
@@ -208,7 +208,7 @@ class Rewriting:
         return node if single is node else self.walk(single, here)
 
     def _sign_taken_apart(self, argument: ast.expr, here: Here) -> ast.expr | None:
-        """Return the replacement of the sign of a non-smooth expression, or None if it is smooth."""
+        """Return the replacement of the sign of a non-smooth expression, or None for a smooth one."""
         minus = ast.UnaryOp(ast.USub(), ast.Constant(1))
         node = ast.IfExp(ast.Compare(argument, [ast.Gt()], [ast.Constant(0)]), ast.Constant(1), minus)
         if self.never_negative(argument) or self._owner(self.meanings.family(argument)[0]) is not None:
@@ -217,7 +217,7 @@ class Rewriting:
         return None if found is node else found
 
     def _hoisted(self, node: ast.expr, border: ast.expr, here: Here) -> ast.expr:
-        """Return a jump between the two values of an expression that depends nonlinearly on a jump."""
+        """Return the replacement of an expression that depends nonlinearly on a jump."""
         whole = self.meanings.written_out(node)
         made = ast.IfExp(ast.Compare(border, [ast.Gt()], [ast.Constant(0)]), whole, whole)
         return self._side(made, (border, whole, whole, whole), here)
@@ -228,7 +228,7 @@ class Rewriting:
         return not any(isinstance(part, ast.IfExp) or sides_of(part) for part in parts)  # type: ignore[arg-type]  # others have none
 
     def is_open(self, family: Family, argument: ast.expr, here: Here) -> bool:
-        """Return whether a switching surface may represent a jump at this place."""
+        """Return whether a switching surface may represent a jump at this place of the model."""
         return bool(
             family
             and not self.never_negative(argument)
@@ -239,14 +239,14 @@ class Rewriting:
         )
 
     def _left(self, family: Family, argument: ast.expr, here: Here) -> str:
-        """Return the reason why a jump is kept, or an empty string."""
+        """Return why a jump is not replaced, or an empty text."""
         reason = here.jumps
         if here.is_passing and self.borders.is_only_passed(argument):
             reason = ""
         return reason or self.refusal or self.refused.get(family, "") or self._border(family, argument)
 
     def _signs(self, here: Here, family: Family, sign: int) -> Mapping[Family, int]:
-        """Return the known signs extended by the sign of one more family."""
+        """Return the known signs, with the sign of one more family."""
         known = {**here.signs, family: sign}
         return self._known_signs.setdefault(frozenset(known.items()), known)
 
@@ -263,7 +263,7 @@ class Rewriting:
         return replace(here, untouched=here.untouched or "it is in a root or a fractional power")
 
     def _side(self, node: ast.expr, parts: Sides, here: Here) -> ast.expr:
-        """Return the replacement of a primitive: one of its sides, or a variable with the active side."""
+        """Return the replacement of a non-smooth function: one of its sides, or a variable."""
         argument, above, below, on_border = parts
         if here.signs and not self.is_smooth(argument):
             argument = resolved(self.meanings, argument, here.signs)
@@ -344,7 +344,7 @@ class Rewriting:
     def _pair(
         self, above: ast.expr, below: ast.expr, family: Family, sign: int, here: Here
     ) -> tuple[ast.expr, ast.expr]:
-        """Rewrite both sides of a primitive; on each side the sign of the border is known.
+        """Rewrite both sides of a non-smooth function; on each side the sign of its argument is known.
 
         Signs without influence are dropped, because corners nested twenty times would otherwise be visited a million
         times.
@@ -359,11 +359,11 @@ class Rewriting:
         return first, second
 
     def _is_met(self, family: Family, node: ast.expr) -> bool:
-        """Return whether a tree contains a corner at this border, or a jump at any border."""
+        """Return whether a tree contains a corner at a given border, or any jump."""
         return None in (met := self._borders_in(node)) or family in met
 
     def _borders_in(self, node: ast.expr) -> frozenset[Family | None]:
-        """Return the borders of the corners in a tree, with None for any jump."""
+        """Return the borders of the corners in a tree, with None for each jump."""
         if id(node) not in self._met:
             found: set[Family | None] = set()
             is_jump = isinstance(node, ast.IfExp | ast.Compare | ast.BoolOp)
@@ -380,18 +380,18 @@ class Rewriting:
         return self._met[id(node)][1]
 
     def _is_limited(self, branch: ast.expr, argument: ast.expr, family: Family, sign: int) -> bool:
-        """Return whether a side may be undefined beyond the border, such as a root."""
+        """Return whether one side may be undefined beyond the border, such as a root."""
         border = names_of(self.meanings.written_out(argument)) & self.meanings.moving
         side = resolved(self.meanings, branch, {family: sign})
         return any(names_of(base) & border for base in limited(side, self.meanings))
 
     def _is_step(self, family: Family, argument: ast.expr, here: Here, agrees: bool) -> bool:
-        """Return whether a signal represents a condition on time alone at this place."""
+        """Return whether a signal represents a condition on time at this place of the model."""
         may_be_timed = here.untouched or (here.times and not agrees) or family in self.timed
         return bool(may_be_timed) and self.borders.is_timed(argument) and not self.borders.refusal(argument)
 
     def _step(self, family: Family, argument: ast.expr) -> TimeStep | None:
-        """Return the step signal of a condition on time, or None if its switching times cannot be computed."""
+        """Return the step signal of a condition on time, or None if its times cannot be computed."""
         if family not in self.steps:
             tree = self.meanings.written_out(argument)
             found = step_of(f"{STEP}{len(self.steps) + 1}", tree, self._parameters, write(argument))
@@ -410,7 +410,7 @@ class Rewriting:
     def _stepped(
         self, node: ast.expr, step: TimeStep, parts: Sides, family: Family, sign: int, here: Here
     ) -> ast.expr:
-        """Return a condition on time as the sum of its two values, weighted by the signal."""
+        """Return a condition on time as the sum of its two values, weighted by a step signal."""
         self.note(node, TIMED, step.title, here)
         pair = self._pair(parts[1], parts[2], family, sign, here)
         pair = pair if sign == self.steps[family][1] else pair[::-1]
@@ -418,7 +418,7 @@ class Rewriting:
         return with_names(_EITHER, names)
 
     def _jump(self, node: ast.expr, parts: Sides, family: Family, sign: int, here: Here) -> ast.expr:
-        """Return the replacement of a primitive whose sides differ."""
+        """Return the replacement of a non-smooth function whose sides differ."""
         argument, above, below, _ = parts
         if self.borders.is_timed(argument):
             reason = (
@@ -445,7 +445,7 @@ class Rewriting:
     def _stairs(
         self, jump: Jump, argument: ast.expr, nested: ast.expr, other: ast.expr, way: int, here: Here
     ) -> ast.expr | None:
-        """Return nested jumps between constants at parallel borders as a sum of both signs, or None.
+        """Return nested jumps between constants at parallel borders as a sum of signs, or None.
 
         `way` is the side (1 or -1) of the first border on which the second border is.
         """
@@ -465,7 +465,7 @@ class Rewriting:
         return with_names(parse(text).tree, {**parts, "uw": with_names(product, parts)})
 
     def _border(self, family: Family, argument: ast.expr) -> str:
-        """Return the reason why a border cannot be a surface, or an empty string."""
+        """Return why a border cannot become a switching surface, or an empty text."""
         if family in self.jumps:
             return ""
         return self.borders.refusal(argument) or self.borders.conflict(argument, self.jumps.values())
@@ -479,7 +479,7 @@ class Rewriting:
         return self.jumps[family]
 
     def agrees(self, node: ast.expr, parts: Sides) -> bool:
-        """Return whether the sides of a primitive have equal values at its border, by their form."""
+        """Return whether the two sides of a non-smooth function are equal at its border."""
         argument, above, below, _ = parts
         if isinstance(node, ast.IfExp):
             family, sign = self.meanings.family(argument)
@@ -489,7 +489,7 @@ class Rewriting:
         return not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "sign")
 
     def _owner(self, family: Family) -> int | None:
-        """Return a component in which every mode implies the side of an expression, or None."""
+        """Return a component whose modes determine the side of an expression, or None."""
         for c, modes in enumerate(self.signs):
             if modes and all(family in signs for signs in modes):
                 return c
@@ -530,5 +530,5 @@ class Rewriting:
             where.append(here.where)
 
     def never_negative(self, node: ast.expr) -> bool:
-        """Return whether a tree is never negative by its form, for all parameters."""
+        """Return whether a tree is never negative for all values of the parameters."""
         return never_negative(node, {}, self.meanings.lookup) is not None

@@ -1,4 +1,4 @@
-"""Conditions on time alone as known signals: 1 if true, 0 if false, with the changes as knots.
+"""This module represents conditions on time as signals: 1 if true, 0 if false.
 
 In a rate such a condition becomes a component, which the compiled loop passes without stopping. In the velocity of a
 contact, a load, a law, a gap or a guard it becomes a signal, whose jumps are treated like those of an input. Its times
@@ -25,7 +25,7 @@ _ZERO, _ONE = ast.Constant(0), ast.Constant(1)
 
 @dataclass(frozen=True)
 class TimeStep(Input):
-    """A signal that is 1 if shift + rate*t, or shift + amplitude*sin(phase + rate*t), is positive, else 0.
+    """A signal that is 1 while a linear or sinusoidal function of time is positive, otherwise 0.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class TimeStep(Input):
 
     @property
     def expressions(self) -> dict[str, Expression]:
-        """The expressions of parameters by field name."""
+        """The expressions of parameters in the signal, by field name."""
         fields = ("shift", "rate", "amplitude", "phase", "period")
         return {name: getattr(self, name) for name in fields if getattr(self, name) is not None}
 
@@ -58,7 +58,7 @@ def constant_inputs(model: Model) -> dict[str, float]:
 
 
 def lasting(model: Model) -> frozenset[str]:
-    """Return names that are constant during a run: unchanged discrete states and constant inputs; no held inputs."""
+    """Return the names that are constant during a run: some discrete states, and inputs that are not held."""
     choices = [choice for c in model.components for m in c.modes for g in m.guards for choice in g.then]
     resets = [choice.reset for choice in choices]
     resets += [part.reset for part in model.monitors] + [part.reset for part in model.schedules]
@@ -67,7 +67,7 @@ def lasting(model: Model) -> frozenset[str]:
 
 
 def step_of(name: str, argument: ast.expr, parameters: Set[str], title: str) -> TimeStep | None:
-    """Return the signal that is 1 while an expression of time is positive, or None for unsupported forms."""
+    """Return the signal that is 1 while a function of time is positive, or None if unsupported."""
     if linear := _linear(argument, TIME, parameters):
         return TimeStep(name, "step", shift=of_tree(linear[0]), rate=of_tree(linear[1]), title=title)
     for part in ast.walk(argument):
@@ -100,7 +100,7 @@ def step_of(name: str, argument: ast.expr, parameters: Set[str], title: str) -> 
 
 
 def _linear(tree: ast.expr, name: str, parameters: Set[str]) -> tuple[ast.expr, ast.expr] | None:
-    """Return a and b of a + b*name, which depend only on parameters, or None for other forms."""
+    """Return a and b of an expression a + b*name, or None if it has another form."""
     shift, at_one = (with_names(tree, {name: value}) for value in (_ZERO, _ONE))
     slope = ast.BinOp(at_one, ast.Sub(), shift)
     if not names_of(shift) <= parameters:

@@ -1,4 +1,4 @@
-"""The structure of a model as canonical text, which is the cache key of generated code."""
+"""This module writes the structure of a model as text, which identifies generated code."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def structure(model: Model) -> str:
-    """Return one line for each relevant part; models with equal texts share their code."""
+    """Return one line for each relevant part; models with equal texts share their generated code."""
     return "\n".join(_lines(model)) + "\n"
 
 
@@ -76,5 +76,5 @@ def _schedule(schedule: Schedule) -> str:
 
 
 def _map(items: Mapping[str, Expression]) -> str:
-    """Return the items sorted by name, because their order has no meaning."""
+    """Return the items of a mapping sorted by name, because their order has no meaning."""
     return " {" + "; ".join(f"{name} = {items[name]}" for name in sorted(items)) + "}"

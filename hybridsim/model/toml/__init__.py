@@ -1,4 +1,4 @@
-"""This folder reads models from TOML text, with the line of every fault, and writes them.
+"""This package reads models from TOML text, reports the line of every fault, and writes models.
 
 Start with `read`.
 """

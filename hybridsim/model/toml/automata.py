@@ -1,4 +1,4 @@
-"""Read components from TOML: modes, guards, choices and the initial mode."""
+"""This module reads components from TOML: modes, guards, choices and the initial mode."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ SINGLE = "mode"
 
 
 def read_components(root: Table) -> Iterable[Component]:
-    """Yield the automaton of the top-level [modes.*], then those of [components.*]."""
+    """Yield the automaton of the top-level [modes.*], followed by those of [components.*]."""
     if "modes" in root.data or "initial" in root.data:
         yield _component(SINGLE, root, root.source.place(("modes",)))
     for name, table in root.entries("components", "component"):

@@ -1,4 +1,4 @@
-"""Read inputs from TOML: waves, chirps, and tables in the file or in a CSV file."""
+"""This module reads inputs from TOML: waves, chirps and tables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Read friction laws from TOML: [laws.*], and the laws of contacts."""
+"""This module reads friction laws from TOML: [laws.*], and the laws of contacts."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def read_laws(root: Table) -> dict[str, FrictionLaw]:
 def read_law_of_contact(
     contact: Table, laws: dict[str, FrictionLaw]
 ) -> tuple[FrictionLaw, dict[str, Expression]] | None:
-    """Return law and arguments of a contact, or None after reporting an unknown law.
+    """Return the law and the arguments of a contact, or None after reporting an unknown law.
 
     ``law = { name = "coulomb", mu = "mu" }`` refers to a law of the file or the package. With ``slip`` and ``stick``,
     or with ``force``, the table declares the law itself, and every other key is a parameter with its value.

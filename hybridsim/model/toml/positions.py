@@ -1,4 +1,4 @@
-"""Line and column of every key in a TOML text, which `tomllib` does not report."""
+"""This module finds the line and column of every key in a TOML text."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _BLANK = " \t"
 
 
 def positions(text: str) -> Mapping[Path, tuple[int, int]]:
-    """Return the line (from 1) and column (from 0) of every key and array element of a valid TOML text.
+    """Return the line (from 1) and column (from 0) of every key and array element in a TOML text.
 
     The text must be valid TOML, which `tomllib` has checked. Escapes in quoted keys are not resolved.
     """
@@ -17,7 +17,7 @@ def positions(text: str) -> Mapping[Path, tuple[int, int]]:
 
 
 class _Scanner:
-    """A scanner that reads keys and skips values; `at` is the current offset."""
+    """Reads the keys of a TOML text and skips the values; `at` is the current offset."""
 
     def __init__(self, text: str) -> None:
         self.text = text + "\n"
@@ -52,7 +52,7 @@ class _Scanner:
         self.at = to
 
     def note(self, path: Path) -> None:
-        """Record the place of the last part of a path; the first mention counts."""
+        """Store the place of the last part of a key, unless it has a place already."""
         column = self.at - (self.text.rfind("\n", 0, self.at) + 1)
         self.found.setdefault(path, (self.line, column))
 
@@ -73,7 +73,7 @@ class _Scanner:
         self.value(path)
 
     def key(self, path: Path) -> Path:
-        """Read a simple or dotted key in the table at a path, and record every part."""
+        """Read a simple or dotted key in the table at a path, and store the place of every part."""
         while True:
             self.skip(_BLANK)
             start = self.at

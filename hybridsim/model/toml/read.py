@@ -1,4 +1,4 @@
-"""Read a model from TOML text, with one function for each kind of table."""
+"""This module reads a model from TOML text, with one function for each kind of table."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ KEYS = (
 
 
 def read_model(text: str, path: str | None = None) -> Model:
-    """Read and validate a model.
+    """Read a model from TOML text, and check it.
 
     Raises
     ------

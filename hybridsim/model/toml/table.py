@@ -1,4 +1,4 @@
-"""Checked access to a TOML table, which collects all errors with their lines."""
+"""This module reads TOML tables, checks types, and collects all errors with their lines."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _ZERO = parse(0)
 
 @dataclass
 class Source:
-    """The text of the file, the positions of its keys, and the errors found so far."""
+    """The text of a TOML file, the positions of its keys, and the errors found so far."""
 
     file: str | None
     lines: list[str]
@@ -34,7 +34,7 @@ class Source:
 
 
 class Table:
-    """A table at a path; getters report wrong types and return a placeholder, so that reading continues."""
+    """A TOML table; wrong types are reported and replaced by a placeholder, so that reading continues."""
 
     def __init__(self, source: Source, path: Path, data: Mapping[str, Any], kind: str) -> None:
         self.source = source
@@ -44,25 +44,25 @@ class Table:
         self.place = source.place(path)
 
     def fail(self, message: str, remedy: str, *keys: str | int) -> None:
-        """Report an error at this table, or at one of its keys."""
+        """Report an error at this table or at one of its keys."""
         place = self.source.place((*self.path, *keys))
         self.source.errors.append(ModelError(f"{self.kind}: {message}", place=place, remedy=remedy))
 
     def only(self, *known: str) -> None:
-        """Report every unknown key."""
+        """Report every key that is not among the known keys."""
         for key in self.data:
             if key not in known:
                 self.fail(f"unknown key '{key}'", nearest(key, known, kind="keys"), key)
 
     def only_in(self, *known: str, others: Sequence[str], remedy: str) -> None:
-        """Report every unknown key, and those that belong to another table together, with their own remedy."""
+        """Report every unknown key, and keys of another table with their own remedy."""
         others = [key for key in others if key not in known]
         if others:
             self.fail(f"unknown {', '.join(map(repr, others))}", remedy, others[0])
         self.only(*known, *others)
 
     def require(self, key: str, remedy: str) -> bool:
-        """Return whether the key exists, and report it if not."""
+        """Return whether a key exists, and report it if it is missing."""
         if key not in self.data:
             self.fail(f"'{key}' is missing", remedy)
         return key in self.data
@@ -92,7 +92,7 @@ class Table:
         return _real(value)
 
     def reals(self, key: str) -> dict[str, float]:
-        """Return a table of numbers, empty if the key is missing."""
+        """Return a table of numbers, or an empty one if the key is missing."""
         found = self._typed(key, dict, "a table of numbers", {})
         table = Table(self.source, (*self.path, key), found, f"{self.kind}, {key}")
         return {name: value for name in found if (value := table.real(name)) is not None}
@@ -107,7 +107,7 @@ class Table:
         return tuple(_real(value) for value in found)
 
     def expression(self, key: str, remedy: str | None = None) -> Expression | None:
-        """Return the expression of a key, or None; with a remedy, a missing key is reported."""
+        """Return the expression of a key, or None; a missing key is reported if a remedy is given."""
         if key not in self.data:
             if remedy is None:
                 return None
@@ -134,17 +134,17 @@ class Table:
             return _ZERO
 
     def expressions(self, key: str) -> dict[str, Expression]:
-        """Return a table of expressions, empty if the key is missing."""
+        """Return a table of expressions, or an empty one if the key is missing."""
         found = self._typed(key, dict, "a table of expressions", {})
         return {name: self.parsed(value, key, name) for name, value in found.items()}
 
     def resets(self, key: str) -> dict[str, Expression]:
-        """Return a table of resets, which may contain '+= amount', empty if the key is missing."""
+        """Return a table of resets, or an empty one if the key is missing."""
         found = self._typed(key, dict, "a table of expressions", {})
         return {name: self.parsed(value, key, name, form=parse_reset) for name, value in found.items()}
 
     def entries(self, key: str, kind: str, shorthand: str | None = None) -> Iterator[tuple[str, Table]]:
-        """Yield named sub-tables; a plain value becomes a table with only the ``shorthand`` key."""
+        """Yield named sub-tables; a plain value becomes a table with the key ``shorthand``."""
         for name, value in self._typed(key, dict, "a table", {}).items():
             table = self.sub(value, f"{kind} {name}", shorthand, key, name)
             if table is not None:

@@ -1,4 +1,4 @@
-"""Read two columns of a CSV file as the table of an input."""
+"""This module reads two columns of a CSV file as the table of an input."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ MAX_BYTES = 64_000_000
 
 
 def read_columns(path: Path, columns: Sequence[str | int]) -> tuple[tuple[float, ...], ...]:
-    """Return columns of a CSV file as numbers.
+    """Return two columns of a CSV file as numbers.
 
     The separator is a comma, a semicolon or a tab. Empty lines and lines that start with # are skipped. The first line
     contains names if a column is selected by name, or if none of the columns selected by index has a number there.

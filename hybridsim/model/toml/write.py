@@ -1,4 +1,4 @@
-"""Write a model as complete TOML text, which reads back to an equal model."""
+"""This module writes a model as complete TOML text, which reads back to an equal model."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def _is_set(value: Any) -> bool:
 
 
 def _short(key: str, entries: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """Return plain values if no entry has further fields; a mixture would be written in another order."""
+    """Return plain values if no entry has further fields, otherwise the entries unchanged."""
     if all(not _is_set(value) for entry in entries.values() for name, value in entry.items() if name != key):
         return {name: entry[key] for name, entry in entries.items()}
     return entries
@@ -144,7 +144,7 @@ def _schedule(schedule: Schedule) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """Return a value for TOML: expressions become numbers or strings, and unset entries are omitted."""
+    """Return a value for TOML: expressions become numbers or strings, unset entries are omitted."""
     if isinstance(value, Expression):
         number = _number(value.text)
         return value.text if number is None else number

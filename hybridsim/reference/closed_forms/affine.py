@@ -1,4 +1,4 @@
-"""This module converts an expression to a linear form in chosen names plus sine waves of time."""
+"""This module converts an expression to a linear form plus sine waves of time."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Affine:
         return not self.linear and not self.waves
 
     def plus(self, other: Affine, factor: float = 1.0) -> Affine:
-        """Return self + factor * other."""
+        """Return the sum of this form and a factor times another form."""
         linear, waves = dict(self.linear), dict(self.waves)
         for name, value in other.linear.items():
             linear[name] = linear.get(name, 0.0) + factor * value
@@ -36,7 +36,7 @@ class Affine:
 
 
 class NotAffine(Exception):
-    """This error reports an expression that is not a linear form plus sine waves."""
+    """Raised for an expression that is not a linear form plus sine waves."""
 
 
 def affine(
@@ -45,7 +45,7 @@ def affine(
     values: Mapping[str, float],
     definitions: Mapping[str, Expression],
 ) -> Affine:
-    """Return the linear form of an expression in the `unknowns`; raise `NotAffine` if it has another form."""
+    """Return the linear form of an expression in the `unknowns`, or raise `NotAffine`."""
     try:
         return _read(expression.tree, unknowns | {TIME}, values, definitions)
     except (NoValue, KeyError) as fault:

@@ -9,7 +9,7 @@ from hybridsim.reference.trajectory import Trajectory
 
 @dataclass(frozen=True)
 class ClosedForm:
-    """An exact motion.
+    """An exact motion in closed form, with its events.
 
     Parameters
     ----------

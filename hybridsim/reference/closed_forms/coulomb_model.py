@@ -27,7 +27,7 @@ _EPS = float(np.finfo(float).eps)
 
 @dataclass(frozen=True)
 class Recognised:
-    """The recognised system, with the names of its position and velocity."""
+    """A recognised system with its closed form, and the names of its position and velocity."""
 
     system: ForcedCoulombOscillator
     position: str

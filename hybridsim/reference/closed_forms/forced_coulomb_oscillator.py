@@ -27,7 +27,7 @@ _TURN, _TURN_LOW = (
 
 @dataclass(frozen=True)
 class ForcedCoulombOscillator:
-    """A forced oscillator; in its equation of motion w is the `frequency` and b is the `offset`.
+    """A forced linear oscillator with Coulomb friction, where w is `frequency` and b is `offset`.
 
     Raises ValueError if the closed form does not hold (overdamped) or would lose half of its digits
     (driven at resonance without damping).
@@ -97,7 +97,7 @@ class ForcedCoulombOscillator:
         )
 
     def _push(self, x: float, angle: float) -> float:
-        """Return the force on the resting body without friction."""
+        """Return the force on the body at rest, without friction."""
         return self.offset + self.force * math.sin(angle) - self.stiffness * x
 
     def _acceleration(self, mode: str, x: float, v: float, angle: float) -> float:
@@ -112,7 +112,7 @@ class ForcedCoulombOscillator:
         return SLIP_FORWARD if push > 0 else SLIP_BACKWARD
 
     def _release(self, x: float, angle: float) -> tuple[float, str] | None:
-        """Return the angle at which the force next exceeds the stick limits, and the slip mode after it."""
+        """Return the forcing angle at which the body next starts to slip, and its direction."""
         exits = []
         for direction, mode in ((1.0, SLIP_FORWARD), (-1.0, SLIP_BACKWARD)):
             # The push times `direction` rises through the limit at |force| sin(angle') = level.
@@ -124,7 +124,7 @@ class ForcedCoulombOscillator:
 
 
 class _Clock:
-    """Time as whole turns of the forcing and an angle in [0, 2 pi)."""
+    """A time as whole turns of the forcing and an angle in [0, 2 pi)."""
 
     def __init__(self, t0: float, frequency: float, phase: float) -> None:
         self.t0, self.frequency = t0, frequency
@@ -151,7 +151,7 @@ class _Clock:
 
 @dataclass(frozen=True)
 class _Segment:
-    """One phase: its mode, its start time and position, and its motion if it slips."""
+    """One phase of the motion: its mode, start time and position, and its motion if it slips."""
 
     mode: str
     start: float

@@ -70,12 +70,12 @@ class SlipPhase:
         return (own.real if n else self.centre + own.real) + forced.imag
 
     def bound(self, n: int, s: float) -> float:
-        """Return a bound of the n-th derivative's magnitude from s on, n > 0."""
+        """Return a bound of the magnitude of the n-th derivative from s on, n > 0."""
         own = abs(self.own) * math.exp(self.rate.real * s) * self.natural**n
         return own + abs(self.response) * self.frequency**n
 
     def time_to_rest(self, horizon: float) -> float | None:
-        """Return the first s > 0 with zero velocity, or None if it is beyond the horizon.
+        """Return the first s > 0 at which the velocity is zero, or None if it is beyond the horizon.
 
         While the body moves, v + v' h - bound h^2 / 2 is a lower bound of the velocity. A step to the zero of
         this bound therefore passes no zero of the velocity, and near the first zero it becomes Newton's step.

@@ -24,7 +24,7 @@ class Appointment:
 
 
 class Appointments:
-    """The appointments of one run over (t0, t1]; a schedule's first time counts even if it equals t0."""
+    """The scheduled times of one run over (t0, t1]; the first time of a schedule may be t0."""
 
     def __init__(
         self, model: Model, signals: Sequence[Signal], precision: Precision, t0: Number, t1: Number
@@ -40,7 +40,7 @@ class Appointments:
                 clock.count += 1
 
     def next(self, t: Number) -> Appointment:
-        """Return the next appointment after t, finally the end of the run."""
+        """Return the next scheduled time after t, finally the end of the run."""
         ahead = [(time, k) for k, clock in enumerate(self._clocks) if (time := clock.next) is not None]
         nearest = min((time for time, _ in ahead), default=self._t1)
         knots = [knot for signal in self._signals if (knot := signal.next_knot(t)) is not None]
@@ -54,7 +54,7 @@ class Appointments:
         return Appointment(nearest, due)
 
     def mark_done(self, appointment: Appointment) -> None:
-        """Mark the schedules of an appointment as done."""
+        """Mark the schedules that are due at a time as done."""
         for k in appointment.schedules:
             self._clocks[k].count += 1
 
@@ -72,7 +72,7 @@ class _Clock:
         self.count = 0
 
     def time(self, k: int) -> Number | None:
-        """Return the k-th time, or None."""
+        """Return the k-th time of the schedule, or None."""
         if self._most is not None and k >= self._most:
             return None
         if self._times:
@@ -80,7 +80,7 @@ class _Clock:
         return self._start if self._period is None else self._start + k * self._period
 
     def times_at(self, k: int, t: Number) -> int:
-        """Return how many consecutive times, from the k-th on, are equal to t."""
+        """Return how many consecutive times of the schedule, from the k-th on, are equal to t."""
         count = 0
         while (time := self.time(k + count)) is not None and _same(time, t):
             count += 1

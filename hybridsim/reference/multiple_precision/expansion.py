@@ -1,4 +1,4 @@
-"""This module stores Taylor series from one instant, with their accurate range and initial signs."""
+"""This module stores Taylor series from one instant, with their accurate range."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _FOREVER = 1000.0
 
 @dataclass(frozen=True)
 class Term:
-    """A term of a sum, whose size bounds the sum's rounding; it is `late` if it is a term of a rate."""
+    """A term of a sum, whose size bounds the rounding error of the sum."""
 
     log2_factor: int
     c: Coefficients
@@ -33,7 +33,7 @@ class Term:
 
 @dataclass(frozen=True)
 class QuantitySeries:
-    """The series of a state, guard, monitor or surface, and the terms of its sum."""
+    """The Taylor series of a state, guard, monitor or surface, and the terms of its sum."""
 
     c: Coefficients
     terms: tuple[Term, ...]
@@ -41,7 +41,7 @@ class QuantitySeries:
 
 @dataclass(frozen=True)
 class Expansion:
-    """The series of the states, the guards of each component's mode, the monitors and the surfaces.
+    """The Taylor series of the states, active guards, monitors and surfaces from one instant.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ class Expansion:
         return self.reach_above([self.precision.context.zero] * len(self.states))
 
     def reach_above(self, sizes: Sequence[Number]) -> Number:
-        """Return the time over which the last two terms are below 10^-digits of the largest one."""
+        """Return the time over which the last two terms are negligible at a number of digits."""
         log2_reach = [self._log2_reach(state.c, size) for state, size in zip(self.states, sizes, strict=True)]
         log2_reach += [
             self._log2_reach(quantity.c, self.precision.context.zero) for quantity in self.quantities
@@ -98,7 +98,7 @@ class Expansion:
         return self._logs[id(c)]
 
     def side_after(self, quantity: QuantitySeries) -> tuple[int, int]:
-        """Return the sign just after the start, and the order of the first non-zero coefficient (or 0, 0).
+        """Return the sign just after the start, and the order of the first non-zero coefficient.
 
         A coefficient counts as zero if it is below 10^-20 (for 32 digits) of the terms of its sum.
         """
@@ -125,7 +125,7 @@ class Expansion:
 
 
 def terms_of(node: Node, rates: Mapping[int, Node]) -> tuple[Term, ...]:
-    """Return the terms of a sum, without constant factors; for a state also the terms of its rate."""
+    """Return the terms of a sum; for a state, also the terms of its rate."""
     found: list[Term] = []
     log2 = node.context.mag
     open_ = [(node, 0, False)]
@@ -148,7 +148,7 @@ def terms_of(node: Node, rates: Mapping[int, Node]) -> tuple[Term, ...]:
 
 
 def value_at(c: Coefficients, s: Number) -> Number:
-    """Return the value of a series at a time s."""
+    """Return the value of a Taylor series at a time s."""
     total = c[-1]
     for value in reversed(c[:-1]):
         total = total * s + value
@@ -156,5 +156,5 @@ def value_at(c: Coefficients, s: Number) -> Number:
 
 
 def rate_at(c: Coefficients, s: Number) -> Number:
-    """Return the slope of a series at a time s."""
+    """Return the slope of a Taylor series at a time s."""
     return value_at([n * value for n, value in enumerate(c)][1:] or [0 * s], s)

@@ -1,4 +1,4 @@
-"""This module builds the functions of expressions as series; each is the integral of its slope."""
+"""This module builds Taylor series of functions, as integrals of their slopes."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from hybridsim.reference.multiple_precision.precision import Number
 
 
 class Functions:
-    """Builds the nodes of smooth functions in one arithmetic."""
+    """Builds the series nodes of smooth functions in one arithmetic."""
 
     def __init__(self, context: Any) -> None:
         self.context = context
         self.one = Held(context, 1)
 
     def build(self, name: str, u: Node) -> Node:
-        """Return the node of a smooth function of one argument."""
+        """Return the series node of a smooth function of one argument."""
         made: Node = getattr(self, "_" + name)(u)
         return made
 
@@ -26,7 +26,7 @@ class Functions:
         return Integral(self.context, u, self.context.exp)  # exp is its own slope
 
     def _pair(self, u: Node, names: tuple[str, str], minus: bool) -> tuple[Integral, Integral]:
-        """Return two functions that are each the slope of the other; `minus` negates the second's slope."""
+        """Return two functions, each of which is the slope of the other, except for a sign."""
         first, second = (Integral(self.context, u, getattr(self.context, name)) for name in names)
         first.slope, second.slope = (second, False), (first, minus)
         return first, second

@@ -1,4 +1,4 @@
-"""This module solves for the forces that hold surfaces at zero, and for the states that follow from them.
+"""This module solves for the forces that hold surfaces at zero, and for the held states.
 
 With J the slopes of the surfaces along the states and G the effects of the unknowns on the rates, both at the start
 of a series, the n-th coefficients of the unknowns change the (n + 1)-th ones of the surfaces by J G / (n + 1).
@@ -30,14 +30,14 @@ class Holding:
         self.pins: list[int] = []
 
     def begin(self, effects: list[list[Number]]) -> None:
-        """Store the effects of the unknowns; find the surface slopes and the states to solve for."""
+        """Store the effects of the unknowns, and find surface slopes and states to solve for."""
         self._effects = effects
         self._find_slopes()
         self._product = [[self.context.fdot(row, effect) for effect in effects] for row in self._slopes]
         self.pins = self._choose_pins()
 
     def coefficients(self, n: int) -> list[Number]:
-        """Compute the n-th coefficients of the surfaces from the stored n-th coefficients of the states."""
+        """Compute the n-th coefficients of the surfaces from those of the states."""
         for node in self._nodes:
             if len(node.c) <= n:
                 node.extend(n)
@@ -51,7 +51,7 @@ class Holding:
         return [surface.coefficient(0) for surface in self._surfaces]
 
     def unknowns_for(self, rates: list[Number]) -> list[Number]:
-        """Return the changes of the unknowns that cancel these rates of the surfaces."""
+        """Return the changes of the unknowns that cancel given rates of the surfaces."""
         return [-value for value in self._solve(self._product, rates)]
 
     def reach_of(self, unknowns: Sequence[Number]) -> Number:
@@ -59,7 +59,7 @@ class Holding:
         return max(abs(a * u) for row in self._product for a, u in zip(row, unknowns, strict=True))
 
     def pin_changes(self, values: list[Number]) -> list[Number]:
-        """Return corrections of the pinned states' coefficients that make these surface coefficients zero."""
+        """Return corrections of states that make the given surface coefficients zero."""
         return self._solve([[row[i] for i in self.pins] for row in self._slopes], values)
 
     def coupled(self, index: int) -> set[int]:
@@ -80,7 +80,7 @@ class Holding:
         self._slopes = [[row[j] - rows[0][j] for row in rows[1:]] for j in range(len(self._surfaces))]
 
     def _choose_pins(self) -> list[int]:
-        """Choose for each surface a state to solve it for, by elimination with the largest pivots."""
+        """Choose for each surface a state to solve for, by elimination with the largest pivots."""
         moved = [any(effect[i] != 0 for effect in self._effects) for i in range(len(self._states))]
         rows = [
             [slope if moves else 0 * slope for slope, moves in zip(row, moved, strict=True)]

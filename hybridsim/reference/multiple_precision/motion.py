@@ -1,4 +1,4 @@
-"""This module stores a multiple-precision run: segments of Taylor series, evaluated in double or full precision."""
+"""This module stores a multiple-precision run as segments of Taylor series."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hybridsim.reference.multiple_precision.precision import Number, Precision
 
 @dataclass(frozen=True)
 class Segment:
-    """The states over [t, t + h] as series in the time since t."""
+    """The states over [t, t + h] as Taylor series in the time since t."""
 
     t: Number
     h: Number
@@ -23,7 +23,7 @@ class Segment:
 
 @dataclass
 class Motion:
-    """The states of a run; ``motion(times, side)`` in double precision, ``motion.state(t)`` in full precision.
+    """The states of a run, as ``motion(times, side)`` in double or ``motion.state(t)`` in full precision.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ class Motion:
         return float(self.segments[-1].t + self.segments[-1].h)
 
     def _values(self, segment: Segment, times: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Evaluate a segment by Horner's scheme in doubles, in the fraction of the step; the error is a few ulps."""
+        """Evaluate a segment by Horner's scheme in doubles, in the fraction of the step."""
         high = float(segment.t)
         low = float(segment.t - high)
         fraction = np.clip(((times - high) - low) / float(segment.h), 0.0, 1.0) if segment.h else 0.0 * times

@@ -1,4 +1,4 @@
-"""This module represents quantities as truncated power series in time, computed one coefficient at a time.
+"""This module represents quantities as truncated power series in time.
 
 A node computes its n-th coefficient from the coefficients of its operands up to the n-th (A. Griewank, A.
 Walther, Evaluating Derivatives, 2nd ed., SIAM 2008, chapter 13, doi:10.1137/1.9780898717761). A step costs a
@@ -16,7 +16,7 @@ from hybridsim.reference.multiple_precision.precision import Number
 
 
 class Node:
-    """One quantity; ``c`` holds its coefficients so far. A constant has only c[0]."""
+    """A quantity as a power series; ``c`` contains its coefficients so far."""
 
     __slots__ = ("c", "constant", "context", "operands")
 
@@ -28,7 +28,7 @@ class Node:
 
     @property
     def delayed(self) -> tuple[Node, ...]:
-        """Return the operands whose n-th coefficient is not needed for the n-th coefficient of this node."""
+        """Return the operands whose n-th coefficient is not needed for the n-th coefficient here."""
         return ()
 
     def coefficient(self, n: int) -> Number:
@@ -40,12 +40,12 @@ class Node:
         raise NotImplementedError
 
     def forget(self, n: int) -> None:
-        """Drop the coefficients from the n-th on."""
+        """Delete the coefficients from the n-th on."""
         del self.c[n:]
 
 
 class Held(Node):
-    """A number that is constant during a mode: a parameter, a discrete state, a literal."""
+    """A number that is constant during a mode: a parameter, a discrete state, or a literal."""
 
     __slots__ = ("value",)
 
@@ -58,7 +58,7 @@ class Held(Node):
 
 
 class ExternalSeries(Node):
-    """A series whose coefficients its owner sets: a state, an unknown force, the time, an input."""
+    """A power series whose coefficients are set from outside: a state, a force, the time, an input."""
 
     __slots__ = ()
 
@@ -66,11 +66,11 @@ class ExternalSeries(Node):
         super().__init__(context, (), constant=False)
 
     def extend(self, n: int) -> None:
-        """Do nothing: the owner appends the coefficients."""
+        """Do nothing, because the coefficients are appended from outside."""
 
 
 class Sum(Node):
-    """The sum a + sign*b."""
+    """The sum of two quantities, a + sign*b."""
 
     __slots__ = ("minus",)
 
@@ -89,7 +89,7 @@ class Sum(Node):
 
 
 class Negative(Node):
-    """The negative -a."""
+    """The negative of a quantity, -a."""
 
     __slots__ = ()
 
@@ -98,7 +98,7 @@ class Negative(Node):
 
 
 class Product(Node):
-    """The product a*b."""
+    """The product of two quantities, a*b."""
 
     __slots__ = ()
 
@@ -113,7 +113,7 @@ class Product(Node):
 
 
 class Quotient(Node):
-    """The quotient a/b."""
+    """The quotient of two quantities, a/b."""
 
     __slots__ = ()
 
@@ -131,7 +131,7 @@ class Quotient(Node):
 
 
 class Power(Node):
-    """The power u**exponent for a constant exponent other than a small integer; u must not be zero."""
+    """The power of a quantity with a constant exponent; the quantity must not be zero."""
 
     __slots__ = ("exponent",)
 
@@ -154,7 +154,7 @@ class Power(Node):
 
 
 class Integral(Node):
-    """The function f(u) with derivative `slope`, which may depend on f: n f_n = sum of k u_k slope_(n-k)."""
+    """A function f(u), computed as the integral of its slope, which may depend on f."""
 
     __slots__ = ("first", "slope", "weights")
 
@@ -182,7 +182,7 @@ class Integral(Node):
 
 
 class Pointwise(Node):
-    """A corner, a jump or a condition: it has a value, and a series only while its operands are constant."""
+    """A corner, a jump or a condition, which has a power series only while its operands are constant."""
 
     __slots__ = ("function", "text")
 
@@ -203,7 +203,7 @@ class Pointwise(Node):
 
 
 def in_order(targets: Sequence[Node]) -> list[Node]:
-    """Return all nodes on which the targets depend, operands first.
+    """Return all nodes on which some nodes depend, sorted so that operands come first.
 
     A cycle is an error, unless it passes a node of which only lower coefficients are used.
     """

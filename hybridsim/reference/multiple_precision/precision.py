@@ -1,4 +1,4 @@
-"""This module chooses the number of digits and of terms, and the size that counts as zero."""
+"""This module chooses the number of digits and of terms, and the size regarded as zero."""
 
 from __future__ import annotations
 
@@ -49,11 +49,11 @@ class Precision:
 
     @property
     def bits(self) -> float:
-        """Return the truncation error of a step, in bits below the size of the quantity."""
+        """Return the truncation error of a step in bits, relative to the size of the quantity."""
         return (self.digits + 2) * math.log2(10)
 
     def number(self, value: Any) -> Number:
-        """Return a number of this context; exact for doubles."""
+        """Return a number in this precision; doubles are converted exactly."""
         return self.context.mpf(value)
 
     def log2(self, value: Number) -> int:

@@ -1,4 +1,4 @@
-"""This module computes the motion of one combination of modes as Taylor series, including holding forces.
+"""This module computes the motion in one combination of modes as Taylor series.
 
 A holding mode (stick) keeps its surface s(t, x) = 0 with an unknown (the friction force) that enters the rates
 linearly. Its n-th coefficient follows from s_(n+1) = 0, a small linear system for each order. Afterwards one state
@@ -24,7 +24,7 @@ _LINEAR = 20
 
 @dataclass(frozen=True)
 class Point:
-    """The start of a series: time, states, discrete states, and the current coefficients of the inputs."""
+    """The start of a Taylor series: time, states, discrete states, and coefficients of the inputs."""
 
     t: Number
     x: tuple[Number, ...]
@@ -108,7 +108,7 @@ class Program:
         return node.c[0]
 
     def project(self, point: Point) -> Point:
-        """Return the point with the held surfaces exactly zero, by a change of one state for each surface."""
+        """Return the point with the held surfaces exactly zero; one state per surface changes."""
         if self.holding is None:
             return point
         x = list(point.x)
@@ -133,7 +133,7 @@ class Program:
                 node.extend(n)
 
     def _first_coefficients(self) -> None:
-        """Compute order 0: the rates without unknowns and with each unknown equal to 1, then the unknowns."""
+        """Compute the rates at the start, without unknown forces and with each equal to 1."""
         one, zero = self.context.one, self.context.zero
         rates: list[list[Number]] = []
         for j in (*range(len(self.unknowns)), -1):  # finally with all of them zero
@@ -149,13 +149,13 @@ class Program:
             self._solve(0)
 
     def _again(self, n: int) -> None:
-        """Recompute the n-th coefficients of all nodes that depend on the unknowns of held surfaces."""
+        """Compute again the n-th coefficients of all nodes that depend on the unknown forces."""
         for node in self.forced:
             node.forget(n)
         self._extend(self.nodes, n)
 
     def _solve(self, n: int) -> None:
-        """Find the n-th coefficients of the unknowns, such that the surfaces have zero coefficients n + 1."""
+        """Find the n-th coefficients of the unknown forces that keep the surfaces at zero."""
         if self.holding is None:
             return
         rates = self._surface_rates(n)
@@ -171,7 +171,7 @@ class Program:
                 )
 
     def _surface_rates(self, n: int) -> list[Number]:
-        """Return the n-th coefficients of the held surfaces' rates, from the rates of the states."""
+        """Return the n-th coefficients of the rates of the held surfaces."""
         assert self.holding is not None
         for state, rate in zip(self.states, self.reading.rates, strict=True):
             state.c.append(rate.coefficient(n) / (n + 1))
@@ -181,7 +181,7 @@ class Program:
         return rates
 
     def _states(self, n: int) -> None:
-        """Append the n-th coefficients of the states; pinned states follow from their surfaces."""
+        """Append the n-th coefficients of the states; held states follow from their surfaces."""
         for state, rate in zip(self.states, self.reading.rates, strict=True):
             state.c.append(rate.coefficient(n - 1) / n)
         if self.holding is not None:
@@ -191,7 +191,7 @@ class Program:
 
 
 def _depending(nodes: Sequence[Node], sources: Sequence[Node]) -> list[Node]:
-    """Return the nodes, in order, whose values depend on the sources, directly or through a slope."""
+    """Return the nodes whose values depend on given nodes, in order."""
     marked = {id(node) for node in sources}
     while True:
         more = {

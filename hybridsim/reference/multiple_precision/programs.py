@@ -19,7 +19,7 @@ UNDECIDED = ""
 
 
 class Programs:
-    """Builds the equations and series on demand and caches them.
+    """Builds the equations and Taylor series of combinations of modes on demand, and caches them.
 
     Parameters
     ----------
@@ -36,15 +36,15 @@ class Programs:
 
     @property
     def first_modes(self) -> Modes:
-        """Return the modes before the first decision."""
+        """Return the modes before the first choice of modes."""
         return tuple(component.initial or UNDECIDED for component in self.components)
 
     def decided(self, modes: Modes) -> Modes:
-        """Return the modes with every undecided component set to hold, which does not change the surfaces."""
+        """Return the modes with every undecided component in its holding mode."""
         return self.held(modes, [c for c, mode in enumerate(modes) if mode == UNDECIDED])
 
     def held(self, modes: Modes, components: Iterable[int]) -> Modes:
-        """Return the modes in which some components hold."""
+        """Return the modes with some components in their holding modes."""
         changed = list(modes)
         for c in components:
             surface = self.components[c].surface
@@ -53,7 +53,7 @@ class Programs:
         return tuple(changed)
 
     def modes_by_side(self, point: Point, modes: Modes) -> Modes:
-        """Return the modes with undecided components on their sides, or holding on the surface."""
+        """Return the modes with undecided components on their sides, or holding if on the surface."""
         if UNDECIDED not in modes:
             return modes
         decided = self.decided(modes)
@@ -67,7 +67,7 @@ class Programs:
         return tuple(changed)
 
     def program(self, modes: Modes) -> Program:
-        """Return the equations of motion in these modes."""
+        """Return the equations of motion in a combination of modes."""
         if modes not in self._programs:
             reading = Reading(self.model, modes, self.precision, self.signals)
             self._programs[modes] = Program(reading, self.precision, self.longest)
@@ -89,7 +89,7 @@ class Programs:
         return self.program(self.decided(modes)).value(expr, point)
 
     def leaving(self, expansion: Expansion) -> list[tuple[int, int]]:
-        """Return the guards, as (component, number), that are negative just after the point of the expansion."""
+        """Return the guards, as (component, number), that are negative just after a point."""
         return [
             (c, j)
             for c, row in enumerate(expansion.guards)

@@ -29,7 +29,7 @@ _SMOOTH = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", 
 
 
 class Reading:
-    """The quantities of a model in the modes z, as nodes; equal expressions share a node.
+    """The quantities of a model in the modes `z`, as nodes; equal expressions share a node.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class Reading:
         return self._walk(expr.tree)
 
     def _signal(self, signal: Signal, piece: Sequence[Held]) -> Node:
-        """Return the node of an input, given the knot and the four coefficients of its piece."""
+        """Return the node of an input from the knot and the four coefficients of its current piece."""
         knot, *coefficients = piece
         passed = self.sum(self.time, knot, minus=True)
         total: Node = coefficients[3]
@@ -95,11 +95,11 @@ class Reading:
         return self.sum(Held(self.context, signal.values.get("offset", 0)), wave)
 
     def product(self, a: Node, b: Node) -> Node:
-        """Return a*b as a shared node."""
+        """Return the product a*b as a shared node."""
         return self._share(("*", id(a), id(b)), lambda: Product(self.context, (a, b)))
 
     def sum(self, a: Node, b: Node, minus: bool = False) -> Node:
-        """Return a + b or a - b as a shared node."""
+        """Return the sum a + b or the difference a - b as a shared node."""
         return self._share(("-" if minus else "+", id(a), id(b)), lambda: Sum(self.context, a, b, minus))
 
     def _share(self, key: Any, make: Callable[[], Node]) -> Node:

@@ -1,4 +1,4 @@
-"""This module runs a model series by series; a step ends at a guard, a monitor or an appointment."""
+"""This module runs a model step by step; a step ends at an event or at a scheduled time."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Run:
         self.initial_modes = dict(zip(names, self.now.modes, strict=True))
 
     def follow(self) -> None:
-        """Follow the motion to the end."""
+        """Follow the motion to the end of the run."""
         while self.now.point.t < self.t1 and not self.finished:
             self._step()
             if self.progress is not None:
@@ -77,7 +77,7 @@ class Run:
     # -- steps ----------------------------------------------------------------------------------------------
 
     def _step(self) -> None:
-        """Make one step, up to the first event in it."""
+        """Make one step up to its end or to the first event in it."""
         point, expansion = self.now.point, self.now.expansion
         appointment = self.appointments.next(point.t)
         bound = appointment.t - point.t
@@ -101,7 +101,7 @@ class Run:
             self._process_schedules(appointment.schedules)
 
     def _go_on(self, point: Point, arrived: bool) -> None:
-        """Begin the next step if no event was located; a guard may still be zero at exactly this instant.
+        """Begin the next step if no event was located and no guard is zero at this instant.
 
         Corners alone cause no event: if something is due, they take their sides with it.
         """
@@ -115,7 +115,7 @@ class Run:
         self._adopt(settled, is_last=not arrived)
 
     def _length(self, expansion: Expansion, bound: Number) -> Number:
-        """Return a step at whose end the equations are satisfied, and guards and monitors are accurate."""
+        """Return a step at whose end the equations, guards and monitors are accurate."""
         h = min(expansion.reach_above(self.sizes), bound)
         for _ in range(60):
             if self._resolved(expansion, h):
@@ -150,7 +150,7 @@ class Run:
         return side, sign_changes(quantity.c[order:], h, self.precision) if side else []
 
     def _first_departure(self, expansion: Expansion, h: Number) -> tuple[list[tuple[int, int]], Number]:
-        """Return the guard that becomes negative first, and the time; without one, no guard and h."""
+        """Return the guard that becomes negative first and its time, or no guard and the step length."""
         first: list[tuple[int, int]] = []
         for c, row in enumerate(expansion.guards):
             for j, guard in enumerate(row):
@@ -162,7 +162,7 @@ class Run:
     # -- events ---------------------------------------------------------------------------------------------
 
     def _adopt(self, settled: Settled, is_last: bool = True) -> None:
-        """Continue after an event; after the last event of an instant, monitors that changed sides fire."""
+        """Continue after an event, and process monitors that changed sides at the instant of the event."""
         self.now = settled
         for move in settled.moves:
             name = self.rules.components[move.component].name
@@ -180,7 +180,7 @@ class Run:
             self._adopt(self.rules.resolve_event(settled.point, settled.modes, (), resets))
 
     def _act(self, monitors: Sequence[int], point: Point) -> None:
-        """Process the given monitors at a point: they reset states or end the run."""
+        """Process some monitors at a point: they reset states or end the run."""
         settled = self.rules.resolve_event(
             point, self.now.modes, (), self._record_monitors(monitors, point.t)
         )
@@ -189,7 +189,7 @@ class Run:
         self._adopt(settled)
 
     def _record_monitors(self, monitors: Sequence[int], t: Number) -> list[Mapping[str, Expression]]:
-        """Record the monitors that fire, and return their resets."""
+        """Record the monitors that fire, and return the resets of these monitors."""
         fired = [self.model.monitors[k] for k in monitors]
         self.events += [ExactEvent(float(t), monitor.name, "", "", kind="monitor") for monitor in fired]
         self.finished = self.finished or any(monitor.action == "terminate" for monitor in fired)
@@ -198,7 +198,7 @@ class Run:
     def _pass_monitors(
         self, expansion: Expansion, t: Number, s: Number, arriving: bool
     ) -> tuple[list[int], Number]:
-        """Record monitors that change sides before s; return the first that act on the run, and the time."""
+        """Record monitors that change sides before a time; return the first that affects the run."""
         seen: list[tuple[Number, int, int]] = []
         tolerance = self.precision.zero * s
         for k, quantity in enumerate(expansion.monitors):
@@ -226,7 +226,7 @@ class Run:
         return [expansion.side_after(quantity)[0] for quantity in expansion.monitors]
 
     def _process_schedules(self, due: tuple[int, ...]) -> None:
-        """Process the schedules due at an instant, with the next coefficients of the inputs."""
+        """Process the schedules that are due at an instant."""
         point = replace(self.now.point, input_coefficients=self._input_coefficients(self.now.point.t))
         schedules = [self.model.schedules[k] for k in due]
         self._record_schedules(schedules)
@@ -241,7 +241,7 @@ class Run:
         return tuple(signal.piece(t) for signal in self.signals)
 
     def _crowd(self, t: Number) -> None:
-        """Refuse events that accumulate."""
+        """Raise an error for events that accumulate."""
         self._event_times.append(t)
         last_times = self._event_times[-_CROWD:]
         if len(last_times) == _CROWD and t - last_times[0] <= _CROWDED * (self.t1 - self.t0):

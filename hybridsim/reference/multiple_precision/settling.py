@@ -1,4 +1,4 @@
-"""This module finds state and modes after an event: transitions, resets, and a search for admissible modes.
+"""This module finds state and modes after an event: transitions, resets and admissible modes.
 
 The rules:
 
@@ -63,7 +63,7 @@ class Settled:
 
 
 class Rules:
-    """The rules that choose state and modes after an event, for one model."""
+    """The rules that choose state and modes after an event."""
 
     def __init__(self, programs: Programs) -> None:
         self.programs, self.components = programs, programs.components
@@ -76,7 +76,7 @@ class Rules:
         located: Iterable[tuple[int, int]] = (),
         resets: Iterable[Mapping[str, Expression]] = (),
     ) -> Settled:
-        """Resolve an event at x-: the guards (component, number) located at zero, and the resets that are due."""
+        """Resolve an event with the guards located at zero and the resets that are due."""
         moves: list[Move] = []
         fired = set(located)
         self.programs.new_instant()
@@ -108,11 +108,11 @@ class Rules:
         )
 
     def _leaving(self, point: Point, modes: Modes) -> set[tuple[int, int]]:
-        """Return the guards that are negative just after, except those of corners and loads."""
+        """Return the guards that are negative just after an event, except those of corners and loads."""
         return self.sides.others(self.programs.leaving(self.programs.expand(point, modes)))
 
     def _cancelled(self, point: Point, modes: Modes, fired: set[tuple[int, int]]) -> set[tuple[int, int]]:
-        """Return the located guards that stay non-negative if the modes of contacts are chosen first."""
+        """Return the located guards that do not fire if the modes of contacts are chosen first."""
         open_ = {c for c, _ in fired if self.components[c].surface}
         if not open_ or all(c in open_ for c, _ in fired):
             return set()
@@ -124,7 +124,7 @@ class Rules:
         return {(c, j) for c, j in fired - leaving if c not in open_}
 
     def _leave_in_any_case(self, point: Point, modes: Modes, moves: list[Move]) -> tuple[Point, Modes]:
-        """Change modes of automata with a guard that is negative for all values of the undecided forces."""
+        """Change modes of automata with a guard that is negative for all values of undecided forces."""
         for _ in range(_MAX_ROUNDS if self._surfaces() else 0):
             leaving = self.sides.leaving_in_any_case(point, modes)
             if not leaving:
@@ -137,7 +137,7 @@ class Rules:
         return [c for c, component in enumerate(self.components) if component.surface]
 
     def _take_sides(self, point: Point, modes: Modes, moves: list[Move]) -> tuple[Modes, set[int]]:
-        """Set components off their surface to the mode of their side; return undecided ones on it."""
+        """Set components to the modes of their sides; return the undecided components on their surfaces."""
         order = self._surfaces()
         if not order:
             return modes, set()
@@ -160,7 +160,7 @@ class Rules:
     def _choose_jointly(
         self, point: Point, modes: Modes, open_: set[int], names: Mapping[int, str], moves: list[Move]
     ) -> tuple[Point, Modes]:
-        """Choose the modes of open components on their surfaces, jointly with the components they affect."""
+        """Choose the modes of components on their surfaces, jointly with the components they affect."""
         deciding = {c for c in open_ if self._on_surface(c, point, modes)}
         while deciding:
             chosen = self._with_coupled(min(deciding), deciding, point, modes)
@@ -187,7 +187,7 @@ class Rules:
         return expansion.is_zero(expansion.surfaces[self._surfaces().index(c)])
 
     def _with_coupled(self, first: int, deciding: set[int], point: Point, modes: Modes) -> list[int]:
-        """Return a component and the undecided or holding components that it is coupled with by forces."""
+        """Return a component and the undecided or holding components to which forces couple it."""
         together = [c for c in self._surfaces() if c in deciding or self._holds(c, modes)]
         program = self.programs.program(self.programs.held(self.programs.decided(modes), together))
         program.begin(point)

@@ -1,4 +1,4 @@
-"""This module implements rule 0 of `settling`: sides of corners and loads, and guards that surely fire."""
+"""This module chooses the sides of corners and loads, and finds guards that certainly fire."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _ROUNDS_PER_MODE = (
 
 
 class Sides:
-    """The components of one model whose modes follow from the state."""
+    """The components of one model whose modes follow from the state, such as corners."""
 
     def __init__(self, programs: Programs) -> None:
         self.programs, self.components = programs, programs.components
@@ -59,7 +59,7 @@ class Sides:
         )
 
     def taken(self, point: Point, modes: Modes, moves: list[Move]) -> Modes:
-        """Return the modes with each corner and load on its side, and add each change to `moves`."""
+        """Return the modes with each corner and load on its side, and append the changes to `moves`."""
         after = self.along(point, modes)
         for c in self.led:
             if after[c] != modes[c]:
@@ -68,7 +68,7 @@ class Sides:
         return after
 
     def leaving_in_any_case(self, point: Point, modes: Modes) -> set[tuple[int, int]]:
-        """Return the guards of automata that are negative just after in all modes of contacts at rest.
+        """Return the guards that are negative just after an event in all modes of resting contacts.
 
         With too many combinations, it returns the guards that are negative by value and independent of
         contact forces.

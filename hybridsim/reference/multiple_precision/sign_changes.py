@@ -1,4 +1,4 @@
-"""This module finds all sign changes of a series within a step, in order.
+"""This module finds all sign changes of a power series within a step, in order.
 
 A polynomial in Bernstein form has, within its interval, at most as many zeros as its coefficients have sign
 changes, and the difference is even (R. T. Farouki, Computer Aided Geometric Design 29 (2012) 379,
@@ -27,7 +27,7 @@ _SURE = 1e-13
 
 
 def sign_changes(c: Coefficients, h: Number, precision: Precision) -> list[Number]:
-    """Return the times in (0, h] at which a series changes its sign.
+    """Return the times in (0, h] at which a power series changes its sign.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def sign_changes(c: Coefficients, h: Number, precision: Precision) -> list[Numbe
 def _isolate(
     p: Sequence[Number], bernstein: list[Number], low: Number, width: Number, depth: int, precision: Precision
 ) -> list[Number]:
-    """Return the places in (low, low + width] at which p changes its sign."""
+    """Return the points in an interval at which a polynomial changes its sign."""
     signs = [value > 0 for value in bernstein if value != 0]
     changes = sum(a != b for a, b in itertools.pairwise(signs))
     if changes == 0:
@@ -75,7 +75,7 @@ def _isolate(
 
 
 def _side_at_end(row: Sequence[Number]) -> bool:
-    """Return whether the last non-zero coefficient is positive."""
+    """Return whether the last coefficient that is not zero is positive."""
     return bool(next(value for value in reversed(row) if value != 0) > 0)
 
 
@@ -101,7 +101,7 @@ def _refine(p: Sequence[Number], low: Number, high: Number, precision: Precision
 
 @functools.cache
 def _fractions(n: int) -> tuple[tuple[tuple[int, int], ...], ...]:
-    """Return the rows of the change to Bernstein form for n coefficients, as pairs of binomials."""
+    """Return the matrix of the conversion of n coefficients to Bernstein form."""
     return tuple(tuple((math.comb(j, i), math.comb(n - 1, i)) for i in range(j + 1)) for j in range(n))
 
 

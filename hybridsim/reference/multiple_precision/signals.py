@@ -1,4 +1,4 @@
-"""This module represents an input by the polynomial that holds from an instant on."""
+"""This module represents an input by its current polynomial."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ class Signal:
 
     @property
     def angular(self) -> bool:
-        """Return whether the polynomial is an angle."""
+        """Return whether the current polynomial of the input is an angle."""
         return self.declared.kind == "chirp" or self.declared.shape == "sine"
 
     def piece(self, t: Number) -> tuple[Number, ...]:
-        """Return the knot and the four coefficients that hold from t on."""
+        """Return the knot and the four coefficients of the piece from a time on."""
         zero = self.number(0)
         if self.declared.kind == "table":
             index = bisect_right(self._times, t)
@@ -60,7 +60,7 @@ class Signal:
         return (knot, self.values["offset"] + scale * value, slope, zero, zero)
 
     def next_knot(self, t: Number) -> Number | None:
-        """Return the first knot after t."""
+        """Return the first knot of the input after a time."""
         if self.declared.kind == "table":
             index = bisect_right(self._times, t)
             return self._times[index] if index < len(self._times) else None
@@ -73,7 +73,7 @@ class Signal:
         return min((knot for knot in knots if knot > t), default=None)
 
     def _corners(self, t: Number) -> list[tuple[Number, Any, Any]]:
-        """Return the corners of a wave near t."""
+        """Return the corners of a wave near a time."""
         period, phase = self.values["period"], self.values["phase"]
         shape = str(self.declared.shape)
         corners: Sequence[tuple[Any, Any, Any]]
@@ -100,7 +100,7 @@ class Signal:
 
 
 def _cubics(declared: Input, times: Sequence[Number], number: Any) -> list[tuple[Number, ...]]:
-    """Return the cubics in t - knot: before the first knot, after each knot, and after the last."""
+    """Return the cubic polynomials before the first knot, between knots, and after the last."""
     values, zero = [number(v) for v in declared.values], number(0)
     bends = _natural_bends(times, values, zero) if declared.interpolation == "cubic" else [zero] * len(times)
     rows = []
@@ -116,7 +116,7 @@ def _cubics(declared: Input, times: Sequence[Number], number: Any) -> list[tuple
 
 
 def _natural_bends(times: Sequence[Number], values: Sequence[Number], zero: Number) -> list[Number]:
-    """Return the second derivatives of the natural cubic spline at its knots, from a tridiagonal system."""
+    """Return the second derivatives of the natural cubic spline at its knots."""
     n = len(times)
     diagonal, right = [zero] * n, [zero] * n
     for i in range(1, n - 1):

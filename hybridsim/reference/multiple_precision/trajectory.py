@@ -1,4 +1,4 @@
-"""This module computes the trajectory of a declared model in multiple precision, as a reference for comparisons."""
+"""This module computes the motion of a model in multiple precision, as a reference."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def multiple_precision_trajectory(
     digits: int = 32,
     progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
-    """Follow a model by Taylor series in multiple precision, deciding its events without the engine.
+    """Follow a model by Taylor series in multiple precision, with its own event decisions.
 
     It reads only the declaration: expressions become series in mpmath numbers, an event is a guard's series
     passing zero downward, and the next modes are found by trial (`multiple_precision.settling` states the

@@ -1,4 +1,4 @@
-"""This module applies declared transitions: choices of guards and resets, evaluated at x- and applied together."""
+"""This module applies declared transitions: choices of guards and resets, applied together."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hybridsim.reference.multiple_precision.programs import Modes, Programs
 
 @dataclass(frozen=True)
 class Move:
-    """A change of one component's mode."""
+    """A change of the mode of one component."""
 
     component: int
     source: str
@@ -23,7 +23,7 @@ class Move:
 
 
 class Transitions:
-    """The declared transitions of one model, which are rule 1 of `settling`."""
+    """The declared transitions of one model."""
 
     def __init__(self, programs: Programs) -> None:
         self.programs = programs

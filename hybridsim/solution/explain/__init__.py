@@ -1,4 +1,4 @@
-"""This folder explains events: it repeats a decision and records every quantity that the decision used.
+"""This package explains events: it repeats a decision and records all quantities that it used.
 
 Start with `explanation`.
 """

@@ -1,4 +1,4 @@
-"""This module describes the combinations of modes that a decision judged, and their guards."""
+"""This module describes the combinations of modes that a decision judged, and the guards."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class GuardView:
 
     @property
     def is_open(self) -> bool:
-        """Whether rounding decides the sign just after the event: no derivative is clearly nonzero."""
+        """Whether rounding makes the sign just after the event uncertain."""
         left = (*self.derivatives[self.decreed :], *self.bounds[self.decreed :])
         return self.side == 0 and any(left)
 
@@ -96,7 +96,7 @@ class Candidate:
 def views(
     system: System, at: Situation, z: np.ndarray, guards: list[int], decreed: np.ndarray
 ) -> Iterable[GuardView]:
-    """Yield guards along the flow of the modes z; values that the event sets to zero count as exact."""
+    """Yield guards along the flow of the modes `z`; values that the event sets to zero are exact."""
     series = system.series(at.s, at.x, at.p, z, at.x_error, at.s_error, at.is_put)
     time = time_unit(system.model)
     for g in guards:
@@ -122,7 +122,7 @@ def views(
 
 
 def as_in(system: System, z: np.ndarray, expression: Expression) -> Expression:
-    """Return an expression in which each corner is replaced by its branch in the modes z."""
+    """Return an expression in which each corner is replaced by its branch in the modes `z`."""
     modes = [c.modes[int(k)] for c, k in zip(system.model.all_components(), z, strict=True)]
     values = {n: e.tree for mode in modes for n, e in mode.set.items() if n.startswith((VARIABLE, SIGN))}
     tree = expression.tree
@@ -139,7 +139,7 @@ def _readable(text: str, component: str) -> str:
 
 
 def candidate(system: System, decision: Decision, look: Look) -> Candidate:
-    """Return one combination that a decision judged, with the values of its guards at that time."""
+    """Return one combination of modes that a decision judged, with the values of its guards."""
     guards = [g for c in look.components for g in system.automata[c].guards[look.z[c]]]
     shown = tuple(views(system, look.at, look.z, guards, look.decreed))
     modes = {system.automata[c].name: system.automata[c].modes[look.z[c]] for c in look.components}

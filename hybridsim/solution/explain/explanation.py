@@ -113,7 +113,7 @@ class Explanation(Readable):
 
 
 def explain(solution: Solution, number: int | Event) -> Explanation:
-    """Return the explanation of one event of a solution; see `Solution.explain`."""
+    """Return the explanation of one event of a solution, as `Solution.explain` does."""
     events, occurrences = solution.events, solution._of_model.record.occurrences
     if isinstance(number, Event) and number in solution.corners:
         corner = [o for o in occurrences if o.kind == CORNER][solution.corners.index(number)]
@@ -132,7 +132,7 @@ def explain(solution: Solution, number: int | Event) -> Explanation:
 
 
 def _explained(solution: Solution, event: Event, happened: list[Occurrence], number: int) -> Explanation:
-    """Return the explanation without remarks; `happened` holds the records of all events, in their order."""
+    """Return the explanation without remarks; `happened` contains the records of all events."""
     if event.kind == "near-grazing":
         near = grazed(solution, happened[number])
         return Explanation(
@@ -185,7 +185,7 @@ def _explained(solution: Solution, event: Event, happened: list[Occurrence], num
 
 
 def _decision(place: Place, occurrence: Occurrence) -> Decision | None:
-    """Return the decision that changed a mode or followed an impact; None if a guard named the new mode."""
+    """Return the decision that changed a mode or followed an impact, or None if there was no decision."""
     resolution, change = place.stage.resolution, place.change
     system = resolution.system
     c = next(k for k, a in enumerate(system.automata) if a.name == occurrence.component)
@@ -209,7 +209,7 @@ def _is_declared(solution: Solution, event: Event) -> bool:
 
 
 def _of_accumulation(solution: Solution, event: Event) -> str:
-    """Explain an accumulation of events, an instant that ends no segment."""
+    """Explain an accumulation of events, which does not end a segment."""
     times = [e.t for e in solution.events if e.kind == "transition" and e.t < event.t]
     gaps = [b - a for a, b in pairwise(times[-_SERIES:]) if b > a]
     clear_gaps = takewhile(
@@ -269,7 +269,7 @@ def _with_unit(value: float, unit: str) -> str:
 
 
 def _taken(solution: Solution, event: Event, at: Situation) -> tuple[tuple[Choice, ...], int]:
-    """Return the choices of the guard that fired, and the index of the chosen one; empty without choices."""
+    """Return the choices of the guard that fired, and the index of the chosen one."""
     component = next((c for c in solution.components if c.name == event.component), None)
     mode = next((m for m in component.modes if m.name == event.source), None) if component else None
     guard = next((g for g in mode.guards if g.name == event.guard), None) if mode else None
@@ -317,7 +317,7 @@ def _of_another_kind(solution: Solution, event: Event, occurrence: Occurrence) -
 
 
 def _sets(event: Event, parts: Sequence[Monitor | Schedule]) -> str:
-    """Describe the reset that a monitor or a schedule declares, or return an empty text without a reset."""
+    """Describe the reset that a monitor or a schedule declares, or return an empty text."""
     part = next((part for part in parts if part.name == event.component), None)
     resets = part.reset.items() if part else ()
     values = ", ".join(assignment(name, value) for name, value in resets)
@@ -329,7 +329,7 @@ def _segment_before(solution: Solution, occurrence: Occurrence) -> Segment | Non
     if solution._save != "all":
         raise UsageError(
             f"the run was made with save={solution._save!r}",
-            remedy="run it with save='all' to have events explained",
+            remedy="simulate it with save='all' to explain events",
         )
     segments = solution._segments
     last = int(np.searchsorted(solution._of_model.frame.starts, float(occurrence.instant), side="right"))

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def grazed(solution: Solution, occurrence: Occurrence) -> tuple[GuardView, ...]:
-    """Return the grazing guard with its derivatives at the nearest point, if states were saved."""
+    """Return the near-grazing guard with its derivatives at the nearest point, if states were saved."""
     if solution._save != "all":
         return ()
     system, x = solution._system, occurrence.x_minus

@@ -1,4 +1,4 @@
-"""This module describes an impact in words: its restitution, its speeds, and the action of friction."""
+"""This module describes an impact in words: restitution, speeds, and friction."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def is_struck(system: System, change: Change) -> bool:
 
 
 def errors_beside(stage: Stage, c: int) -> np.ndarray:
-    """Return rounding bounds of the states that impulses of the contact can change; infinity for the rest."""
+    """Return rounding bounds of the states that an impulse of a contact can change."""
     system, at = stage.resolution.system, stage.before
     cluster = next(cluster for cluster in system.clusters if c in cluster)
     _, changes, _ = system.impulses(at.s, at.x, at.p, np.maximum(at.z, 0))
@@ -53,7 +53,7 @@ def errors_beside(stage: Stage, c: int) -> np.ndarray:
 
 
 def friction(stage: Stage, c: int) -> str:
-    """Describe the friction during an impact, slip or stick; return an empty text without friction.
+    """Describe the friction during an impact (slip or stick), or return an empty text.
 
     The impulses are computed from the changes of the states. The text is empty if several sets of impulses
     fit.

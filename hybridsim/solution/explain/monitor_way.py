@@ -1,4 +1,4 @@
-"""This module describes how a monitor left zero or its side of zero when it fired."""
+"""This module describes how a monitor left zero or its side of zero."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def way_of_monitor(solution: Solution, event: Event, occurrence: Occurrence) -> str:
-    """Describe how a monitor passed zero or reached zero when it fired."""
+    """Describe how a monitor passed or reached zero when it fired."""
     way, side = ("rose", "below") if event.direction > 0 else ("fell", "above")
     after = _side_after(solution, occurrence) if solution._save == "all" else None
     if after is None:
@@ -30,7 +30,7 @@ def way_of_monitor(solution: Solution, event: Event, occurrence: Occurrence) -> 
 
 
 def _side_after(solution: Solution, occurrence: Occurrence) -> int | None:
-    """Return the side of a monitor just after an instant; None if no motion is known there."""
+    """Return the side of a monitor just after an instant, or None if no motion is known there."""
     last = int(np.searchsorted(solution._of_model.frame.starts, float(occurrence.instant), side="right")) - 1
     if last < 0:
         return None

@@ -1,4 +1,4 @@
-"""This module describes events of one instant: guards located at zero, and effects of resets."""
+"""This module describes events of one instant: guards at zero, and effects of resets."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def changes_text(
     error: np.ndarray | float = 0.0,
     texts: Mapping[str, str] = MappingProxyType({}),
 ) -> str:
-    """Describe each state that changed by more than its error: old value, new value, and an optional note."""
+    """Describe each state that changed by more than its error, by its old and new values."""
     moved = np.abs(after - before) > 2.0 * error
     return ", ".join(
         f"{name} from {a:.6g} to {b:.6g}{texts.get(name, '')}"

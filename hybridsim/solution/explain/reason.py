@@ -28,7 +28,7 @@ def reason(
     has_choices: bool,
     impact_guard: GuardView | None,
 ) -> str:
-    """Return the sentence; `changed` names changed states, `impact_guard` is the gap when it closed."""
+    """Return a sentence with the reason for an event."""
     stage, change = place.stage, place.change
     resolution, outcome = stage.resolution, stage.outcome
     system = resolution.system
@@ -69,7 +69,7 @@ def reason(
 
 
 class _Led(NamedTuple):
-    """The causes of a change: earlier events at the same instant, as clauses or as nouns."""
+    """The causes of a change: earlier events at the same instant."""
 
     clauses: list[str]
     nouns: list[str]
@@ -89,7 +89,7 @@ class _Led(NamedTuple):
 
 
 def _led(place: Place) -> tuple[list[str], list[str]]:
-    """List the causes of a change: due events and transitions as clauses, resets and impacts as nouns."""
+    """List the causes of a change: due events, transitions, resets and impacts."""
     stage, change = place.stage, place.change
     resolution = stage.resolution
     assert change is not None
@@ -119,7 +119,7 @@ def _transitions(system: System, changes: Sequence[Change]) -> list[str]:
 
 
 def _impacts(system: System, changes: Sequence[Change], of: Change) -> list[str]:
-    """Return the names of the contacts in the impact, without the contact whose change is explained."""
+    """Return the names of the contacts in an impact, except the contact whose change is explained."""
     struck = [one.component for one in changes if is_struck(system, one) and one.component != of.component]
     return [system.automata[c].name for c in struck]
 
@@ -160,7 +160,7 @@ def _of_several(system: System, decision: Decision) -> str:
 
 
 def _open(system: System, undecided: Sequence[Look], taken: Look) -> str:
-    """Describe the combinations whose admissibility rounding leaves open."""
+    """Describe the combinations of modes whose admissibility is uncertain because of rounding."""
     ways = " and ".join(f"({way(system, look)})" for look in undecided)
     are = "is a question" if len(undecided) == 1 else "are questions"
     same = ": the same motion to rounding" if all(look.is_as(taken) for look in undecided) else ""
@@ -168,7 +168,7 @@ def _open(system: System, undecided: Sequence[Look], taken: Look) -> str:
 
 
 def _open_modes(system: System, look: Look) -> str:
-    """Return the modes of a combination whose guards have an undecided sign."""
+    """Return the modes of a combination whose guards have an uncertain sign."""
     guards = [g for c in look.components for g in system.automata[c].guards[look.z[c]]]
     shown = views(system, look.at, look.z, guards, look.decreed)
     return " and ".join(dict.fromkeys(view.mode for view in shown if view.is_open))

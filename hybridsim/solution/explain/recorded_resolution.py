@@ -1,4 +1,4 @@
-"""This module repeats the choice of modes at an event, and records each decision and the values it used."""
+"""This module repeats the choice of modes at an event, and records each decision."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Look:
     free: np.ndarray
 
     def is_as(self, other: Look) -> bool:
-        """Return whether two combinations give the same motion within rounding."""
+        """Return whether two combinations of modes give the same motion within rounding."""
         free = self.free & other.free
         (mine, error), (its, its_error) = self.motion[:, free], other.motion[:, free]
         return bool((np.abs(mine - its) <= error + its_error).all())
@@ -45,7 +45,7 @@ class Look:
 
 @dataclass
 class Decision:
-    """A decision on several components: the combinations it judged, the chosen modes, and the changes.
+    """A decision on several components: the judged combinations, the chosen modes, and the changes.
 
     Parameters
     ----------
@@ -60,36 +60,36 @@ class Decision:
 
     @property
     def components(self) -> tuple[int, ...]:
-        """Return the components whose guards were evaluated."""
+        """Return the components whose guards the decision evaluated."""
         return self.looks[0].components if self.looks else ()
 
     def has_taken(self, look: Look) -> bool:
-        """Return whether the decision chose the modes of this combination."""
+        """Return whether the decision chose the modes of a combination."""
         members = list(look.components)
         return bool(len(self.z) and (look.z[members] == self.z[members]).all())
 
     @property
     def taken(self) -> Look | None:
-        """The combination with the chosen modes."""
+        """The combination of modes that the decision chose."""
         return next((look for look in self.looks if self.has_taken(look)), None)
 
     def with_verdict(self, verdict: int) -> list[Look]:
-        """Return the combinations with a given verdict."""
+        """Return the combinations of modes with a given verdict."""
         return [look for look in self.looks if look.verdict == verdict]
 
     @property
     def fine(self) -> list[Look]:
-        """Return the admissible combinations."""
+        """Return the admissible combinations of modes."""
         return self.with_verdict(FINE)
 
     @property
     def undecided(self) -> list[Look]:
-        """Return the combinations that rounding leaves undecided."""
+        """Return the combinations of modes that are undecided because of rounding."""
         return self.with_verdict(UNDECIDED)
 
 
 class RecordedResolution(EventResolution):
-    """Choose the modes at an event, and record the verdict on every combination of modes."""
+    """Chooses the modes at an event, and records the verdict on every combination of modes."""
 
     is_thorough = True
 

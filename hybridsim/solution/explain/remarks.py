@@ -25,7 +25,7 @@ _FIRST_PIECE = "1"  # the name of the first mode of a table's component; its mod
 
 
 def remarks(solution: Solution, occurrence: Occurrence, everything: Sequence[Occurrence]) -> tuple[str, ...]:
-    """Return remarks on facts that the guards do not show; `everything` holds all records of the run."""
+    """Return remarks on facts that the guards do not show, as text."""
     if solution._save != "all":
         return ()  # the modes and the motion around the event were not kept
     system = solution._system
@@ -51,7 +51,7 @@ def change_of_side(solution: Solution, occurrence: Occurrence) -> str:
 
 
 def _companions(occurrence: Occurrence, together: Sequence[Occurrence]) -> Iterator[str]:
-    """List the other events of the same instant in order."""
+    """List the other events at the same instant, in order."""
     events = [one for one in together if one.kind != CORNER]
     if len(events) < 2:
         return
@@ -64,7 +64,7 @@ def _name(one: Occurrence) -> str:
 
 
 def _changed(system: System, occurrence: Occurrence, z: np.ndarray) -> str:
-    """Describe a corner that changes its side, or a table that goes to another piece."""
+    """Describe a corner that changes its side, or a table that changes its piece."""
     name, component = _quoted(occurrence.component), _component(system, occurrence.component)
     if component.modes[0].name == _FIRST_PIECE:
         return f"table {name} goes from piece {occurrence.source} to piece {occurrence.target} here"
@@ -90,7 +90,7 @@ def _jump(system: System, occurrence: Occurrence, z: np.ndarray) -> Iterator[str
 def _unchanged_sides(
     system: System, occurrence: Occurrence, z: np.ndarray, changed: set[str]
 ) -> Iterator[str]:
-    """Describe the corners and tables that an event depends on, and their present sides and pieces."""
+    """Describe the corners and tables that affect an event, with their present sides and pieces."""
     read = _read_by(system, occurrence)
     for component, automaton, mode in zip(system.model.all_components(), system.automata, z, strict=True):
         own = component.modes[int(mode)]
@@ -110,7 +110,7 @@ def _unchanged_sides(
 
 
 def _read_by(system: System, occurrence: Occurrence) -> set[str]:
-    """Return the names that the guards or the monitor of an event depend on, also through definitions."""
+    """Return the names on which the guards or the monitor of an event depend."""
     model = system.model
     behind: dict[str, set[str]] = {name: set(names_of(expr.tree)) for name, expr in model.definitions}
     for component in model.all_components():
@@ -184,7 +184,7 @@ def _modes_after(solution: Solution, t: float) -> np.ndarray:
 
 
 def _quoted(name: str) -> str:
-    """Return the name of a corner, in quotation marks if it contains words."""
+    """Return the name of a corner, in quotation marks if the name contains words."""
     return f"'{name}'" if " if " in name else name
 
 

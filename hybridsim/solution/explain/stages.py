@@ -1,4 +1,4 @@
-"""This module repeats the decisions of one instant in order: located guards, monitor resets, due events."""
+"""This module repeats the decisions of one instant in order: guards, monitor resets, due events."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Stage:
-    """One choice of modes at an instant, and the changes that followed.
+    """One choice of modes at an instant, with the changes that followed from it.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class Place:
-    """The stage of an instant in which a transition was made; `change` is None if it was not found."""
+    """The stage of an instant at which a transition was made."""
 
     stage: Stage
     change: Change | None
@@ -62,7 +62,7 @@ class Place:
 def place_of(
     run: Run, segment: Segment, together: Sequence[Occurrence], fired: list[int], occurrence: Occurrence
 ) -> Place | None:
-    """Return the stage in which a transition was made; `together` holds all records of its instant."""
+    """Return the stage at which a transition was made, among the records of its instant."""
     instant = _Instant(run, segment, together)
     stages = list(instant.located(fired))
     found, left = _matched(run.system, instant.transitions, stages)
@@ -81,7 +81,7 @@ def place_of(
 def _matched(
     system: System, transitions: Sequence[Occurrence], stages: Sequence[Stage]
 ) -> tuple[dict[int, Place], list[Occurrence]]:
-    """Match transitions with stages: return the place of each by index, and the unmatched transitions."""
+    """Assign transitions to stages; return the stages by index, and the transitions without a stage."""
     made = [Place(stage, change) for stage in stages for change in stage.changes]
     found, left, start = {}, [], 0
     for number, occurrence in enumerate(transitions):
@@ -102,7 +102,7 @@ def _is_of(system: System, change: Change | None, occurrence: Occurrence) -> boo
 
 
 class _Instant:
-    """An instant of a run, with the segment that ended at it and the records made at it."""
+    """An instant of a run, with the segment that ended there and the records made there."""
 
     def __init__(self, run: Run, segment: Segment, together: Sequence[Occurrence]) -> None:
         self.system, self.task, self.segment, self.together = run.system, run.task, segment, together
@@ -129,7 +129,7 @@ class _Instant:
         ]
 
     def located(self, fired: list[int]) -> list[Stage]:
-        """Return the stages of located guards and monitors, evaluated with inputs on their next pieces."""
+        """Return the stages of located guards and monitors."""
         at = situation(self.system, self.segment, fired)
         found = self._nothing(at, {g: k for k, g in enumerate(fired)})
         if self.is_general and (self.schedules or self.knots) and (fired or self.stopping):
@@ -147,7 +147,7 @@ class _Instant:
         return Located(at, fired or {}, none, True)
 
     def crossed(self, stage: Stage) -> Stage | None:
-        """Return the stage of the monitor resets that an earlier stage triggered, or None."""
+        """Return the stage of monitor resets that an earlier stage caused, or None."""
         sides = stage.outcome.monitor_sides
         crossed = [k for k, way in self.monitors.items() if k not in self.stopping and sides[k] != -way]
         if not crossed:
@@ -157,7 +157,7 @@ class _Instant:
         return self._settled(self._nothing(at), crossed, ())
 
     def due(self, stage: Stage | None, first: Occurrence | None) -> list[Stage]:
-        """Return the stages of events that were due and of their resets; `first` is the first transition."""
+        """Return the stages of events that were due, and of their resets."""
         system, segment = self.system, self.segment
         if first is None or not (self.schedules or self.knots):
             return []
@@ -175,7 +175,7 @@ class _Instant:
     def _settled(
         self, found: Located, monitors: Sequence[int], schedules: Sequence[int], begins: bool = False
     ) -> Stage:
-        """Choose the modes of one stage; `begins` says whether inputs begin new pieces with it."""
+        """Choose the modes of one stage; `begins` says whether inputs change their pieces there."""
         system, model, at = self.system, self.system.model, found.at
         keys = [("monitor", k) for k in monitors] + [("schedule", k) for k in schedules]
         before = Situation(at.s, at.x.copy(), at.p.copy(), at.z.copy(), at.x_error.copy(), at.s_error)
@@ -197,7 +197,7 @@ class _Instant:
 
 
 def situation(system: System, segment: Segment, fired: list[int]) -> Situation:
-    """Return the state before an event, with the same rounding bounds that the run uses."""
+    """Return the state before an event, with the rounding bounds that the run used."""
     s, x = float(segment.s[-1]), segment.x[-1].copy()
     s_error = 2.0 * math.ulp(s)
     series = system.series(s, x, segment.p, segment.z, np.zeros(system.n), 0.0)

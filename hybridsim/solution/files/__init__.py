@@ -1,4 +1,4 @@
-"""This folder saves solutions to files and loads them: archives that are checked on reading, and tables.
+"""This package saves solutions to files and loads them: archives that are checked, and tables.
 
 Start with `archive`.
 """

@@ -60,7 +60,7 @@ def to_bytes(solution: Solution) -> bytes:
 
 
 def of_bytes(stored: bytes) -> Solution:
-    """Return the solution from bytes that `to_bytes` made."""
+    """Return the solution from the bytes of its archive."""
     return _read(io.BytesIO(stored), "the solution that another process sent")
 
 
@@ -260,7 +260,7 @@ def _checkpoint(header: dict[str, Any], arrays: dict[str, np.ndarray]) -> Checkp
 
 
 def _digest(text: str, arrays: dict[str, np.ndarray]) -> str:
-    """Return a hash of header and arrays, which is checked before compiled code uses the arrays."""
+    """Return a hash of the header and the arrays of an archive."""
     digest = hashlib.sha256(text.encode())
     for name in sorted(arrays):
         array = np.ascontiguousarray(arrays[name])

@@ -66,7 +66,7 @@ def mode_counts(system: System) -> list[int]:
 
 
 def sizes_of(system: System) -> dict[str, int]:
-    """Return the sizes that array shapes refer to, by symbol, such as n for the number of states."""
+    """Return the sizes in array shapes by symbol, such as n for the number of states."""
     return {
         "n": system.n,
         "C": len(system.automata),
@@ -81,22 +81,22 @@ def check_header(header: Header) -> None:
     """Reject a header in which an entry has the wrong type."""
     for name in _TEXTS:
         if not isinstance(header[name], str):
-            raise ValueError(f"its {name} cannot be {header[name]!r}")
+            raise ValueError(f"the entry '{name}' of the header cannot be {header[name]!r}")
     for name in ("warnings", "warnings_there"):
         entries = header[name]
         if not isinstance(entries, dict):
-            raise ValueError(f"its {name} are {entries!r}")
+            raise ValueError(f"the entry '{name}' of the header cannot be {entries!r}")
         for count in entries.values():
-            check_count(f"a count of its {name}", count)
+            check_count(f"a count in the entry '{name}' of the header", count)
     for name in ("counters", "method", "tolerances"):
         if not isinstance(header[name], dict):
-            raise ValueError(f"its {name} are not a mapping")
+            raise ValueError(f"the entry '{name}' of the header is not a mapping")
     for name, value in header["counters"].items():
-        check_number(f"its count '{name}'", value, 0.0)
+        check_number(f"the count '{name}'", value, 0.0)
     if not (isinstance(header["cost"], list) and len(header["cost"]) == 2):
-        raise ValueError("its cost is not a pair of numbers")
+        raise ValueError("the cost is not a pair of numbers")
     for value in header["cost"]:
-        check_number("a part of its cost", value, 0.0)
+        check_number("a part of the cost", value, 0.0)
     taken_over = header.get("taken_over")
     if taken_over is not None:
         if not (isinstance(taken_over, list) and len(taken_over) == 2 and isinstance(taken_over[0], str)):
@@ -104,15 +104,15 @@ def check_header(header: Header) -> None:
         check_number("the time at which another integrator took over", taken_over[1])
     kinds = header["kinds"]
     if not (isinstance(kinds, list) and all(isinstance(kind, str) for kind in kinds)):
-        raise ValueError("its block kinds are not strings")
+        raise ValueError("the kinds of blocks are not strings")
     if header["save"] not in ("all", "events", "last-period", "nothing"):
-        check_number("its save setting", header["save"], 0.0)
+        check_number("the save setting", header["save"], 0.0)
     retention = header["keep"]
     if not (isinstance(retention, list) and len(retention) == 2):
-        raise ValueError("its retention is not a pair")
+        raise ValueError("the retention is not a pair")
     for value in retention:
         if value is not None:
-            check_number("a part of its retention", value, 0.0, is_finite=False)
+            check_number("a part of the retention", value, 0.0, is_finite=False)
 
 
 def check_task(header: Header, arrays: Arrays, system: System) -> None:
@@ -197,7 +197,7 @@ def check_checkpoint(header: Header, arrays: Arrays, system: System, span: tuple
                 np.isnan(arrays["headway"]).any()
                 or np.isinf(np.delete(arrays["headway"], HEADWAY_PACE)).any()
             ):
-                raise ValueError("the headway of the checkpoint is not finite")
+                raise ValueError("the pace of the run in the checkpoint is not finite")
         if "taken_over" in arrays:
             check_forms("the checkpoint", arrays, {"taken_over": (float, ())}, {})
             check_finite("the time of a change of method", arrays["taken_over"])

@@ -56,7 +56,7 @@ def read_arrays(file: IO[bytes]) -> dict[str, np.ndarray]:
     """
     try:
         if not zipfile.is_zipfile(file):
-            raise ValueError("it is not an archive of arrays")
+            raise ValueError("the file is not an archive of arrays")
         size = file.seek(0, os.SEEK_END)
         with zipfile.ZipFile(file) as archive:
             members = archive.infolist()
@@ -71,13 +71,13 @@ def _check_members(members: list[zipfile.ZipInfo], size: int) -> None:
     """Reject archive members that `numpy.savez` would not write, or that do not fit into the file size."""
     names = {member.filename for member in members}
     if len(names) != len(members) or len({name.removesuffix(".npy") for name in names}) != len(names):
-        raise ValueError("two of its arrays have the same name")
+        raise ValueError("two arrays in the file have the same name")
     for member in members:
         is_plain = member.compress_type == zipfile.ZIP_STORED and member.file_size == member.compress_size
         if not is_plain or member.flag_bits & ~_NAMES_IN_UTF8:
-            raise ValueError(f"its array '{member.filename}' is compressed, encrypted or of another kind")
+            raise ValueError(f"the array '{member.filename}' is compressed, encrypted or of another kind")
     if sum(member.file_size for member in members) > size:
-        raise ValueError("its arrays are larger than the file")
+        raise ValueError("the arrays are larger than the file")
 
 
 def _array(content: bytes, name: str) -> np.ndarray:
@@ -89,12 +89,12 @@ def _array(content: bytes, name: str) -> np.ndarray:
     elif version == (2, 0):
         shape, is_fortran, dtype = npy.read_array_header_2_0(head)
     else:
-        raise ValueError(f"its array '{name}' is of version {version}")
+        raise ValueError(f"the array '{name}' is of version {version}")
     if dtype.hasobject or dtype.kind not in _KINDS or not dtype.isnative:
-        raise ValueError(f"its array '{name}' cannot be read as numbers")
+        raise ValueError(f"the array '{name}' cannot be read as numbers")
     start = head.tell()
     is_shape = len(shape) <= 5 and all(type(n) is int and 0 <= n <= len(content) for n in shape)
     if not is_shape or math.prod(shape) * dtype.itemsize != len(content) - start:
-        raise ValueError(f"its array '{name}' has a shape that does not match its content")
+        raise ValueError(f"the array '{name}' has a shape that does not match its content")
     found = np.ndarray(shape, dtype, bytearray(content[start:]), order="F" if is_fortran else "C")
     return np.ascontiguousarray(found).reshape(shape)

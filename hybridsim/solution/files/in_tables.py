@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 
 class InTables(EventsAndModes):
-    """The results of a run in several formats; see `hybridsim.solution.solution.Solution`."""
+    """The results of a run in several formats, as a part of `Solution`."""
 
     def table(self, points: int | None = None) -> Table:
-        """Return times, states, quantities and modes as columns; the export methods use this table.
+        """Return times, states, quantities and modes as columns of a table.
 
         Parameters
         ----------
@@ -37,7 +37,7 @@ class InTables(EventsAndModes):
         self.table(points).to_csv(path)
 
     def to_npz(self, path: str | PathLike[str], points: int | None = None) -> None:
-        """Write table and events for `numpy.load`, as ``["x"]``, ``["mode(f)"]``, ``["events/t"]``, ..."""
+        """Write the table and the events to a file for `numpy.load`."""
         self.table(points).to_npz(path, event_columns(self.events, self.names))
 
     def to_pandas(self, points: int | None = None) -> pd.DataFrame:

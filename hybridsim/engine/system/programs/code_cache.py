@@ -1,4 +1,4 @@
-"""Compile machine code for the modes in which a run takes many steps.
+"""This module compiles machine code for modes in which a run takes many steps.
 
 A mode starts with the interpreter of `hybridsim.engine.series.interpreter`. After enough steps its code is compiled, or
 read from disk if an earlier process stored it. Both give the same bits, so the time of the switch does not matter.
@@ -23,7 +23,7 @@ from hybridsim.forks import SharedLock
 
 
 class Codes(NamedTuple):
-    """Addresses of machine code of Taylor's method (`hybridsim.engine.series.emit_series`) by vector of modes.
+    """Addresses of the machine code of Taylor's method, by combination of modes.
 
     0 means that there is none. lacked: number of steps without code. bernstein: addresses of the functions of
     `hybridsim.engine.series.emit_bernstein`.
@@ -38,7 +38,7 @@ class Codes(NamedTuple):
 
 
 class EndsCodes(NamedTuple):
-    """The same for Runge-Kutta methods: functions at the end of a step, at the start of a segment, and for guards."""
+    """Addresses of the machine code of Runge-Kutta methods, by combination of modes."""
 
     ends: np.ndarray
     first: np.ndarray
@@ -48,7 +48,7 @@ class EndsCodes(NamedTuple):
 
 
 class CodeCache:
-    """Machine code of one structure, in the order of its tapes.
+    """Machine code of all systems with the same structure, in the order of the tapes.
 
     Parameters
     ----------
@@ -67,11 +67,11 @@ class CodeCache:
         self._known: tuple[Tapes | None, Any, Any] = (None, self._blank(0), None)
 
     def _blank(self, count: int) -> Any:
-        """Return codes without addresses for a given number of mode vectors."""
+        """Return codes without addresses, for a number of combinations of modes."""
         return self.codes(*(np.zeros(count, dtype=np.int64) for _ in self.codes._fields))
 
     def of(self, tapes: Tapes) -> Any:
-        """Return the code for these tapes, packed for kernels."""
+        """Return the packed machine code for the given tapes."""
         known = self._known  # read once, because other threads may replace it
         if known[0] is not tapes:
             with self._lock:
@@ -86,7 +86,7 @@ class CodeCache:
         return known[2]
 
     def look(self, tapes: Tapes, codes: Any) -> None:
-        """Prepare code for the modes that have taken many steps without it."""
+        """Compile code for modes in which many steps were taken without it."""
         self.compiler.prepare(tapes.modes, codes.lacked, partial(self._put, codes))
 
     def _put(self, codes: Any, k: int, addresses: list[int]) -> None:
@@ -95,7 +95,7 @@ class CodeCache:
 
 
 class SeriesCodes(CodeCache):
-    """Machine code of one structure for Taylor series of one order."""
+    """Machine code for Taylor series of one order, shared by systems of the same structure."""
 
     def __init__(self, system: System, order: int) -> None:
         super().__init__(system, f"series{order}", Codes, partial(series_text, order=order))
@@ -115,7 +115,7 @@ series_codes = per_structure(SeriesCodes)
 
 @per_structure
 def ends_codes(system: System, terms: int, first: int, order: int) -> CodeCache:
-    """Return the machine code of Runge-Kutta methods.
+    """Return the machine code of Runge-Kutta methods for a system.
 
     Parameters
     ----------

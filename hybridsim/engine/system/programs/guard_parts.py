@@ -1,4 +1,4 @@
-"""Extract from tapes the rows that the guards need: fewer than for the flow, and often only linear operations."""
+"""This module extracts from tapes the rows that the guards need."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _LINEAR = {ADD, SUB, NEG, ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB, SCALE, DIVID
 
 
 class Parts(NamedTuple):
-    """Rows for the guards of each mode vector, and whether these guards are linear in states and time.
+    """Tape rows for the guards in each combination of modes, and whether the guards are linear.
 
     The step rows are those that a step needs: of the flow, and of guards that are linear.
     """
@@ -37,7 +37,7 @@ class Parts(NamedTuple):
 
 
 class _ModeParts(NamedTuple):
-    """The parts of one vector of modes."""
+    """Tape rows for the guards in one combination of modes."""
 
     guards: np.ndarray
     is_linear: bool
@@ -45,14 +45,14 @@ class _ModeParts(NamedTuple):
 
 
 class GuardParts:
-    """The rows for guards, made from the most recent tapes; they depend only on the model's structure."""
+    """Caches the tape rows for guards, which depend on the model's structure only."""
 
     def __init__(self, system: System) -> None:
         self.system = system
         self._known: tuple[Tapes, Parts] | None = None
 
     def of(self, tapes: Tapes) -> Parts:
-        """Return the rows for guards of the given tapes."""
+        """Return the rows for the guards of the given tapes."""
         known = self._known  # read once, because other threads may replace it
         if known is None or known[0] is not tapes:
             self._known = known = tapes, self._parts(tapes)

@@ -1,4 +1,4 @@
-"""Provide the input for machine code of one vector of modes, compile it when it pays, and store it on disk."""
+"""This module prepares and compiles machine code for one combination of modes."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ NEVER = -(2**62)  # count of misses if code exists, or cannot be made
 
 
 def mode_tape(system: System, z: np.ndarray) -> ModeTape:
-    """Return the tape of a vector of modes with its active guards."""
+    """Return the tape of one combination of modes with its active guards."""
     tape, optimised = system.code.data["tape"], system.optimised_tape(z)
     return ModeTape(
         rows=_rows(optimised.rows),
@@ -50,7 +50,7 @@ def mode_tape(system: System, z: np.ndarray) -> ModeTape:
 
 
 def _holding(system: System, z: np.ndarray) -> Iterator[int]:
-    """Yield registers of the condition that held states follow from constraints; it is true in every mode."""
+    """Yield the registers of a condition that is true in every mode: held states follow from constraints."""
     tape = system.code.data["tape"]
     zeros = [register for register, value, _ in tape["constants"] if value == 0.0]
     pins = [register for register, source in tape["parameters"] if source == system.layout.pin_at]
@@ -60,7 +60,7 @@ def _holding(system: System, z: np.ndarray) -> Iterator[int]:
 
 
 def computed_rates(system: System, z: np.ndarray) -> list[bool]:
-    """Return for each state whether its rate is computed, rather than constant, another state, or held."""
+    """Return for each state whether its rate is computed and not constant, another state, or held."""
     tape, sure = system.optimised_tape(z), frozenset(_holding(system, z))
     rows = _rows(tape.rows)
     chosen = {out: b for op, a, b, _, out in rows if op == SELECT and a in sure}
@@ -88,7 +88,7 @@ def fading(system: System, z: np.ndarray) -> list[int]:
 
 
 def _highest_power(rows: Iterable[tuple[int, ...]], first: int, count: int) -> int:
-    """Return the highest power to which products raise `count` registers from `first` on."""
+    """Return the highest power to which products raise some registers."""
     powers = dict.fromkeys(range(first, first + count), 1)
     for row in rows:
         op, out = row[0], row[4]
@@ -102,7 +102,7 @@ def _highest_power(rows: Iterable[tuple[int, ...]], first: int, count: int) -> i
 
 
 def most_fading(system: System) -> int:
-    """Return an upper bound of the number of functions that may vanish in one vector of modes."""
+    """Return an upper bound of the number of vanishing functions in one combination of modes."""
     parts = system.code.data["tape"]["parts"]
     return sum(_may_fade(op, b) for _, branches in parts for rows in branches for op, _, b, *_ in rows)
 
@@ -112,12 +112,12 @@ def _may_fade(op: int, b: int) -> bool:
 
 
 def constant_rows(system: System, z: np.ndarray) -> tuple[tuple[int, ...], ...]:
-    """Return the rows that are executed once per segment."""
+    """Return the rows of a tape that are executed only once per segment."""
     return _rows(system.optimised_tape(z).constant_rows)
 
 
 def constant_sources(system: System) -> ConstantSources:
-    """Return the sources of the constants of a system's tapes."""
+    """Return the sources of the constants of the tapes of a system."""
     tape = system.code.data["tape"]
     return ConstantSources(
         {register: (value, error) for register, value, error in tape["constants"]},
@@ -127,7 +127,7 @@ def constant_sources(system: System) -> ConstantSources:
 
 
 def code_path(system: System, kind: str, z: np.ndarray) -> Path | None:
-    """Return the path stem of stored code of a kind, or None; the name of the machine is appended."""
+    """Return the path of stored code without its file ending, or None without a cache."""
     file = getattr(system.code.module, "__file__", None)
     if file is None:
         return None
@@ -140,7 +140,7 @@ def _rows(rows: np.ndarray) -> tuple[tuple[int, ...], ...]:
 
 
 class ModeCompiler:
-    """Compile functions of one kind for vectors of modes of one structure.
+    """Compiles functions of one kind for combinations of modes.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ class ModeCompiler:
         self._engines: list[Any] = []  # references that keep the code alive
 
     def prepare(self, modes: np.ndarray, lacked: np.ndarray, put: Callable[[int, list[int]], None]) -> None:
-        """Prepare code for the modes that have taken many steps without it; put(k, addresses) receives it."""
+        """Compile code for modes with many steps; `put(k, addresses)` receives the result."""
         if not ENABLED or max(lacked.tolist(), default=0) < KNOWN:
             return
         for k in np.flatnonzero(lacked >= KNOWN).tolist():

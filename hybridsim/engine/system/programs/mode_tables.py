@@ -1,4 +1,4 @@
-"""Arrays for compiled loops: a model's automata, and the tapes of every vector of modes that a run has met."""
+"""This module builds arrays for compiled loops: the automata of a model, and tapes of modes."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _ALL = 27  # largest number of vectors of modes that are all present from the st
 
 
 class Automata(NamedTuple):
-    """The constant structure of a model: components, guards, clusters and choices; -1 means none."""
+    """The constant structure of a model: components, guards, clusters and choices; -1 is none."""
 
     guards_of: np.ndarray  # guard numbers (C, M, W) of component and mode
     hold: np.ndarray  # holding mode (C,)
@@ -49,7 +49,7 @@ class Automata(NamedTuple):
 
 
 class Tapes(NamedTuple):
-    """The tapes of K vectors of modes, one row or one slice each."""
+    """The tapes of several combinations of modes, with one row or one slice for each."""
 
     modes: np.ndarray  # modes (K, C)
     hash_slots: np.ndarray  # hash table: `hybridsim.engine.system.programs.modes_index`
@@ -123,13 +123,13 @@ def automata_of(system: System) -> Automata:
 
 
 def _flat(lists: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return the start of each list in their concatenation, and the concatenation."""
+    """Return the start of each list in a concatenation of lists, and the concatenation."""
     starts = np.cumsum([0, *(len(part) for part in lists)])
     return starts.astype(np.int64), np.array([i for part in lists for i in part], dtype=np.int64)
 
 
 class TapeCache:
-    """The tapes of the modes met so far; it grows when a run reaches a new vector of modes.
+    """The tapes of the modes that occurred so far; new combinations of modes are added.
 
     If there are few vectors, all are present from the start. The presence of a tape decides how an event is resolved,
     and so affects the last digits. These digits then do not depend on earlier runs.
@@ -147,7 +147,7 @@ class TapeCache:
         self.tapes = self._stacked()
 
     def look(self) -> None:
-        """Prepare code for modes in which many short series were computed without it."""
+        """Compile code for modes in which many short series were computed without it."""
         tapes = self.tapes
 
         def put(k: int, addresses: list[int]) -> None:
@@ -156,7 +156,7 @@ class TapeCache:
         self._compiler.prepare(tapes.modes, tapes.lacked, put)
 
     def _text(self, tape: ModeTape, z: np.ndarray) -> Callable[[], str] | None:
-        """Return what writes the code for the short series of one vector of modes, or None."""
+        """Return a function that writes the code of short series for one combination of modes, or None."""
         system, rows = self.system, constant_rows(self.system, z)
         if not can_bound(tape, rows):
             return None
@@ -164,7 +164,7 @@ class TapeCache:
         return lambda: bounds_text(tape, rows, constant_sources(system), numbers, system.guard_count)
 
     def surround(self, z: np.ndarray) -> None:
-        """Add the tapes of a vector of modes, and of the modes to which one event may lead."""
+        """Add the tapes of a combination of modes, and of the modes to which one event may lead."""
         if z.tobytes() in self._surrounded:
             return
         with self._lock:
@@ -183,7 +183,7 @@ class TapeCache:
             self._surrounded.add(z.tobytes())
 
     def rows_of(self, vectors: np.ndarray) -> np.ndarray:
-        """Return the rows of these vectors of modes (k, components), and add missing ones."""
+        """Return the rows of some combinations of modes, and add the missing rows."""
         with self._lock:
             met = len(self._met)
             for z in vectors:
@@ -223,7 +223,7 @@ tape_cache_of = per_structure(TapeCache)
 
 
 class _ModeRows(NamedTuple):
-    """The rows of `Tapes` for one vector of modes."""
+    """The rows of `Tapes` for one combination of modes."""
 
     optimised: np.ndarray
     high: np.ndarray
@@ -236,7 +236,7 @@ class _ModeRows(NamedTuple):
 
     @classmethod
     def of(cls, system: System, z: np.ndarray) -> _ModeRows:
-        """Compute the rows. They are reused whenever the tapes grow."""
+        """Return the rows of a combination of modes; they are reused when the tapes grow."""
         tape = system.optimised_tape(z)
         return cls(
             tape.rows,
@@ -251,6 +251,6 @@ class _ModeRows(NamedTuple):
 
 
 def in_a_row(parts: list[np.ndarray], columns: tuple[int, ...] = (5,)) -> tuple[np.ndarray, np.ndarray]:
-    """Return the start of each integer array in their concatenation, and the concatenation; `columns`: entry shape."""
+    """Return the start of each integer array in a concatenation, and the concatenation."""
     starts = np.cumsum([0, *(len(part) for part in parts)]).astype(np.int64)
     return starts, np.concatenate([np.zeros((0, *columns), dtype=np.int64), *parts])

@@ -1,4 +1,4 @@
-"""Find a vector of modes among the tapes, by a hash table if there are many.
+"""This module finds the row of a combination of modes among the tapes, by a hash table.
 
 The table uses open addressing: a vector is stored at the first free slot after its hash, the number with its modes as
 digits modulo the table size (D. E. Knuth, The Art of Computer Programming, vol. 3, 2nd ed. 1998, section 6.4,
@@ -30,7 +30,7 @@ def _is_at(modes: Any, k: int, z: Any) -> bool:
 
 @inlined
 def _first_place(z: Any, count: int) -> int:
-    """Return the hash of a vector: its number modulo a power of two."""
+    """Return the hash of a combination of modes: its number modulo a power of two."""
     number = 0
     for c in range(z.shape[0]):
         short_loop()
@@ -48,7 +48,7 @@ def _fill(modes: Any, index: Any) -> None:
 
 
 def index_of(modes: np.ndarray) -> np.ndarray:
-    """Return the hash table of these distinct vectors (K, components): rows, or -1 for a free slot."""
+    """Return the hash table of different combinations of modes; -1 is a free slot."""
     if len(modes) <= _SEARCHED:
         return np.full(1, _FREE, dtype=np.int64)
     index = np.full(1 << (_SLOTS_PER_VECTOR * len(modes) - 1).bit_length(), _FREE, dtype=np.int64)
@@ -58,7 +58,7 @@ def index_of(modes: np.ndarray) -> np.ndarray:
 
 @inlined
 def find_modes(tapes: Any, z: Any) -> int:
-    """Return the row of a vector of modes in the tapes, or -1."""
+    """Return the row of a combination of modes in the tapes, or -1."""
     modes, index = tapes.modes, tapes.hash_slots
     if modes.shape[0] <= _SEARCHED:
         for k in range(modes.shape[0]):

@@ -1,4 +1,4 @@
-"""This folder runs models of Python functions: compiled by numba if possible, else called from the engine.
+"""This package runs models of Python functions, compiled by numba if possible.
 
 Start with `forms`, then `compiled` and `code`.
 """

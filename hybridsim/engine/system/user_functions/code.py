@@ -1,4 +1,4 @@
-"""The code of a model of Python functions; it replaces the generated code of other models."""
+"""This module provides the code of a model of Python functions in place of a generated module."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class RunRecord(Protocol):
-    """The part of the record of a run to which user functions add warnings."""
+    """The part of a run's record to which user functions add warnings."""
 
     status: str
     message: str
@@ -31,7 +31,7 @@ class RunRecord(Protocol):
 
 
 class PythonCode:
-    """The Python functions of a model, compiled by numba if possible, else called back from the engine.
+    """The Python functions of a model, compiled by numba if possible.
 
     It has the interface of `hybridsim.engine.system.modules.Compiled`; ``data["tape"]`` is None.
     """
@@ -94,12 +94,12 @@ class PythonCode:
 
     @property
     def is_current(self) -> bool:
-        """Return whether the globals that the functions read are unchanged since their compilation."""
+        """Return whether the global variables that the functions read are unchanged since compilation."""
         is_live = self._compiler is None or bool(self.refused)
         return is_live or surroundings(self._functions) == self._surroundings
 
     def address(self, name: str) -> Any:
-        """Return the address of flow, guards, monitors, quantities or guards_and_monitors."""
+        """Return the address of a function by its name, such as flow, guards or monitors."""
         if name not in self._addresses:
             self._addresses.setdefault(name, self._addressed(name))
         return self._addresses[name][0]
@@ -119,14 +119,14 @@ class PythonCode:
         return compiled
 
     def last_failure(self) -> str:
-        """Return the last exception of a run as text, or an empty text, and reset it."""
+        """Return the last exception of a run as text, or an empty text, and clear it."""
         if self._compiler is not None and not self.refused:
             self._compiler.replay(self.forms.failures)
         last, self.forms.failures.last = self.forms.failures.last, ""
         return last
 
     def flow_without_value(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> str:
-        """Return which flow returned a rate that is not finite, with its values, as text.
+        """Return as text which function returned a rate that is not finite, with its arguments.
 
         The text is empty if the flow raises an error. `report` covers that case, even if compiled code does not raise,
         as in a division by zero.
@@ -147,23 +147,23 @@ class PythonCode:
 
     @property
     def refusal_message(self) -> str:
-        """Return why the functions are not compiled."""
+        """Return the reason why the functions are not compiled."""
         return f"numba cannot compile its Python functions ({self.refused})"
 
     def report(self, trajectory: RunRecord) -> None:
-        """Add warnings to the record of a run about derivatives, compilation and exceptions."""
+        """Add warnings on derivatives, compilation and exceptions to the record of a run."""
         if self._rows["guards_and_monitors"]:
             trajectory.warn(
                 "derivatives of guards and monitors are finite differences of the Python functions"
             )
         if self.refused:
-            trajectory.warn(f"{self.refusal_message}: they were called as Python functions")
+            trajectory.warn(f"{self.refusal_message}: they run as uncompiled Python functions")
         failure = self.last_failure()
         if failure and trajectory.status not in ("finished", "terminated"):
             trajectory.message += f"; {failure}"
 
     def check(self, x: np.ndarray, p: np.ndarray) -> None:
-        """Call each function once in plain Python, to report wrong shapes and mistakes with the name of the function.
+        """Call each function once in plain Python, to report mistakes with the name of the function.
 
         Values that are not numbers there (outside the domain, or in an inactive mode) are left to the run.
         """
@@ -190,7 +190,7 @@ class PythonCode:
     # -- functions called once per event, in plain Python ---------------------------------------------------
 
     def _choose(self, s: float, x: Any, p: Any, z: Any, out: Any) -> int:
-        """Do the work of the generated function `choose`; component, mode and guard follow the modes in z."""
+        """Return the branch of a guard, as the generated function `choose` does."""
         c, m, g = (int(k) for k in z[-3:])
         out[0] = -1.0
         for k, condition in enumerate(self.conditions[c, m, g]):
@@ -200,7 +200,7 @@ class PythonCode:
         return 0
 
     def _reset(self, s: float, x: Any, p: Any, z: Any, out: Any) -> int:
-        """Do the work of the generated function `reset`; the number of the reset follows the modes in z."""
+        """Write the values of a reset, as the generated function `reset` does."""
         names = [state.name for state in self.model.states]
         for name, function in self.resets[int(z[-1])][1].items():
             out[names.index(name)] = self.forms.number(function, s, x, p)
@@ -208,7 +208,7 @@ class PythonCode:
 
 
 def _refuse_other_arguments(parts: Parts) -> None:
-    """Refuse a function that does not accept time, states and parameters."""
+    """Raise an error for a function that does not accept time, states and parameters."""
     scalars = (*parts.guards, *parts.monitors, *parts.outputs)
     functions = [function for _, function in parts.flows] + [scalar.function for scalar in scalars]
     for function in filter(callable, functions):
@@ -220,8 +220,8 @@ def _refuse_other_arguments(parts: Parts) -> None:
             name = function_name(function)
             raise ModelError(
                 f"the function {name} takes {inspect.signature(function)}, but is called with (t, x, p)",
-                remedy="give the function three arguments: the time, the states in order, and the parameters by name "
-                "(p.NAME), even if the function does not use all of them",
+                remedy="define the function with three arguments: the time, the states in order, and the parameters "
+                "by name (p.NAME), even if the function does not use all of them",
             ) from None
 
 

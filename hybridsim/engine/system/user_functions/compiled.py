@@ -48,7 +48,7 @@ def _as_tuple(typingctx: Any, array: Any, count: Any) -> Any:
 
 @numba.njit
 def _mark(address: int, function: int, t: float, x: Any, p: Any) -> None:
-    """Store the last call that raised: number of the function (from 1), t, states, parameters."""
+    """Store the last call that raised an exception: function number, t, states, parameters."""
     last_call = numba.carray(_doubles_at(address), (2 + x.shape[0] + p.shape[0],))
     last_call[0], last_call[1] = function, t
     last_call[2 : 2 + x.shape[0]] = x
@@ -89,7 +89,7 @@ class Compiler:
         return _as_cfunc(write_all)
 
     def replay(self, failures: Failures) -> None:
-        """Repeat in plain Python the last call that raised in compiled code, to get its error."""
+        """Repeat the last failed call of compiled code in plain Python, to get its exception."""
         if self.last_call[0] == 0.0:
             return
         function, is_flow = self.functions[int(self.last_call[0]) - 1]
@@ -102,7 +102,7 @@ class Compiler:
             failures.note(function, t, fault, True)
 
     def _take(self, function: Any, is_flow: bool) -> str:
-        """Compile a function and the code that writes its result to out. Return the reason if numba cannot."""
+        """Compile a function and the code that writes its result; return the reason if numba cannot."""
         if (id(function), is_flow) in self._written:
             return ""
         if not (inspect.isfunction(function) or hasattr(function, "py_func")):
@@ -127,7 +127,7 @@ class Compiler:
         return ""
 
     def _wrapped(self, function: Any, number: int, width: int) -> Any:
-        """Return code that calls a function and writes `width` numbers; width = -1 for a scalar."""
+        """Return code that calls a function and writes `width` numbers; -1 means a scalar."""
         n, count, origin = self.parts.states, self.count, self.parts.origin_at
         parameters, address, length = self.parts.parameters, self.last_call.ctypes.data, abs(width)
 
@@ -150,7 +150,7 @@ class Compiler:
 
 
 def _put(result: Any, out: Any, at: int, width: int) -> None:
-    """Write the result of a function, `width` numbers or (-1) a scalar; raise an error for other results."""
+    """Write the result of a function, `width` numbers or a scalar; raise an error for other results."""
     raise NotImplementedError("the function runs in compiled code only")
 
 
@@ -172,7 +172,7 @@ def _put_compiled(result: Any, out: Any, at: Any, width: Any) -> Any:
 
         def mixed(result: Any, out: Any, at: Any, width: Any) -> Any:
             if len(result) != width:
-                raise ValueError("another number of rates")
+                raise ValueError("the number of rates is wrong")
             i = at
             for number in literal_unroll(result):
                 out[i] = number
@@ -185,7 +185,7 @@ def _put_compiled(result: Any, out: Any, at: Any, width: Any) -> Any:
 
         def row(result: Any, out: Any, at: Any, width: Any) -> Any:
             if len(result) != width:
-                raise ValueError("another number of rates")
+                raise ValueError("the number of rates is wrong")
             for i in range(width):
                 out[at + i] = result[i]
 
@@ -198,7 +198,7 @@ overload(_put)(_put_compiled)
 
 @numba.njit
 def _nothing(s: float, x: Any, p: Any, z: Any, out: Any) -> None:
-    """Do nothing, as the last function of a chain."""
+    """Do nothing, as the last function of a chain of functions."""
 
 
 def _constant(value: float) -> Any:
@@ -210,7 +210,7 @@ def _constant(value: float) -> Any:
 
 
 def _one_more(write: Any, place: int, component: int, mode: int, rest: Any) -> Any:
-    """Return a chain that writes one more number first, or 1 if the number's mode is not active."""
+    """Return a chain that first writes one more number, or 1 if the mode of this number is not active."""
 
     @numba.njit
     def write_row(s: float, x: Any, p: Any, z: Any, out: Any) -> None:
@@ -224,7 +224,7 @@ def _one_more(write: Any, place: int, component: int, mode: int, rest: Any) -> A
 
 
 def _either(component: int, mode: int, write: Any, other: Any) -> Any:
-    """Return a flow that calls `write` in one mode, and `other` in all other modes."""
+    """Return a flow that calls `write` in one mode and `other` in all other modes."""
 
     @numba.njit
     def chosen(s: float, x: Any, p: Any, z: Any, out: Any) -> None:
@@ -254,7 +254,7 @@ def _as_cfunc(function: Any) -> tuple[int, Any]:
 
 
 def called_back(form: Callable[..., int], parts: Parts, components: int, width: int) -> tuple[int, Any]:
-    """Return the address of a C function that calls a Python form, and an object that keeps it alive."""
+    """Return the address of a C function that calls a Python function, and an object that keeps it alive."""
     sizes = (parts.states, parts.origin_at + 2)
 
     def call(s: float, x: int, p: int, z: int, out: int) -> int:

@@ -1,4 +1,4 @@
-"""Wrap a model's Python functions in the form that the engine calls, f(t, x, p, z, out) -> status, as plain Python."""
+"""This module wraps a model's Python functions in the form f(t, x, p, z, out) -> status."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Function = Callable[..., Any]
 
 
 class Scalar(NamedTuple):
-    """A number that depends on (t, x, p): a function or a constant, for one mode of one component (-1: all)."""
+    """A number that depends on (t, x, p): a function or a constant, for one mode of a component."""
 
     component: int
     mode: int
@@ -81,18 +81,18 @@ def parts_of(model: Model) -> Parts:
 
 
 def value(expr: Expression) -> Function | float:
-    """Return the function of an expression, or its constant value."""
+    """Return the function of an expression, or its value if it is constant."""
     return expr.function if isinstance(expr, FunctionExpression) else evaluate(expr, {})
 
 
 class Failures:
-    """The last exception that a function raised in a run; the function's value is then NaN."""
+    """The last exception that a user's function raised in a run; the function's value is then NaN."""
 
     def __init__(self) -> None:
         self.last = ""
 
     def note(self, function: Function, t: float, fault: Exception, on_the_run: bool) -> None:
-        """Store an exception, unless it comes from finite differences far from the run."""
+        """Store an exception, unless it comes from finite differences far away from the run."""
         if on_the_run:
             self.last = (
                 f"the function {function_name(function)} raised {type(fault).__name__}: {fault} at t = {t!r}"
@@ -100,7 +100,7 @@ class Failures:
 
 
 class Forms:
-    """The Python forms of all functions. A call that raises gives NaN and is noted in `failures`."""
+    """The Python form of all functions of a model; a call that raises an exception gives NaN."""
 
     def __init__(self, parts: Parts) -> None:
         self.parts, self.failures = parts, Failures()
@@ -113,7 +113,7 @@ class Forms:
         return float(p[parts.origin_at] + s), state, parts.parameters(*(float(v) for v in p[:count]))
 
     def flow(self, s: float, x: Any, p: Any, z: Any, out: Any) -> int:
-        """Write the rates in the modes z to out."""
+        """Write the rates in the modes `z` to `out`."""
         parts, function = self.parts, self.flow_of(z)
         t, state, named = self.arguments(s, x, p)
         try:
@@ -125,12 +125,12 @@ class Forms:
         return 0
 
     def flow_of(self, z: Any) -> Function:
-        """Return the function that gives the rates in the modes z."""
+        """Return the user's function that computes the rates in the modes `z`."""
         mode = z[self.parts.component] if self.parts.component >= 0 else -1
         return next(f for m, f in self.parts.flows if m in (mode, -1))
 
     def row(self, scalars: tuple[Scalar, ...]) -> Function:
-        """Return one function that writes several numbers; numbers of inactive modes are 1."""
+        """Return one function that writes several numbers; a number whose mode is inactive becomes 1."""
 
         def form(s: float, x: Any, p: Any, z: Any, out: Any) -> int:
             status = 0
@@ -144,7 +144,7 @@ class Forms:
         return form
 
     def number(self, function: Function | float, s: float, x: Any, p: Any) -> float:
-        """Return the value of one function."""
+        """Return the value of one user function."""
         if not callable(function):
             return function
         t, state, named = self.arguments(s, x, p)
@@ -156,7 +156,7 @@ class Forms:
 
 
 def rates(function: Function, count: int, t: float, x: np.ndarray, p: Any) -> np.ndarray:
-    """Return the result of a flow as an array; raises an error with its name if it is not n numbers."""
+    """Return the result of a flow as an array; raise an error if it is not n numbers."""
     returned = function(t, x, p)
     found = _array(returned)
     if found is None or found.shape != (count,):
@@ -168,7 +168,7 @@ def rates(function: Function, count: int, t: float, x: np.ndarray, p: Any) -> np
 
 
 def number(function: Function, t: float, x: np.ndarray, p: Any) -> float:
-    """Return the result of a scalar function; raises an error with its name if it is not a number."""
+    """Return the result of a scalar function; raise an error if it is not a number."""
     returned = function(t, x, p)
     found = _array(returned)
     if found is None or found.shape != ():
@@ -179,7 +179,7 @@ def number(function: Function, t: float, x: np.ndarray, p: Any) -> float:
 
 
 def _array(returned: Any) -> np.ndarray | None:
-    """Return real numbers as an array, or None for anything else."""
+    """Return real numbers as an array, or None for other values."""
     try:
         found = np.asarray(returned)
     except ValueError:  # rows of unequal length

@@ -1,4 +1,4 @@
-"""Compile the plain Python functions that a user's function calls by name, because numba needs them compiled."""
+"""This module compiles the plain Python functions that a user's function calls by name."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _NUMBA_KNOWS = ("numpy", "numba", "math")  # modules whose functions numba repla
 
 
 def compiled_with_helpers(function: FunctionType, made: dict[FunctionType, Any] | None = None) -> Any:
-    """Return a function compiled with bounds checks, and compile plain functions in its globals and closures.
+    """Return a function compiled with bounds checks, together with the plain functions that it calls.
 
     Bounds are checked, because finite differences and trial steps may index beyond a table.
     """

@@ -1,4 +1,4 @@
-"""Collect the globals and closures that functions read, because compiled code keeps their old values."""
+"""This module collects the globals and closures that functions read, to detect changes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _PLAIN = (bool, int, float, complex, str, bytes, type(None), np.generic)
 
 
 def surroundings(functions: Iterable[Callable[..., Any]]) -> tuple[Any, ...]:
-    """Return names and values of the globals and closures of plain functions.
+    """Return the names and values of the globals and closures of plain functions.
 
     Numbers, texts, tuples and arrays are compared by value, everything else by identity. Functions already compiled by
     `numba.njit` keep the values they read then, as in numba itself.
@@ -39,13 +39,13 @@ def _surroundings(
 
 
 def globals_of(function: FunctionType) -> dict[str, Any]:
-    """Return names and values of the globals that a function may read."""
+    """Return the names and values of the globals that a function may read."""
     known = function.__globals__
     return {name: known[name] for name in sorted(_names(function.__code__)) if name in known}
 
 
 def closure_of(function: FunctionType) -> dict[str, Any]:
-    """Return names and values of a function's closure, without empty cells."""
+    """Return the names and values of a function's closure, without empty cells."""
     found = {}
     for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
         try:
