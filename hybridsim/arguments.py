@@ -354,10 +354,9 @@ def run_limits(limits: Any) -> Limits:
         remedy = f"use a dict with the keys {', '.join(names)}, such as {{'events': 1000}}"
         raise cannot_be("limits", limits, remedy)
     for name, value in limits.items():
-        if name not in names:
-            raise UsageError(f"Unknown limit {name!r}", remedy=nearest(str(name), names, kind="limits"))
+        known_name(name, names, "Unknown limit", "limits")
         if not number(value, f"the limit {name!r}") > 0.0:
-            raise UsageError(f"the limit {name!r} cannot be {value!r}", remedy="use a positive number")
+            raise cannot_be(f"the limit {name!r}", value, "use a positive number")
     return Limits(**{name: float(value) for name, value in limits.items()})
 
 

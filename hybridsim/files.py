@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import csv
 import errno
 import json
 import math
 import os
 import secrets
 import stat
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from os import PathLike
 from typing import Any
@@ -169,18 +170,39 @@ def path_text(path: object) -> str:
 
 def json_text(value: Any) -> str:
     """Return a value as a JSON document; nan and inf become null."""
-    return json.dumps(_plain(value), indent=2, ensure_ascii=True, allow_nan=False)
+    return json.dumps(plain(value), indent=2, ensure_ascii=True, allow_nan=False)
 
 
-def _plain(value: Any) -> Any:
+def json_record(record: Mapping[str, Any], path: str | PathLike[str] | None) -> str:
+    """Return a result as a JSON document, and write it if a path is given."""
+    text = json_text(record)
+    if path is not None:
+        write_text(path, text + "\n")
+    return text
+
+
+def csv_records(path: str | PathLike[str], records: Sequence[Mapping[str, Any]]) -> None:
+    """Write records with the same keys as lines of a CSV file; mappings are written as JSON."""
+    with whole_file(path) as partly, open(partly, "w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, list(records[0]) if records else [])
+        writer.writeheader()
+        for record in records:
+            texts = {k: json.dumps(v, default=str) for k, v in record.items() if isinstance(v, Mapping)}
+            writer.writerow({**record, **texts})
+
+
+def plain(value: Any, digits: int | None = None) -> Any:
+    """Return a value as lists, mappings, text and numbers, rounded to some digits; nan and inf become None."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item, digits) for key, item in value.items()}
     if hasattr(value, "tolist"):  # numpy arrays and numbers
-        return _plain(value.tolist())
+        return plain(value.tolist(), digits)
+    if isinstance(value, float) and math.isfinite(value):
+        return value if digits is None else float(f"{value:.{digits}g}")
     if isinstance(value, float):
-        return value if math.isfinite(value) else None
+        return None
     if value is None or isinstance(value, bool | int | str):
         return value
     if isinstance(value, Iterable):
-        return [_plain(item) for item in value]
+        return [plain(item, digits) for item in value]
     return str(value)

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.arguments import chosen_model
+from hybridsim.arguments import cannot_be, chosen_model
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError, nearest
 from hybridsim.model import Model
@@ -138,7 +138,7 @@ def _modes(system: Any, declared: Mapping[str, str] | None) -> np.ndarray:
     names = [a.name for a in system.automata]
     z: object = {} if declared is None else declared
     if not isinstance(z, Mapping):
-        raise UsageError(f"`z` cannot be {z!r}", remedy="use a dict of component names and mode names")
+        raise cannot_be("z", z, "use a dict of component names and mode names")
     for name in z:
         if name not in names:
             raise UsageError(

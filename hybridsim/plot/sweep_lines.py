@@ -7,7 +7,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from hybridsim.analysis import Sweep
-from hybridsim.errors import UsageError, nearest
+from hybridsim.arguments import known_name
+from hybridsim.errors import UsageError
 from hybridsim.plot import style
 from hybridsim.plot.scale import label_axis
 from hybridsim.plot.sweep_readings import (
@@ -49,10 +50,7 @@ def sweep_lines(
     across = over
     if over is None:  # texts have no distances
         across = max(dimensions, key=lambda name: (result.axes[name].dtype.kind == "f", lengths[name]))
-    if not isinstance(across, str) or across not in dimensions:
-        raise UsageError(
-            f"`over` cannot be {over!r}", remedy=nearest(str(over), dimensions, kind="parameters")
-        )
+    across = known_name(across, dimensions, "`over` cannot be", "parameters")
     found = chosen_names(result, names, arrays=True)
     if axes is None:
         figure = style.figure(_WIDTH, _HEIGHT * len(found) + _MORE)

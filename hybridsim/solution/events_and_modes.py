@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.arguments import side_of_event, text
+from hybridsim.arguments import known_name, side_of_event, text
 from hybridsim.calls import refusing
-from hybridsim.errors import UsageError, nearest
+from hybridsim.errors import UsageError
 from hybridsim.solution.event import Event, ModeInterval
 from hybridsim.solution.states import States
 
@@ -59,12 +59,8 @@ class EventsAndModes(States):
         self._require_events()
         if kind is not None:
             text(kind, "kind")
-        known = self._trajectory.event_names
-        if not isinstance(component, str) or component not in known:
-            raise UsageError(
-                f"the model has no component, monitor or schedule {component!r}",
-                remedy=nearest(str(component), list(known), kind="names"),
-            )
+        known = list(self._trajectory.event_names)
+        known_name(component, known, "the model has no component, monitor or schedule", "names")
 
     @property
     def components(self) -> Sequence[Any]:

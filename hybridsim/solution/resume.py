@@ -8,6 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from hybridsim import arguments
+from hybridsim.arguments import cannot_be
 from hybridsim.errors import UsageError
 
 if TYPE_CHECKING:
@@ -32,9 +33,7 @@ def resumed(
         )
     end = task.t1 if t_end is None else arguments.number(t_end, "t_end")
     if not math.isfinite(end):
-        raise UsageError(
-            f"`t_end` cannot be {t_end!r}", remedy="use a finite time; a monitor can end a run early"
-        )
+        raise cannot_be("t_end", t_end, "use a finite time; a monitor can end a run early")
     sign = 1.0 if task.t1 >= task.t0 else -1.0
     if t_end is None and solution.status == "finished":
         raise UsageError(

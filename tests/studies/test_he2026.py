@@ -11,13 +11,14 @@ import threading
 import numpy as np
 import pytest
 
+from hybridsim.files import plain
 from hybridsim.reference.closed_forms.den_hartog import no_stops
 from hybridsim.reference.closed_forms.forced_coulomb_oscillator import ForcedCoulombOscillator
 from hybridsim.studies.he2026.measured import deviation, settings, step_study
 from hybridsim.studies.he2026.measured.pool import Pool
 from hybridsim.studies.he2026.measured.settings import LITERAL, SIGNS, ZEROED, Point
 from hybridsim.studies.he2026.measured.steady import by_steps, exact
-from hybridsim.studies.he2026.measured.verdicts import Verdict, plain
+from hybridsim.studies.he2026.measured.verdicts import Verdict
 
 STICKING = Point(0.6, 0.75)
 SLIPPING = Point(1.0, 0.8)
@@ -159,7 +160,7 @@ class TestVerdictOnARidge:
 
     def test_a_claim_is_plain_data(self) -> None:
         claim = deviation.claim(made_up_maps(0.2), "A", made_up_steps(1.0))
-        text = json.dumps(plain(claim.to_plain()), allow_nan=False)
+        text = json.dumps(plain(claim.to_plain(), 6), allow_nan=False)
         read = json.loads(text)
         assert read["verdict"] == "an artefact of discretisation"
         assert set(read["ours"]) == {
@@ -170,7 +171,7 @@ class TestVerdictOnARidge:
 
 def test_plain() -> None:
     given = {"a": np.array([1.0, math.nan]), 2: np.float64(1.23456789), "c": (True, None, "x", math.inf)}
-    assert plain(given) == {"a": [1.0, None], "2": 1.23457, "c": [True, None, "x", None]}
+    assert plain(given, digits=6) == {"a": [1.0, None], "2": 1.23457, "c": [True, None, "x", None]}
 
 
 def test_full_is_finer_than_quick() -> None:

@@ -17,8 +17,9 @@ from hybridsim.analysis.advise.settings import Setting
 from hybridsim.analysis.advise.uncertainty import Spread
 from hybridsim.analysis.provenance import provenance
 from hybridsim.analysis.sweep import Sweep
-from hybridsim.errors import UsageError, nearest
-from hybridsim.files import json_text, write_text
+from hybridsim.arguments import known_name
+from hybridsim.errors import UsageError
+from hybridsim.files import json_record
 from hybridsim.model import Model
 from hybridsim.presentation.readable import Readable
 
@@ -84,13 +85,8 @@ class Advice(Readable):
 
     def __getitem__(self, name: str) -> Step:
         """Return the simpler model with this name."""
-        for step in self.ladder:
-            if step.name == name:
-                return step
-        names = [step.name for step in self.ladder]
-        raise UsageError(
-            f"the advice has no simpler model {name!r}", remedy=nearest(str(name), names, kind="rungs")
-        )
+        steps = {step.name: step for step in self.ladder}
+        return steps[known_name(name, list(steps), "the advice has no simpler model", "rungs")]
 
     @property
     def map(self) -> np.ndarray:
@@ -151,10 +147,7 @@ class Advice(Readable):
 
     def to_json(self, path: str | Path | None = None) -> str:
         """Return all results as JSON text, with versions, machine and model hash; write it if a path is given."""
-        text = json_text(self.to_dict())
-        if path is not None:
-            write_text(path, text + "\n")
-        return text
+        return json_record(self.to_dict(), path)
 
     def plot(self) -> Any:
         """Draw the errors of the compared models, or the map of a region; see `hybridsim.plot.advice`."""

@@ -22,6 +22,7 @@ from hybridsim.analysis.compare.timed_runs import Budget
 from hybridsim.analysis.ladder import LADDER, LadderStep
 from hybridsim.analysis.progress import Progress
 from hybridsim.analysis.time_budget import OutOfTime
+from hybridsim.arguments import cannot_be
 from hybridsim.calls import refusing
 from hybridsim.errors import SimulationError, UsageError, nearest
 from hybridsim.model import Model
@@ -124,7 +125,7 @@ def advise(
     over = None if over is None else mapping(over, "over")
     tol = positive(tol, "tol")
     if not tol < 1.0:
-        raise UsageError(f"`tol` cannot be {tol!r}", remedy="use a relative tolerance below 1, such as 0.01")
+        raise cannot_be("tol", tol, "use a relative tolerance below 1, such as 0.01")
     accuracy = min(max(_FINER * tol, _ACCURACY[0]), _ACCURACY[1])
     span = None if t_span is None else arguments.time_span(t_span)
     question = question_of(model, quantity, span, accuracy)

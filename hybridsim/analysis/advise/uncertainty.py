@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hybridsim.analysis.advise.question import Number, Question
-from hybridsim.arguments import is_row, number
+from hybridsim.arguments import cannot_be, is_row, number
 from hybridsim.errors import UsageError
 from hybridsim.model import Model
 
@@ -31,9 +31,10 @@ class Spread:
 def ranges_of(model: Model, declared_ranges: Any) -> dict[str, tuple[float, float]]:
     """Return the checked ranges by parameter; each must contain the model's own value."""
     if not isinstance(declared_ranges, Mapping) or not declared_ranges:
-        raise UsageError(
-            f"`uncertain` cannot be {declared_ranges!r}",
-            remedy="use a dict of parameter names and ranges, such as {'mu': (0.28, 0.32)}",
+        raise cannot_be(
+            "uncertain",
+            declared_ranges,
+            "use a dict of parameter names and ranges, such as {'mu': (0.28, 0.32)}",
         )
     if len(declared_ranges) > _MAX_RANGES:
         raise UsageError(
@@ -42,12 +43,10 @@ def ranges_of(model: Model, declared_ranges: Any) -> dict[str, tuple[float, floa
     found, known = {}, model.parameter_values()
     for name, ends in declared_ranges.items():
         if not is_row(ends) or len(ends) != 2:
-            raise UsageError(f"the range of {name} cannot be {ends!r}", remedy="use (low, high)")
+            raise cannot_be(f"the range of {name}", ends, "use (low, high)")
         low, high = (number(end, f"an end of the range of {name}") for end in ends)
         if not low < high:
-            raise UsageError(
-                f"the range of {name} cannot be {ends!r}", remedy="use (low, high) with low < high"
-            )
+            raise cannot_be(f"the range of {name}", ends, "use (low, high) with low < high")
         if name not in known:
             raise UsageError(
                 f"`uncertain` contains {name!r}, which is not a parameter of model {model.name}",

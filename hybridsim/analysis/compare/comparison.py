@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -12,9 +10,8 @@ from typing import Any
 from hybridsim.analysis.compare.errors_against_reference import Errors
 from hybridsim.analysis.compare.rows import QUANTITIES, Reading, Row
 from hybridsim.analysis.compare.table import table
-from hybridsim.arguments import known_name
-from hybridsim.errors import UsageError
-from hybridsim.files import json_text, whole_file, write_text
+from hybridsim.arguments import cannot_be, known_name
+from hybridsim.files import csv_records, json_record
 from hybridsim.presentation.readable import Readable
 
 
@@ -74,7 +71,7 @@ class Comparison(Readable):
         Event times are in periods if the model has a period, else in the model's unit of time.
         """
         if not isinstance(row, Row):
-            raise UsageError(f"`row` cannot be {row!r}", remedy="use a row from `comparison.rows`")
+            raise cannot_be("row", row, "use a row from `comparison.rows`")
         value, floor = self.scaled(row.errors, quantity), self.floor(quantity)
         if value is None:
             return None
@@ -97,7 +94,7 @@ class Comparison(Readable):
         """Return an error in the units of `reading`."""
         known_name(quantity, QUANTITIES, "a comparison has no quantity", "quantities")
         if errors is not None and not isinstance(errors, Errors):
-            raise UsageError(f"`errors` cannot be {errors!r}", remedy="use the errors of a row: `row.errors`")
+            raise cannot_be("errors", errors, "use the errors of a row: `row.errors`")
         value: float | None = getattr(errors, quantity, None)
         return (
             value / self.period if value is not None and quantity == "event_time" and self.period else value
@@ -117,12 +114,7 @@ class Comparison(Readable):
 
     def to_csv(self, path: str | Path) -> None:
         """Write one line per row; times are in the model's unit, wall times in seconds."""
-        records = self.records()
-        with whole_file(path) as partly, open(partly, "w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(records[0]) if records else [])
-            writer.writeheader()
-            for record in records:
-                writer.writerow({**record, "options": json.dumps(record["options"], default=str)})
+        csv_records(path, self.records())
 
     def to_dict(self) -> dict[str, Any]:
         """Return all results as plain values."""
@@ -146,10 +138,7 @@ class Comparison(Readable):
 
     def to_json(self, path: str | Path | None = None) -> str:
         """Return all results as JSON text, with versions, machine and model hash; write it if a path is given."""
-        text = json_text(self.to_dict())
-        if path is not None:
-            write_text(path, text + "\n")
-        return text
+        return json_record(self.to_dict(), path)
 
     def _record(self, row: Row) -> dict[str, Any]:
         errors, cost = row.errors, row.cost

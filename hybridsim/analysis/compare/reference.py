@@ -11,6 +11,7 @@ from hybridsim.analysis.compare.errors_against_reference import Errors, Yardstic
 from hybridsim.analysis.compare.resets import resets_of
 from hybridsim.analysis.compare.trajectory import as_trajectory, trajectory_of
 from hybridsim.analysis.time_budget import OutOfTime, TimeBudget
+from hybridsim.arguments import cannot_be
 from hybridsim.errors import HybridsimError, SimulationError, UsageError
 from hybridsim.model import Model
 from hybridsim.reference.closed_forms import find_closed_form
@@ -108,9 +109,7 @@ def find_reference(
     refusal: UsageError | None = None
     for kind in kinds:
         if kind not in KINDS:
-            raise UsageError(
-                f"`reference` cannot be {kind!r}", remedy=f"use one of {', '.join(map(repr, KINDS))}"
-            )
+            raise cannot_be("reference", kind, f"use one of {', '.join(map(repr, KINDS))}")
         try:
             if kind == CLOSED_FORM:
                 return _checked(_closed_form(model, t_span, yardstick), timed)

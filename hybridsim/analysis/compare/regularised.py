@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.analysis.compare.lines import Series
-from hybridsim.errors import UsageError, nearest
+from hybridsim.arguments import known_name
+from hybridsim.errors import UsageError
 from hybridsim.model.smoothing.regularize import KINDS
 from hybridsim.reference.trajectory import EventLike, ExactEvent, Trajectory
 
@@ -51,10 +52,7 @@ def regularised_series(
             f"model {model.name} has no contact to regularise", remedy="choose a model with dry friction"
         )
     for kind in kinds:
-        if kind not in KINDS:
-            raise UsageError(
-                f"`regularized` cannot contain {kind!r}", remedy=nearest(kind, KINDS, kind="forms")
-            )
+        known_name(kind, KINDS, "`regularized` cannot contain", "forms")
     widths = tuple(v0) if v0 else tuple(fraction * _velocity_size(model) for fraction in FRACTIONS)
     chosen = [(name, float(rtol)) for name in integrators or INTEGRATORS for rtol in rtols or RTOLS]
     many = len(rtols or RTOLS) > 1

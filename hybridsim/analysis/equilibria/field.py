@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.arguments import cannot_be, known_name
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.sides import modes_by_state
 from hybridsim.engine.system.system import System
@@ -101,7 +102,7 @@ def modes_of(system: System, mode: Mapping[str, str] | str | None) -> tuple[np.n
             )
         mode = {declared[0].name: mode}
     if not (mode is None or isinstance(mode, Mapping)):
-        raise UsageError(f"`mode` cannot be {mode!r}", remedy="use a dict of component names and modes")
+        raise cannot_be("mode", mode, "use a dict of component names and modes")
     mode_names: dict[str, Any] = dict(mode or {})
     names = [a.name for a in system.declared]
     for name in mode_names:
@@ -119,10 +120,7 @@ def modes_of(system: System, mode: Mapping[str, str] | str | None) -> tuple[np.n
             raise UsageError(
                 f"`mode` has no entry for {automaton.name}", remedy=f"use one of {', '.join(automaton.modes)}"
             )
-        if chosen is not None and chosen not in automaton.modes:
-            raise UsageError(
-                f"`mode` of {automaton.name} cannot be {chosen!r}",
-                remedy=nearest(str(chosen), automaton.modes, kind="modes"),
-            )
+        if chosen is not None:
+            known_name(chosen, automaton.modes, f"`mode` of {automaton.name} cannot be", "modes")
         numbers.append(max(automaton.initial, 0) if chosen is None else automaton.modes.index(chosen))
     return np.array(numbers, dtype=np.int64), tuple(by_state)

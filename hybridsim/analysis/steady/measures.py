@@ -12,7 +12,7 @@ import numpy as np
 
 from hybridsim.analysis.steady.orbit import Orbit
 from hybridsim.analysis.steady.resolving import orbit_of
-from hybridsim.arguments import known_name
+from hybridsim.arguments import cannot_be, known_name
 from hybridsim.errors import UsageError, nearest
 from hybridsim.expr import evaluate
 from hybridsim.expr.grammar import TIME
@@ -141,9 +141,8 @@ class Measures:
         """
         known_name(name, self._names, "the steady state has no quantity", "quantities")
         if not isinstance(k, int) or not 0 <= k <= MOST_HARMONICS:
-            raise UsageError(
-                f"`k` cannot be {k!r}",
-                remedy="use 0 for the mean, 1 for the fundamental, or 2, 3, ... for higher harmonics",
+            raise cannot_be(
+                "k", k, "use 0 for the mean, 1 for the fundamental, or 2, 3, ... for higher harmonics"
             )
         frequency = 2.0 * math.pi * k / self._orbit.duration
         found = self._orbit.harmonic(name, frequency)

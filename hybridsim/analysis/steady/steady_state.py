@@ -35,6 +35,7 @@ from hybridsim.analysis.steady.settling import (
 from hybridsim.analysis.steady.shooting import Orbit, followed_closely, shoot
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.analysis.variations.sizes import ranges
+from hybridsim.arguments import cannot_be
 from hybridsim.calls import refusing
 from hybridsim.engine.system.period import all_periods, common_period
 from hybridsim.engine.system.system import System
@@ -144,9 +145,7 @@ def steady_state(
     model = arguments.chosen_model(model, params)
     tol = arguments.number(tol, "tol")
     if not 0.0 < tol < 1.0:
-        raise UsageError(
-            f"`tol` cannot be {tol!r}", remedy="use a relative tolerance between 0 and 1, such as 1e-10"
-        )
+        raise cannot_be("tol", tol, "use a relative tolerance between 0 and 1, such as 1e-10")
     system = system_of(model)
     _refuse_what_ends(system, period is not None)
     own = common_period(system)
@@ -442,7 +441,7 @@ def _found(
 
 def _check_period(model: Model, period: float, own: float | None) -> None:
     if not (period > 0.0 and math.isfinite(period)):
-        raise UsageError(f"`period` cannot be {period!r}", remedy="use a time above zero")
+        raise cannot_be("period", period, "use a time above zero")
     if own is not None and abs(period / own - max(round(period / own), 1)) > _COMMENSURATE * period / own:
         raise UsageError(
             f"`period` is {period!r}, but model {model.name} is forced with the period {own!r}",

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +13,7 @@ from hybridsim.analysis.compare.rows import NOT_STARTED, STOPPED, Row
 from hybridsim.analysis.compare.table import setting
 from hybridsim.analysis.suite.scenes import Scene
 from hybridsim.analysis.suite.verdict import Verdict, verdict
-from hybridsim.files import json_text, whole_file, write_text
+from hybridsim.files import csv_records, json_record
 from hybridsim.presentation.readable import Readable
 
 ACCURACIES = (1e-3, 1e-6, 1e-9, 1e-11)
@@ -137,15 +135,8 @@ class SuiteComparison(Readable):
 
     def to_csv(self, path: str | Path) -> None:
         """Write one line per run of any scene; times are in the model's unit, wall times in seconds."""
-        records = [
-            {"scene": result.scene.name, **record, "options": json.dumps(record["options"], default=str)}
-            for result in self.results
-            for record in result.comparison.records()
-        ]
-        with whole_file(path) as partly, open(partly, "w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(records[0]))
-            writer.writeheader()
-            writer.writerows(records)
+        rows = ((result.scene.name, row) for result in self.results for row in result.comparison.records())
+        csv_records(path, [{"scene": scene, **row} for scene, row in rows])
 
     def to_dict(self) -> dict[str, Any]:
         """Return all results as plain values."""
@@ -180,7 +171,4 @@ class SuiteComparison(Readable):
 
     def to_json(self, path: str | Path | None = None) -> str:
         """Return all results as JSON text, with versions and machine; write it if a path is given."""
-        text = json_text(self.to_dict())
-        if path is not None:
-            write_text(path, text + "\n")
-        return text
+        return json_record(self.to_dict(), path)

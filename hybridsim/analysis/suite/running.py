@@ -21,10 +21,10 @@ from hybridsim.analysis.compare.timed_runs import Budget, Entry, timed_rows
 from hybridsim.analysis.progress import Progress, Steps
 from hybridsim.analysis.suite.result import SceneResult, SuiteComparison
 from hybridsim.analysis.suite.scenes import SCENES, Scene, scene_names
-from hybridsim.arguments import callback
+from hybridsim.arguments import callback, known_name
 from hybridsim.calls import refusing
 from hybridsim.engine.system.period import forcing_period
-from hybridsim.errors import UsageError, nearest
+from hybridsim.errors import UsageError
 from hybridsim.model import load
 
 BUDGET = 600.0
@@ -108,10 +108,7 @@ def _chosen(names: Sequence[str] | None) -> tuple[Scene, ...]:
         return SCENES
     names = comparison_request.checked_names(names, "scenes")
     for name in names:
-        if name not in scene_names():
-            raise UsageError(
-                f"the suite has no scene {name!r}", remedy=nearest(name, scene_names(), kind="scenes")
-            )
+        known_name(name, scene_names(), "the suite has no scene", "scenes")
     if not names:
         raise UsageError("no scenes to run", remedy=f"use some of {', '.join(scene_names())}")
     return tuple(scene for scene in SCENES if scene.name in names)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.arguments import is_row, number
+from hybridsim.arguments import cannot_be, is_row, number
 from hybridsim.errors import ExpressionError, UsageError
 from hybridsim.expr import Expression, parse, require_names, resolve
 from hybridsim.model import Model
@@ -90,11 +90,10 @@ def points_of(model: Model, values: Any, mode: Any) -> Points:
         For unknown names, invalid values, or lists of different lengths.
     """
     if not isinstance(mode, str) or mode not in MODES:
-        raise UsageError(f"`mode` cannot be {mode!r}", remedy="use 'grid' for all combinations, or 'list'")
+        raise cannot_be("mode", mode, "use 'grid' for all combinations, or 'list'")
     if not isinstance(values, Mapping) or not values:
-        raise UsageError(
-            f"`values` cannot be {values!r}",
-            remedy="use a dict of parameter names and values, such as {'F0': [20, 30, 40]}",
+        raise cannot_be(
+            "values", values, "use a dict of parameter names and values, such as {'F0': [20, 30, 40]}"
         )
     units = {p.name: p.unit for p in model.parameters}
     starts = {s.name: s.unit for s in model.states} | {d.name: d.unit for d in model.discrete}
@@ -167,7 +166,7 @@ def _setting(name: str, value: Any) -> float | Expression:
         return parse(value)
     found = number(value, f"a value of {name}", "use a number or an expression")
     if not math.isfinite(found):
-        raise UsageError(f"a value of {name} cannot be {value!r}", remedy="use finite numbers")
+        raise cannot_be(f"a value of {name}", value, "use finite numbers")
     return found
 
 

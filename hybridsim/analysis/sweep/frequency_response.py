@@ -9,7 +9,7 @@ from typing import Any
 from hybridsim.analysis.compare.comparison_request import mapping
 from hybridsim.analysis.sweep.result import Sweep
 from hybridsim.analysis.sweep.sweep import sweep
-from hybridsim.arguments import chosen_model, text
+from hybridsim.arguments import cannot_be, chosen_model, text
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
 from hybridsim.model import Model
@@ -60,9 +60,7 @@ def frequency_response(
     model = chosen_model(model, params)
     others, frequency = mapping(levels, "levels"), text(frequency, "frequency")
     if len(others) > 1 or frequency in others:
-        raise UsageError(
-            f"`levels` cannot be {levels!r}", remedy="use one parameter other than the frequency"
-        )
+        raise cannot_be("levels", levels, "use one parameter other than the frequency")
     if not model.states:
         raise UsageError(f"model {model.name} has no states", remedy="use a model with at least one state")
     readings = [f"amplitude.{model.states[0].name if quantity is None else text(quantity, 'quantity')}"]

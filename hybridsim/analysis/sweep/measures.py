@@ -9,8 +9,7 @@ from typing import Any
 from hybridsim.analysis.keyword_options import refuse_what_it_does_not_take
 from hybridsim.analysis.sweep.named_measures import named_measure
 from hybridsim.analysis.sweep.work.job import Measure
-from hybridsim.arguments import is_row
-from hybridsim.errors import UsageError
+from hybridsim.arguments import cannot_be, is_row
 from hybridsim.model import Model
 
 
@@ -43,7 +42,4 @@ def measure_of(measure: Any, model: Model, chained: bool, options: Mapping[str, 
     names = tuple(measure) if is_row(measure) else ()
     if names and all(isinstance(word, str) for word in names):
         return named_measure(names, model, options)
-    raise UsageError(
-        f"`measure` cannot be {measure!r}",
-        remedy="use a function of the model, or the name of a built-in measure",
-    )
+    raise cannot_be("measure", measure, "use a function of the model, or the name of a built-in measure")

@@ -13,6 +13,7 @@ from hybridsim.analysis.steady.result import SteadyState
 from hybridsim.analysis.steady.steady_state import steady_state
 from hybridsim.analysis.sweep.last_period import OF_MOTION, LastPeriod, MeasuredPeriod, period_of
 from hybridsim.analysis.sweep.work.job import Incomplete
+from hybridsim.arguments import cannot_be
 from hybridsim.errors import SimulationError, UsageError, nearest
 from hybridsim.model import Model
 from hybridsim.model.checks.units import time_unit, units_of
@@ -109,9 +110,10 @@ def named_measure(
         names = states if asked == (FINAL,) else [_of(word, states, "states") for word in asked]
         return Final(tuple(names), options)
     if FINAL in heads:
-        raise UsageError(
-            f"`measure` cannot be {reading_names!r}",
-            remedy="use two sweeps: one for values of steady states, and one for ends of runs",
+        raise cannot_be(
+            "measure",
+            reading_names,
+            "use two sweeps: one for values of steady states, and one for ends of runs",
         )
     if AFTER in options:
         refuse_unknown([simulate], {name: value for name, value in options.items() if name != AFTER})

@@ -17,8 +17,8 @@ from hybridsim.analysis.provenance import provenance
 from hybridsim.analysis.sweep.axes import POINT
 from hybridsim.analysis.sweep.table import heading, statuses, table
 from hybridsim.analysis.sweep.work.job import DONE, NOT_RUN
-from hybridsim.errors import UsageError, nearest
-from hybridsim.files import json_text, whole_file, write_text
+from hybridsim.arguments import known_name
+from hybridsim.files import json_record, whole_file
 from hybridsim.model import Model
 from hybridsim.presentation.readable import Readable
 from hybridsim.presentation.tables import library
@@ -84,11 +84,7 @@ class Sweep(Readable):
 
     def __getitem__(self, name: str) -> np.ndarray:
         """Return the array of results with a given name."""
-        if name not in self.values:
-            raise UsageError(
-                f"the sweep has no {name!r}", remedy=nearest(str(name), self.values, kind="readings")
-            )
-        return self.values[name]
+        return self.values[known_name(name, list(self.values), "the sweep has no", "readings")]
 
     def __repr__(self) -> str:
         return "\n".join([heading(self), *statuses(self)])
@@ -140,10 +136,7 @@ class Sweep(Readable):
 
     def to_json(self, path: str | Path | None = None) -> str:
         """Return all results as JSON text, with versions, machine and model hash; write it if a path is given."""
-        text = json_text(self.to_dict())
-        if path is not None:
-            write_text(path, text + "\n")
-        return text
+        return json_record(self.to_dict(), path)
 
     def to_xarray(self) -> xr.Dataset:
         """Return an xarray data set over the axes, with the results, their units and the status."""

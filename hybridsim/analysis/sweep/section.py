@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.analysis.steady.motion import Motion, Point, point_at_end
+from hybridsim.arguments import cannot_be
 from hybridsim.engine.system.period import common_period, system_period
 from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import SimulationError, UsageError
@@ -109,9 +110,7 @@ def with_section(model: Model, section: str | None) -> tuple[Model, str]:
     if section is None:
         return model, ""
     if not isinstance(section, str):
-        raise UsageError(
-            f"`section` cannot be {section!r}", remedy="use an expression, or the name of a monitor"
-        )
+        raise cannot_be("section", section, "use an expression, or the name of a monitor")
     if section in {monitor.name for monitor in model.monitors}:
         return model, section
     name = free_name(names_of_model(model), LEVEL)

@@ -13,7 +13,7 @@ from hybridsim.analysis.variations.carried import Carrier
 from hybridsim.analysis.variations.directions import Carried, Directions
 from hybridsim.analysis.variations.parameters import start_slopes, value_slopes
 from hybridsim.analysis.variations.refused import refuse_limits
-from hybridsim.arguments import flag
+from hybridsim.arguments import cannot_be, flag
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
 from hybridsim.presentation.readable import Readable, aligned
@@ -139,7 +139,7 @@ def _found(
     ],
 ) -> Sensitivities:
     if not hasattr(solution, "_segments"):
-        raise UsageError(f"`solution` cannot be {solution!r}", remedy="use the result of hs.simulate")
+        raise cannot_be("solution", solution, "use the result of hs.simulate")
     model, system = solution.model, solution._system
     names = [p.name for p in model.parameters]
     starts_follow = flag(starts_follow, "starts_follow")

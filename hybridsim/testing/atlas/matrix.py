@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import multiprocessing
 import os
 import signal
@@ -14,7 +13,9 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from hybridsim.errors import UsageError, nearest
+from hybridsim.arguments import known_name
+from hybridsim.errors import UsageError
+from hybridsim.files import plain
 from hybridsim.integrators.contract import Integrator
 from hybridsim.integrators.registry import registered
 from hybridsim.testing.atlas.cell import SECONDS, STEPS, Cell, run_cell
@@ -76,9 +77,9 @@ class Atlas:
 
     def to_json(self) -> str:
         """Return JSON text with one line per cell; nan and inf become null."""
-        plain = _finite(self.to_plain())
+        record = plain(self.to_plain(), digits=4)
         parts = []
-        for name, part in plain.items():
+        for name, part in record.items():
             lines = ",\n".join(json.dumps(item) for item in part) if isinstance(part, list) else ""
             parts.append(f'"{name}": ' + (f"[\n{lines}\n]" if lines else json.dumps(part)))
         return "{\n" + ",\n".join(parts) + "\n}\n"
@@ -86,12 +87,12 @@ class Atlas:
     @classmethod
     def from_json(cls, text: str) -> Atlas:
         """Return an atlas from the JSON text of `to_json`, with the current descriptions of the scenes."""
-        plain = json.loads(text)
+        record = json.loads(text)
         scenes = {scene.name: scene for scene in SCENES}
-        found = [Cell.from_plain(cell) for cell in plain["cells"]]
+        found = [Cell.from_plain(cell) for cell in record["cells"]]
         return cls(
-            tuple(scenes[one["name"]] for one in plain["scenes"]),
-            tuple(Configuration(**one) for one in plain["integrators"]),
+            tuple(scenes[one["name"]] for one in record["scenes"]),
+            tuple(Configuration(**one) for one in record["integrators"]),
             {(cell.scene, cell.configuration): cell for cell in found},
         )
 
@@ -160,13 +161,10 @@ def atlas(
 def scenes_named(names: Sequence[str], trouble: str = "") -> tuple[Scene, ...]:
     """Return the packaged scenes with the given names, or of one class; without arguments, all scenes."""
     known = {scene.name: scene for scene in SCENES}
-    if trouble and trouble not in TROUBLES:
-        raise UsageError(
-            f"Unknown class of scenes {trouble!r}", remedy=nearest(trouble, TROUBLES, kind="classes")
-        )
+    if trouble:
+        known_name(trouble, list(TROUBLES), "Unknown class of scenes", "classes")
     for name in names:
-        if name not in known:
-            raise UsageError(f"Unknown scene {name!r}", remedy=nearest(name, known, kind="scenes"))
+        known_name(name, list(known), "Unknown scene", "scenes")
     of_class = [scene for scene in SCENES if not trouble or scene.trouble == trouble]
     return tuple(known[name] for name in names) or tuple(of_class)
 
@@ -236,13 +234,3 @@ def _quiet_worker() -> None:
 
 def _by_name(scene: str, configuration: Configuration, quick: bool) -> Cell:
     return run_cell(next(one for one in SCENES if one.name == scene), configuration, quick)
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    if isinstance(value, float):
-        return float(f"{value:.4g}") if math.isfinite(value) else None
-    return value

@@ -15,6 +15,7 @@ from hybridsim.analysis.sweep.journal import Journal
 from hybridsim.analysis.sweep.work.batches import Batches
 from hybridsim.analysis.sweep.work.job import Job
 from hybridsim.analysis.sweep.work.sending import Points, Sending, require_sendable, worker_count
+from hybridsim.arguments import cannot_be
 from hybridsim.errors import UsageError
 
 
@@ -34,9 +35,10 @@ def work(
         If the executor is invalid, or cannot take the work.
     """
     if executor is not None and not isinstance(executor, Executor):
-        raise UsageError(
-            f"`executor` cannot be {executor!r}",
-            remedy="use a concurrent.futures.Executor; a dask client has the method get_executor()",
+        raise cannot_be(
+            "executor",
+            executor,
+            "use a concurrent.futures.Executor; a dask client has the method get_executor()",
         )
     if isinstance(executor, ProcessPoolExecutor):
         require_sendable(job)

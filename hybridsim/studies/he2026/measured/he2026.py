@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from hybridsim.analysis.provenance import provenance
+from hybridsim.files import plain
 from hybridsim.model import load
 from hybridsim.studies.he2026.measured import (
     convergence,
@@ -26,7 +27,7 @@ from hybridsim.studies.he2026.measured import (
 )
 from hybridsim.studies.he2026.measured.pool import Pool
 from hybridsim.studies.he2026.measured.settings import FULL, QUICK, SOURCE, Size
-from hybridsim.studies.he2026.measured.verdicts import Claim, plain
+from hybridsim.studies.he2026.measured.verdicts import Claim
 
 # The time of each part, full and quick, in seconds on two processors; used for progress only.
 _SHARES = {
@@ -103,7 +104,7 @@ class Study:
 
     def to_json(self) -> str:
         """Return the verdicts as JSON text."""
-        return json.dumps(plain(self.to_plain()), indent=1, allow_nan=False) + "\n"
+        return json.dumps(plain(self.to_plain(), digits=6), indent=1, allow_nan=False) + "\n"
 
     def rows(self) -> list[tuple[str, str, str]]:
         """Return the name, the verdict and the reason of each claim, for a table."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -56,16 +55,3 @@ class Claim:
         if not self.step_study:
             del plain["step_study"]
         return plain
-
-
-def plain(value: Any) -> Any:
-    """Return a value as lists, mappings, text and numbers with six digits; NaN becomes None."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if hasattr(value, "tolist"):  # numpy arrays and numbers
-        return plain(value.tolist())
-    if isinstance(value, float):
-        return float(f"{value:.6g}") if math.isfinite(value) else None
-    if value is None or isinstance(value, bool | int | str):
-        return value
-    return [plain(item) for item in value]
