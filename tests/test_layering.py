@@ -58,9 +58,6 @@ HANDED_ON = {
     "solution.solution",
     "solution.run",
     "analysis.compare.comparison",
-    "analysis.sweep.result",
-    "analysis.advise.advice",
-    "analysis.suite.result",
 }
 # A family of integrators takes nothing from another one, but these.
 SHARED = {

@@ -18,10 +18,10 @@ from hybridsim.analysis.advise.uncertainty import Spread
 from hybridsim.analysis.provenance import provenance
 from hybridsim.analysis.sweep import Sweep
 from hybridsim.arguments import known_name
-from hybridsim.errors import UsageError
+from hybridsim.errors import UsageError, printable
 from hybridsim.files import json_record
 from hybridsim.model import Model
-from hybridsim.presentation.readable import Readable
+from hybridsim.presentation.readable import Readable, aligned
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,9 +108,16 @@ class Advice(Readable):
 
     def table(self) -> str:
         """Return the compared models, the integrator settings and the remarks as text."""
-        from hybridsim.analysis.advise.table import table
-
-        return table(self)
+        lines = [f"{self.quantity} of {self.model.name} within {self.tol:g}: {_conclusion(self)}"]
+        lines += [f"  by theory: {text}" for text in self.certificates]
+        lines += ["", *aligned(_ladder(self))]
+        if self.settings:
+            lines += ["", *aligned(_settings(self))]
+        if self.spread is not None:
+            lines += ["", _spread(self)]
+        if self.remarks:
+            lines += ["", *self.remarks]
+        return printable("\n".join(lines))
 
     def to_dict(self) -> dict[str, Any]:
         """Return all results as plain values; None replaces NaN and infinity."""
@@ -205,3 +212,52 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
     return value
+
+
+def _conclusion(advice: Advice) -> str:
+    if advice.region is not None:
+        return f"over {advice.region.status.size} points of {', '.join(advice.region.axes)}"
+    simplest, setting = advice.simplest, advice.integrator
+    how = f"; run the full model by {setting.title}" if setting is not None else ""
+    if all(step.verdict in (*WITHOUT_TRIAL, FULL) for step in advice.ladder):
+        return f"no simpler model could be tried, so the full model is needed{how}"
+    if simplest.verdict == FULL:
+        return f"the full model is needed{how}"
+    return f"{simplest.title} is enough{how}"
+
+
+def _ladder(advice: Advice) -> list[tuple[str, ...]]:
+    rows: list[tuple[str, ...]] = [("rung", "value", "error", "cost", "verdict", "why")]
+    return rows + [_row(step) for step in advice.ladder]
+
+
+def _row(step: Step) -> tuple[str, ...]:
+    value = "" if step.value is None or _is_nan(step.value) else f"{step.value:.7g}"
+    error = "" if step.verdict in WITHOUT_TRIAL or step.value is None else f"{step.error:.2e}"
+    return (step.name, value, error, _cost(step.seconds), step.verdict, step.why)
+
+
+def _settings(advice: Advice) -> list[tuple[str, ...]]:
+    rows: list[tuple[str, ...]] = [("full model by", "value", "error", "cost", "verdict", "why")]
+    for s in advice.settings:
+        value = "" if s.value is None else f"{s.value:.7g}"
+        error = "" if s.value is None else f"{s.error:.2e}"
+        rows.append((s.title, value, error, _cost(s.seconds), s.verdict, s.why))
+    return rows
+
+
+def _spread(advice: Advice) -> str:
+    spread = advice.spread
+    assert spread is not None
+    ranges = ", ".join(f"{name} in [{low:g}, {high:g}]" for name, (low, high) in spread.ranges.items())
+    return f"with {ranges}, at the ends: {spread.low:.7g} to {spread.high:.7g}, +-{spread.relative:.2g} of the value"
+
+
+def _cost(seconds: float) -> str:
+    if math.isnan(seconds):
+        return ""
+    return duration(seconds)
+
+
+def _is_nan(value: float | complex) -> bool:
+    return value != value

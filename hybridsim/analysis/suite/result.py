@@ -10,11 +10,12 @@ from typing import Any
 from hybridsim.analysis.compare.comparison import Comparison
 from hybridsim.analysis.compare.comparison_request import positives
 from hybridsim.analysis.compare.rows import NOT_STARTED, STOPPED, Row
-from hybridsim.analysis.compare.table import setting
+from hybridsim.analysis.compare.table import differences, milliseconds, setting, turns, versions
 from hybridsim.analysis.suite.scenes import Scene
-from hybridsim.analysis.suite.verdict import Verdict, verdict
+from hybridsim.analysis.suite.verdict import COMMON, USELESS, Verdict, verdict
+from hybridsim.errors import printable
 from hybridsim.files import csv_records, json_record
-from hybridsim.presentation.readable import Readable
+from hybridsim.presentation.readable import Readable, aligned
 
 ACCURACIES = (1e-3, 1e-6, 1e-9, 1e-11)
 
@@ -129,9 +130,8 @@ class SuiteComparison(Readable):
 
     def table(self) -> str:
         """Return the results as text: correct runs, cheapest runs, uncertainty of the references, and notes."""
-        from hybridsim.analysis.suite.table import table
-
-        return table(self)
+        blocks = [_who_is_right(self), _cheapest(self), _references(self), _notes(self)]
+        return printable("\n\n".join("\n".join(block) for block in blocks))
 
     def to_csv(self, path: str | Path) -> None:
         """Write one line per run of any scene; times are in the model's unit, wall times in seconds."""
@@ -172,3 +172,57 @@ class SuiteComparison(Readable):
     def to_json(self, path: str | Path | None = None) -> str:
         """Return all results as JSON text, with versions and machine; write it if a path is given."""
         return json_record(self.to_dict(), path)
+
+
+def _who_is_right(suite: SuiteComparison) -> list[str]:
+    verdicts = suite.verdicts()
+    # A long name is split over two lines, so that nine columns fit.
+    heads = [name.rpartition("-") if len(name) > 8 else ("", "", name) for name in verdicts]
+    rows = [["", *(first + dash for first, dash, _ in heads)], ["", *(last for *_, last in heads)]]
+    rows += [
+        [f"  {label}", *(str(found.get(label, "-")) for found in verdicts.values())] for label in suite.labels
+    ]
+    title = (
+        f"Correct runs, at rtol {COMMON['rtol']:.0e}, or with {COMMON['steps_per_period']:g} steps per period "
+        "if the step is fixed"
+    )
+    return [
+        title,
+        *aligned(rows),
+        f"off: the modes are right, but a state is wrong by more than {USELESS:.0%} of its amplitude",
+    ]
+
+
+def _cheapest(suite: SuiteComparison) -> list[str]:
+    cheapest = suite.cheapest()
+    accuracies = next(iter(cheapest.values()))
+    rows = [["", *(f"to {accuracy:.0e}" for accuracy in accuracies)]]
+    for scene, found in cheapest.items():
+        cells = [
+            f"{row.label} {setting(row)}, {milliseconds(row.cost.wall_time)}" if row and row.cost else "none"
+            for row in found.values()
+        ]
+        rows.append([f"  {scene}", *cells])
+    return ["Cheapest, by the largest error of the states over the run", *aligned(rows)]
+
+
+def _references(suite: SuiteComparison) -> list[str]:
+    rows = [["", "reference", "compared with", "differs by"]]
+    for result in suite.results:
+        found = result.comparison
+        second = found.second_reference or "nothing"
+        difference = differences(found) if found.difference else "-"
+        rows.append([f"  {result.scene.name}", found.reference, second, difference])
+    return ["References", *aligned(rows)]
+
+
+def _notes(suite: SuiteComparison) -> list[str]:
+    return [
+        "State errors: the largest error of all states over the run, relative to the state's amplitude.",
+        "Event times are in periods of the forcing if the model has one, else in the model's unit of time.",
+        f"Wall times: {turns(suite.repeat)} of all runs of all scenes; short runs are repeated within "
+        "one measurement.",
+        f"The suite took {suite.seconds:.0f} s of its budget of {suite.budget:g} s.",
+        versions(suite.provenance),
+        *(["Differences from the request:", *(f"  {note}" for note in suite.notes)] if suite.notes else []),
+    ]

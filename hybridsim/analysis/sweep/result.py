@@ -15,16 +15,17 @@ import numpy as np
 
 from hybridsim.analysis.provenance import provenance
 from hybridsim.analysis.sweep.axes import POINT
-from hybridsim.analysis.sweep.table import heading, statuses, table
 from hybridsim.analysis.sweep.work.job import DONE, NOT_RUN
 from hybridsim.arguments import known_name
+from hybridsim.errors import printable
 from hybridsim.files import json_record, whole_file
 from hybridsim.model import Model
-from hybridsim.presentation.readable import Readable
+from hybridsim.presentation.readable import Readable, aligned
 from hybridsim.presentation.tables import library
 
 if TYPE_CHECKING:
     import xarray as xr
+_SHOWN = 5  # number of statuses that are shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +92,23 @@ class Sweep(Readable):
 
     def table(self) -> str:
         """Return the extremes of each result, and the counts of statuses, as text."""
-        return table(self)
+        rows: list[tuple[str, ...]] = []
+        for name, values in self.values.items():
+            unit = self.units.get(name, "")
+            if values.dtype.hasobject:
+                counted = Counter(text for text in values.ravel().tolist() if text != "").most_common(_SHOWN)
+                rows.append((name, ", ".join(f"{text} {count}" for text, count in counted), "", unit))
+                continue
+            numbers = np.abs(values) if np.iscomplexobj(values) else values
+            if np.isfinite(numbers).any():
+                low, high = (int(find(numbers)) for find in (np.nanargmin, np.nanargmax))
+                ends = [f"{numbers.ravel()[k]:.6g} at {_where(self, k, values.shape)}" for k in (low, high)]
+                shown = f"|{name}|" if np.iscomplexobj(values) else name
+                rows.append((shown, *ends, unit))
+        header = ("reading", "least", "greatest", "unit")
+        lines = aligned([header, *rows])
+        head = [heading(self), *statuses(self)]
+        return printable("\n".join([*head, "", *lines] if rows else head))
 
     def columns(self) -> dict[str, np.ndarray]:
         """Return axes, results and status as columns, one row per point; arrays become ``name[0]``, ..."""
@@ -189,3 +206,28 @@ def _nested(values: np.ndarray) -> Any:
     plain = values.astype(object)
     plain[~np.isfinite(values)] = None
     return plain.tolist()
+
+
+def heading(sweep: Sweep) -> str:
+    """Return model, axes and readings in one line."""
+    shape = " x ".join(f"{len(values)} {name}" for name, values in sweep.axes.items())
+    return f"Sweep of {sweep.model.name} over {shape}: {', '.join(sweep.values) or 'nothing'}"
+
+
+def statuses(sweep: Sweep) -> list[str]:
+    """Return the number of points per status, one line each."""
+    counted = Counter(sweep.status.ravel().tolist()).most_common()
+    lines = [f"  {count} of {sweep.status.size} points: {text}" for text, count in counted[:_SHOWN]]
+    return lines + ([f"  ... and {len(counted) - _SHOWN} other statuses"] if len(counted) > _SHOWN else [])
+
+
+def _where(sweep: Sweep, k: int, shape: tuple[int, ...]) -> str:
+    """Return the parameters of the point that contains the k-th number of a reading."""
+    place = np.unravel_index(k, shape)
+    if sweep.mode == "list":
+        return ", ".join(_set(name, settings[place[0]]) for name, settings in sweep.axes.items())
+    return ", ".join(_set(name, settings[i]) for (name, settings), i in zip(sweep.axes.items(), place))
+
+
+def _set(name: str, value: object) -> str:
+    return f"{name}={value:.6g}" if isinstance(value, float) else f"{name}={value}"
