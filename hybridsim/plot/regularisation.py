@@ -19,7 +19,7 @@ def regularisation(comparison: Comparison) -> tuple[Axes, Axes]:
     The legend gives the exponents of error and work (evaluations) as v0 falls. Horizontal lines are the set-valued law.
     """
     figure = style.figure(12.5, 5.0)
-    figure.suptitle(headline(comparison), fontsize=10, x=0.01, ha="left")
+    style.put_title(figure, headline(comparison), size=10)
     errors, times = figure.subplots(1, 2)
     chosen = looks(comparison.rows)
     for label in comparison.labels:

@@ -54,6 +54,11 @@ def figure(width: float, height: float) -> Figure:
     return Figure(figsize=(width, height), layout="constrained")
 
 
+def put_title(whole: Figure, text: str, size: float = 11) -> None:
+    """Write a text above the panels of a figure, at the left."""
+    whole.suptitle(text, fontsize=size, x=0.01, ha="left")
+
+
 def save(picture: Any, path: str | Path, dpi: float = _DPI) -> Path:
     """Write a picture to a file of type .png, .pdf or .svg.
 

@@ -26,10 +26,9 @@ def suite_page(suite: SuiteComparison) -> tuple[Axes, ...]:
     columns = min(_COLUMNS, len(comparisons))
     count = math.ceil(len(comparisons) / columns)
     figure = style.figure(4.3 * columns, 3.3 * count + 1.6)
-    figure.suptitle(
-        "Largest error of the states over the run / amplitude, against the time of the run", fontsize=11, x=0.01,
-        ha="left",
-    )  # fmt: skip
+    style.put_title(
+        figure, "Largest error of the states over the run / amplitude, against the time of the run"
+    )
     panels = figure.subplots(count, columns, squeeze=False).ravel()
     chosen = looks(rows)
     for panel, result in zip(panels, suite.results, strict=False):

@@ -51,7 +51,7 @@ def sweep_map(result: Sweep, *names: str, axes: tuple[Axes, ...] | None = None) 
         rows = math.ceil(len(found) / columns)
         figure = style.figure(_WIDTH * columns, _HEIGHT * rows + _MORE)
         figure.set_layout_engine("constrained", w_pad=_BETWEEN)
-        figure.suptitle(style.literal(title_of(result)), fontsize=10, x=0.01, ha="left")
+        style.put_title(figure, style.literal(title_of(result)), size=10)
         panels = figure.subplots(rows, columns, squeeze=False).ravel()
         for empty in panels[len(found) :]:
             empty.remove()

@@ -43,7 +43,7 @@ def work_precision(comparison: Comparison, axes: Sequence[Axes] | None = None) -
     quantities = comparison.quantities
     if axes is None:
         figure = style.figure(4.1 * len(quantities) + 1.8, 5.4)
-        figure.suptitle(headline(comparison), fontsize=10, x=0.01, ha="left")
+        style.put_title(figure, headline(comparison), size=10)
         panels = tuple(figure.subplots(1, len(quantities), squeeze=False)[0])
     else:
         panels = tuple(axes)

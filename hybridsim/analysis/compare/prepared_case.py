@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -15,14 +14,11 @@ from hybridsim.analysis.compare.regularised import as_set_valued
 from hybridsim.analysis.compare.rows import STOPPED, Cost, Row
 from hybridsim.analysis.compare.trajectory import trajectory_of
 from hybridsim.analysis.provenance import provenance
+from hybridsim.analysis.time_budget import OutOfTime, TimeBudget
 from hybridsim.errors import HybridsimError, UsageError
 from hybridsim.model import Model
 from hybridsim.simulate import simulate
 from hybridsim.solution import Solution
-
-
-class _OutOfTime(Exception):
-    """Raised when a run has passed its time limit."""
 
 
 @dataclass(frozen=True)
@@ -58,24 +54,19 @@ class PreparedCase:
         """
         options = line.options_at(value)
         row = Row(line.integrator, line.label, (line.varied, value), options, "failed", form=line.regularized)
-        began: list[float] = []
-
-        def watch(_: float) -> None:
-            began.append(time.perf_counter()) if not began else None
-            if time.perf_counter() - began[0] > limit:
-                raise _OutOfTime
-
+        watch = TimeBudget(limit) if limit < math.inf else None
         try:
-            time_limit: Mapping[str, Any] = {"progress": watch} if limit < math.inf else {}
-            solution = self.simulate(line.integrator, model=self._form(line, value), **options, **time_limit)
+            solution = self.simulate(
+                line.integrator, model=self._form(line, value), progress=watch, **options
+            )
             if not solution.success:
                 return replace(row, status=solution.status, message=solution.message)
             found = trajectory_of(solution)
             if line.regularized:
                 found = as_set_valued(found, {contact.name for contact in self.model.contacts})
             errors = reference.yardstick.measure(found)
-        except _OutOfTime:
-            return replace(row, status=STOPPED, message=f"not finished after {limit:.2g} s")
+        except OutOfTime as late:
+            return replace(row, status=STOPPED, message=str(late))
         except HybridsimError as error:
             return replace(
                 row, status="refused" if isinstance(error, UsageError) else "failed", message=error.message

@@ -21,6 +21,7 @@ from hybridsim.analysis.compare.timed_runs import Budget, Entry, timed_rows
 from hybridsim.analysis.progress import Progress, Steps
 from hybridsim.analysis.suite.result import SceneResult, SuiteComparison
 from hybridsim.analysis.suite.scenes import SCENES, Scene, scene_names
+from hybridsim.analysis.time_budget import OutOfTime, TimeBudget
 from hybridsim.arguments import callback, known_name
 from hybridsim.calls import refusing
 from hybridsim.engine.system.period import forcing_period
@@ -33,10 +34,6 @@ _REFERENCE_SHARE = 1 / 20
 
 
 _RUNNING = 0.95  # the rest of the budget is for writing and drawing
-
-
-class _TooSlow(Exception):
-    """Raised when a reference has passed its time limit."""
 
 
 @refusing
@@ -123,18 +120,14 @@ def _prepared_case(scene: Scene) -> PreparedCase:
 
 def _reference(case: PreparedCase, seconds: float, step: Callable[[str], None]) -> Reference:
     """Return an exact reference if it can be computed in time, otherwise a reference from two runs."""
-    limit = Budget(seconds)
-
-    def watch(_: float) -> None:
-        if not limit.left:
-            raise _TooSlow
+    watch = TimeBudget(seconds)
 
     def find(kinds: tuple[str, ...]) -> Reference:
         return find_reference(case.model, case.t_span, case.period, case.simulate, kinds, watch)
 
     try:
         return find((CLOSED_FORM, MULTIPLE_PRECISION, RUNS))
-    except _TooSlow:
+    except OutOfTime:
         warning = (
             f"a reference in multiple precision was not finished after {seconds:.2g} s: the "
             "reference is a run instead"

@@ -17,7 +17,7 @@ def convergence(curves: Curves, title: str, label: str, published: float) -> Fig
     """Draw the relative errors of A and E over the settings; a column is a method, a line is a case."""
     methods = list(curves.values)
     figure = style.figure(2.6 * len(methods) + 0.6, 5.4)
-    figure.suptitle(title, fontsize=11, x=0.01, ha="left")
+    style.put_title(figure, title)
     panels = figure.subplots(2, len(methods), sharex=True, sharey="row", squeeze=False)
     count: dict[str, int] = {}
     looks = {}

@@ -34,11 +34,9 @@ def deviation_maps(maps: Maps, quantity: str) -> Figure:
     columns = (LITERAL.name, ZEROED.name, EXACT)
     figure = style.figure(10.2, 6.4)
     number = {"A": "10", "E": "11"}[quantity]
-    figure.suptitle(
+    style.put_title(
+        figure,
         f"Figure {number}: {quantity}_D, the deviation of {quantity} without stick from {quantity} with it",
-        fontsize=11,
-        x=0.01,
-        ha="left",
     )
     panels = figure.subplots(len(SIGNS), len(columns), sharex=True, sharey=True)
     x, y = edges(maps.r), edges(maps.ratios)
@@ -87,10 +85,10 @@ def _regions(axes: Axes, quantity: str) -> None:
 def step_lines(study: StepStudy) -> Figure:
     """Draw the deviation along the published ridge over the step and over the velocity interval."""
     figure = style.figure(9.6, 4.0)
-    figure.suptitle(
+    style.put_title(
+        figure,
         "Deviation of A from the exact motion, root mean square over ten places along the published ridge",
-        fontsize=11, x=0.01, ha="left",
-    )  # fmt: skip
+    )
     left, right = figure.subplots(1, 2)
     for k, sign in enumerate(SIGNS):
         colour, marker = style.PALETTE[k], style.MARKERS[k]

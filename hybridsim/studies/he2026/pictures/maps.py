@@ -23,9 +23,7 @@ _MOST_STOPS = 8  # larger numbers are drawn as this one
 def stick_and_stops(truth: Truth) -> Figure:
     """Draw stick fraction, stops per period and amplitude of the exact motion, and the no-stop boundary."""
     figure = style.figure(11.0, 4.0)
-    figure.suptitle(
-        "The exact steady motion; white: no stops above it (closed form)", fontsize=11, x=0.01, ha="left"
-    )
+    style.put_title(figure, "The exact steady motion; white: no stops above it (closed form)")
     panels = figure.subplots(1, 3, sharey=True)
     x, y = edges(truth.r), edges(truth.ratios)
     stick = panels[0].pcolormesh(
@@ -59,10 +57,9 @@ def stick_and_stops(truth: Truth) -> Figure:
 def simpler_models(truth: Truth) -> Figure:
     """Draw the error of the amplitude of each simpler model."""
     figure = style.figure(11.0, 4.0)
-    figure.suptitle(
-        "Deviation of the amplitude of simpler models from the exact one; white: no stops above it",
-        fontsize=11, x=0.01, ha="left",
-    )  # fmt: skip
+    style.put_title(
+        figure, "Deviation of the amplitude of simpler models from the exact one; white: no stops above it"
+    )
     panels = figure.subplots(1, len(MODELS), sharey=True)
     mesh: Any = None
     for axes, model in zip(panels, MODELS, strict=True):
@@ -77,10 +74,9 @@ def simpler_models(truth: Truth) -> Figure:
 def required_settings_map(required: RequiredSettings) -> Figure:
     """Draw the coarsest step and the largest velocity interval with which the error of A is below 1 %."""
     figure = style.figure(9.6, 7.4)
-    figure.suptitle(
-        "The coarsest setting that is within 1 % of the exact amplitude; hatched: the finest is not",
-        fontsize=11, x=0.01, ha="left",
-    )  # fmt: skip
+    style.put_title(
+        figure, "The coarsest setting that is within 1 % of the exact amplitude; hatched: the finest is not"
+    )
     panels = figure.subplots(2, 2, sharex=True, sharey=True)
     rows = ((required.steps, STEPS, "steps per period, h0"), (required.eps, EPS, "eps_v [m/s]"))
     for line, (tables, ladder, label) in zip(panels, rows, strict=True):
@@ -101,10 +97,10 @@ def required_settings_map(required: RequiredSettings) -> Figure:
 def timed_map(timing: TimedMap) -> Figure:
     """Draw the amplitude error over the time per point: median and largest error of the sample."""
     figure = style.figure(7.6, 4.2)
-    figure.suptitle(
+    style.put_title(
+        figure,
         f"Steady amplitude over a map: {timing.side} x {timing.side} points, error against time of a point",
-        fontsize=11, x=0.01, ha="left",
-    )  # fmt: skip
+    )
     axes = figure.subplots()
     for k, (name, entry) in enumerate(timing.entries.items()):
         colour = style.INK if name == "exact" else style.PALETTE[k]

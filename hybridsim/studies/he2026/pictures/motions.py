@@ -37,7 +37,7 @@ def motions(runs: dict[str, Response], title: str, spectrum: bool = False) -> Fi
     names = [*(name for name in runs if name != "exact"), "exact"]
     rows = 3 if spectrum else 2
     figure = style.figure(2.45 * len(names) + 0.6, 1.9 * rows + 0.6)
-    figure.suptitle(title, fontsize=11, x=0.01, ha="left")
+    style.put_title(figure, title)
     panels = figure.subplots(rows, len(names), sharey="row", squeeze=False)
     for column, name in enumerate(names):
         run, colour = runs[name], style.INK if name == "exact" else style.PALETTE[column]

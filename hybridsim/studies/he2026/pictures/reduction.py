@@ -21,9 +21,7 @@ def reduction(found: Reduction) -> Figure:
     """Draw one line for each F0/N; a line is flat if the results depend only on r and F0/N."""
     names = [*(v.name for v in METHODS), EXACT, STRIBECK]
     figure = style.figure(2.3 * len(names) + 0.4, 4.8)
-    figure.suptitle(
-        "Figures 8 and 9: A/A0 and E/E0 at r = 0.6 as F0 grows at fixed F0/N", fontsize=11, x=0.01, ha="left"
-    )
+    style.put_title(figure, "Figures 8 and 9: A/A0 and E/E0 at r = 0.6 as F0 grows at fixed F0/N")
     panels = figure.subplots(2, len(names), sharex=True, sharey="row", squeeze=False)
     for j, name in enumerate(names):
         for i, table in enumerate((found.A, found.E)):

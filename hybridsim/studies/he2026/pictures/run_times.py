@@ -14,10 +14,10 @@ from hybridsim.studies.he2026.pictures.motions import column_title, plain_log
 def interval_cost(times: RunTimes) -> Figure:
     """Draw the time increase t_d over eps_v for every case, and the number of right-hand side evaluations."""
     figure = style.figure(9.2, 3.8)
-    figure.suptitle(
+    style.put_title(
+        figure,
         f"Figure 6: cost of a smaller zero-velocity interval, mean of {times.repeats} runs of {times.periods} periods",
-        fontsize=11, x=0.01, ha="left",
-    )  # fmt: skip
+    )
     left, right = figure.subplots(1, 2, sharex=True)
     for k, method in enumerate(WITH):
         colour = style.PALETTE[k]
@@ -44,12 +44,7 @@ def interval_cost(times: RunTimes) -> Figure:
 def stick_cost(times: RunTimes) -> Figure:
     """Draw the run time in milliseconds for every method and case."""
     figure = style.figure(8.6, 4.2)
-    figure.suptitle(
-        f"Figure 7: time of {times.periods} periods, mean of {times.repeats} runs",
-        fontsize=11,
-        x=0.01,
-        ha="left",
-    )
+    style.put_title(figure, f"Figure 7: time of {times.periods} periods, mean of {times.repeats} runs")
     axes = figure.subplots()
     names = [*(v.name for v in SIGNS), *(v.name for v in WITH), "exact"]
     rows = list(range(len(CASES)))
