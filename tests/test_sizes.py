@@ -22,10 +22,10 @@ COMPILED = {"kernel", "inlined", "allocating_kernel", "polynomial_kernel", "merg
 FILES = {
     "analysis/advise/question.py": 321,
     "analysis/continuation/continuation.py": 323,
-    "analysis/steady/steady_state.py": 485,
+    "analysis/steady/steady_state.py": 484,
     "analysis/variations/carried.py": 343,
     "analysis/variations/off_zero.py": 305,
-    "arguments.py": 389,
+    "arguments.py": 388,
     "engine/events/zeno/accumulation.py": 388,
     "engine/linear/modal.py": 365,
     "engine/linear/motion.py": 370,
