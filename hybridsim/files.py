@@ -22,7 +22,7 @@ _LETTERS = 100  # leading characters of the name that a temporary name copies; f
 
 @contextmanager
 def whole_file(path: str | PathLike[str]) -> Iterator[str]:
-    """Yield a temporary path; after the block succeeds, the file there replaces `path`.
+    """Yield a temporary path; after the block succeeds, the temporary file replaces `path`.
 
     The temporary file has a unique name in the same folder. If two processes write the same file, the last complete
     file remains. A replaced file keeps its mode and owner, and before the replacement only this user can read the new

@@ -1,4 +1,4 @@
-"""`hybridsim schema`: print the JSON Schema of model files, with which editors complete and check them."""
+"""`hybridsim schema`: print the JSON Schema of model files, for completion and checks in editors."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def terms_of(e: Any) -> int:
 
 
 def _named(e: Any, names: dict[Any, Any]) -> Any:
-    """Return an expression in which arguments and parts that are not polynomials are replaced by names."""
+    """Return an expression with names in place of arguments and of parts that are not polynomials."""
     if e.is_Symbol or e.is_number:
         return e
     if e.is_Pow and not e.exp.is_Integer:

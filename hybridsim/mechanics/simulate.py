@@ -87,12 +87,12 @@ def simulate_mechanical(
     span = arguments.time_span(t_span)
     if span[1] < span[0]:
         raise UsageError(
-            f"t_span is {t_span!r}",
+            f"`t_span` is {t_span!r}",
             remedy="use t1 >= t0 (time runs forward only), or simulate system.to_model()",
         )
     if not (isinstance(save, str) and save in ("all", "events", "nothing")):
         raise UsageError(
-            f"save is {save!r}", remedy="for a MechanicalSystem use 'all', 'events' or 'nothing'"
+            f"`save` is {save!r}", remedy="for a MechanicalSystem use 'all', 'events' or 'nothing'"
         )
     start, relative = _start(system, x0), arguments.relative_tolerance(rtol)
     absolute = _absolute(system, atol, relative, start)
@@ -130,7 +130,7 @@ def _start(system: MechanicalSystem, x0: Any) -> np.ndarray:
         for name, value in x0.items():
             if name not in names:
                 raise UsageError(
-                    f"x0 contains {name!r}, which is not a state of {system.name}",
+                    f"`x0` contains {name!r}, which is not a state of {system.name}",
                     remedy=nearest(str(name), names, kind="states"),
                 )
             start[names.index(name)] = arguments.number(value, f"x0 of {name}")
@@ -153,5 +153,5 @@ def _absolute(system: MechanicalSystem, atol: Any, rtol: float, start: np.ndarra
     else:
         values = np.full(len(start), arguments.number(atol, "atol", remedy))
     if values.shape != start.shape or not (np.isfinite(values).all() and (values >= 0).all()):
-        raise UsageError(f"atol is {atol!r}", remedy=remedy)
+        raise UsageError(f"`atol` is {atol!r}", remedy=remedy)
     return values

@@ -105,7 +105,7 @@ class Meanings:
 
 
 def _reaching(behind: Mapping[str, Iterable[ast.expr]], sources: set[str]) -> set[str]:
-    """Return the given names and all names that depend on one of them."""
+    """Return the given names and all names that depend on any of them."""
     found, size = set(sources), -1
     while len(found) > size:
         size = len(found)

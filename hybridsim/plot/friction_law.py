@@ -42,11 +42,12 @@ def friction_law(
     found = load_law(law) if isinstance(law, str) else law
     if speed is None:
         raise UsageError(
-            f"friction_law({found.name!r}) needs a speed", remedy="use speed=, the largest velocity to draw"
+            f"friction_law({found.name!r}) needs `speed`",
+            remedy="set `speed` to the largest velocity to draw",
         )
     if not speed > 0 or not amplitude > 0:
         raise UsageError(
-            f"speed and amplitude cannot be {speed!r} and {amplitude!r}", remedy="use numbers above zero"
+            f"`speed` and `amplitude` cannot be {speed!r} and {amplitude!r}", remedy="use numbers above zero"
         )
     law_arguments = {name: parse(value) for name, value in (arguments or {}).items()}
     contact = Contact("f", parse("v"), parse(normal), found, law_arguments)

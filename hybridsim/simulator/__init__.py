@@ -1,4 +1,4 @@
-"""This package holds the simulator object, which runs a model whole or in steps.
+"""This package contains the class `Simulator`, which runs a model as a whole or in steps.
 
 Read `held_inputs` and `position` first, then `saved_state` and `simulator`.
 """

@@ -1,4 +1,4 @@
-"""Change held inputs at the instant of a checkpoint: corners and modes are judged again with the new values."""
+"""This module changes held inputs at the instant of a checkpoint, and chooses the modes again."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from hybridsim.engine.system.system import System
 
 
 class InputChange(ModeLoop):
-    """A run without duration, in which discrete values change at the instant of the checkpoint.
+    """A run of zero duration, in which discrete values change at the instant of a checkpoint.
 
     Parameters
     ----------

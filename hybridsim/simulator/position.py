@@ -1,4 +1,4 @@
-"""The place at which a simulator stands: a checkpoint of its run, which moves forward and takes new inputs."""
+"""This module defines the position of a simulator: a checkpoint of its run."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class Position:
 
     @property
     def discrete(self) -> np.ndarray:
-        """Return the discrete states and held inputs; methods with fixed steps store them apart."""
+        """Return the discrete states and held inputs, which methods with fixed steps store separately."""
         arrays = self.checkpoint.arrays
         return self.run.system.discrete(arrays["p"]) if "p" in arrays else arrays["discrete"]
 
@@ -88,7 +88,7 @@ class Position:
 
 
 def begun(run: Run, commit: Callable[[Position], None]) -> None:
-    """Commit the position just after the start of a run; its task must end where it begins."""
+    """Pass the position just after the start of a run to the function `commit`."""
     run = stepped(run)
     empty = Position(run, Checkpoint(Instant(run.task.t0), {}, None, {}), Counters(), {})
     _follow(empty, run.task, lambda task: run.method.run(run.system, task), commit)
@@ -101,13 +101,13 @@ def stepped(run: Run) -> Run:
 
 
 def advanced(position: Position, to: float, commit: Callable[[Position], None]) -> None:
-    """Commit the position at a later time. An exception leaves the one at the last event committed."""
+    """Pass the position at a later time to `commit`; after an error, the position at the last event."""
     run = position.run
     _follow(position, _task(position, to), lambda task: run.method.run(run.system, task), commit)
 
 
 def changed(position: Position, discrete: np.ndarray, commit: Callable[[Position], None]) -> None:
-    """Commit the position with other values of discrete states and held inputs at the same instant."""
+    """Pass a position with other values of discrete states and held inputs to the function `commit`."""
     run = position.run
     if type(run.method).run is Integrator.run:
         task = _task(position, position.t)
@@ -138,7 +138,7 @@ def _follow(
     go: Callable[[Task], Trajectory],
     commit: Callable[[Position], None],
 ) -> None:
-    """Carry out a task and commit its end, or the last event before it stopped, which raises an error."""
+    """Carry out a task, and pass its end to `commit`, or the last event before it stopped with an error."""
     record = task.record
     try:
         record = go(task)

@@ -46,7 +46,7 @@ class SavedState:
         return f"<saved state of {self.position.run.model.name} at t = {self.t:.9g}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle no address: the run is prepared again where the state is read."""
+        """Pickle the state without the prepared run, which is prepared again on reading."""
         position = self.position
         run, task = position.run, position.run.task
         method = run.method.name, vars(run.method), run.reason
@@ -56,7 +56,7 @@ class SavedState:
 
 
 def require_fit(saved: SavedState, model: Model, about: str) -> None:
-    """Raise an error unless a state belongs to this model, with any values, and to these settings."""
+    """Raise an error if a saved state belongs to another model or to other settings."""
     own = saved.position.run.model
     fits = own.structure() == model.structure() and own.with_values_of(model) == model
     if not fits or about != saved.about:

@@ -93,12 +93,12 @@ class Simulator:
         self._own()
 
     def _own(self) -> None:
-        """Make the current thread the owner."""
+        """Make the current thread the owner of the simulator."""
         self._owner, self._busy = threading.current_thread(), False
 
     @contextmanager
     def _mine(self, call: str) -> Iterator[None]:
-        """Refuse calls of other threads, and calls from within a call."""
+        """Raise an error for calls of other threads, and for calls from within a call."""
         here = threading.current_thread()
         if self._owner is not here:
             raise UsageError(
@@ -280,7 +280,7 @@ class Simulator:
             return self._taken()
 
     def _with(self, position: Position, inputs: Any) -> np.ndarray | None:
-        """Return the discrete values with new inputs, or None if they are those of now."""
+        """Return the discrete values with new inputs, or None if no value changes."""
         if inputs is None:
             return None
         if not isinstance(inputs, Mapping):
@@ -296,7 +296,7 @@ class Simulator:
         return None if discrete.tobytes() == position.discrete.tobytes() else discrete
 
     def _taken(self) -> tuple[Event, ...]:
-        """Return the events that were not returned yet."""
+        """Return the events that were not returned by earlier calls."""
         position = self._current
         if position.events:
             self._position = replace(position, events=())

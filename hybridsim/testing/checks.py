@@ -68,7 +68,7 @@ def no_transition(solution: Any) -> list[str]:
 
 
 def equals(t: float, **values: float) -> Check:
-    """Return a check that quantities have an exact value at t, just after any event there."""
+    """Return a check that quantities have an exact value at a time, just after any event at this time."""
 
     def check(solution: Any) -> list[str]:
         found = {name: float(solution.output(name, t)) for name in values}
@@ -80,7 +80,7 @@ def equals(t: float, **values: float) -> Check:
 
 
 def says(*texts: str) -> Check:
-    """Return a check that the message of a stopped run contains these words."""
+    """Return a check that the message of a stopped run contains given words."""
 
     def check(solution: Any) -> list[str]:
         return [

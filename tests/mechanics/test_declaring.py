@@ -33,7 +33,7 @@ def test_a_direction_has_a_weight_for_each_coordinate() -> None:
 
 
 def test_a_forcing_has_an_entry_for_each_coordinate() -> None:
-    with pytest.raises(hs.UsageError, match="forcing has 2 entries for 3 coordinates"):
+    with pytest.raises(hs.UsageError, match="`forcing` has 2 entries for 3 coordinates"):
         hs.MechanicalSystem([1, 1, 1], None, [1, 1, 1], forcing=[1, 2])
 
 

@@ -28,7 +28,7 @@ def test_a_law_with_states_is_a_loop_as_well() -> None:
 
 
 def test_a_picture_needs_a_speed() -> None:
-    with pytest.raises(hs.UsageError, match="speed and amplitude cannot be 0 and 1"):
+    with pytest.raises(hs.UsageError, match="`speed` and `amplitude` cannot be 0 and 1"):
         friction_law("coulomb", {"mu": 0.5}, speed=0)
 
 

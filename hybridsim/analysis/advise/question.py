@@ -281,7 +281,8 @@ def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None,
         return Question(getattr(quantity, "__name__", "a function"), quantity, t_span, accuracy)
     if not isinstance(quantity, str):
         raise UsageError(
-            f"quantity cannot be {quantity!r}", remedy=f"use a name such as {'amplitude.x'!r}, or a function"
+            f"`quantity` cannot be {quantity!r}",
+            remedy=f"use a name such as {'amplitude.x'!r}, or a function",
         )
     head, *rest = quantity.split(".")
     if head not in HEADS:
@@ -290,12 +291,13 @@ def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None,
         raise UsageError(f"`quantity` is unknown: {quantity!r}", remedy=named)
     if head in OF_RUN and t_span is None:
         raise UsageError(
-            f"{quantity} is read from a run and needs t_span", remedy="pass `t_span`, such as t_span=(0, 10)"
+            f"{quantity} is read from a run and needs `t_span`",
+            remedy="pass `t_span`, such as t_span=(0, 10)",
         )
     if head in OF_MOTION:
         if t_span is not None or rest:
             raise UsageError(
-                f"quantity cannot be {quantity!r}",
+                f"`quantity` cannot be {quantity!r}",
                 remedy="use 'period' alone, without `.` and a name, and without `t_span`",
             )
         return Question(quantity, None, None, accuracy)
@@ -306,10 +308,11 @@ def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None,
     numbered = head in ("harmonic", "event_time")
     if len(rest) > 2 or (len(rest) == 2 and not (numbered and rest[1].isdecimal())):
         raise UsageError(
-            f"quantity cannot be {quantity!r}", remedy=f"write {head}.{rest[0]}" + (".1" if numbered else "")
+            f"`quantity` cannot be {quantity!r}",
+            remedy=f"write {head}.{rest[0]}" + (".1" if numbered else ""),
         )
     if head == "event_time" and len(rest) == 2 and int(rest[1]) < 1:
-        raise UsageError(f"quantity cannot be {quantity!r}", remedy="use an event number from 1 on")
+        raise UsageError(f"`quantity` cannot be {quantity!r}", remedy="use an event number from 1 on")
     return Question(quantity, None, t_span, accuracy)
 
 

@@ -103,7 +103,7 @@ class Yardstick:
     def _matched_times(
         self, matched: MatchedEvents, t_span: tuple[float, float]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return the times at which to evaluate the run, and a mask of those just before an event."""
+        """Return the times at which to evaluate the run, and a mask of the times just before an event."""
         jumps = [(a.t, b.t) for a, b in matched.pairs if a in self.resets]
         if not jumps:
             return self.times, self.before
@@ -122,7 +122,7 @@ class Yardstick:
 def _states(
     trajectory: Trajectory, times: NDArray[np.float64], before: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
-    """Return the states (n, k) at times, just before or just after events at those times."""
+    """Return the states (n, k) at given times, just before or just after events."""
     after = trajectory.states(times[~before], "+")
     states = np.empty((len(after), len(times)))
     states[:, ~before] = after

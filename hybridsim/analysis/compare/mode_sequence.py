@@ -116,7 +116,7 @@ def _sequences(trajectory: Trajectory) -> dict[tuple[str, str], list[_Entry]]:
 
 
 def _without_instants(entries: Sequence[_Entry]) -> list[_Entry]:
-    """Return a sequence of modes without those of zero duration."""
+    """Return a sequence of modes without the modes of zero duration."""
     lasting: list[_Entry] = []
     for _, group in itertools.groupby(entries, key=lambda entry: entry.t):
         *passing, last = group

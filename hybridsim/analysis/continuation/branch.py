@@ -44,7 +44,7 @@ class BranchPoint:
 
     @cached_property
     def steady(self) -> SteadyState:
-        """This orbit as a steady state with amplitudes, energies and so on; see `steady_state`."""
+        """This orbit as a steady state, with amplitudes, energies and other measures."""
         message = f"orbit of a branch; residual {self.orbit.residual:.1e}"
         return SteadyState(self.motion, "periodic", self.orbit, self.is_free, 0, 0, message)
 

@@ -1,4 +1,4 @@
-"""This module chooses where on a free periodic orbit its run begins, and which state holds the phase there."""
+"""This module chooses where on a periodic orbit without forcing its run begins, and which state is fixed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hybridsim.solution import Solution
 
 
 def begun_elsewhere(point: BranchPoint) -> tuple[BranchPoint, Solution]:
-    """Return the same orbit from the middle of its longest smooth part, with its run from there.
+    """Return the same orbit with a start in the middle of its longest smooth part.
 
     Orbits next to it begin at the same value of one state, so that they have to pass this value, too.
     """

@@ -67,13 +67,13 @@ def _matrix(rows: list[Affine], names: list[str]) -> np.ndarray:
 
 
 def _wave(row: Affine, frequency: float, inputs: Mapping[str, complex]) -> complex:
-    """Return the complex amplitude of the forcing in one row: of its harmonic constants and inputs."""
+    """Return the complex amplitude of the forcing terms in one rate."""
     own = sum(-1j * p for w, p in row.waves.items() if abs(w - frequency) <= _SAME * frequency)
     return complex(own + sum(row.linear.get(name, 0.0) * wave for name, wave in inputs.items()))
 
 
 def _mean(row: Affine, inputs: Iterable[Input], values: Mapping[str, float]) -> float:
-    """Return the mean over a period of the forcing in one row, without the states."""
+    """Return the mean over a period of the forcing terms in one rate, without the states."""
     total = row.constant
     for declared in inputs:
         number = {name: float(evaluate(e, values)) for name, e in declared.expressions.items()}

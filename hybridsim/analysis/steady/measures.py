@@ -216,7 +216,7 @@ class Measures:
 
     @cached_property
     def grazing(self) -> Grazing | None:
-        """The guard that comes closest to zero without reaching it, or None; near grazing it is small.
+        """The guard that comes closest to zero without reaching it, or None if there is no such guard.
 
         A guard at an event that makes it zero is left out there. So is a guard that varies too fast for its
         minima to be found.

@@ -66,8 +66,8 @@ class Orbit:
         if name in self.too_fast:
             raise SimulationError(
                 f"{name} varies too fast, or jumps too often, to be measured over a period",
-                remedy="sample this quantity from steady.solution, and remove it from the outputs to read all other "
-                "quantities at once",
+                remedy="sample this quantity from steady.solution, and remove it from the model's outputs to "
+                "measure all others at once",
             )
         return self.names.index(name)
 

@@ -171,7 +171,7 @@ def _setting(name: str, value: Any) -> float | Expression:
 
 
 def _values(model: Model, name: str, row: Sequence[float | Expression], swept: frozenset[str]) -> np.ndarray:
-    """Return the values as numbers, or as text if one of them depends on another axis."""
+    """Return the values as numbers, or as text if a value depends on another axis."""
     declared = {p.name: p.value for p in model.parameters}
     dependencies = {}
     for setting in row:

@@ -53,7 +53,7 @@ def identity(value: Any) -> str:
 
 
 class _Describer:
-    """Computes the identifying texts, also of values that contain one another."""
+    """Computes texts that identify values, including values that contain one another."""
 
     def __init__(self) -> None:
         self._around: list[int] = []  # the values in progress: a value may contain itself

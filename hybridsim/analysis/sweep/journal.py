@@ -166,7 +166,7 @@ def _piece(line: Any) -> tuple[list[int], list[Outcome]]:
         raise ValueError("the line is not a pair of points and results")
     numbers, rows = line
     if not all(type(number) is int for number in numbers):
-        raise ValueError("the points of the line are not numbers")
+        raise ValueError("the line has an index of a point that is not a number")
     return numbers, [_outcome(row) for row in rows]
 
 

@@ -1,4 +1,4 @@
-"""This module defines directions of change at the start of a run, and derivatives along them at the end."""
+"""This module defines directions of change at the start of a run, and derivatives in each direction."""
 
 from __future__ import annotations
 

@@ -28,8 +28,7 @@ def refuse_limits(solution: Solution) -> None:
         if event.guard == LIMIT and LIMIT in names and component.limit:
             raise UsageError(
                 f"the guard {LIMIT} of {event.component} has a name that is reserved for accumulations "
-                "of events; one ends at "
-                f"t = {event.t:.9g}, so that the two cannot be distinguished",
+                f"of events, so the guard cannot be distinguished from the accumulation at t = {event.t:.9g}",
                 remedy="rename the guard",
             )
         if event.guard == LIMIT and LIMIT not in names:

@@ -147,7 +147,7 @@ class EventResolution(ClusterChoice):
         return None
 
     def take_sides(self, open_: set[int]) -> None:
-        """Set each component with a surface to the mode on the surface's side.
+        """Set each component with a surface to the mode of the side on which the state lies.
 
         open_: the components to be decided on their surfaces. A component that a reset moved off its surface is
         removed, and one that came to its surface is added.

@@ -58,7 +58,7 @@ class Modal:
 
 @dataclass(frozen=True)
 class _Cluster:
-    """A cluster of eigenvalues that share a block, by the indices of those with imaginary part >= 0."""
+    """A cluster of eigenvalues that share a block; complex pairs are listed once."""
 
     members: tuple[int, ...]
     folded: bool  # True for real eigenvalues

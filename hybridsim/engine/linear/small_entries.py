@@ -14,7 +14,7 @@ _CLOSE = 1e-14  # largest change of a row relative to the largest row; a larger 
 
 
 def with_small_rows(A: np.ndarray, V: np.ndarray, T: np.ndarray) -> np.ndarray:
-    """Correct the small rows of V in A V = V T, recursively, because rounding hides them."""
+    """Correct the small rows of V in A V = V T, because rounding errors are large relative to them."""
     V, sizes = V.astype(complex), np.abs(V).max(axis=1, initial=0.0)
     largest = sizes.max(initial=0.0)
     small = sizes < _SMALL * largest

@@ -42,7 +42,7 @@ class Lines:
         self._known: dict[tuple[str, ...], str] = {}
 
     def put(self, line: str) -> None:
-        """Append a line that has no result."""
+        """Append a line of code that computes no value."""
         self.lines.append(line)
         if len(self.lines) > _LONGEST:
             raise TooLong

@@ -24,7 +24,7 @@ class Frame(NamedTuple):
 
     @classmethod
     def of(cls, origins: np.ndarray, spans: np.ndarray, t_end: float) -> Frame:
-        """Return the frame of some segments, the last of which ends at `t_end`."""
+        """Return the times of some segments, the last of which ends at `t_end`."""
         starts, ends = np.empty(len(spans)), np.empty(len(spans))
         _lay_out(origins, spans, t_end, starts, ends)
         return cls(starts, ends, origins, spans)

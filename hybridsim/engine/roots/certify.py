@@ -174,7 +174,7 @@ def past_dip(terms: Any, first: int, longest: float, error: float, backward: Any
 
 @inlined
 def falls_over(terms: Any, rest: float, longest: float) -> float:
-    """Return up to which distance on both sides a guard falls at least half as fast as here, or 0."""
+    """Return how far on both sides a guard falls at least half as fast as at its zero, or 0."""
     steepness = -terms[1]
     if not steepness > 0.0:
         return 0.0

@@ -192,7 +192,7 @@ class SegmentRun:
         self.grazings = [grazing for grazing in self.grazings if grazing[1] <= s]
 
     def _check_shape(self, step: Step) -> None:
-        """Check the shape of the dense output, for a number of times different from the states."""
+        """Check the shape of the dense output by a call with more or fewer times than states."""
         n = self.system.n
         times = np.linspace(step.s0, step.s1, 2 if n != 2 else 3)
         try:

@@ -26,7 +26,7 @@ def _kernels(system: System, tolerances: Tolerances, longest: float) -> ClosedFo
 
 @dataclass(frozen=True)
 class Exact(Integrator):
-    """Closed-form motion of each linear mode, x(t) = Re(T exp(B t) c), with certain zeros of guards.
+    """Closed-form motion of each linear mode, x(t) = Re(T exp(B t) c), with bounds for zeros of guards.
 
     It applies to modes that are linear in the states with constant, polynomial, exponential or sinusoidal
     forcing, and to guards that are linear in states and forcing. The model's declaration decides this, and

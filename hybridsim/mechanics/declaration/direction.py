@@ -26,13 +26,13 @@ def weights(part: Declared, direction: Any) -> tuple[tuple[tuple[int, float], ..
     is_mapping = isinstance(direction, Mapping)
     if not (is_mapping or is_row(direction)):
         raise part._fault(
-            f"direction is {direction!r}", "use a row of weights, or a mapping from coordinates"
+            f"`direction` is {direction!r}", "use a row of weights, or a mapping from coordinates"
         )
     row = list(direction.items() if is_mapping else enumerate(direction))
     entries = [(i, finite(part, "direction", w)) for i, w in row]
     for i, _ in entries:
         if not isinstance(i, Integral):
-            raise part._fault(f"direction names the coordinate {i!r}", "use whole numbers, counted from 0")
+            raise part._fault(f"`direction` names the coordinate {i!r}", "use whole numbers, counted from 0")
     pairs = tuple((int(i), w) for i, w in entries if w != 0.0)
     if not pairs:
         raise part._fault("the direction is zero", "use at least one weight that is not zero")

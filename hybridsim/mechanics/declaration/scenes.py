@@ -79,7 +79,7 @@ def chain_on_belt(
     belt = finite_number(belt, "belt")
     spread, gap = finite_number(spread, "spread"), None if gap is None else finite_number(gap, "gap")
     if not spread >= 0.0:
-        raise UsageError(f"spread is {spread!r}", remedy="use a number >= 0")
+        raise UsageError(f"`spread` is {spread!r}", remedy="use a number >= 0")
     diagonal = np.full(n, leaf + 2.0 * coupling)
     diagonal[0] -= coupling
     diagonal[-1] -= coupling
@@ -90,7 +90,7 @@ def chain_on_belt(
     ]
     if gap is not None and not 2.0 * spread < gap:
         raise UsageError(
-            f"gap is {gap!r}, but the blocks start within +-{spread!r}", remedy="use a spread below gap/2"
+            f"`gap` is {gap!r}, but the blocks start within +-{spread!r}", remedy="use a spread below gap/2"
         )
     stops = range(n - 1) if gap is not None else ()
     return MechanicalSystem(

@@ -102,7 +102,7 @@ class MechanicalContact(Declared):
         if isinstance(law, str):
             object.__setattr__(self, "law", load_law(law))
         elif not isinstance(law, FrictionLaw):
-            raise self._fault(f"law is {law!r}", "use hs.FrictionLaw(...), or the name of a law")
+            raise self._fault(f"`law` is {law!r}", "use hs.FrictionLaw(...), or the name of a law")
         if not self.law.is_set_valued or self.law.tables:
             what = "tables" if self.law.tables else "a direct force instead of slip and stick"
             raise self._fault(
@@ -111,7 +111,7 @@ class MechanicalContact(Declared):
             )
         object.__setattr__(self, "normal", finite(self, "normal", self.normal))
         if not self.normal >= 0.0:
-            raise self._fault(f"normal is {self.normal!r}", "use a load >= 0")
+            raise self._fault(f"`normal` is {self.normal!r}", "use a load >= 0")
         if not isinstance(self.base, Harmonic):
             object.__setattr__(self, "base", finite(self, "base", self.base))
         pairs, count = weights(self, self.direction)
@@ -207,7 +207,7 @@ class MechanicalSystem:
         self.q0, self.v0 = self._start(q0, "q0"), self._start(v0, "v0")
         self.names = tuple(f"q{i + 1}" for i in range(self.n)) if names is None else as_tuple(names)
         if not all(isinstance(x, str) for x in self.names):
-            raise UsageError(f"{name}: names is {names!r}", remedy=f"use {self.n} strings")
+            raise UsageError(f"{name}: `names` is {names!r}", remedy=f"use {self.n} strings")
         self.velocities = tuple(f"v{i + 1}" if names is None else f"v_{x}" for i, x in enumerate(self.names))
         self._check()
 
@@ -227,13 +227,13 @@ class MechanicalSystem:
         if not isinstance(forcing, Mapping):
             if not is_row(forcing):
                 raise UsageError(
-                    f"{self.name}: forcing is {forcing!r}",
+                    f"{self.name}: `forcing` is {forcing!r}",
                     remedy="use one entry for each coordinate, or a mapping from coordinates",
                 )
             forcing = tuple(forcing)
         if not isinstance(forcing, Mapping) and len(forcing) != self.n:
             raise UsageError(
-                f"{self.name}: forcing has {len(forcing)} entries for {self.n} coordinates",
+                f"{self.name}: `forcing` has {len(forcing)} entries for {self.n} coordinates",
                 remedy="use one entry for each coordinate, or a mapping from coordinates",
             )
         pairs = dict(forcing if isinstance(forcing, Mapping) else enumerate(forcing))
@@ -241,7 +241,7 @@ class MechanicalSystem:
         for i, entry in pairs.items():
             if not (isinstance(i, int | np.integer) and 0 <= i < self.n):
                 raise UsageError(
-                    f"{self.name}: forcing has the coordinate {i!r}, but there are {self.n} coordinates",
+                    f"{self.name}: `forcing` has the coordinate {i!r}, but there are {self.n} coordinates",
                     remedy="number the coordinates from 0",
                 )
             terms = entry if isinstance(entry, tuple | list) else (entry,)
@@ -250,7 +250,7 @@ class MechanicalSystem:
                     math.nan if (n := as_real(term)) is None else n
                 ):
                     raise UsageError(
-                        f"{self.name}: forcing of coordinate {i} holds {term!r}",
+                        f"{self.name}: `forcing` of coordinate {i} holds {term!r}",
                         remedy="use numbers and hs.Harmonic(omega, ...); write other forcing in an hs.Model",
                     )
             nonzero = tuple(t if isinstance(t, Harmonic) else float(t) for t in terms if t != 0.0)

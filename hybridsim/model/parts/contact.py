@@ -101,7 +101,7 @@ class Contact(Declared):
     def components(
         self, constants: Collection[str] = (), load_rate: Callable[[], Expression] | None = None
     ) -> tuple[Component, ...]:
-        """Return all automata of the contact: its own and those of copies, lift-off and tables.
+        """Return all automata of the contact: its own, and the automata of copies, lift-off and tables.
 
         Parameters
         ----------
@@ -152,7 +152,7 @@ class Contact(Declared):
 
     @property
     def table_speed(self) -> str | None:
-        """The name of the variable that tables of the speed use as argument, or None without such tables."""
+        """The name of the variable that is the argument of tables of the speed, or None without tables."""
         asked = any(SPEED in table.over.names for table in self.law.tables)
         return self.variable(SPEED) if asked and self.law.is_set_valued else None
 
@@ -213,7 +213,7 @@ class Contact(Declared):
         return substitute(self._form("slip", slip=slip), {SPEED: speed, **self.values()})
 
     def slip_force_at(self, speed: float, backward: bool = False) -> Expression:
-        """Return the magnitude of the slip force at a numeric speed, with the values of tables there."""
+        """Return the magnitude of the slip force at a numeric speed."""
         names = {t.name: parse(t.value(speed)) for t in self.law.tables if t.over.text == SPEED}
         slip = (self.law.slip_backward if backward else None) or self.law.slip
         assert slip is not None  # always set in a set-valued law

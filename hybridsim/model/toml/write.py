@@ -67,7 +67,7 @@ def _is_set(value: Any) -> bool:
 
 
 def _short(key: str, entries: dict[str, dict[str, Any]]) -> dict[str, Any]:
-    """Return plain values if no entry has further fields, otherwise the entries unchanged."""
+    """Return plain values if no entry has further fields, otherwise the entries with all fields."""
     if all(not _is_set(value) for entry in entries.values() for name, value in entry.items() if name != key):
         return {name: entry[key] for name, entry in entries.items()}
     return entries

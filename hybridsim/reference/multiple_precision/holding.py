@@ -37,7 +37,7 @@ class Holding:
         self.pins = self._choose_pins()
 
     def coefficients(self, n: int) -> list[Number]:
-        """Compute the n-th coefficients of the surfaces from those of the states."""
+        """Compute the n-th coefficients of the surfaces from the n-th coefficients of the states."""
         for node in self._nodes:
             if len(node.c) <= n:
                 node.extend(n)

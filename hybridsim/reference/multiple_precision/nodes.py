@@ -28,7 +28,7 @@ class Node:
 
     @property
     def delayed(self) -> tuple[Node, ...]:
-        """Return the operands whose n-th coefficient is not needed for the n-th coefficient here."""
+        """Return the operands whose n-th coefficient is not needed for the n-th coefficient of this node."""
         return ()
 
     def coefficient(self, n: int) -> Number:

@@ -15,7 +15,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _stops() -> Scene:
-    """Return the scene of monitors on the speeds of two bodies, which decrease to zero and stay there."""
+    """Return the scene of monitors on the speeds of two bodies, which decrease to zero and stay zero."""
     first = ((1.0, "f:stick"), (1.0, "stopped"), (1.0, "counted"))
     return Scene(
         "monitors-at-stops",

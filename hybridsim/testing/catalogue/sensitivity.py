@@ -21,7 +21,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def grazing_stop() -> Scene:
-    """Return the scene of a swing that passes a rigid stop by 1e-4; the map has an infinite slope there."""
+    """Return the scene of a swing that passes a rigid stop by 1e-4, near an infinitely steep map."""
     events, states = recomputed("grazing-stop")
     return Scene(
         "grazing-stop",

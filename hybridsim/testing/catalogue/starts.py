@@ -135,7 +135,7 @@ def _flat() -> Scene:
 
 
 def _zeros() -> Scene:
-    """Return the scene of states that start at zeros of their guards and leave them at rate one."""
+    """Return the scene of states that start at zeros of their guards and change at rate one."""
     starts = tuple(a + b for a, b in _SUMS)
     return Scene(
         "starts-at-zeros",

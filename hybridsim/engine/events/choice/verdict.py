@@ -98,7 +98,7 @@ def kind_of_change(automata: Any, event: Any, z: Any, members: Any) -> int:
 
 @inlined
 def is_smooth(automata: Any, event: Any, z: Any, members: Any, jumps: Any) -> bool:
-    """Return whether a release leaves all unknowns continuous; `jumps` are those on release."""
+    """Return whether a release leaves all unknowns continuous; `jumps` contains the jumps on release."""
     for i in range(members.shape[0]):
         c = index(members[i])
         jump = 2 * automata.surface[c] + (0 if z[c] == automata.above[c] else 1)

@@ -121,7 +121,7 @@ def moved_on(high: float, low: float, s: float) -> tuple[float, float]:
 
 
 def link_event_resolution(model: Any, state: Any, work: Any) -> None:
-    """Compile the kernel that resolves events, and store its address and those of its callees."""
+    """Compile the kernel that resolves events, and store the addresses of all kernels that it calls."""
     x, (automata, tapes, inputs, lin) = work.y, (model.automata, model.tapes, model.inputs, model.lin)
     work.entry_points[SERIES] = kernel_address(
         interpreted_series, tapes, inputs, 0, 0.0, 0.0, x, x, state.p, work

@@ -204,7 +204,7 @@ class Accumulation:
         )
 
     def reach(self, now: float) -> float:
-        """Return a time span ahead in which rounding does not hide the events of a series."""
+        """Return how far ahead in time rounding errors do not hide the events of a series."""
         if not self.is_under_way(now):
             return math.inf
         return min(
@@ -270,7 +270,7 @@ class Accumulation:
         return None
 
     def limit(self, instant: Instant, components: tuple[int, ...]) -> Limit | None:
-        """Add an event of some components; return the limit if the remaining time is negligible."""
+        """Add an event of some components; return the limit of accumulation if it is close enough."""
         times = {c: self._limit_of(instant, c) for c in components}
         ended = [(self._sign * time, c) for c, time in times.items() if time is not None]
         return self._shared(self._sign * min(ended)[0], min(ended)[1]) if ended else None

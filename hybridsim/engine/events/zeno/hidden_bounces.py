@@ -1,4 +1,4 @@
-"""Find when bounces end if rounding hides the last of them.
+"""Find when bounces end if rounding hides the last bounces.
 
 A guard w leaves zero with w' = u > 0 and w'' = -g, for a flight of 2 u/g. The next flights last e, e**2, ... of it,
 with e the ratio of the speeds after and before, so that they take 2 u/(g (1 - e)) in total. A bounce loses

@@ -35,7 +35,7 @@ def _doubles_at(typingctx: Any, address: Any) -> Any:
 
 @intrinsic(prefer_literal=True)
 def _as_tuple(typingctx: Any, array: Any, count: Any) -> Any:
-    """Return the first numbers of an array, a literal count of them, as a tuple."""
+    """Return the first numbers of an array as a tuple with a constant length."""
     kind = types.UniTuple(types.float64, count.literal_value)
 
     def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
