@@ -19,6 +19,7 @@ from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.model import Model
 from hybridsim.preparation import prepared
 from hybridsim.simulate import KEYWORDS, simulate
+from hybridsim.simulator.current_state import CurrentState
 from hybridsim.simulator.position import Position, advanced, begun, changed, require_running
 from hybridsim.simulator.saved_state import SavedState, model_of, require_fit, source_of
 from hybridsim.solution.event import Event
@@ -26,7 +27,7 @@ from hybridsim.solution.run import Run
 from hybridsim.solution.solution import Solution
 
 
-class Simulator:
+class Simulator(CurrentState):
     """A model with an integrator and its settings, for many runs or for one run in steps.
 
     `run` simulates a whole span. `start` and `advance` go from instant to instant, for example with a controller or
@@ -301,68 +302,6 @@ class Simulator:
         if position.events:
             self._position = replace(position, events=())
         return position.events
-
-    @property
-    def _current(self) -> Position:
-        if self._position is None:
-            raise UsageError("the simulator has not started", remedy="call sim.start(t0) first")
-        return self._position
-
-    # -- the present state ----------------------------------------------------------------------------------
-
-    @property
-    def t(self) -> float:
-        """The present time."""
-        return self._current.t
-
-    @property
-    def state(self) -> dict[str, float]:
-        """The present states by name."""
-        position = self._current
-        return dict(zip(position.run.system.names, position.x.tolist(), strict=True))
-
-    @property
-    def modes(self) -> dict[str, str]:
-        """The present mode of each component, by name."""
-        system, z = self._current.run.system, self._current.z
-        return {a.name: a.modes[m] for a, m in zip(system.declared, z.tolist(), strict=False)}
-
-    @property
-    def inputs(self) -> dict[str, float]:
-        """The present values of the held inputs."""
-        position = self._current
-        return {name: float(position.discrete[k]) for name, k in position.held_indices.items()}
-
-    @property
-    def ended(self) -> str:
-        """Why the run has ended, such as a monitor that terminates it; empty while it can go on."""
-        return self._current.ended
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """Warnings since the start."""
-        return tuple(f"{m} ({n} times)" if n > 1 else m for m, n in self._current.warnings.items())
-
-    @refusing
-    def output(self, name: str) -> float:
-        """Return the present value of a state, output, input, definition, force, or ``v_rel(contact)``.
-
-        Parameters
-        ----------
-        name : str
-            Name of the quantity, as in `Solution.output`.
-
-        Returns
-        -------
-        float
-            The value just after everything that happened so far at this time, new inputs included.
-
-        Raises
-        ------
-        UsageError
-            For an unknown name.
-        """
-        return self._current.value(name)
 
     # -- copies ---------------------------------------------------------------------------------------------
 
