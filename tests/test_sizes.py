@@ -51,7 +51,7 @@ FILES = {
     "mechanics/time_stepping/kernels.py": 379,
     "model/parts/model.py": 496,
     "model/smoothing/rewriting.py": 534,
-    "simulator/simulator.py": 441,
+    "simulator/simulator.py": 380,
     "solution/explain/explanation.py": 351,
 }
 FUNCTIONS = {
