@@ -20,11 +20,22 @@ INTEGRATORS = [one.name for one in hs.list_integrators()]
 REFUSED = {"contacts", "transitions", "monitors", "scheduled", "backward", "corners", "nonlinear"}
 
 
+# These step from Python, and those of a library share all that hybridsim adds to them: each scene has its turn with one
+# method of SUNDIALS and one of SciPy. The rest, some minutes, is run where slow tests are asked for, and by
+# `python -m conformance.table`. What is compiled runs every scene.
 NATIVE = [name for name in INTEGRATORS if name.startswith("scipy-")]
-QUICK = {"scipy-dop853"}
-# They step from Python and share all that hybridsim adds to them: every second scene has its turn with one of them,
-# and the rest, some minutes, where slow tests are asked for; `python -m conformance.table` runs all of them as well.
-TURNS = [name for name in NATIVE if name not in QUICK]
+QUICK = "scipy-dop853"
+TURNS = [name for name in NATIVE if name != QUICK]
+MULTISTEP = [name for name in INTEGRATORS if name.startswith("cvode-")]
+
+
+def has_its_turn(name: str, number: int) -> bool:
+    """Whether the scene of that number is for this method; `QUICK` has every second one, and the others the rest."""
+    if name in MULTISTEP:
+        return number // 2 % len(MULTISTEP) == MULTISTEP.index(name)
+    if name in TURNS:
+        return (number + 2 * TURNS.index(name)) % (2 * len(TURNS)) == 0
+    return name != QUICK or number % 2 == 1
 
 
 LONGEST = 400  # units of time
@@ -42,8 +53,7 @@ def runs() -> list[Any]:
         for name in INTEGRATORS:
             if is_long(scene) and not integrator(name).has_compiled_loop:
                 continue  # it steps from Python: hours
-            is_slow = name in TURNS and (number + 2 * TURNS.index(name)) % (2 * len(TURNS)) != 0
-            marks = [pytest.mark.slow] if is_slow else []
+            marks = [] if has_its_turn(name, number) else [pytest.mark.slow]
             found.append(pytest.param(scene, name, id=f"{scene.name}-{name}", marks=marks))
     return found
 
@@ -62,10 +72,18 @@ def test_scene(scene: Scene, name: str) -> None:
             assert any(reasons[capability] in str(refusal.value) for capability in missing)
 
 
-@pytest.mark.parametrize(
-    "name", [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in NATIVE]
-)
-@pytest.mark.parametrize("scene", [s for s in SCENES if not is_long(s)], ids=lambda scene: scene.name)
+def native_runs() -> list[Any]:
+    """Every scene with SciPy's own event finding; `QUICK` where it has no turn above, or is known to be wrong."""
+    found = []
+    for number, scene in enumerate(SCENES):
+        for name in NATIVE if not is_long(scene) else ():
+            is_run = name == QUICK and (not has_its_turn(name, number) or mechanism(name, scene.name))
+            marks = [] if is_run else [pytest.mark.slow]
+            found.append(pytest.param(scene, name, id=f"{scene.name}-{name}", marks=marks))
+    return found
+
+
+@pytest.mark.parametrize(("scene", "name"), native_runs())
 def test_events_found_by_scipy(scene: Scene, name: str) -> None:
     """Right, or wrong for a reason that is known; what is called wrong is."""
     result = outcome(name, scene, events="native")

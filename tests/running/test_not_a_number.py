@@ -218,7 +218,10 @@ def test_a_monitor_crosses_nothing_where_it_has_no_value(integrator: str, level:
     assert sol.event_times("level") == pytest.approx(sol.event_times("place"), abs=1e-8)
 
 
-@pytest.mark.parametrize("integrator", ["taylor", "dop853", "tsit5", "rodas5p", "scipy-dop853"])
+@pytest.mark.parametrize(
+    "integrator",
+    ["taylor", "dop853", pytest.param("tsit5", marks=pytest.mark.slow), "rodas5p", "scipy-dop853"],
+)
 def test_a_run_into_a_singularity_comes_to_an_end(integrator: str) -> None:
     """Where log(0.3 + x) has no value any more steps of some units in the last place move nothing."""
     rate = "-0.05*t - 0.89*x - 0.17*v + 0.05*log(0.3 + x) + 0.3"
