@@ -282,7 +282,7 @@ class CompiledLoop:
         steps = slice(run.first_step, run.first_step + run.steps)
         return self.kernels.block(
             run.result,
-            self.kernels.rows(*(array[steps] for array in rows[len(LoopRecord._fields) :])),
+            self.kernels.rows._make([array[steps] for array in rows[len(LoopRecord._fields) :]]),
             rows.last_steps[run.first : run.first + run.count + 1],
             rows.clocks[begun],
             rows.modes[begun],

@@ -75,12 +75,10 @@ class Headway:
         self._cost, self._twice, self._half, self._led, self._fading = 0.0, _WINDOW, origin, 0.0, 0
 
     @property
-    def place(self) -> np.ndarray:
-        """Return the stored measurements as an array for a checkpoint."""
+    def place(self) -> tuple[float, ...]:
+        """Return the state as numbers, for a checkpoint."""
         counts = self._steps, self._events, self._in_python, self._last, self._slow
-        return np.array(
-            [*self._since, *self._half, *counts, self._cost, self._twice, self._led, self._fading]
-        )
+        return *self._since, *self._half, *counts, self._cost, self._twice, self._led, self._fading
 
     def go_on(self, place: np.ndarray) -> None:
         """Restore the stored measurements from a checkpoint."""

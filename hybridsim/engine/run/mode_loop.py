@@ -243,7 +243,7 @@ class ModeLoop:
 
         def checkpoint(segments: int, occurrences: int) -> Checkpoint:
             size = math.nan if step_size is None else step_size
-            arrays = lazy_state.outcome.arrays() | {"step_size": np.array(size), "headway": headway}
+            arrays = lazy_state.outcome.arrays() | {"step_size": np.array(size), "headway": np.array(headway)}
             if taken_over is not None:
                 arrays["taken_over"] = np.array(taken_over[1])
             if place is not None:
