@@ -33,5 +33,5 @@ def test_a_picture_needs_a_speed() -> None:
 
 
 def test_a_law_does_not_know_how_fast_it_is_used() -> None:
-    with pytest.raises(UsageError, match="give speed="):
+    with pytest.raises(UsageError, match="set `speed` to the largest"):
         friction_law("coulomb", {"mu": 0.5})
