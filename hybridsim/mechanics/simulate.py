@@ -135,7 +135,7 @@ def _start(system: MechanicalSystem, x0: Any) -> np.ndarray:
                 )
             start[names.index(name)] = arguments.number(value, f"x0 of {name}")
     else:
-        start = arguments.numbers(x0, "x0", f"give {len(names)} numbers: positions, then velocities")
+        start = arguments.numbers(x0, "x0", f"use {len(names)} numbers: positions, then velocities")
     if start.shape != (len(names),) or not np.isfinite(start).all():
         raise UsageError(
             f"x0 is {x0!r}", remedy=f"use {len(names)} finite numbers: positions, then velocities"
@@ -147,7 +147,7 @@ def _absolute(system: MechanicalSystem, atol: Any, rtol: float, start: np.ndarra
     """Return the absolute tolerances (2n,), by default rtol * 1e-3 * |x0|, or 1 where x0 is zero."""
     if atol is None:
         return 1e-3 * rtol * np.where(start == 0.0, 1.0, abs(start))
-    remedy = f"give a number >= 0, or {len(start)} of them"
+    remedy = f"use a number >= 0, or {len(start)} of them"
     if arguments.is_row(atol):
         values = arguments.numbers(atol, "atol", remedy)
     else:

@@ -51,10 +51,10 @@ def mapping(value: Any, what: str) -> Mapping[str, Any]:
 
 def checked_names(values: Any, what: str) -> tuple[str, ...]:
     """Return a tuple of names; a single name becomes a tuple of length one."""
-    found = (values,) if isinstance(values, str) else tuple(_row(values, what, "give names"))
+    found = (values,) if isinstance(values, str) else tuple(_row(values, what, "use names"))
     for value in found:
         if not isinstance(value, str):
-            raise UsageError(f"`{what}` cannot contain {value!r}", remedy="give names")
+            raise UsageError(f"`{what}` cannot contain {value!r}", remedy="use names")
     return found
 
 

@@ -17,7 +17,7 @@ def finite(part: Declared, what: str, value: Any) -> float:
     """Return a finite number, or raise an error that names the argument."""
     number = as_real(value)
     if number is None or not math.isfinite(number):
-        raise part._fault(f"{what} is {value!r}", "give finite numbers" + _MOVES * isinstance(value, str))
+        raise part._fault(f"{what} is {value!r}", "use finite numbers" + _MOVES * isinstance(value, str))
     return number
 
 

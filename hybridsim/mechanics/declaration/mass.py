@@ -47,6 +47,4 @@ def require_positive_definite(M: Any, name: str) -> None:
             pivots = factors.U.diagonal() / diagonal[place]
     least = 0.0 if pivots is diagonal else len(diagonal) * _PIVOT
     if not (pivots > least).all():
-        raise UsageError(
-            f"{name}: M is not positive definite", remedy="give every coordinate a mass above zero"
-        )
+        raise UsageError(f"{name}: M is not positive definite", remedy="use masses above zero")

@@ -191,7 +191,7 @@ def three_coupled_blocks(
     >>> [contact.normal for contact in hs.three_coupled_blocks().contacts]
     [30.0, 20.0, 10.0]
     """
-    coefficients = numbers(mu, "mu", "give three numbers")
+    coefficients = numbers(mu, "mu", "use three numbers")
     if len(coefficients) != 3:
         raise UsageError(f"mu is {mu!r}", remedy="use three numbers")
     directions = [[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [0.0, -1.0, 1.0]]

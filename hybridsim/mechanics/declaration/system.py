@@ -259,7 +259,7 @@ class MechanicalSystem:
         return found
 
     def _start(self, start: Any, what: str) -> np.ndarray:
-        remedy = f"give {self.n} finite numbers"
+        remedy = f"use {self.n} finite numbers"
         values = np.zeros(self.n) if start is None else real_array(start, f"{self.name}: `{what}`", remedy)
         if values.shape != (self.n,):
             raise UsageError(f"{self.name}: `{what}` is {start!r}", remedy=remedy)
@@ -334,10 +334,10 @@ def _matrix(entries: Any, what: str, n: int | None) -> Any:
     if entries is None and n is not None:
         return sparse.csr_array((n, n))
     if sparse.issparse(entries):
-        real_array(entries.data, what, "give finite real numbers")
+        real_array(entries.data, what, "use finite real numbers")
         matrix = sparse.csr_array(entries, dtype=float)
     else:
-        dense = real_array(entries, what, "give finite real numbers, (n, n), or (n,) for a diagonal")
+        dense = real_array(entries, what, "use finite real numbers, (n, n), or (n,) for a diagonal")
         if dense.ndim not in (1, 2):
             raise UsageError(
                 f"{what} has {dense.ndim} dimensions", remedy="use shape (n, n), or (n,) for a diagonal"
