@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.errors import UsageError, nearest
-from hybridsim.model import Model, load
+from hybridsim.model import Model
+from hybridsim.model.library import loaded
 
 if TYPE_CHECKING:
     from hybridsim.engine.record.limits import Limits
@@ -157,7 +158,7 @@ def as_times(t: Any) -> np.ndarray:
 def chosen_model(model: Any, params: Any) -> Model:
     """Return the model, which may be given by name or path; `params` changes its parameters."""
     if not isinstance(model, Model):
-        model = load(model)
+        model = loaded(model)
     if params is None:
         return model
     if not isinstance(params, Mapping) or not all(isinstance(name, str) for name in params):

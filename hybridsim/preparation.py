@@ -18,7 +18,7 @@ from hybridsim.engine.native.kernels import announce_compilation
 from hybridsim.engine.record.trajectory import Task
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
-from hybridsim.engine.system.system_cache import known_system, system_of
+from hybridsim.engine.system.system_cache import runs_of, system_of
 from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.engine.system.user_functions.code import PythonCode
 from hybridsim.errors import UsageError
@@ -30,7 +30,7 @@ from hybridsim.model import Model
 from hybridsim.model.laws.velocity_powers import velocity_powers
 from hybridsim.solution.run import Run
 
-_MAX_RUNS = 16  # prepared runs stored per system; a loop usually repeats one or a few
+_MAX_RUNS = 16  # prepared runs stored per model; a loop usually repeats one or a few
 _PLAIN = frozenset({int, float, np.float64, str, type(None)})  # types whose equal values are interchangeable
 
 
@@ -67,8 +67,7 @@ def prepared(
         if options:  # an integer option rejects 16.0, which equals 16
             settings += (*chain(*options.items()), *(type(value).__name__ for value in options.values()))
         run_key = _run_key(t_span, settings)
-        known = known_system(model)
-        run = None if known is None else known.runs.get(run_key)
+        run = runs_of(model).get(run_key)
         if run is not None and type(run.method) is integrator_class(run.method.name):  # still registered
             span = run.task.t0, run.task.t1
             return run.on_grid(arguments.time_grid(t_eval, span, run.task.retention, save)), 0.0
@@ -110,9 +109,10 @@ def prepared(
     require_dissipation(system, span[0], start, discrete, modes)
     run = Run(model, system, method, task, None, save, reason)
     if run_key is not None and not isinstance(system.code, PythonCode):  # a Python function may change
-        if len(system.runs) >= _MAX_RUNS:
-            system.runs.clear()
-        system.runs[run_key] = run
+        runs = runs_of(model)
+        if len(runs) >= _MAX_RUNS:
+            runs.clear()
+        runs[run_key] = run
     return run.on_grid(grid), compile_time
 
 

@@ -40,7 +40,7 @@ PARTS = {
     "is_settled": CHOOSERS,
     "rank_candidates": {f"{CHOICE}candidates.py", "engine/events/compiled/resolve_surface.py"},
     "rank_of": {"engine/events/compiled/resolve_clear.py"},
-    "is_below_limit": {f"{CHOICE}uniqueness.py", "ensemble/start.py"},
+    "is_below_limit": {f"{CHOICE}uniqueness.py", "engine/events/compiled/start.py"},
     "rough_side": {"engine/events/compiled/resolve_clear.py"},
 }
 
@@ -111,8 +111,8 @@ WRITERS = {
     "engine/linear/modes.py::_linear_beside_corners_at": "each combination of modes, to see whether it is linear",
     "engine/system/sides.py::modes_by_state": "modes by the signs of the surfaces",
     "engine/system/sides.py::violated": "modes by the signs of the surfaces",
-    "ensemble/start.py::_choose_cluster": "all surfaces held, to project the states, and the chosen modes",
-    "ensemble/start.py::_take_sides": "modes by the signs of the surfaces",
+    "engine/events/compiled/start.py::_choose_cluster": "all surfaces held, to project the states, and the chosen modes",
+    "engine/events/compiled/start.py::_take_sides": "modes by the signs of the surfaces",
 }
 
 

@@ -7,14 +7,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.events.compiled.scratch import EVENT_LOOP
+from hybridsim.engine.events.compiled.start import plain_start
 from hybridsim.engine.linear.motion_summary import sum_up
 from hybridsim.engine.native.kernels import call_kernel, inlined, kernel
 from hybridsim.engine.native.loop_hints import fill, put
 from hybridsim.engine.native.struct_pack import pack_at
-from hybridsim.engine.run.event_loop import AT_TARGET, FULL
+from hybridsim.engine.run.event_loop import AT_TARGET, FULL, set_origin
 from hybridsim.engine.run.event_loop import SEGMENTS as SEGMENTS_AT
+from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.instant import two_sum
-from hybridsim.ensemble.start import keeps_holding, plain_start
+from hybridsim.ensemble.start import keeps_holding
 
 SEGMENTS = 1024  # largest number of segments in one compiled call
 # A compiled call ends if events follow each other ever faster, because they may accumulate. A few shrinking intervals
@@ -82,10 +84,11 @@ def run_ensemble(
             put(runs.starts[i], state.x)
             put(runs.vectors[i], state.p)
             segments += 1
-            if not plain_start(
-                automata, tapes, inputs, none, (rates, origin_at, phases_at, pin_at), surfaces, 0.0, state,
-                work,
-            ):  # fmt: skip
+            set_origin((origin_at, phases_at), rates, 0.0, 0.0, state.p)
+            for j in range(state.x.shape[0]):  # as `hybridsim.engine.events.start.start_errors`
+                x = state.x[j]
+                state.x_error[j] = 0.0 if x == round(x) else 2.0 * UNIT * abs(x)
+            if not plain_start(automata, tapes, inputs, none, pin_at, surfaces, state, work):
                 at[NEXT] += 1
                 continue
             if keeps_holding(tapes, tables, state, work, own.c):

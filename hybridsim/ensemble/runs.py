@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.events.compiled.scratch import MAX_JOINT_COMPONENTS
+from hybridsim.engine.events.compiled.start import surfaces_of
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.linear.modes import holds_constants, is_always_linear
@@ -83,14 +84,7 @@ class Ensemble:
         tape_cache = tape_cache_of(system)
         tape_cache.surround(self.first)
         self.tapes = tape_cache.tapes
-        tape, layout = system.optimised_tape(self.first), system.layout
-        self.surfaces = (
-            tape.constant_rows,
-            tape.rows,
-            tape.derivatives,
-            tape.surfaces,
-            np.array(system.surface_of, dtype=np.int64),
-        )
+        layout, self.surfaces = system.layout, surfaces_of(system)
         self.vector_positions = layout.origin_at, layout.phases_at, layout.pin_at
         self.hold = np.array([a.hold for a in system.automata], dtype=np.int64)
 

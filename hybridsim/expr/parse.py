@@ -84,6 +84,11 @@ class Expression:
         """Whether the expression contains no names."""
         return not self.names
 
+    @property
+    def is_number(self) -> bool:
+        """Whether the value is a number without names, and not true or false."""
+        return not self.names and not self.is_boolean
+
     def error(
         self, message: str, *, node: ast.expr | None = None, remedy: str | None = None
     ) -> ExpressionError:

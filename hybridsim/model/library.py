@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 import tomllib
 from dataclasses import dataclass
 from functools import lru_cache
@@ -15,6 +16,12 @@ from hybridsim.model.parts.model import Model
 
 # Limit of the size of a model file; a model with a thousand states has about 100 kB.
 MAX_BYTES = 1_000_000
+_MAX_LOADED = 64  # most models kept in memory
+# A file that was written this many nanoseconds ago may change again without a change of its time stamp.
+_RECENT = 200_000_000
+
+# Where each model lies, by the argument of `load`: the path, the state of the file when it was read, and the model.
+_loaded: dict[str, tuple[str, tuple[int, ...], Model]] = {}
 
 
 @dataclass(frozen=True)
@@ -53,6 +60,11 @@ def load(name_or_path: str | os.PathLike[str]) -> Model:
     >>> hs.load("dfcs").parameter_values()["N"]
     40.0
     """
+    return loaded(name_or_path).with_()  # an object of its own
+
+
+def loaded(name_or_path: str | os.PathLike[str]) -> Model:
+    """Return a model by name or path: one object, as long as its file does not change."""
     argument: object = name_or_path
     if not isinstance(argument, str | os.PathLike):
         remedy = "use a Model, a name or a path"
@@ -62,9 +74,12 @@ def load(name_or_path: str | os.PathLike[str]) -> Model:
             remedy = "for rates from a function f(t, x, p) use hs.Model('m', states={'x': 1.0}, flow=f)"
         raise UsageError(f"The model cannot be {argument!r}", remedy=remedy)
     text = os.fspath(name_or_path)
-    if isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or "/" in text or os.sep in text:
-        path = Path(text)
-    else:
+    is_path = isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or "/" in text or os.sep in text
+    known = _loaded.get(text)
+    if known is not None and known[1] == _state_of(known[0]) and is_path == (known[0] == text):
+        return known[2]
+    path = Path(text)
+    if not is_path:
         path = models_folder() / f"{text}.toml"
         names = [info.stem for info in _model_files()]
         if text not in names:
@@ -73,7 +88,23 @@ def load(name_or_path: str | os.PathLike[str]) -> Model:
                 remedy=nearest(text, names, kind="models")
                 + "; for your own file pass its path, ending in .toml",
             )
-    return Model.from_toml(read_text(path), str(path))
+    state = _state_of(str(path))
+    model = Model.from_toml(read_text(path), str(path))
+    # a table may lie in a file of its own, which may change alone
+    if state and time.time_ns() - state[2] > _RECENT and not any(i.kind == "table" for i in model.inputs):
+        if len(_loaded) >= _MAX_LOADED:
+            _loaded.clear()
+        _loaded[text] = (text if is_path else str(path)), state, model
+    return model
+
+
+def _state_of(path: str) -> tuple[int, ...]:
+    """Return what changes when a file changes: device, inode, time stamp and size; nothing without a file."""
+    try:
+        found = os.stat(path)
+    except (OSError, ValueError):
+        return ()
+    return found.st_dev, found.st_ino, found.st_mtime_ns, found.st_size
 
 
 def list_models() -> tuple[ModelInfo, ...]:

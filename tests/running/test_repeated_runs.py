@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.system.system_cache import system_of
+from hybridsim.engine.system.system_cache import runs_of, system_of
 from hybridsim.integrators.registry import registered
 from hybridsim.integrators.scipy.solvers import ScipyRK45
 
@@ -196,7 +196,8 @@ def test_a_sweep_in_threads_is_the_sweep_in_turn(integrator: str) -> None:
 
 def test_the_same_words_find_the_run_that_was_prepared(model: hs.Model) -> None:
     """Only for plain numbers and words; times of output are not among them, and may differ."""
-    kept = system_of(model).runs
+    system_of(model)
+    kept = runs_of(model)
     first = hs.simulate(model, SPAN, integrator="exact", save="events")
     assert len(kept) == 1
     again = hs.simulate(model, SPAN, integrator="exact", save="events")

@@ -8,8 +8,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from hybridsim.engine.events.compiled.start import compiled_start
 from hybridsim.engine.events.outcome import Outcome, Situation
 from hybridsim.engine.events.resolve import EventResolution
+from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.record.trajectory import Task
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.instant import Instant
@@ -41,6 +43,14 @@ def settled_start(system: System, task: Task, origin: Instant, due: tuple[int, .
     return known
 
 
+def contacts_at_start(system: System, task: Task, origin: Instant) -> HybridState | None:
+    """Return the state just after the start by compiled code, or None if only `settled_start` can tell."""
+    if not task.forward or (task.z0 >= 0).any():
+        return None
+    p = system.vector(origin, task.discrete)
+    return compiled_start(system, task.x0, start_errors(system, task.x0), p)
+
+
 def start_errors(system: System, x0: np.ndarray) -> np.ndarray:
     """Return error bounds (n,) of the initial states.
 
@@ -49,9 +59,9 @@ def start_errors(system: System, x0: np.ndarray) -> np.ndarray:
     Python functions are unknown, so their bounds assume a number of the size of the initial value.
     """
     rounding = np.where(x0 == np.round(x0), 0.0, UNIT * np.abs(x0))
-    errors, declared = rounding.copy(), system.start_state({})
+    errors = rounding.copy()
     for i, state in enumerate(system.model.states):
-        if x0[i] == declared[i] and not isinstance(state.start.tree, ast.Constant):
+        if not isinstance(state.start.tree, ast.Constant) and x0[i] == system.start_state({})[i]:
             errors[i] = max(errors[i], rounding_of(state.start, system.values))
     return errors if system.has_tape else errors + rounding
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from hybridsim.engine.events.outcome import Outcome
-from hybridsim.engine.events.start import settled_start
+from hybridsim.engine.events.start import contacts_at_start, settled_start
 from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.record.trajectory import Task
 from hybridsim.engine.run.compiled_loop import CompiledLoop
@@ -29,7 +29,7 @@ class RunSetup:
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
         self.renewal = _RENEWAL_TURNS * 2.0 * math.pi / system.fastest if system.fastest else math.inf
         self._pattern = self._compiled_loop(task)
-        self.begins_silently = False  # set by `start`: whether nothing is recorded at the start
+        self.begins_silently = False  # set by `_settle`: whether nothing is recorded at the start
         self._start: tuple[Outcome, np.ndarray] | None = None
         self._buffer: HybridState | None = None  # the same in the layout of compiled loops
 
@@ -50,28 +50,39 @@ class RunSetup:
         """Return a compiled loop for one run, or None."""
         return None if self._pattern is None else self._pattern.fresh_copy()
 
-    @property
-    def silent_start(self) -> HybridState | None:
-        """Return the read-only state at the start, if an earlier run has shown that the start has no events.
+    def silent_start(self, task: Task) -> HybridState | None:
+        """Return the read-only state at the start, if the start has no events.
 
-        The result is None if an event is recorded at the start, if there are schedules or input signals, or if there is
-        no compiled loop.
+        The result is also None if there are schedules or input signals, or if there is no compiled loop.
         """
         system = self.system
-        is_free = self._pattern is not None and not system.model.schedules and not system.signals
-        if self._buffer is None and is_free and self.begins_silently and self._start is not None:
-            self._buffer = HybridState.of(*self._start)
+        if self._pattern is None or system.model.schedules or system.signals:
+            return None
+        if self._buffer is None:
+            self._buffer = contacts_at_start(system, task, self.origin)
+            self.begins_silently = self._buffer is not None
+        if self._buffer is None:
+            settled = self._settle(task, ())
+            if self.begins_silently:
+                self._buffer = HybridState.of(*settled)
         return self._buffer
 
     def start(self, task: Task, due: tuple[int, ...]) -> LazyState:
         """Return the state just after the start of a task, after schedules that are due at the start."""
+        settled = self._settle(task, due)
+        return LazyState(self.system, self.origin, task.forward, settled[0].copy, settled)
+
+    def _settle(self, task: Task, due: tuple[int, ...]) -> tuple[Outcome, np.ndarray]:
+        """Return the outcome at the start, and the run-time vector there."""
         system, forward = self.system, task.forward
+        if self._start is None and self._buffer is not None:
+            self._start = self._buffer.copy().outcome(), self._buffer.p
         if self._start is None:
             outcome = settled_start(system, task, self.origin, due)
-            self._start = outcome, system.vector(self.origin, system.discrete(outcome.p), forward)
             is_recorded = due or outcome.changes or outcome.warnings or outcome.status or system.monitor_names
             self.begins_silently = forward and not is_recorded
-        return LazyState(system, self.origin, forward, self._start[0].copy, self._start)
+            self._start = outcome, system.vector(self.origin, system.discrete(outcome.p), forward)
+        return self._start
 
 
 def setup_of(system: System, method: Method, task: Task) -> RunSetup:

@@ -122,15 +122,16 @@ def run_task(
 ) -> Trajectory:
     """Run a task with its compiled loop if possible, and continue with the mode loop if necessary."""
     setup, retention = setup_of(system, method, task), task.retention
-    start = setup.silent_start
     is_plain = progress is None and task.record is None and task.limits is UNLIMITED and not task.is_stepped
     # with limited retention the record must be small, but the arrays of the loop are not
     keeps_all = retention.events == math.inf and retention.segments in (None, math.inf)
-    if start is None or not is_plain or not keeps_all:
-        return ModeLoop(system, method, task, progress).run()
     compiled_loop = setup.compiled_loop()
-    assert compiled_loop is not None
+    if compiled_loop is None or not is_plain or not keeps_all:
+        return ModeLoop(system, method, task, progress).run()
     try:
+        start = setup.silent_start(task)
+        if start is None:
+            return ModeLoop(system, method, task).run()
         kernel_run = compiled_loop.kernel_run = compiled_loop.go(setup.origin, start, setup.end)
     except (KeyboardInterrupt, StepFailure) as error:
         return ModeLoop(

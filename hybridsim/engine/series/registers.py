@@ -53,20 +53,23 @@ class Registers:
         key, last = values_now.tobytes(), self._rounded
         if last is not None and last[0] == key:
             return last[1]
-        numbers = np.concatenate([known.values[:, 0], values_now])
-        errors = np.array([own_roundoff(number) for number in numbers.tolist()])
-        errors[: len(known.constants)] = np.maximum(errors[: len(known.constants)], known.values[:, 1])
-        none = np.zeros(0, dtype=np.int64)
-        inputs: Inputs = packed(
-            Inputs(
-                np.concatenate([known.constants, known.parameters]),
-                np.column_stack([numbers, errors]),
-                none,
-                none,
-                known.phases,
-                known.time,
-                known.states,
-            )
-        )
+        inputs, values = self.rounded()
+        self.fill(values, p)
         self._rounded = key, inputs
         return inputs
+
+    def rounded(self) -> tuple[Inputs, np.ndarray]:
+        """Return inputs in which parameters are constants, and their values and error bounds, which `fill` writes."""
+        known: Inputs = self.inputs
+        values = np.zeros((len(known.constants) + len(known.parameters), 2))
+        values[: len(known.constants), 0] = known.values[:, 0]
+        errors = [own_roundoff(number) for number in known.values[:, 0].tolist()]
+        values[: len(known.constants), 1] = np.maximum(errors, known.values[:, 1])
+        none, constants = np.zeros(0, dtype=np.int64), np.concatenate([known.constants, known.parameters])
+        return packed(Inputs(constants, values, none, none, known.phases, known.time, known.states)), values
+
+    def fill(self, values: np.ndarray, p: np.ndarray) -> None:
+        """Write the parameters in the run-time vector p and their roundoff to the values of `rounded` inputs."""
+        known: Inputs = self.inputs
+        numbers, first = p[known.sources], len(known.constants)
+        values[first:, 0], values[first:, 1] = numbers, [own_roundoff(number) for number in numbers.tolist()]

@@ -206,7 +206,6 @@ class System:
         self.signals = tuple(Signal(i, numbers) for i in model.inputs)
         self.starts: dict[tuple[Any, ...], Any] = {}  # cache of `hybridsim.engine.events.start`
         self.tables: dict[float, Any] = {}  # cache of `hybridsim.engine.linear.tables`
-        self.runs: dict[Any, Any] = {}  # cache of `hybridsim.preparation`
         self.opposed: set[tuple[Any, ...]] = (
             set()
         )  # starts accepted by `hybridsim.engine.events.dissipation_check`

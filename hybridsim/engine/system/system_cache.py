@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
 from hybridsim.model.parts.model import Model
 
 _MAX_SYSTEMS = 16  # largest number of cached systems, enough for loops over several models
 
-_systems: dict[int, System] = {}
+# the system of each model by its identity, and the runs that were prepared for it
+_systems: dict[int, tuple[System, dict[Any, Any]]] = {}
 _lock = SharedLock()
 
 
-def known_system(model: Model) -> System | None:
-    """Return the cached system of a model, or None."""
+def runs_of(model: Model) -> dict[Any, Any]:
+    """Return the prepared runs of a model, for `hybridsim.preparation`; they are dropped together with its system."""
     # a system keeps its model alive, so no other object has the same id
-    return _systems.get(id(model))
+    known = _systems.get(id(model))
+    return {} if known is None else known[1]
 
 
 def system_of(model: Model) -> System:
@@ -26,12 +30,12 @@ def system_of(model: Model) -> System:
     ModelError
         With all faults of the model.
     """
-    system = known_system(model)
-    if system is not None and system.code.is_current:
-        return system
+    known = _systems.get(id(model))
+    if known is not None and known[0].code.is_current:
+        return known[0]
     system = System(model.validate())
     with _lock:
         while len(_systems) >= _MAX_SYSTEMS:
             del _systems[next(iter(_systems))]
-        _systems[id(model)] = system
+        _systems[id(model)] = system, {}
     return system

@@ -12,7 +12,7 @@ from hybridsim.model.checks.names import check_names
 from hybridsim.model.checks.scope import Scope
 from hybridsim.model.checks.signals import check_signals
 from hybridsim.model.checks.surfaces import check_surfaces
-from hybridsim.model.checks.values import check_values
+from hybridsim.model.checks.values import check_values, errors_of_numbers
 from hybridsim.model.checks.velocity_powers import check_velocity_powers
 from hybridsim.model.parts.model import Model
 
@@ -22,8 +22,11 @@ def find_errors(model: Model) -> tuple[ModelError, ...]:
 
     The checks of names come first, then those of the structure, then those of the expressions. Values are checked
     only if all of these succeed, because they would repeat the same errors. In a copy of a valid model with other
-    values only the values are checked.
+    values only the values are checked; if only numbers of parameters differ, only what depends on them.
     """
+    changed = model.changed_numbers
+    if changed is not None:
+        return errors_of_numbers(model, changed)
     scope = Scope(model)
     if model.is_known_to_be_sound:
         check_before_run(scope)

@@ -20,6 +20,20 @@ from hybridsim.model.parts.model import Model
 ROUNDING = 1e-12
 
 
+def errors_of_numbers(model: Model, changed: frozenset[str]) -> tuple[ModelError, ...]:
+    """Return the errors of a copy of a valid model with other numbers of some parameters."""
+    checked = model.once_per_expressions("checked names", lambda: checked_names(model))
+    if changed.isdisjoint(checked):
+        try:
+            model.parameter_values()
+        except ModelError as fault:
+            return (fault,)
+        return ()
+    scope = Scope(model)
+    check_values(scope)
+    return tuple(scope.errors)
+
+
 def check_values(scope: Scope) -> None:
     """Report parameters without a value, and values outside their valid range."""
     model = scope.model

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from numbers import Real
-from typing import Any
+from typing import Any, ClassVar
 
 from hybridsim.errors import ExpressionError, ModelError, Place, UsageError, nearest
 from hybridsim.expr import Expression, evaluate, parse, resolve
+from hybridsim.expr.evaluate import dependency_order
 from hybridsim.files import path_text
 from hybridsim.model.laws.law_with_states import ContactState
 from hybridsim.model.parts.component import Component, Corner
 from hybridsim.model.parts.contact import Contact
-from hybridsim.model.parts.declared import Declared, as_tuple
+from hybridsim.model.parts.declared import Declared
 from hybridsim.model.parts.impact import Impact
 from hybridsim.model.parts.inputs import Input
 from hybridsim.model.parts.monitor import Monitor
@@ -38,10 +39,13 @@ _PARTS: dict[str, type[Declared]] = {
 
 # methods that other parts of the package call; completion does not offer them
 _INTERNAL = {
+    "affected_by",
+    "changed_numbers",
     "components_of",
     "error",
     "is_known_to_be_sound",
     "once",
+    "once_per_expressions",
     "place",
     "remedy_for_parameter",
     "structure",
@@ -121,6 +125,9 @@ class Model(Declared):
     flow: Callable[..., Any] | None = None
     surfaces: tuple[SwitchingSurface, ...] = ()
     impacts: tuple[Impact, ...] = ()
+
+    # of a checked model: its values; of its copies also the parameters that have other numbers than it
+    _sound: ClassVar[tuple[dict[str, float], frozenset[str]]]
 
     def __post_init__(self) -> None:
         self._functions("flow")
@@ -219,13 +226,20 @@ class Model(Declared):
         ExpressionError
             For a value that is not a valid expression.
         """
-        names = [parameter.name for parameter in self.parameters]
-        _known(changes, names, "parameter", self.name, self.remedy_for_parameter)
-        changed = (
-            replace(p, value=_changed_value(changes, p.name)) if p.name in changes else p
-            for p in self.parameters
-        )
-        return self._valued(parameters=tuple(changed))
+        places = self._places()
+        _known(changes, places, "parameter", self.name, self.remedy_for_parameter)
+        parameters, are_numbers = list(self.parameters), True
+        for name in changes:
+            former = parameters[places[name]]
+            parameters[places[name]] = changed = former.with_value(_changed_value(changes, name))
+            are_numbers = are_numbers and former.value.is_constant and changed.value.is_number
+        copy = self._valued(parameters=tuple(parameters))
+        if are_numbers:
+            vars(copy)["_unnumbered"] = self._unnumbered
+            if "_sound" in vars(self):
+                values, others = self._sound
+                vars(copy)["_sound"] = values, others.union(changes)
+        return copy
 
     def remedy_for_parameter(self, name: str, others: tuple[str, ...] = ()) -> str:
         """Return the remedy for an unknown parameter: similar names, or the argument of a law to change."""
@@ -260,14 +274,22 @@ class Model(Declared):
     def with_values_of(self, other: Model) -> Model:
         """Return a copy with the values of another model with the same parameters and states."""
         states = tuple(replace(s, start=o.start) for s, o in zip(self.states, other.states, strict=True))
-        return self._valued(states=states, parameters=other.parameters, discrete=other.discrete)
+        copy = self._valued(states=states, parameters=other.parameters, discrete=other.discrete)
+        vars(copy)["_values"] = other._values
+        return copy
 
     def _valued(self, **parts: Any) -> Model:
         """Return a copy that differs only in values and shares all other results with the model."""
         copy: Model = object.__new__(type(self))
         vars(copy).update(vars(self), **parts, _common=self._common)
-        vars(copy).pop("_values", None)
+        for name in ("_values", "_sound", "_unnumbered"):
+            vars(copy).pop(name, None)
         return copy
+
+    @cached_property
+    def _unnumbered(self) -> dict[str, Any]:
+        """The results that depend on the structure and the expressions of parameters, but on no number."""
+        return {}
 
     @cached_property
     def _common(self) -> dict[str, Any]:
@@ -278,6 +300,12 @@ class Model(Declared):
         if name not in self._common:
             self._common[name] = make()
         return self._common[name]
+
+    def once_per_expressions(self, name: str, make: Callable[[], Any]) -> Any:
+        """Return a result that depends only on structure and expressions of parameters, shared by their copies."""
+        if name not in self._unnumbered:
+            self._unnumbered[name] = make()
+        return self._unnumbered[name]
 
     def _started(self, contact: Contact, changes: Mapping[str, Any]) -> Contact:
         """Return the contact with new initial values for the states of its friction law."""
@@ -337,7 +365,36 @@ class Model(Declared):
 
     @cached_property
     def _values(self) -> dict[str, float]:
-        return resolve({parameter.name: parameter.value for parameter in self.parameters})
+        if "_sound" not in vars(self):
+            return resolve({parameter.name: parameter.value for parameter in self.parameters})
+        values, places = dict(self._sound[0]), self._places()
+        for name in self._sound[1]:
+            values[name] = evaluate(self.parameters[places[name]].value, values)
+        for name, value in self.affected_by(self._sound[1]):
+            values[name] = evaluate(value, values)
+        return values
+
+    def _places(self) -> dict[str, int]:
+        """Return the position of each parameter by name."""
+        places: dict[str, int] = self.once(
+            "places", lambda: {p.name: k for k, p in enumerate(self.parameters)}
+        )
+        return places
+
+    def affected_by(self, names: Iterable[str]) -> list[tuple[str, Expression]]:
+        """Return the parameters that depend on some others, with their expressions, in an order to evaluate them."""
+        found, reached = [], set(names)
+        for name, value in self.once_per_expressions("derived", self._derived):
+            if not reached.isdisjoint(value.names):
+                found.append((name, value))
+                reached.add(name)
+        return found
+
+    def _derived(self) -> list[tuple[str, Expression]]:
+        """Return the parameters that are expressions of others, each after those that it depends on."""
+        values = {parameter.name: parameter.value for parameter in self.parameters}
+        order = dependency_order(values, "parameters")
+        return [(name, values[name]) for name in order if values[name].names]
 
     def start_values(self) -> dict[str, float]:
         """Return the initial values of the states for the current parameters."""
@@ -402,6 +459,11 @@ class Model(Declared):
         """Whether this model, or a copy with other values, has passed all checks of its structure."""
         return "is sound" in self._common
 
+    @property
+    def changed_numbers(self) -> frozenset[str] | None:
+        """The parameters whose numbers are not those of a checked model, in a copy of one; None in another model."""
+        return self._sound[1] if "_sound" in vars(self) else None
+
     def validate(self) -> Model:
         """Check the declaration and return the model itself.
 
@@ -420,6 +482,7 @@ class Model(Declared):
         errors = find_errors(self)
         if errors:
             raise ModelError.collect(errors, f"model {self.name}")
+        vars(self)["_sound"] = self._values, frozenset[str]()
         return self
 
     def to_toml(self) -> str:
@@ -480,17 +543,16 @@ def _changed_value(changes: Mapping[str, Any], name: str) -> Expression:
 
 def _known(
     changes: Mapping[str, Any],
-    names: Iterable[str],
+    allowed: Collection[str],
     kind: str,
     model: str,
     remedy: Callable[[str], str] | None = None,
 ) -> None:
-    allowed = as_tuple(names)
     for name, value in changes.items():
         if not isinstance(value, Expression | str | Real):
             raise UsageError(f"{kind} {name} cannot be {value!r}", remedy="use a number or an expression")
         if name not in allowed:
             raise UsageError(
                 f"the model '{model}' has no {kind} '{name}'",
-                remedy=remedy(name) if remedy else nearest(name, allowed, kind=f"{kind}s"),
+                remedy=remedy(name) if remedy else nearest(name, list(allowed), kind=f"{kind}s"),
             )

@@ -44,6 +44,12 @@ class Parameter(Declared):
         self._texts("name", "unit", "title")
         self._expressions("value")
 
+    def with_value(self, value: Expression) -> Parameter:
+        """Return a copy with another value."""
+        copy: Parameter = object.__new__(Parameter)
+        vars(copy).update(vars(self), value=value)
+        return copy
+
 
 @dataclass(frozen=True)
 class State(Declared):

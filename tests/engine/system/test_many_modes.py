@@ -20,7 +20,7 @@ from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.programs.mode_tables import TapeCache, tape_cache_of
 from hybridsim.engine.system.programs.modes_index import find_modes, index_of
 from hybridsim.engine.system.system import System
-from hybridsim.engine.system.system_cache import system_of
+from hybridsim.engine.system.system_cache import runs_of, system_of
 
 COMPILED = ("exact", "taylor", "dop853", "tsit5")
 
@@ -79,7 +79,7 @@ def first_and_later(model: hs.Model, integrator: str, end: float) -> tuple[list[
     """Of a run that meets its modes one by one, and of one that knows them all beforehand."""
     system = system_of(model)
     system.code.shared.clear()
-    system.runs.clear()
+    runs_of(model).clear()
     runs = [hs.simulate(model, (0, end), integrator=integrator) for _ in range(2)]
     return bits(runs[0]), bits(runs[1])
 
