@@ -111,7 +111,7 @@ WRITERS = {
     "engine/linear/modes.py::_linear_beside_corners_at": "each combination of modes, to see whether it is linear",
     "engine/system/sides.py::modes_by_state": "modes by the signs of the surfaces",
     "engine/system/sides.py::violated": "modes by the signs of the surfaces",
-    "engine/events/compiled/start.py::_choose_cluster": "all surfaces held, to project the states, and the chosen modes",
+    "engine/events/compiled/start.py::_choose_cluster": "all surfaces held, for projection, and the chosen modes",
     "engine/events/compiled/start.py::_take_sides": "modes by the signs of the surfaces",
 }
 
