@@ -43,7 +43,7 @@ def settled_start(system: System, task: Task, origin: Instant, due: tuple[int, .
     return known
 
 
-def contacts_at_start(system: System, task: Task, origin: Instant) -> HybridState | None:
+def start_by_kernel(system: System, task: Task, origin: Instant) -> HybridState | None:
     """Return the state just after the start by compiled code, or None if only `settled_start` can tell."""
     if not task.forward or (task.z0 >= 0).any():
         return None

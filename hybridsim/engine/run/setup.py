@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from hybridsim.engine.events.outcome import Outcome
-from hybridsim.engine.events.start import contacts_at_start, settled_start
+from hybridsim.engine.events.start import start_by_kernel, settled_start
 from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.record.trajectory import Task
 from hybridsim.engine.run.compiled_loop import CompiledLoop
@@ -59,7 +59,7 @@ class RunSetup:
         if self._pattern is None or system.model.schedules or system.signals:
             return None
         if self._buffer is None:
-            self._buffer = contacts_at_start(system, task, self.origin)
+            self._buffer = start_by_kernel(system, task, self.origin)
             self.begins_silently = self._buffer is not None
         if self._buffer is None:
             settled = self._settle(task, ())

@@ -153,9 +153,9 @@ def surfaces_of(system: System) -> tuple[np.ndarray, ...]:
 @per_structure
 def _is_supported(system: System) -> bool:
     """Return whether all components are contacts, and few enough that all their tapes exist from the start."""
-    are_contacts = all(a.has_surface and not (a.is_unique or a.is_unilateral) for a in system.automata)
+    are_set_valued = all(a.has_surface and not (a.is_unique or a.is_unilateral) for a in system.automata)
     count = len(system.automata)
-    return ENABLED and system.has_tape and are_contacts and 0 < count <= MAX_JOINT_COMPONENTS and not (
+    return ENABLED and system.has_tape and are_set_valued and 0 < count <= MAX_JOINT_COMPONENTS and not (
         system.stop_couplings or system.monitor_names
     )  # fmt: skip
 
