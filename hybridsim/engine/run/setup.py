@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from hybridsim.engine.events.outcome import Outcome
-from hybridsim.engine.events.start import start_by_kernel, settled_start
+from hybridsim.engine.events.start import settled_start, start_by_kernel
 from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.record.trajectory import Task
 from hybridsim.engine.run.compiled_loop import CompiledLoop
