@@ -18,7 +18,7 @@ from hybridsim.model.parts.model import Model
 MAX_BYTES = 1_000_000
 _MAX_LOADED = 64  # most models kept in memory
 # A file that was written this many nanoseconds ago may change again without a change of its time stamp.
-_RECENT = 200_000_000
+_MIN_AGE = 200_000_000
 
 # Where each model lies, by the argument of `load`: the path, the state of the file when it was read, and the model.
 _loaded: dict[str, tuple[str, tuple[int, ...], Model]] = {}
@@ -91,7 +91,7 @@ def loaded(name_or_path: str | os.PathLike[str]) -> Model:
     state = _state_of(str(path))
     model = Model.from_toml(read_text(path), str(path))
     # a table may lie in a file of its own, which may change alone
-    if state and time.time_ns() - state[2] > _RECENT and not any(i.kind == "table" for i in model.inputs):
+    if state and time.time_ns() - state[2] > _MIN_AGE and not any(i.kind == "table" for i in model.inputs):
         if len(_loaded) >= _MAX_LOADED:
             _loaded.clear()
         _loaded[text] = (text if is_path else str(path)), state, model

@@ -29,7 +29,7 @@ class RunSetup:
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
         self.renewal = _RENEWAL_TURNS * 2.0 * math.pi / system.fastest if system.fastest else math.inf
         self._pattern = self._compiled_loop(task)
-        self.begins_silently = False  # set by `_settle`: whether nothing is recorded at the start
+        self.begins_silently = False  # set by `_at_start`: whether nothing is recorded at the start
         self._start: tuple[Outcome, np.ndarray] | None = None
         self._buffer: HybridState | None = None  # the same in the layout of compiled loops
 
@@ -62,17 +62,17 @@ class RunSetup:
             self._buffer = start_by_kernel(system, task, self.origin)
             self.begins_silently = self._buffer is not None
         if self._buffer is None:
-            settled = self._settle(task, ())
+            settled = self._at_start(task, ())
             if self.begins_silently:
                 self._buffer = HybridState.of(*settled)
         return self._buffer
 
     def start(self, task: Task, due: tuple[int, ...]) -> LazyState:
         """Return the state just after the start of a task, after schedules that are due at the start."""
-        settled = self._settle(task, due)
+        settled = self._at_start(task, due)
         return LazyState(self.system, self.origin, task.forward, settled[0].copy, settled)
 
-    def _settle(self, task: Task, due: tuple[int, ...]) -> tuple[Outcome, np.ndarray]:
+    def _at_start(self, task: Task, due: tuple[int, ...]) -> tuple[Outcome, np.ndarray]:
         """Return the outcome at the start, and the run-time vector there."""
         system, forward = self.system, task.forward
         if self._start is None and self._buffer is not None:

@@ -226,12 +226,12 @@ class Model(Declared):
         ExpressionError
             For a value that is not a valid expression.
         """
-        places = self._places()
-        _known(changes, places, "parameter", self.name, self.remedy_for_parameter)
+        positions = self._positions()
+        _known(changes, positions, "parameter", self.name, self.remedy_for_parameter)
         parameters, are_numbers = list(self.parameters), True
         for name in changes:
-            former = parameters[places[name]]
-            parameters[places[name]] = changed = former.with_value(_changed_value(changes, name))
+            former = parameters[positions[name]]
+            parameters[positions[name]] = changed = former.with_value(_changed_value(changes, name))
             are_numbers = are_numbers and former.value.is_constant and changed.value.is_number
         copy = self._valued(parameters=tuple(parameters))
         if are_numbers:
@@ -367,19 +367,19 @@ class Model(Declared):
     def _values(self) -> dict[str, float]:
         if "_sound" not in vars(self):
             return resolve({parameter.name: parameter.value for parameter in self.parameters})
-        values, places = dict(self._sound[0]), self._places()
+        values, positions = dict(self._sound[0]), self._positions()
         for name in self._sound[1]:
-            values[name] = evaluate(self.parameters[places[name]].value, values)
+            values[name] = evaluate(self.parameters[positions[name]].value, values)
         for name, value in self.affected_by(self._sound[1]):
             values[name] = evaluate(value, values)
         return values
 
-    def _places(self) -> dict[str, int]:
+    def _positions(self) -> dict[str, int]:
         """Return the position of each parameter by name."""
-        places: dict[str, int] = self.once(
-            "places", lambda: {p.name: k for k, p in enumerate(self.parameters)}
+        positions: dict[str, int] = self.once(
+            "positions", lambda: {p.name: k for k, p in enumerate(self.parameters)}
         )
-        return places
+        return positions
 
     def affected_by(self, names: Iterable[str]) -> list[tuple[str, Expression]]:
         """Return the parameters that depend on some others, with their expressions, in an order to evaluate them."""
