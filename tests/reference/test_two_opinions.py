@@ -88,7 +88,21 @@ set = {{ d = "0.5*d - x" }}
 """
 
 
-@pytest.mark.parametrize("scene", [blocks, switches])
+def sliders(draw: random.Random) -> str:
+    """Two coupled sliders that are pulled over springs, and whose slips end between their limits."""
+    text = "[states]\n"
+    for i in (0, 1):
+        text += f'e{i} = {{ start = {draw.choice([0, 0.02])}, der = "{draw.choice([0.07, 0.09])} - v{i}" }}\n'
+        text += f'v{i} = {{ start = 0, der = "{draw.choice([9, 16])}*e{i} + e{i} - e{1 - i} - f{i}" }}\n'
+    for i in (0, 1):
+        law = (
+            f'{{ name = "static-kinetic", mu_s = {draw.choice([0.8, 1])}, mu_k = {draw.choice([0.1, 0.2])} }}'
+        )
+        text += f'[contacts.f{i}]\nvelocity = "v{i}"\nnormal = {draw.choice([0.3, 0.4])}\nlaw = {law}\n'
+    return text
+
+
+@pytest.mark.parametrize("scene", [blocks, switches, sliders])
 @pytest.mark.parametrize("seed", range(5))
 def test_engine_and_multiple_precision_agree(scene: object, seed: int) -> None:
     """The same modes in the same order, the same events of every kind, states to 1e-9 of their amplitudes."""

@@ -16,7 +16,7 @@ STICK = needs("contacts", "exact-stick")
 
 def scenes() -> tuple[Scene, ...]:
     """Return all scenes of this file."""
-    return _micro_slip(), _fading(), _many_stops(), _half(), _small(), _at_rest()
+    return _micro_slip(), _fading(), _many_stops(), _between(), _half(), _small(), _at_rest()
 
 
 def _swing(name: str, periods: float, **changes: Any) -> Scene:
@@ -78,6 +78,35 @@ def _many_stops() -> Scene:
     """Return the scene of a body that is pulled slowly and stops many times in each period."""
     swing = _swing("many-stops", 1, w=0.05, c=0.1, Fs=0.1, Fk=0.05)
     return replace(swing, needs=STICK | {"multiple-roots"})  # a slip is short compared with the period
+
+
+def _between() -> Scene:
+    """Each slip of the pulled slider ends where the spring pushes back with 0.6, between 0.2 and 1.
+
+    In a slip e = 0.2 + 0.8 cos(s) + 0.5 sin(s), and it ends at tan(s/2) = -0.8/0.5, where e = 0.2 - 0.8.
+    """
+    rate, kinetic, fall = 0.5, 0.2, 0.8
+    slip = 2 * (math.pi - math.atan(fall / rate))
+    period = slip + 2 * fall / rate
+    begins = [1.0 / rate + k * period for k in range(3)]
+    changes = [change for t in begins for change in ((t, "f:slip+"), (t + slip, "f:stick"))]
+    samples = [(1.0, (rate, 0.0))]
+    for t in begins:
+        for s in (0.2 * slip, 0.7 * slip):
+            e = kinetic + fall * math.cos(s) + rate * math.sin(s)
+            samples.append((t + s, (e, rate + fall * math.sin(s) - rate * math.cos(s))))
+        samples.append((t + slip + 1.0, (kinetic - fall + rate, 0.0)))
+    return Scene(
+        "stops-between-limits",
+        "static-kinetic",
+        (0.0, begins[-1] + slip + 2.0),
+        Truth(tuple(changes), tuple(samples), checks=(("exact-stick", exact_stick("f", {"v": 0.0})),)),
+        STICK,
+        params={"m": 1, "k": 1, "N": 1, "mu_s": 1, "mu_k": kinetic, "v_pull": rate},
+        unit=2 * math.pi,
+        start_is_event=False,
+        speed=rate + fall,
+    )
 
 
 def _half() -> Scene:
