@@ -93,6 +93,21 @@ def known_name(value: Any, known: Sequence[str], what: str, kind: str) -> str:
     return value
 
 
+def known_entry(name: Any, known: Sequence[str], argument: str, what: str, kind: str) -> None:
+    """Raise an error if an argument contains a name that is not, for example, "a state of model 'm'"."""
+    if name not in known:
+        message = f"`{argument}` contains {name!r}, which is not {what}"
+        raise UsageError(message, remedy=nearest(str(name), known, kind=kind))
+
+
+def known_mode(mode: Any, modes: Sequence[str], argument: str, component: str) -> int:
+    """Return the index of a mode of a component, or raise an error."""
+    if mode not in modes:
+        message = f"`{argument}` of {component} is {mode!r}, which is not a mode of {component}"
+        raise UsageError(message, remedy=nearest(str(mode), modes, kind="modes"))
+    return modes.index(mode)
+
+
 def flag(value: Any, what: str) -> bool:
     """Return a bool, or raise an error."""
     if not isinstance(value, bool | np.bool_):
@@ -279,11 +294,7 @@ def absolute_tolerances(model: Model, atol: Any, rtol: float, start: np.ndarray)
     remedy = f"use a number >= 0, or one for each of {', '.join(names)}"
     if isinstance(atol, Mapping):
         for name, value in atol.items():
-            if name not in names:
-                raise UsageError(
-                    f"`atol` contains {name!r}, which is not a state of model '{model.name}'",
-                    remedy=nearest(str(name), names, kind="states"),
-                )
+            known_entry(name, names, "atol", f"a state of model '{model.name}'", "states")
             values[names.index(name)] = number(value, f"`atol` of {name}")
     elif is_row(atol):
         values = numbers(atol, "atol", remedy)
@@ -305,18 +316,9 @@ def initial_modes(system: System, z0: Any) -> np.ndarray:
     if not isinstance(z0, Mapping):
         raise cannot_be("z0", z0, "use a dict of component names and mode names")
     for name, mode in z0.items():
-        if name not in components:
-            raise UsageError(
-                f"`z0` contains {name!r}, which is not a component of model '{system.model.name}'",
-                remedy=nearest(str(name), components, kind="components"),
-            )
-        automaton = system.automata[components.index(name)]
-        if mode not in automaton.modes:
-            raise UsageError(
-                f"`z0` of {name} is {mode!r}, which is not a mode of {name}",
-                remedy=nearest(str(mode), automaton.modes, kind="modes"),
-            )
-        z[components.index(name)] = automaton.modes.index(mode)
+        known_entry(name, components, "z0", f"a component of model '{system.model.name}'", "components")
+        c = components.index(name)
+        z[c] = known_mode(mode, system.automata[c].modes, "z0", name)
     return z
 
 

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.arguments import cannot_be, chosen_model
+from hybridsim.arguments import cannot_be, chosen_model, known_entry, known_mode
 from hybridsim.calls import refusing
-from hybridsim.errors import UsageError, nearest
+from hybridsim.errors import UsageError
 from hybridsim.model import Model
 
 Function = Callable[[float, np.ndarray], Any]
@@ -140,11 +140,7 @@ def _modes(system: Any, declared: Mapping[str, str] | None) -> np.ndarray:
     if not isinstance(z, Mapping):
         raise cannot_be("z", z, "use a dict of component names and mode names")
     for name in z:
-        if name not in names:
-            raise UsageError(
-                f"`z` contains {name!r}, which is not a component of model '{system.model.name}'",
-                remedy=nearest(str(name), names, kind="components"),
-            )
+        known_entry(name, names, "z", f"a component of model '{system.model.name}'", "components")
     modes = []
     for automaton in system.automata:
         mode = z.get(automaton.name)
@@ -153,10 +149,8 @@ def _modes(system: Any, declared: Mapping[str, str] | None) -> np.ndarray:
                 f"`z` needs a mode of {automaton.name}, which has no initial mode",
                 remedy=f"use one of {', '.join(automaton.modes)}",
             )
-        if mode is not None and mode not in automaton.modes:
-            raise UsageError(
-                f"`z` of {automaton.name} is {mode!r}, which is not a mode of {automaton.name}",
-                remedy=nearest(str(mode), automaton.modes, kind="modes"),
-            )
-        modes.append(automaton.initial if mode is None else automaton.modes.index(mode))
+        if mode is None:
+            modes.append(automaton.initial)
+        else:
+            modes.append(known_mode(mode, automaton.modes, "z", automaton.name))
     return np.array(modes, dtype=np.int64)

@@ -24,7 +24,7 @@ from hybridsim.analysis.progress import Progress
 from hybridsim.analysis.time_budget import OutOfTime
 from hybridsim.arguments import cannot_be
 from hybridsim.calls import refusing
-from hybridsim.errors import SimulationError, UsageError, nearest
+from hybridsim.errors import SimulationError, UsageError
 from hybridsim.model import Model
 
 _BUDGET = 120.0  # seconds; the default budget, as for a comparison
@@ -212,11 +212,7 @@ def _chosen(names: Sequence[str] | None) -> tuple[LadderStep, ...]:
     known = {rung.name: rung for rung in LADDER}
     asked_for = checked_names(names, "rungs")
     for name in asked_for:
-        if name not in known:
-            raise UsageError(
-                f"`rungs` contains {name!r}, which is not a simpler model",
-                remedy=nearest(name, known, kind="rungs"),
-            )
+        arguments.known_entry(name, list(known), "rungs", "a simpler model", "rungs")
     return tuple(rung for rung in LADDER if rung.name in asked_for)
 
 

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.arguments import cannot_be, known_name
+from hybridsim.arguments import cannot_be, known_entry, known_name
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.sides import modes_by_state
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tangents import TangentTape
-from hybridsim.errors import UsageError, nearest
+from hybridsim.errors import UsageError
 
 INSIDE = 1e-12  # relative to a guard's terms: the rounding error
 
@@ -106,11 +106,7 @@ def modes_of(system: System, mode: Mapping[str, str] | str | None) -> tuple[np.n
     mode_names: dict[str, Any] = dict(mode or {})
     names = [a.name for a in system.declared]
     for name in mode_names:
-        if name not in names:
-            raise UsageError(
-                f"`mode` contains {name!r}, which is not a component of model {system.model.name}",
-                remedy=nearest(str(name), names, kind="components"),
-            )
+        known_entry(name, names, "mode", f"a component of model {system.model.name}", "components")
     numbers, by_state = [], []
     for c, automaton in enumerate(system.automata):
         chosen = mode_names.get(automaton.name)

@@ -209,7 +209,7 @@ def _nested(values: np.ndarray) -> Any:
 
 
 def heading(sweep: Sweep) -> str:
-    """Return model, axes and readings in one line."""
+    """Return the model, the axes and the names of the results in one line."""
     shape = " x ".join(f"{len(values)} {name}" for name, values in sweep.axes.items())
     return f"Sweep of {sweep.model.name} over {shape}: {', '.join(sweep.values) or 'nothing'}"
 
@@ -222,7 +222,7 @@ def statuses(sweep: Sweep) -> list[str]:
 
 
 def _where(sweep: Sweep, k: int, shape: tuple[int, ...]) -> str:
-    """Return the parameters of the point that contains the k-th number of a reading."""
+    """Return the parameters of the point at which the k-th value of a result was computed."""
     place = np.unravel_index(k, shape)
     if sweep.mode == "list":
         return ", ".join(_set(name, settings[place[0]]) for name, settings in sweep.axes.items())

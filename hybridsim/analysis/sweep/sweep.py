@@ -6,24 +6,57 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import nullcontext
+from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
 from hybridsim import __version__
 from hybridsim.analysis.compare.comparison_request import mapping, whole
+from hybridsim.analysis.keyword_options import refuse_what_it_does_not_take
 from hybridsim.analysis.progress import Progress
 from hybridsim.analysis.sweep.axes import points_of
 from hybridsim.analysis.sweep.journal import Journal, fingerprint
 from hybridsim.analysis.sweep.last_period import LastPeriod
-from hybridsim.analysis.sweep.measures import measure_of
-from hybridsim.analysis.sweep.named_measures import Final, Steady, units_of_readings
+from hybridsim.analysis.sweep.named_measures import Final, Steady, named_measure, units_of_readings
 from hybridsim.analysis.sweep.result import Sweep
-from hybridsim.analysis.sweep.work.job import Job, new_token
+from hybridsim.analysis.sweep.work.job import Job, Measure, new_token
 from hybridsim.analysis.sweep.work.measure import work
-from hybridsim.arguments import callback, chosen_model, flag
+from hybridsim.arguments import callback, cannot_be, chosen_model, flag, is_row
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
 from hybridsim.model import Model
+
+
+@dataclass(frozen=True)
+class UserFunction:
+    """A measure defined by a user's function of the model and, with `warm_start`, of the previous result."""
+
+    function: Callable[..., Any]
+    options: Mapping[str, Any]
+    chained: bool
+
+    def run(self, model: Model, previous: Any) -> Any:
+        """Call the user's function at one point."""
+        if self.chained:
+            return self.function(model, previous, **self.options)
+        return self.function(model, **self.options)
+
+    def read(self, result: Any) -> Any:
+        """Return the result unchanged."""
+        return result
+
+
+def measure_of(measure: Any, model: Model, chained: bool, options: Mapping[str, Any]) -> Measure:
+    """Return the measure that the argument `measure` of `sweep` describes."""
+    if callable(measure):
+        refuse_what_it_does_not_take(measure, options)
+        return UserFunction(measure, options, chained)
+    if isinstance(measure, str):
+        return named_measure(measure, model, options)
+    names = tuple(measure) if is_row(measure) else ()
+    if names and all(isinstance(word, str) for word in names):
+        return named_measure(names, model, options)
+    raise cannot_be("measure", measure, "use a function of the model, or the name of a built-in measure")
 
 
 @refusing

@@ -21,8 +21,28 @@ from hybridsim.engine.events.choice.verdict import LEAVES
 from hybridsim.engine.events.corner_start import cross, past_zero, vanishing_surfaces
 from hybridsim.engine.events.diagnosis import rates_without_value
 from hybridsim.engine.events.outcome import Change
-from hybridsim.engine.events.rest_at_stops import together, with_tied
 from hybridsim.engine.series.bounded import UNIT
+from hybridsim.engine.system.system import System
+
+
+def with_tied(system: System, members: list[int]) -> list[int]:
+    """Return the components that are decided together, with the friction contacts along their gaps."""
+    tied = {along for gap, along, is_one in system.stop_couplings if is_one and gap in members}
+    return sorted(tied.union(members))
+
+
+def together(system: System, members: list[int], candidates: np.ndarray) -> np.ndarray:
+    """Return the candidates in which a gap and the friction along it are both held, or neither is held.
+
+    If their velocities differ (a stop beside a belt), candidates in which both hold are removed.
+    """
+    is_allowed = np.ones(len(candidates), dtype=np.bool_)
+    for gap, along, is_one in system.stop_couplings:
+        if gap in members and along in members:
+            a, b = (candidates[:, members.index(c)] == system.automata[c].hold for c in (gap, along))
+            is_allowed &= (a == b) if is_one else ~(a & b)
+    return candidates[is_allowed]
+
 
 _SEVERAL_MOTIONS = "several motions are admissible"
 _MAX_CANDIDATES = 3**8  # a cluster of more components needs a complementarity solver, not enumeration
