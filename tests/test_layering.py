@@ -57,7 +57,6 @@ HANDED_ON = {
     "solution.model_trajectory",
     "solution.solution",
     "solution.run",
-    "analysis.compare.comparison",
 }
 # A family of integrators takes nothing from another one, but these.
 SHARED = {

@@ -44,7 +44,7 @@ def regularisation(comparison: Comparison) -> tuple[Axes, Axes]:
     times.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5), numticks=20))
     times.yaxis.set_major_formatter(EngFormatter(unit="s", sep="\N{THIN SPACE}"))
     found = handles(comparison.rows, [], chosen)
-    fitted = exponents(comparison)
+    fitted = exponents(comparison.rows)
     for handle, label in zip(found, chosen, strict=False):
         if label in fitted:
             power, work = map(exponent_text, fitted[label])

@@ -2,17 +2,31 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 from hybridsim.analysis.compare.errors_against_reference import Errors
+from hybridsim.analysis.compare.regularised import exponent_text, exponents
 from hybridsim.analysis.compare.rows import QUANTITIES, Reading, Row
-from hybridsim.analysis.compare.table import table
+from hybridsim.analysis.compare.table import (
+    aligned_cells,
+    failure_of,
+    milliseconds,
+    model_hash,
+    setting,
+    turns,
+    versions,
+)
+from hybridsim.analysis.compare.timing import ENOUGH
 from hybridsim.arguments import cannot_be, known_name
+from hybridsim.errors import printable
 from hybridsim.files import csv_records, json_record
 from hybridsim.presentation.readable import Readable
+
+_NAMES = dict(zip(QUANTITIES, ("state", "last period", "event time", "graph")))
 
 
 @dataclass(frozen=True)
@@ -107,10 +121,23 @@ class Comparison(Readable):
 
     def table(self) -> str:
         """Return the comparison as text."""
-        return table(self)
-
-    def __str__(self) -> str:
-        return self.table()
+        names = {**_NAMES, "state": "state error"} | ({"event_time": "event time / T"} if self.period else {})
+        errors = (names[quantity] for quantity in self.quantities)
+        header = ("", *errors, "wall time", "min .. max", "rhs", "guards", "steps", "modes")
+        cells = [_cells(self, row) for row in self.rows]
+        widths = [max(map(len, column)) for column in zip(header, *(line for line in cells if line))]
+        text = [aligned_cells(header, widths)]
+        for label, block in itertools.groupby(zip(self.rows, cells), key=lambda item: item[0].label):
+            text.append(label)
+            for failure, group in itertools.groupby(
+                block, key=lambda item: "" if item[1] else failure_of(item[0])
+            ):
+                same = list(group)
+                if failure:
+                    text.append(f"  {', '.join(setting(row) for row, _ in same)}: {failure}")
+                else:
+                    text += [aligned_cells(line, widths) for _, line in same]
+        return printable("\n".join([*_heading(self), "", *text, "", *_notes(self)]))
 
     def to_csv(self, path: str | Path) -> None:
         """Write one line per row; times are in the model's unit, wall times in seconds."""
@@ -164,3 +191,77 @@ class Comparison(Readable):
         for count in ("repetitions", "compile_time", "rhs_evaluations", "guard_evaluations", "steps"):
             record[count] = getattr(cost, count, None)
         return record
+
+
+def _cells(comparison: Comparison, row: Row) -> tuple[str, ...]:
+    """Return the cells of a row; empty for a failure."""
+    if row.errors is None or row.cost is None:
+        return ()
+    readings = [comparison.reading(row, quantity) for quantity in comparison.quantities]
+    low, high = min(row.cost.wall_times), max(row.cost.wall_times)
+    counts = (row.cost.rhs_evaluations, row.cost.guard_evaluations, row.cost.steps)
+    return (
+        f"  {setting(row)}",
+        *(str(reading) if reading else "-" for reading in readings),
+        milliseconds(row.cost.wall_time),
+        f"{milliseconds(low)} .. {milliseconds(high)}" if high > low else "once",
+        *map(str, counts),
+        "none" if row.errors.sequence is None else str(row.errors.sequence),
+    )
+
+
+def _heading(comparison: Comparison) -> list[str]:
+    (t0, t1), period = comparison.t_span, comparison.period
+    periods = f" ({(t1 - t0) / period:g} periods)" if period else ""
+    lines = [
+        comparison.title,
+        f"  time       {t0:g} to {t1:g}{periods}",
+        f"  reference  {comparison.reference}",
+    ]
+    if comparison.uncertainty is not None:
+        lines.append(f"             uncertain by: {differences(comparison, comparison.uncertainty)}")
+    if comparison.difference is not None:
+        lines.append(f"             {comparison.second_reference} differs by: {differences(comparison)}")
+    return lines
+
+
+def differences(comparison: Comparison, errors: Errors | None = None) -> str:
+    """Return errors as text in the units of the table; by default the difference of the second reference."""
+    readings = {name: comparison.scaled(errors or comparison.difference, name) for name in QUANTITIES}
+    return ", ".join(f"{_NAMES[name]} {value:.1e}" for name, value in readings.items() if value) or "nothing"
+
+
+def _graph_notes(comparison: Comparison) -> list[str]:
+    if "graph" not in comparison.quantities:
+        return []
+    unit = "periods" if comparison.period else "run lengths"
+    return [f"Graph: Hausdorff distance of the completed graphs, in {unit} and amplitudes, to 1 %."]
+
+
+def _form_notes(comparison: Comparison) -> list[str]:
+    fitted = exponents(comparison.rows)
+    if not fitted:
+        return []
+    lines = ["Against the set-valued law, as v0 falls (work in evaluations):"]
+    for label, powers in fitted.items():
+        error, work = map(exponent_text, powers)
+        lines.append(f"  {label}: error ~ v0^{error}, work ~ v0^{work}")
+    return lines
+
+
+def _notes(comparison: Comparison) -> list[str]:
+    unit = "periods T" if comparison.period else "the model's unit of time"
+    facts = comparison.provenance
+    counted = any(row.setting[0] == "steps_per_period" for row in comparison.rows)
+    return [
+        "State errors: the largest error of all states, relative to the state's amplitude in the reference.",
+        f'Event times are in {unit}. "< u": below the uncertainty u of the reference.',
+        *_graph_notes(comparison),
+        *_form_notes(comparison),
+        *(["T is a tenth of the run: the model has no period."] if counted and not comparison.period else []),
+        f"Wall time of one run: {turns(comparison.repeat)} of all rows, of several calls if they are short,",
+        f"after a warm-up; fewer turns of a run that takes more than {ENOUGH / comparison.repeat:.2g} s.",
+        versions(facts),
+        f"model {facts.get('model')}, {model_hash(facts)}",
+        *(f"warning: {warning}" for warning in comparison.warnings),
+    ]

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hybridsim.analysis.compare.lines import Series
+from hybridsim.analysis.compare.rows import Row
 from hybridsim.arguments import known_name
 from hybridsim.errors import UsageError
+from hybridsim.model import Model
 from hybridsim.model.smoothing.regularize import KINDS
 from hybridsim.reference.trajectory import EventLike, ExactEvent, Trajectory
-
-if TYPE_CHECKING:
-    from hybridsim.analysis.compare.comparison import Comparison
-    from hybridsim.model import Model
 
 # A stiff and an explicit method, because the cost of a small v0 differs between them.
 INTEGRATORS = ("cvode-bdf", "dop853")
@@ -96,21 +93,16 @@ def as_set_valued(run: Trajectory, contacts: Collection[str]) -> Trajectory:
     return replace(run, events=tuple(events), initial_modes=modes)
 
 
-def exponents(comparison: Comparison) -> Mapping[str, tuple[float | None, float | None]]:
+def exponents(rows: Sequence[Row]) -> Mapping[str, tuple[float | None, float | None]]:
     """Return the exponents p of error ~ v0^p and work ~ v0^p of each line over v0; None if unknown.
 
     They are fitted by least squares of the logarithms over the three smallest v0 that ran. For the error only
     those count whose error is at least three times that of the same integrator on the set-valued law at the
     same tolerance. Work is counted in evaluations, which are the same on every machine.
     """
-    own = {
-        (row.integrator, row.setting[1]): row.errors.state
-        for row in comparison.rows
-        if not row.form and row.errors
-    }
+    own = {(row.integrator, row.setting[1]): row.errors.state for row in rows if not row.form and row.errors}
     found = {}
-    for label in comparison.labels:
-        rows = [row for row in comparison.rows if row.label == label and row.form]
+    for label in dict.fromkeys(row.label for row in rows):
         points = [
             (
                 row.setting[1],
@@ -119,7 +111,7 @@ def exponents(comparison: Comparison) -> Mapping[str, tuple[float | None, float 
                 own.get((row.integrator, row.options["rtol"]), 0.0),
             )
             for row in rows
-            if row.errors and row.cost
+            if row.label == label and row.form and row.errors and row.cost
         ]
         if points:
             errors = [(v0, error) for v0, error, _, least in points if error > _CLEAR * least]

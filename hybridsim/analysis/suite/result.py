@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hybridsim.analysis.compare.comparison import Comparison
+from hybridsim.analysis.compare.comparison import Comparison, differences
 from hybridsim.analysis.compare.comparison_request import positives
 from hybridsim.analysis.compare.rows import NOT_STARTED, STOPPED, Row
-from hybridsim.analysis.compare.table import differences, milliseconds, setting, turns, versions
+from hybridsim.analysis.compare.table import milliseconds, setting, turns, versions
 from hybridsim.analysis.suite.scenes import Scene
 from hybridsim.analysis.suite.verdict import COMMON, USELESS, Verdict, verdict
 from hybridsim.errors import printable

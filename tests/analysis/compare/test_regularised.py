@@ -43,8 +43,8 @@ def test_a_smooth_form_is_neither_right_nor_wrong_and_karnopps_is_right() -> Non
 def test_errors_fall_as_the_forms_say() -> None:
     """tanh misses the limit of friction at the speed v by exp(-2 v/v0): error v0 times a logarithm of v0. Karnopp
     stops the body v0/a too early: an error v0 in the time and v0^2 in the position and, later, the velocity."""
-    tanh, _ = exponents(comparison())["tanh, dop853"]
-    karnopp, _ = exponents(comparison())["karnopp, dop853"]
+    tanh, _ = exponents(comparison().rows)["tanh, dop853"]
+    karnopp, _ = exponents(comparison().rows)["karnopp, dop853"]
     assert 0.85 < tanh < 1.0
     assert karnopp == pytest.approx(2.0, abs=0.05)
     times = [row.errors.event_time for row in rows_of("karnopp, dop853")]
@@ -54,7 +54,7 @@ def test_errors_fall_as_the_forms_say() -> None:
 def test_an_explicit_method_works_harder_as_v0_falls() -> None:
     work = [row.cost.work for row in rows_of("tanh, dop853")]
     assert work[0] < work[1] < work[2]
-    assert exponents(comparison())["tanh, dop853"][1] < -0.3
+    assert exponents(comparison().rows)["tanh, dop853"][1] < -0.3
 
 
 def test_the_table_and_the_records_say_which_form() -> None:
