@@ -25,7 +25,7 @@ FILES = {
     "analysis/steady/steady_state.py": 484,
     "analysis/variations/carried.py": 343,
     "analysis/variations/off_zero.py": 305,
-    "arguments.py": 389,
+    "arguments.py": 391,
     "engine/events/zeno/accumulation.py": 388,
     "engine/linear/modal.py": 365,
     "engine/linear/motion.py": 370,
