@@ -9,29 +9,77 @@ from typing import ClassVar
 
 import numpy as np
 
+from hybridsim.engine.events.compiled.scratch import called_by
+from hybridsim.engine.native.kernels import call, inlined, kernel
 from hybridsim.engine.record.trajectory import Task, Trajectory
-from hybridsim.engine.run.compiled_loop import CompiledLoop
+from hybridsim.engine.roots.first_exit import FOUND, NEVER, OPEN
+from hybridsim.engine.run.compiled_loop import CompiledLoop, compile_loops
+from hybridsim.engine.run.event_loop import FOLLOWED, FULL, STOPPED, event_loop, not_followed
 from hybridsim.engine.run.method_kernels import MethodKernels
+from hybridsim.engine.run.polynomial_steps import (
+    GOES_ON,
+    PolynomialKernels,
+    begin_segment,
+    end_segment,
+    first_zero,
+    guards_at_end,
+    next_step,
+    project,
+    put_sides,
+    record_step,
+)
 from hybridsim.engine.run.single_call import run_task
 from hybridsim.engine.run.stepping import Flow, Root, Step, Stepper, Watch
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
+from hybridsim.integrators.one_step import OneStepStepper, Point, Trial
+from hybridsim.integrators.step_control import forget, next_length
 
 __all__ = [
     "CAPABILITIES",
+    "FOLLOWED",
+    "FOUND",
+    "FULL",
+    "GOES_ON",
     "NEEDS_TAPE",
+    "NEVER",
+    "OPEN",
+    "STOPPED",
+    "CompiledLoop",
     "Flow",
     "Integrator",
     "MethodKernels",
+    "OneStepStepper",
+    "Point",
+    "PolynomialKernels",
     "Root",
     "Step",
     "StepFailure",
     "Stepper",
+    "System",
     "Task",
     "Tolerances",
     "Trajectory",
+    "Trial",
     "Watch",
+    "begin_segment",
+    "call",
+    "called_by",
+    "compile_loops",
+    "end_segment",
+    "event_loop",
+    "first_zero",
+    "forget",
+    "guards_at_end",
+    "inlined",
+    "kernel",
+    "next_length",
+    "next_step",
+    "not_followed",
+    "project",
+    "put_sides",
+    "record_step",
 ]
 
 NEEDS_TAPE = "it needs rates that are declared as expressions"  # reason for lacks["functions"]

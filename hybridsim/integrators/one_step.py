@@ -84,14 +84,14 @@ class OneStepStepper(ABC):
         return Point(self.flow, s, x)
 
     @abstractmethod
-    def _attempt(self, start: Point, h: float) -> Trial:
+    def attempt(self, start: Point, h: float) -> Trial:
         """Try one step of length `h`, which is negative for a run backward in time."""
 
     @abstractmethod
-    def _dense(self, start: Point, end: Point, trial: Trial) -> Dense:
+    def dense(self, start: Point, end: Point, trial: Trial) -> Dense:
         """Return the dense output of an accepted step."""
 
-    def _holds(self, start: Point, end: Point, trial: Trial) -> bool:
+    def holds(self, start: Point, end: Point, trial: Trial) -> bool:
         """Return whether the dense output is accurate inside the step."""
         return True
 
@@ -105,17 +105,17 @@ class OneStepStepper(ABC):
             h = abs(self.bound - start.s) if last else abs(on_the_grid(start.s, direction * h))
             if not h > 0.0:
                 raise Collapsed(f"the step size fell to {h:.3g}")
-            trial = self._attempt(start, direction * h)
+            trial = self.attempt(start, direction * h)
             self.h = next_length(h, trial.error, self.error_order, self._memory)
             if trial.error <= 1.0:
                 s = self.bound if last else start.s + direction * h
                 end = self._point(s, self.flow.landed(s, trial.x))
-                if self._holds(start, end, trial):
+                if self.holds(start, end, trial):
                     break
                 self.h = _SHORTER * h
             self.flow.counters.rejected += 1
         self.here = end
-        return Step(start.s, s, start.x, end.x, self._dense(start, end, trial))
+        return Step(start.s, s, start.x, end.x, self.dense(start, end, trial))
 
     def restep(self, step: Step, s: float) -> Step:
         """Return one step from the start to exactly the local time `s`, or a shorter one if it is inaccurate.
@@ -125,10 +125,10 @@ class OneStepStepper(ABC):
         be resolved further.
         """
         start, length = self._point(step.s0, step.x0), s - step.s0
-        trial = self._attempt(start, length)
+        trial = self.attempt(start, length)
         if trial.error <= 1.0:
             end = self._point(s, trial.x)
-            return Step(step.s0, s, step.x0, trial.x, self._dense(start, end, trial))
+            return Step(step.s0, s, step.x0, trial.x, self.dense(start, end, trial))
         self.flow.counters.rejected += 1
         rtol, atol = self.control
         moves = np.abs(step.dense(np.array([s]))[0] - step.x0)
@@ -144,14 +144,14 @@ class OneStepStepper(ABC):
             knots = np.linspace(start.s, s, count + 1)
             points, trials = [start], []
             for a, b in pairwise(knots.tolist()):
-                trials.append(self._attempt(points[-1], b - a))
+                trials.append(self.attempt(points[-1], b - a))
                 points.append(self._point(b, trials[-1].x))
             if count == _MAX_PARTS or all(trial.error <= 1.0 for trial in trials):
                 break
             self.flow.counters.rejected += 1
             count *= 2
         parts = tuple(
-            self._dense(a, b, trial) for (a, b), trial in zip(pairwise(points), trials, strict=True)
+            self.dense(a, b, trial) for (a, b), trial in zip(pairwise(points), trials, strict=True)
         )
         return Step(start.s, s, start.x, points[-1].x, PiecewiseDense(knots, parts))
 

@@ -90,7 +90,7 @@ class RosenbrockStepper(OneStepStepper):
         linearise(self._rows, self._flow_registers, s, x, self._V, jacobian, rate)
         return jacobian, rate
 
-    def _attempt(self, start: Point, h: float) -> Trial:
+    def attempt(self, start: Point, h: float) -> Trial:
         assert isinstance(start, RosenbrockPoint)
         flow, tableau, out = self.flow, self.tableau, np.empty(self.flow.n)
         stages = np.empty((len(tableau.nodes), flow.n))
@@ -111,14 +111,14 @@ class RosenbrockStepper(OneStepStepper):
         )
         return Trial(out, error, stages)
 
-    def _holds(self, start: Point, end: Point, trial: Trial) -> bool:
+    def holds(self, start: Point, end: Point, trial: Trial) -> bool:
         """Return whether the dense output satisfies the differential equation in the middle of the step.
 
         The defect is weighted like an error of the step, h (1 - gamma h J)^-1 (f(x) - x'). The weight is
         small for a stiff component that the flow damps immediately.
         """
         flow, tableau = self.flow, self.tableau
-        dense = self._dense(start, end, trial)
+        dense = self.dense(start, end, trial)
         x = dense.middle()
         flow.counters.rhs_evaluations += 1
         missed = flow.rhs(0.5 * (start.s + end.s), x) - dense.middle_slope()
@@ -128,7 +128,7 @@ class RosenbrockStepper(OneStepStepper):
         size = np.maximum(np.abs(x), np.abs(start.x))
         return not (np.abs(missed) > tableau.gamma * _DEFECT * (atol + rtol * size)).any()
 
-    def _dense(self, start: Point, end: Point, trial: Trial) -> StageDense:
+    def dense(self, start: Point, end: Point, trial: Trial) -> StageDense:
         return StageDense(start.s, end.s, start.x, end.x, self.tableau.dense @ trial.dense_data)
 
 

@@ -42,7 +42,7 @@ class RungeKuttaStepper(OneStepStepper):
         self._slopes = np.empty((len(tableau.c), flow.n))
         super().__init__(flow, x0, bound, tolerances, first_step, tableau.order, tableau.error_order)
 
-    def _attempt(self, start: Point, h: float) -> Trial:
+    def attempt(self, start: Point, h: float) -> Trial:
         flow, out = self.flow, np.empty(self.flow.n)
         flow.counters.rhs_evaluations += len(self.tableau.c) - 1
         error = attempt(
@@ -60,7 +60,7 @@ class RungeKuttaStepper(OneStepStepper):
         )
         return Trial(out, error)
 
-    def _holds(self, start: Point, end: Point, trial: Trial) -> bool:
+    def holds(self, start: Point, end: Point, trial: Trial) -> bool:
         flow, (x, dx) = self.flow, np.empty((2, self.flow.n))
         if not flow.system.has_tape:  # its derivatives are differences, too inaccurate for the tolerances
             return True
@@ -70,7 +70,7 @@ class RungeKuttaStepper(OneStepStepper):
             self._address, weights, start.s, end.s - start.s, *ends, flow.p, flow.z, self.control, x, dx
         )
 
-    def _dense(self, start: Point, end: Point, trial: Trial) -> Dense:
+    def dense(self, start: Point, end: Point, trial: Trial) -> Dense:
         made: list[Dense] = []
 
         def dense(s: np.ndarray) -> np.ndarray:

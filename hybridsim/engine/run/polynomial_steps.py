@@ -1,0 +1,294 @@
+"""Base of compiled methods whose steps have polynomials as dense output, with kernels that their segments call.
+
+A segment kernel takes steps and fits a polynomial to each. The kernels here begin a segment, find the first zero of a
+guard along a polynomial, compute guards at the end of a step, and write the end of the segment for the event loop.
+"""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Sequence
+from typing import Any, ClassVar, NamedTuple
+
+import numpy as np
+
+from hybridsim.engine.events.compiled.at_end import may_vanish
+from hybridsim.engine.events.compiled.scratch import called_by
+from hybridsim.engine.native.kernels import call as call_function
+from hybridsim.engine.native.kernels import call_noinline, call_series, inlined, kernel
+from hybridsim.engine.native.loop_hints import put
+from hybridsim.engine.native.struct_pack import packed, replaced
+from hybridsim.engine.record.series_block import SeriesBlock
+from hybridsim.engine.roots.dense_guards import first_guard
+from hybridsim.engine.run.event_loop import (
+    FOLLOWED,
+    FULL,
+    MIN_STEPS_IN_PART,
+    STOPPED,
+    SegmentEnd,
+    any_holding,
+    any_projecting,
+    load_constants,
+    not_followed,
+)
+from hybridsim.engine.run.method_kernels import MethodKernels
+from hybridsim.engine.series.interpreter import advance
+from hybridsim.engine.system.programs.code_cache import ends_codes
+from hybridsim.engine.system.programs.guard_parts import guard_parts_of
+from hybridsim.engine.system.programs.mode_tables import Tapes, tape_cache_of
+from hybridsim.engine.system.series_at import short_order
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.tolerances import Tolerances
+
+TERMS = 3  # Taylor coefficients of guards at the end of a step: value, slope and bend
+GOES_ON = -1  # a segment takes another step
+TRIED, REJECTED, TAKEN = range(3)  # indices of `PolynomialArrays.counts`
+RTOL, MAX_STEP = range(2)  # indices of `PolynomialArrays.control`
+
+
+class PolynomialRows(NamedTuple):
+    """The committed steps."""
+
+    steps: np.ndarray  # start and length (S, 2) in local time
+    series: np.ndarray  # coefficients (S, n, degree + 1) of the states in powers of the time since the start
+
+
+class PolynomialArrays(NamedTuple):
+    """Arrays of a segment kernel, for n states, G guards, R registers, and guards expanded up to an order."""
+
+    method: Any  # arrays of the method
+    parts: Any  # `hybridsim.engine.system.programs.guard_parts.Parts` of the tapes
+    codes: Any  # `hybridsim.engine.system.programs.code_cache.EndsCodes` of the tapes
+    control: np.ndarray  # rtol, longest step
+    atol: np.ndarray  # (n,)
+    counts: np.ndarray  # rates that were evaluated, rejected steps, and steps of the segment
+    polynomial: np.ndarray  # (n, degree + 1), states in powers of the time since the start of the step
+    guards: np.ndarray  # (G, TERMS), Taylor coefficients of the active guards along the flow
+    x: np.ndarray  # (n, TERMS), the same of the states
+    V: np.ndarray  # (R, order + 1), series along the polynomial; the next arrays belong to `first_guard`
+    W: np.ndarray  # (R, order + 1), values and series at points
+    states: np.ndarray
+    guard_series: np.ndarray
+    a: np.ndarray
+    b: np.ndarray
+    stack: np.ndarray
+    powers: np.ndarray
+    values: np.ndarray
+    sums: np.ndarray
+    totals: np.ndarray
+    floors: np.ndarray
+    ahead: np.ndarray
+    rates: np.ndarray
+    everyone: np.ndarray
+    guard_registers: np.ndarray
+    sides: np.ndarray
+    orders: np.ndarray
+    bernstein: np.ndarray
+
+
+class PolynomialKernels(MethodKernels):
+    """The part of a method whose steps have polynomials of one degree as dense output."""
+
+    rows = PolynomialRows
+    degree: ClassVar[int]
+
+    def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
+        super().__init__(system, longest)
+        self.tolerances, degree = tolerances, self.degree
+        self.order = max(short_order(tolerances.rtol), degree + 2)
+        self.kind = f"{type(self).__module__}.{type(self).__qualname__}, order {self.order}"
+        self.columns = system.n * (degree + 1) + 2
+        self.parts, self.codes = guard_parts_of(system), ends_codes(system, TERMS, TERMS, self.order)
+
+    @abstractmethod
+    def method_arrays(self) -> Any:
+        """Return a named tuple of the arrays that the method needs for one call."""
+
+    def arrays(self) -> PolynomialArrays:
+        """Return new arrays of the kernel for one call, as a pack."""
+        system, n, columns = self.system, self.system.n, self.order + 1
+        tapes, guards, whole = tape_cache_of(system).tapes, system.guard_count, np.int64
+        arrays: PolynomialArrays = packed(
+            PolynomialArrays(
+                method=packed(self.method_arrays()),
+                parts=self.parts.of(tapes),
+                codes=self.codes.of(tapes),
+                control=np.empty(2),
+                atol=np.empty(n),
+                counts=np.zeros(3, dtype=whole),
+                polynomial=np.empty((n, self.degree + 1)),
+                guards=np.empty((guards, TERMS)),
+                x=np.empty((n, TERMS)),
+                **{name: np.zeros((system.registers.count, columns)) for name in ("V", "W")},
+                states=np.empty((n, columns)),
+                guard_series=np.empty((guards, columns)),
+                **{name: np.empty(columns) for name in ("a", "b")},
+                stack=np.empty((64, columns + 2)),
+                powers=np.empty(columns + 1),
+                **{name: np.empty(guards) for name in ("values", "sums", "totals", "floors")},
+                **{name: np.empty(n) for name in ("ahead", "rates")},
+                everyone=np.arange(guards, dtype=whole),
+                **{name: np.empty(guards, dtype=whole) for name in ("guard_registers", "sides", "orders")},
+                bernstein=np.zeros(0, dtype=whole),
+            )
+        )
+        return arrays
+
+    def fields(self) -> Sequence[tuple[Any, tuple[int, ...]]]:
+        """Return the dtype and the shape of a row of each array in `rows`."""
+        return (float, (2,)), (float, (self.system.n, self.degree + 1))
+
+    def begin(self, own: PolynomialArrays, tapes: Tapes) -> Any:
+        """Write the settings of the run to the arrays before a call. Return the arrays."""
+        own.control[RTOL], own.control[MAX_STEP] = self.tolerances.rtol, self.tolerances.max_step
+        own.atol[:], own.counts[:] = self.tolerances.atol, 0
+        return replaced(own, parts=self.parts.of(tapes), codes=self.codes.of(tapes))
+
+    def end(self, own: PolynomialArrays, tapes: Tapes, lin: Any) -> Any:
+        """Return the numbers of evaluated rates and of rejected steps."""
+        self.codes.look(tapes, own.codes)
+        return own.counts.tolist()
+
+    def count(self, counters: Any, steps: int, result: Any) -> None:
+        """Add the cost of the steps to the counters."""
+        counters.rhs_evaluations += result[TRIED]
+        counters.rejected += result[REJECTED]
+
+    def block(
+        self, result: Any, rows: PolynomialRows, last_steps: np.ndarray, *record: np.ndarray
+    ) -> SeriesBlock:
+        """Return the committed segments of a call."""
+        return SeriesBlock(self.system, last_steps, *rows, *record)
+
+
+@inlined
+def project(model: Any, work: Any, state: Any, s: float, x: Any) -> None:
+    """Put states at the end of a step back on the surfaces that a projection keeps."""
+    if any_projecting(model.automata, state.z):
+        call_function(called_by(work).project, s, x, state.p, state.z, work.slopes)
+        put(work.slopes, x)
+
+
+@inlined
+def put_sides(state: Any, own: Any) -> None:
+    """Take the sides of the guards from the start of the segment, before a first step is taken again."""
+    put(state.sides, own.sides)
+    put(state.orders, own.orders)
+    put(state.floors, own.floors)
+
+
+@inlined
+def begin_segment(start: Any, model: Any, call: Any, state: Any, work: Any, own: Any) -> bool:
+    """Begin a segment, with its states in ``work.y``. Return False if it is not to be followed."""
+    tapes, inputs, k = model.tapes, model.inputs, start.mode_row
+    load_constants(inputs, tapes, k, state.p, own.V)
+    load_constants(inputs, tapes, k, state.p, own.W)
+    first = tapes.active_start[k]
+    for i in range(tapes.active_start[k + 1] - first):
+        own.guard_registers[i] = tapes.guards[k, tapes.active[first + i]]
+    put_sides(state, own)
+    put(state.x, work.y)
+    for i in range(state.x.shape[0]):
+        call.scale[i] = abs(state.x[i])
+    own.counts[TAKEN] = 0
+    return not start.is_rejected
+
+
+@inlined
+def next_step(start: Any, call: Any, own: Any, rows: Any, s: float) -> int:
+    """Return GOES_ON, FOLLOWED if the segment is to be divided at s, or another outcome of the segment."""
+    taken = own.counts[TAKEN]
+    if s > call.longest[0]:
+        return STOPPED
+    if start.step + taken < rows.steps.shape[0]:
+        return GOES_ON
+    return FULL if start.number > 0 or taken < MIN_STEPS_IN_PART else FOLLOWED
+
+
+@inlined
+def first_zero(start: Any, model: Any, own: Any, s: float, d: float) -> tuple[int, int, float]:
+    """Find the first zero of an active guard along ``own.polynomial`` from s to s + d.
+
+    Return (FOUND, number among the active guards, time since s), (NEVER, -1, d), or OPEN if zeros are not certain.
+    """
+    tapes, parts, k = model.tapes, own.parts, start.mode_row
+    count = tapes.active_start[k + 1] - tapes.active_start[k]
+    outcome, g, at = first_guard(
+        tapes, k, parts.rows[parts.start[k] : parts.start[k + 1]], model.inputs, own.codes,
+        own.guard_series.shape[1] - 1, own.control[RTOL], s, d, own.atol, own.guard_registers[:count], own,
+    )  # fmt: skip
+    number = -1
+    for i in range(count):
+        if tapes.active[tapes.active_start[k] + i] == g:
+            number = i
+    return outcome, number, at
+
+
+@kernel
+def expand_at(model: Any, k: int, s: float, x: Any, own: Any) -> None:
+    """Compute Taylor coefficients along the flow from (s, x) with the interpreter of tapes; see `guards_at_end`."""
+    tapes, inputs, W, n = model.tapes, model.inputs, own.W, x.shape[0]
+    rows = tapes.optimised[tapes.optimised_start[k] : tapes.optimised_start[k + 1]]
+    if inputs.time[0] >= 0:
+        W[inputs.time[0], 0], W[inputs.time[0], 1] = s, 1.0
+    for i in range(n):
+        W[inputs.states[i], 0] = x[i]
+    for order in range(TERMS):
+        call_noinline(advance, (rows, W, order))
+        for i in range(n):
+            W[inputs.states[i], order + 1] = W[tapes.derivatives[k, i], order] / (order + 1)
+    for j in range(tapes.active_start[k + 1] - tapes.active_start[k]):
+        for order in range(TERMS):
+            own.guards[j, order] = W[own.guard_registers[j], order]
+
+
+@inlined
+def guards_at_end(start: Any, model: Any, own: Any, s: float, x: Any) -> None:
+    """Write value, slope and half the second derivative of the active guards along the flow to ``own.guards``."""
+    code = own.codes.ends[start.mode_row]
+    if code != 0:
+        call_series(code, s, 0.0, x, own.guards, own.W, own.x)
+    else:
+        expand_at(model, start.mode_row, s, x, own)
+
+
+@inlined
+def record_step(start: Any, call: Any, work: Any, own: Any, rows: Any, s: float, d: float, end: Any) -> None:
+    """Write the step from s to s + d to the record, and its end to ``work.y``."""
+    row = start.step + own.counts[TAKEN]
+    own.counts[TAKEN] += 1
+    put(end, work.y)
+    rows.steps[row, 0], rows.steps[row, 1] = s, d
+    for i in range(work.y.shape[0]):
+        call.scale[i] = max(call.scale[i], abs(work.y[i]))
+        for j in range(own.polynomial.shape[1]):
+            rows.series[row, i, j] = own.polynomial[i, j]
+
+
+@inlined
+def end_segment(
+    start: Any, model: Any, call: Any, state: Any, work: Any, own: Any, s: float, length: float, number: int
+) -> SegmentEnd:
+    """Return the end of a segment at s, with the states in ``work.y``, after a last step of this length.
+
+    number: of the active guard that is zero there, -1 for none. ``own.guards`` belong to this end if there is one.
+    """
+    k, y, taken, fired, slope, bend = start.mode_row, work.y, own.counts[TAKEN], -1, 0.0, 0.0
+    if own.codes.ends[k] == 0:
+        own.codes.lacked[k] += taken
+    if any_holding(model.automata, state.z):
+        call_function(called_by(work).project, s, y, state.p, state.z, work.x_after)
+        put(work.x_after, y)
+    call_function(called_by(work).flow, s, y, state.p, state.z, work.slopes)
+    error = 2.0 * 2.0**-52 * s
+    if number >= 0:
+        fired = model.tapes.active[model.tapes.active_start[k] + number]
+        value, slope, bend = own.guards[number, 0], own.guards[number, 1], own.guards[number, 2]
+        if slope != 0.0 and abs(value / slope) < math.inf:
+            error = max(error, abs(value / slope))
+    elif s >= start.bound:
+        latest = max(abs(call.times[0]), abs(call.times[2]))
+        if may_vanish(model, k, s, latest, taken, call.scale, work.slopes, state, work):
+            return not_followed(STOPPED)
+    return SegmentEnd(FOLLOWED, s, fired, taken, s, error, slope, bend, length, False)
