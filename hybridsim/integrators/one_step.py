@@ -150,9 +150,7 @@ class OneStepStepper(ABC):
                 break
             self.flow.counters.rejected += 1
             count *= 2
-        parts = tuple(
-            self.dense(a, b, trial) for (a, b), trial in zip(pairwise(points), trials, strict=True)
-        )
+        parts = tuple(self.dense(a, b, trial) for (a, b), trial in zip(pairwise(points), trials, strict=True))
         return Step(start.s, s, start.x, points[-1].x, PiecewiseDense(knots, parts))
 
     def _first_step(self) -> float:
