@@ -16,7 +16,13 @@ from hybridsim.engine.roots.first_exit import FOUND, NEVER, OPEN
 from hybridsim.engine.run.compiled_loop import CompiledLoop, compile_loops
 from hybridsim.engine.run.event_loop import FOLLOWED, FULL, STOPPED, event_loop, not_followed
 from hybridsim.engine.run.method_kernels import MethodKernels
-from hybridsim.engine.run.polynomial_steps import (
+from hybridsim.engine.run.single_call import run_task
+from hybridsim.engine.run.stepping import Flow, Root, Step, Stepper, Watch
+from hybridsim.engine.system.failures import StepFailure
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.tolerances import Tolerances
+from hybridsim.integrators.one_step import OneStepStepper, Point, Trial
+from hybridsim.integrators.polynomial_steps import (
     GOES_ON,
     PolynomialKernels,
     begin_segment,
@@ -28,12 +34,6 @@ from hybridsim.engine.run.polynomial_steps import (
     put_sides,
     record_step,
 )
-from hybridsim.engine.run.single_call import run_task
-from hybridsim.engine.run.stepping import Flow, Root, Step, Stepper, Watch
-from hybridsim.engine.system.failures import StepFailure
-from hybridsim.engine.system.system import System
-from hybridsim.engine.system.tolerances import Tolerances
-from hybridsim.integrators.one_step import OneStepStepper, Point, Trial
 from hybridsim.integrators.step_control import forget, next_length
 
 __all__ = [
