@@ -23,7 +23,7 @@ from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.integrators.one_step import OneStepStepper, Point, Trial
 from hybridsim.integrators.polynomial_steps import (
-    GOES_ON,
+    CONTINUES,
     PolynomialKernels,
     begin_segment,
     end_segment,
@@ -38,10 +38,10 @@ from hybridsim.integrators.step_control import forget, next_length
 
 __all__ = [
     "CAPABILITIES",
+    "CONTINUES",
     "FOLLOWED",
     "FOUND",
     "FULL",
-    "GOES_ON",
     "NEEDS_TAPE",
     "NEVER",
     "OPEN",

@@ -42,7 +42,7 @@ from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
 
 TERMS = 3  # Taylor coefficients of guards at the end of a step: value, slope and bend
-GOES_ON = -1  # a segment takes another step
+CONTINUES = -1  # a segment takes another step
 TRIED, REJECTED, TAKEN = range(3)  # indices of `PolynomialArrays.counts`
 RTOL, MAX_STEP = range(2)  # indices of `PolynomialArrays.control`
 
@@ -197,12 +197,12 @@ def begin_segment(start: Any, model: Any, call: Any, state: Any, work: Any, own:
 
 @inlined
 def next_step(start: Any, call: Any, own: Any, rows: Any, s: float) -> int:
-    """Return GOES_ON, FOLLOWED if the segment is to be divided at s, or another outcome of the segment."""
+    """Return CONTINUES, FOLLOWED if the segment is to be divided at s, or another outcome of the segment."""
     taken = own.counts[TAKEN]
     if s > call.longest[0]:
         return STOPPED
     if start.step + taken < rows.steps.shape[0]:
-        return GOES_ON
+        return CONTINUES
     return FULL if start.number > 0 or taken < MIN_STEPS_IN_PART else FOLLOWED
 
 

@@ -114,7 +114,7 @@ def segment(start, model, call, state, work, own, rows):
         code = contract.next_step(start, call, own, rows, s)
         if code == contract.FOLLOWED:
             break  # the segment is divided
-        if code != contract.GOES_ON:
+        if code != contract.CONTINUES:
             return contract.not_followed(code)
         h = min(h, max_step)
         is_last = h >= bound - s
