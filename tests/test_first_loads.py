@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
+import fresh
 import pytest
 
 import hybridsim as hs
@@ -38,7 +37,5 @@ def test_a_saved_run_goes_on_in_a_fresh_process(integrator: str, tmp_path: Path)
         "sol = hs.load_solution('run.hsol').resume(2.0)\n"
         "print(sol.status, abs(sol(2.0)[0] - 0.5) < 2e-3)\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, env=None, check=False
-    )
+    done = fresh.run(code, folder=tmp_path)
     assert done.stdout == "finished True\n", done.stderr

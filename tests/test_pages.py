@@ -9,6 +9,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import fresh
 import pytest
 
 import hybridsim as hs
@@ -25,13 +26,7 @@ def blocks(page: Path, language: str) -> list[str]:
 
 
 def test_the_lines_of_the_readme_run(tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", "\n".join(blocks(README, "python"))],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = fresh.run("\n".join(blocks(README, "python")), folder=tmp_path, is_strict=True)
     assert done.returncode == 0, done.stderr
     assert "mode changes" in done.stdout
     assert "27 transition" in done.stdout  # of the model in Python: as many as the packaged one has
@@ -58,9 +53,7 @@ def test_the_lines_of_the_readme_run(tmp_path: Path) -> None:
 def test_a_page_prints_what_it_says(page: str, fewest: int, tmp_path: Path) -> None:
     """Its examples in order; behind each print stands, as a comment, what it prints."""
     code = "\n".join(blocks(ROOT / "docs" / page, "python"))
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    done = fresh.run(code, folder=tmp_path, is_strict=True)
     assert done.returncode == 0, done.stderr
     said = re.findall(r"^ *print\(.*\)  # (.+)$", code, re.MULTILINE)
     assert len(said) == code.count("print(") >= fewest
@@ -129,9 +122,7 @@ def test_the_page_on_many_contacts_runs_and_is_short(
 
 def test_a_long_run_goes_on(tmp_path: Path) -> None:
     code = "\n".join(blocks(ROOT / "docs" / "how-to" / "long-runs.md", "python"))
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    done = fresh.run(code, folder=tmp_path, is_strict=True)
     assert done.returncode == 0, done.stderr
     status, message = done.stdout.splitlines()
     assert status == "limit" and "500 were allowed" in message
@@ -140,9 +131,7 @@ def test_a_long_run_goes_on(tmp_path: Path) -> None:
 def test_the_event_trace_is_as_shown(tmp_path: Path) -> None:
     page = ROOT / "docs" / "how-to" / "event-trace.md"
     code = "\n".join(blocks(page, "python"))
-    done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
+    done = fresh.run(code, folder=tmp_path, is_strict=True)
     assert done.returncode == 0, done.stderr
     shown = "".join(blocks(page, "text"))
     rounded = r"within rounding \(\S+\)"  # of another machine's sine

@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import fresh
 import pytest
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="owners and modes are those of POSIX")
@@ -61,13 +62,7 @@ class Place:
         """Run the script in a process of its own."""
         paths = os.pathsep.join(path for path in sys.path if path)
         given = {"HYBRIDSIM_CACHE": str(cache or self.cache), "PYTHONPATH": paths, "NUMBA_CACHE_DIR": ""}
-        return subprocess.run(
-            [sys.executable, "-c", SCRIPT, str(self.kernels)],
-            env={**os.environ, **given, **more},
-            capture_output=True,
-            text=True,
-            timeout=600,
-        )
+        return fresh.run(SCRIPT, str(self.kernels), environment={**os.environ, **given, **more})
 
     def plant(self) -> None:
         """Put code that leaves a trace in the place of all that is kept."""
