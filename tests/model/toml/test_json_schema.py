@@ -88,6 +88,7 @@ x = { start = 0, der = "n + u" }
 n = { start = 1 }
 [inputs]
 u = { kind = "chirp", f0 = 1, f1 = 2, duration = 3, amplitude = 1 }
+h = { kind = "held", value = 1, unit = "N" }
 [monitors]
 m = "x - 1"
 [schedules.s]
