@@ -18,6 +18,7 @@ EXTRAS = PROJECT["optional-dependencies"]
 # Names of packages that are imported by another name than "-" written as "_".
 IMPORTED_AS = {"scikit-sundae": "sksundae", "pillow": "PIL"}
 # What is used without an import, and by what.
+IF_THERE = {"gymnasium"}  # an example and its test use it where it is installed
 NOT_IMPORTED = {
     "pytest-xdist": "-n auto of pytest",
     "pytest-randomly": "the order of the tests",
@@ -66,7 +67,7 @@ def of_others(folder: str) -> set[str]:
         "rivals",
     }
     found = {name.partition(".")[0] for path in files for name in imported(path.read_text(encoding="utf-8"))}
-    return found - set(sys.stdlib_module_names) - own
+    return found - set(sys.stdlib_module_names) - own - IF_THERE
 
 
 def test_the_package_imports_what_it_declares() -> None:
