@@ -154,15 +154,15 @@ events. "By name" is compared with the same packaged model passed as an object.
 
 {table}
 
-## What is bound anew
+## What is prepared again
 
 | change | what happens |
 | --- | --- |
 | a number of a parameter | checks that depend on it are repeated, all else is kept |
 | an expression for a parameter | all values are checked; the code of the structure is kept |
-| a number that decides a condition, or makes a coefficient vanish | linear modes are read anew, once for each case |
-| a start, a discrete state | the start is decided anew |
-| the file of a model | the model is read anew if time stamp or size of the file change |
+| a number that decides a condition, or makes a coefficient vanish | linear modes are read again, once for each case |
+| a start, a discrete state | the start is decided again |
+| the file of a model | the model is read again if the time stamp or the size of the file has changed |
 | a table in a file of its own | the model is read at every call |
 | a Python function | its values are examined at every call |
 """

@@ -1,4 +1,4 @@
-"""Base of compiled methods whose steps have polynomials as dense output, with kernels that their segments call.
+"""This module contains the base class of compiled methods whose dense output is a polynomial, and its kernels.
 
 A segment kernel takes steps and fits a polynomial to each. The kernels here begin a segment, find the first zero of a
 guard along a polynomial, compute guards at the end of a step, and write the end of the segment for the event loop.
@@ -172,7 +172,7 @@ def project(model: Any, work: Any, state: Any, s: float, x: Any) -> None:
 
 @inlined
 def put_sides(state: Any, own: Any) -> None:
-    """Take the sides of the guards from the start of the segment, before a first step is taken again."""
+    """Take the sides of the guards from the start of the segment, before the first step is repeated."""
     put(state.sides, own.sides)
     put(state.orders, own.orders)
     put(state.floors, own.floors)

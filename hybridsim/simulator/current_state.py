@@ -1,4 +1,4 @@
-"""The present state of a simulator, as it is read between two calls."""
+"""This module reads the present state of a simulator between two calls."""
 
 from __future__ import annotations
 

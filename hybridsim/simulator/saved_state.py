@@ -1,4 +1,4 @@
-"""A saved state of a simulator, which can be pickled: the model as text, the state as numbers."""
+"""This module defines the saved state of a simulator: the model as text and the state as numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The class Simulator: a model with an integrator that runs whole spans, or goes step by step."""
+"""This module defines the class `Simulator`, which runs a model over whole spans or step by step."""
 
 from __future__ import annotations
 

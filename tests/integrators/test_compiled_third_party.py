@@ -1,4 +1,4 @@
-"""A compiled method in a package of its own, in docs/examples, held against closed forms and the scenes."""
+"""A compiled method in a package of its own, in docs/examples, compared with closed forms and the scenes."""
 
 from __future__ import annotations
 

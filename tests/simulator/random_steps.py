@@ -1,4 +1,4 @@
-"""Random sequences of calls of a simulator, each held against the straight run with knots at the same times."""
+"""Random sequences of calls of a simulator, each compared with the straight run with knots at the same times."""
 
 from __future__ import annotations
 

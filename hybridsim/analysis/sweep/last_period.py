@@ -46,7 +46,7 @@ class MeasuredPeriod(Measures):
 
 @dataclass(frozen=True)
 class LastPeriod:
-    """A measure of the forcing period that follows the first `after` periods."""
+    """This class measures a result over the forcing period that follows the first `after` periods."""
 
     reading_names: tuple[str, ...]
     after: int
