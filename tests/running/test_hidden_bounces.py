@@ -250,3 +250,23 @@ def test_a_series_that_breaks_off_leaves_no_trace_backward_in_time() -> None:
     assert (sol.status, sol.t_end) == ("finished", -20.0)
     assert 30 < len(sol.events) < 45
     assert sol.stats["restarts"] <= len(sol.events) + 8
+
+
+@pytest.mark.parametrize(
+    ("integrator", "restitution"), [("cvode-bdf", 0.46), ("cvode-adams", 0.6), ("scipy-bdf", 0.6)]
+)
+def test_bounces_that_accumulate_are_not_reported_as_near_grazings_as_well(
+    integrator: str, restitution: float
+):
+    states = [hs.State("h", 0.64, "w"), hs.State("w", 0.1, "b - 4")]
+    floor = hs.Input("floor", "table", times=[-1.0, 0.9, 6.0], values=[0.0, 0.1, -0.2])
+    ball = hs.Model(
+        "ball",
+        states=states,
+        inputs=[floor],
+        impacts=[hs.Impact("b", gap="h - floor", restitution=restitution)],
+    )
+    sol = hs.simulate(ball, (0, 5), integrator=integrator)
+    assert sol.status == "finished"
+    assert any("accumulation" in text for text in sol.warnings)
+    assert {event.kind for event in sol.events} == {"transition"}

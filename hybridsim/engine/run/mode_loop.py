@@ -357,7 +357,7 @@ class ModeLoop:
         record = self.record
         if len(run.knots) > 1:
             record.segments.append(run.segment())
-        record.occurrences.extend(passed_events(self.system, self.origin, run, record))
+        record.occurrences.extend(passed_events(self.system, self.origin, run, record, self.accumulation))
         for k in sorted(run.undefined):
             name = self.system.monitor_names[k]
             record.warn(

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hybridsim.engine.events.outcome import Change
+from hybridsim.engine.events.zeno.accumulation import Accumulation
 from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.record.trajectory import Trajectory
 from hybridsim.engine.run.segment_run import PassedMonitor, SegmentRun
@@ -51,10 +52,18 @@ class Recorder:
         )
 
 
-def passed_events(system: System, origin: Instant, run: SegmentRun, record: Trajectory) -> list[Occurrence]:
-    """Return recorded monitors and near-grazings in order of time, and warn of near-grazings."""
+def passed_events(
+    system: System, origin: Instant, run: SegmentRun, record: Trajectory, accumulation: Accumulation
+) -> list[Occurrence]:
+    """Return recorded monitors and near-grazings in order of time, and warn of near-grazings.
+
+    Between accumulating events a guard stays near zero all the time, so its near-grazings there are left out.
+    """
     passed = [(seen.s, _passed_monitor(system, origin, seen)) for seen in run.passed_monitors]
     declared = [g for g in run.grazings if not system.is_corner[system.owner[g[0]]]]
+    if declared:
+        accumulating = accumulation.under_way
+        declared = [g for g in declared if int(system.owner[g[0]]) not in accumulating]
     if declared:
         times = np.array([s for _, s, _ in declared])
         states = run.flow.project(times, run.segment().dense(times))

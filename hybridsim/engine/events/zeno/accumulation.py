@@ -180,7 +180,7 @@ class Accumulation:
         self._unjudged: set[int] = set()  # components whose series have not been judged yet
 
     @property
-    def _under_way(self) -> set[int]:
+    def under_way(self) -> set[int]:
         """Return the components whose last intervals shrink by a common factor."""
         for c in self._unjudged:
             self._update_shrinking(c)
@@ -189,18 +189,18 @@ class Accumulation:
 
     def is_under_way(self, now: float) -> bool:
         """Return whether the last intervals of a component shrink by a common factor."""
-        for c in sorted(self._under_way):
+        for c in sorted(self.under_way):
             limit, rest = self._ahead(self.paces[c])
             if self._sign * (now - limit) > rest + _END * math.ulp(
                 now
             ):  # the series has ended without a limit
-                self._under_way.discard(c)
-        return bool(self._under_way)
+                self.under_way.discard(c)
+        return bool(self.under_way)
 
     def is_closing_in(self, now: float) -> bool:
         """Return whether a series shrinks so fast that its events have to be resolved one by one."""
         return self.is_under_way(now) and any(
-            _next_turn(self.paces[c])[1] < CLOSING_IN for c in self._under_way
+            _next_turn(self.paces[c])[1] < CLOSING_IN for c in self.under_way
         )
 
     def reach(self, now: float) -> float:
@@ -209,7 +209,7 @@ class Accumulation:
             return math.inf
         return min(
             _LOOK_AHEAD_INTERVALS * max(self.paces[c].intervals[-MAX_EVENTS_PER_TURN:])
-            for c in self._under_way
+            for c in self.under_way
         )
 
     def go_on(self, paces: dict[int, Pace]) -> None:
@@ -277,7 +277,7 @@ class Accumulation:
 
     def expected(self, instant: Instant) -> Limit | None:
         """Return the limit of a series if an instant outside the series is close to the limit, else None."""
-        for c in sorted(self._under_way):
+        for c in sorted(self.under_way):
             time = _expected(self.paces[c], instant)
             if time is not None:
                 return self._shared(time, c)
@@ -286,7 +286,7 @@ class Accumulation:
     def _shared(self, time: float, first: int) -> Limit:
         """Return the limit with all components whose series of events converge to it."""
         among = {first}
-        for c in self._under_way:
+        for c in self.under_way:
             forecast = self.paces[c].forecast
             if forecast is not None and abs(forecast[0] - time) <= max(forecast[1], _END * math.ulp(time)):
                 among.add(c)
@@ -324,7 +324,7 @@ class Accumulation:
             return float(instant)
         if min(gaps) <= 0.0:
             return None
-        if component in self._under_way:
+        if component in self.under_way:
             limit, rest = self._ahead(pace)
             steadiest = _steadier(before, limit, math.ulp(limit))
             self.paces[component] = pace._replace(
