@@ -214,7 +214,7 @@ def _states_in_order(name: str, states: list[str], discrete: list[str]) -> str:
 
 
 def start_values(model: Model, x0: Any, what: str = "x0") -> tuple[dict[str, float], Model]:
-    """Return initial values by name, and the model with changed discrete states; `what` is the argument."""
+    """Return initial values by name, and the model with the given discrete states; `what` names the argument."""
     names = [s.name for s in model.states]
     if x0 is None:
         return {}, model

@@ -204,7 +204,7 @@ def _summary(solution: Solution) -> list[str]:
     found = (
         {kind: n for kind, n in solution._of_model.kinds().items() if kind != "corner"} if has_events else {}
     )
-    counted = ", ".join(f"{n} {kind}" for kind, n in found.items())
+    counted = ", ".join(f"{n} {kind}{'s' * (n > 1 and kind != 'scheduled')}" for kind, n in found.items())
     lines = [
         f"{model.name}: {model.title}" if model.title else model.name,
         f"  integrator   {solution.integrator}"
@@ -214,6 +214,9 @@ def _summary(solution: Solution) -> list[str]:
         if has_events
         else "  events       not stored",
     ]
+    for impact in model.impacts if has_events else ():
+        hits = sum(e.component == impact.name and e.guard == "gap" for e in solution.events)
+        lines.append(f"  {f'impacts ({impact.name})':<12} {hits}")
     for component, modes in (_shares(solution) if has_events else {}).items():
         shares = ", ".join(f"{mode} {100 * share:.3g} %" for mode, share in modes.items())
         lines.append(f"  {f'modes ({component})':<12} {shares} of the time")

@@ -187,7 +187,7 @@ def _call(name: str, args: list[ast.expr], node: ast.expr) -> Polynomial:
 
 
 def tree_of(p: Polynomial) -> ast.expr:
-    """Return the tree of a polynomial of names."""
+    """Return the syntax tree of a polynomial."""
     total: ast.expr | None = None
     for monomial, coefficient in sorted(p.items()):
         term = number_tree(coefficient)

@@ -65,7 +65,7 @@ def _jumps(system: System) -> np.ndarray:
 
 
 def throws(terms: np.ndarray, direction: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the heights to which guards are thrown by their first three terms, and the times of their return.
+    """Return the maxima of guards from their first three Taylor terms, and the times of their return to zero.
 
     A guard that is not pulled back has the height inf.
     """

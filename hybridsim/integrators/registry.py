@@ -51,7 +51,7 @@ def _registered() -> dict[str, type[Integrator]]:
             )
         if integrator.name in found and found[integrator.name] is not integrator:
             raise UsageError(
-                f"{entry.value} has the name {integrator.name!r}, which another integrator has",
+                f"{entry.value} has the name {integrator.name!r}, which another integrator already has",
                 remedy="choose another name",
             )
         found[integrator.name] = integrator
@@ -97,7 +97,7 @@ def registered(method: str | type[Integrator]) -> Iterator[str]:
     before = found.get(method.name)
     if before is not None and before is not method:
         raise UsageError(
-            f"{method.__name__} has the name {method.name!r}, which {before.__name__} has",
+            f"{method.__name__} has the name {method.name!r}, which {before.__name__} already has",
             remedy="choose another name",
         )
     found[method.name] = method

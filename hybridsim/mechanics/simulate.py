@@ -87,12 +87,12 @@ def simulate_mechanical(
     span = arguments.time_span(t_span)
     if span[1] < span[0]:
         raise UsageError(
-            f"`t_span` is {t_span!r}",
+            f"`t_span` cannot be {t_span!r}",
             remedy="use t1 >= t0 (time runs forward only), or simulate system.to_model()",
         )
     if not (isinstance(save, str) and save in ("all", "events", "nothing")):
         raise UsageError(
-            f"`save` is {save!r}", remedy="for a MechanicalSystem use 'all', 'events' or 'nothing'"
+            f"`save` cannot be {save!r}", remedy="for a MechanicalSystem use 'all', 'events' or 'nothing'"
         )
     start, relative = _start(system, x0), arguments.relative_tolerance(rtol)
     absolute = _absolute(system, atol, relative, start)
@@ -138,7 +138,7 @@ def _start(system: MechanicalSystem, x0: Any) -> np.ndarray:
         start = arguments.numbers(x0, "x0", f"use {len(names)} numbers: positions, then velocities")
     if start.shape != (len(names),) or not np.isfinite(start).all():
         raise UsageError(
-            f"x0 is {x0!r}", remedy=f"use {len(names)} finite numbers: positions, then velocities"
+            f"`x0` cannot be {x0!r}", remedy=f"use {len(names)} finite numbers: positions, then velocities"
         )
     return start
 
@@ -153,5 +153,5 @@ def _absolute(system: MechanicalSystem, atol: Any, rtol: float, start: np.ndarra
     else:
         values = np.full(len(start), arguments.number(atol, "atol", remedy))
     if values.shape != start.shape or not (np.isfinite(values).all() and (values >= 0).all()):
-        raise UsageError(f"`atol` is {atol!r}", remedy=remedy)
+        raise UsageError(f"`atol` cannot be {atol!r}", remedy=remedy)
     return values

@@ -99,7 +99,7 @@ def loaded(name_or_path: str | os.PathLike[str]) -> Model:
 
 
 def _state_of(path: str) -> tuple[int, ...]:
-    """Return what changes when a file changes: device, inode, time stamp and size; nothing without a file."""
+    """Return the device, inode, time stamp and size of a file, which differ after a change; () without a file."""
     try:
         found = os.stat(path)
     except (OSError, ValueError):

@@ -57,7 +57,9 @@ def sweep_lines(
         axes = tuple(figure.subplots(len(found), 1, sharex=True, squeeze=False)[:, 0])
         style.head(axes[0], title_of(result))
     if len(axes) != len(found):
-        raise UsageError(f"{len(axes)} axes for {len(found)} results", remedy="use one axes per result")
+        raise UsageError(
+            f"{len(axes)} axes were passed for {len(found)} results", remedy="use one axes per result"
+        )
     others = [name for name in dimensions if name != across]
     for panel, name in zip(axes, found, strict=True):
         _draw(panel, result, name, across, others[0] if others else None, dimensions)

@@ -57,7 +57,9 @@ def sweep_map(result: Sweep, *names: str, axes: tuple[Axes, ...] | None = None) 
             empty.remove()
         axes = tuple(panels[: len(found)])
     if len(axes) != len(found):
-        raise UsageError(f"{len(axes)} axes for {len(found)} results", remedy="use one axes per result")
+        raise UsageError(
+            f"{len(axes)} axes were passed for {len(found)} results", remedy="use one axes per result"
+        )
     for panel, name in zip(axes, found, strict=True):
         _draw(panel, result, name)
     return axes

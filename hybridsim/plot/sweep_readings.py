@@ -38,7 +38,7 @@ def chosen_names(result: Sweep, names: Sequence[str], arrays: bool) -> tuple[str
     found = tuple(names) or _first_asked_for(drawable)
     if not found:
         raise UsageError(
-            "the sweep has no reading that can be drawn", remedy="the status of each point gives the reason"
+            "no result of the sweep can be drawn", remedy="the status of each point gives the reason"
         )
     return found
 

@@ -99,7 +99,9 @@ def _axes(quantities: int, components: int, axes: Sequence[Axes] | None) -> Time
     if axes is not None:
         all_axes = tuple(axes)
         if len(all_axes) != count:
-            raise UsageError(f"{len(all_axes)} axes for {quantities} quantities", remedy=f"use {count} axes")
+            raise UsageError(
+                f"{len(all_axes)} axes were passed for {quantities} quantities", remedy=f"use {count} axes"
+            )
         return TimeHistoryAxes(all_axes[:quantities], all_axes[quantities] if components else None)
     heights = [_ROW] * quantities + [0.1 + _STRIP * components] * bool(components)
     figure = style.figure(9.0, 0.7 + sum(heights))

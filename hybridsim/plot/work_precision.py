@@ -49,7 +49,8 @@ def work_precision(comparison: Comparison, axes: Sequence[Axes] | None = None) -
         panels = tuple(axes)
     if len(panels) != len(quantities):
         raise UsageError(
-            f"{len(panels)} axes for {len(quantities)} kinds of error", remedy=f"use {len(quantities)} axes"
+            f"{len(panels)} axes were passed for {len(quantities)} kinds of error",
+            remedy=f"use {len(quantities)} axes",
         )
     chosen = looks(comparison.rows)
     for panel, quantity in zip(panels, quantities, strict=True):

@@ -43,7 +43,7 @@ class CurrentState:
 
     @property
     def ended(self) -> str:
-        """Why the run has ended, such as a monitor that terminates it; empty while it can go on."""
+        """The reason why the run has ended, such as a monitor; empty while it can continue."""
         return self._current.ended
 
     @property

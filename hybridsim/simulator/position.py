@@ -154,7 +154,7 @@ def _follow(
     if record.status not in ("finished", "terminated"):
         raise SimulationError(
             f"{position.run.model.name}: {record.status}, {record.message}",
-            remedy="the simulator stands just after the last event before this; restore a saved state, or start again",
+            remedy="call sim.restore() or sim.start(); the simulator is now just after the last event that succeeded",
         )
 
 

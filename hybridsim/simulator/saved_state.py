@@ -67,12 +67,12 @@ def require_fit(saved: SavedState, model: Model, about: str) -> None:
 
 
 def source_of(model: Model) -> str | Model:
-    """Return the text of a model; one with Python functions is pickled as it is."""
+    """Return the text of a model; a model with Python functions is pickled instead."""
     return model.to_toml() if model.flow is None else model
 
 
 def model_of(source: str | Model) -> Model:
-    """Return the model of `source_of`."""
+    """Return the model from a result of `source_of`."""
     return Model.from_toml(source) if isinstance(source, str) else source
 
 

@@ -212,7 +212,7 @@ class Simulator(CurrentState):
 
     @refusing
     def advance(self, to: float, inputs: Mapping[str, float] | None = None) -> tuple[Event, ...]:
-        """Go forward to a later time and return what happened on the way, the events at that time included.
+        """Advance to a later time, and return the events on the way and at that time.
 
         Parameters
         ----------
@@ -231,7 +231,7 @@ class Simulator(CurrentState):
         UsageError
             If an argument does not fit, or the run has ended.
         SimulationError
-            If the motion cannot be continued to this time. The simulator then stands just after the last event.
+            If the motion cannot be continued to this time. The simulator is then just after the last event.
         """
         with self._mine("advance"):
             position = require_running(self._position, "advance")
@@ -345,7 +345,7 @@ class Simulator(CurrentState):
 
     @refusing
     def restore(self, saved: SavedState) -> None:
-        """Go back, or on, to a saved state of this simulator or of another one with the same model.
+        """Restore a saved state of this simulator, or of another one with the same model.
 
         Parameters
         ----------
@@ -364,7 +364,7 @@ class Simulator(CurrentState):
             self._position = saved.position
 
     def reset(self) -> None:
-        """Go back to the state just after the last start."""
+        """Restore the state just after the last start."""
         with self._mine("reset"):
             require_running(self._first, "reset")
             self._position = self._first

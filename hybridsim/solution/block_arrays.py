@@ -160,7 +160,9 @@ def _check_series(title: str, system: System, arrays: Arrays, sizes: dict[str, i
     check_ascending(f"{title}: the steps of its segments", ends, strictly=True)
     check_finite(f"{title}: a time", steps)
     if known["K"] < 1 or (columns and known["K"] != columns):
-        raise ValueError(f"{title} has {known['K']} coefficients per step")
+        raise ValueError(
+            f"{title} has {known['K']} coefficients per step instead of {columns or 'at least 1'}"
+        )
 
 
 def _not_near_a_start(count: int, unknowns: int) -> Arrays:

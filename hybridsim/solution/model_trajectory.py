@@ -286,7 +286,9 @@ class ModelTrajectory:
 
     def summary(self) -> list[str]:
         """Return the end state, the events by kind, and the cost."""
-        counted = ", ".join(f"{n} {kind}" for kind, n in sorted(self.kinds().items())) or "none"
+        counted = ", ".join(
+            f"{n} {kind}{'s' * (n > 1 and kind != 'scheduled')}" for kind, n in sorted(self.kinds().items())
+        )
         lines, stats = [], self.stats
         if self.segments:
             last = self.segments[-1].x[-1]
@@ -294,6 +296,6 @@ class ModelTrajectory:
             lines.append(f"  t from {self.t_start:.9g} to {self.t_end:.9g}; at the end {final}")
         return [
             *lines,
-            f"  events: {'not kept' if self.save == 'nothing' else counted}",
+            f"  events: {'not kept' if self.save == 'nothing' else counted or 'none'}",
             f"  cost: {stats['steps']} steps, {stats['rhs_evaluations']} right-hand sides, {stats['wall_time']:.3g} s",
         ]

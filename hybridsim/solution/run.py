@@ -51,7 +51,7 @@ class Run:
     def carried_out(
         self, progress: Callable[[float], None] | None, compile_time: float = 0.0, before: float = 0.0
     ) -> Solution:
-        """Carry out the run and return its solution; the two times are those of an earlier part."""
+        """Carry out the run and return its solution; `compile_time` and `before` are seconds spent earlier."""
         began, compiled = time.perf_counter(), seconds_compiling()
         trajectory = self.method.run(self.system, self.task, progress)
         within = seconds_compiling() - compiled  # compile time of kernels that were first needed in this run

@@ -46,7 +46,7 @@ class Outcome:
 
     @property
     def failed(self) -> bool:
-        """Whether the verdict is neither that the run is right nor that a capability is missing."""
+        """Whether the verdict is a failure: the run is wrong, and no capability is missing."""
         return self.verdict not in (RIGHT, LACKS)
 
 

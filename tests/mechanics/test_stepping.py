@@ -222,9 +222,9 @@ def test_what_cannot_be_run_is_refused() -> None:
 
 
 def test_a_declaration_that_does_not_fit_is_refused() -> None:
-    with pytest.raises(hs.UsageError, match=r"`restitution` is 1\.5"):
+    with pytest.raises(hs.UsageError, match=r"`restitution` cannot be 1\.5"):
         hs.MechanicalImpact("p", [1.0], 0.0, 1.5)
-    with pytest.raises(hs.UsageError, match="gap is 'wide'"):
+    with pytest.raises(hs.UsageError, match="`gap` cannot be 'wide'"):
         hs.MechanicalImpact("p", [1.0], "wide", 0.5)
     with pytest.raises(hs.UsageError, match="direction is zero"):
         hs.MechanicalImpact("p", [0.0], 0.0, 0.5)

@@ -71,7 +71,7 @@ def test_restarting_parts_is_as_good_as_restarting_everything() -> None:
         ({"integrator": "dop853"}, "dop853 cannot simulate a MechanicalSystem"),
         ({"t_span": (1, 0)}, "forward only"),
         ({"z0": {"f1": "stick"}}, "does not support z0"),
-        ({"save": 3.0}, "`save` is 3.0"),
+        ({"save": 3.0}, "`save` cannot be 3.0"),
         ({"x0": {"w": 1.0}}, "contains 'w'"),
         ({"tolerance": 1e-3}, "tolerance is an option of moreau"),
     ],

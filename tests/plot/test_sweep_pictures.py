@@ -113,8 +113,8 @@ def test_texts_as_values_of_a_parameter() -> None:
         (lambda: swept(omega=OMEGA).plot(over="N"), "`over` cannot be 'N'"),
         (lambda: swept(omega=OMEGA, N=N, F0=[1]).plot(), "3 parameters"),
         (lambda: sweep_map(swept(omega=OMEGA)), "a grid of two"),
-        (lambda: hs.sweep("dfcs", {"N": [1]}, lambda m: "s").plot(), "no reading that can be drawn"),
-        (lambda: sweep_lines(swept(omega=OMEGA), "a", axes=()), "0 axes for 1"),
+        (lambda: hs.sweep("dfcs", {"N": [1]}, lambda m: "s").plot(), "no result of the sweep can be drawn"),
+        (lambda: sweep_lines(swept(omega=OMEGA), "a", axes=()), "0 axes were passed for 1"),
     ],
 )
 def test_what_cannot_be_drawn(draw, message: str) -> None:

@@ -103,7 +103,7 @@ def test_axes_of_the_caller_are_used(tmp_path) -> None:
     figure = Figure(figsize=(12, 4))
     axes = figure.subplots(1, 3)
     assert work_precision(comparison(), axes) == tuple(axes)
-    with pytest.raises(UsageError, match="2 axes for 3 kinds of error"):
+    with pytest.raises(UsageError, match="2 axes were passed for 3 kinds of error"):
         work_precision(comparison(), axes[:2])
     assert save(work_precision(comparison()), tmp_path / "chart.png").exists()
 

@@ -93,7 +93,7 @@ class Advice(Readable):
         """The name of the simplest adequate model at each point of a region."""
         if self.region is None:
             raise UsageError(
-                "the advice has no map, because it is for a single point",
+                "this advice is for a single point, so it has no `map`",
                 remedy="pass `over`, such as over={'F0': [20, 30]}, to compute a map",
             )
         return self.region["simplest"]

@@ -86,7 +86,7 @@ class Limits:
     report: Callable[[], None] | None = None
 
     def time_budget(self, full: Answer | None = None) -> TimeBudget:
-        """Return the time budget of one computation: a multiple of the full model's cost, or what is left."""
+        """Return the time limit of one computation: a multiple of the full model's cost, or the remaining time."""
         own = math.inf if full is None else max(_DEARER * full.seconds, self.least)
         return TimeBudget(min(own, self.budget.left), self.report)
 

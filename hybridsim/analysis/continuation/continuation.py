@@ -205,7 +205,7 @@ class _Follower:
         return found, f"{self.parameter} = {here.point.parameter:g} (after {self.max_points} points)"
 
     def _elsewhere(self, here: _Closing) -> _Closing | None:
-        """Return the same orbit from another start, since orbits next to it may not pass the present one."""
+        """Return the same orbit with another start, because neighbouring orbits may not pass the present start."""
         point, solution = begun_elsewhere(here.point)
         self.section = fastest(solution, self.unit)
         return self._closing(point, self._unknowns(point))

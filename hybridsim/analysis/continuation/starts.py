@@ -1,4 +1,4 @@
-"""This module chooses where on a periodic orbit without forcing its run begins, and which state is fixed."""
+"""This module chooses the start of an unforced periodic orbit, and the state that keeps its value there."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def begun_elsewhere(point: BranchPoint) -> tuple[BranchPoint, Solution]:
 
 
 def in_shared(tangent: np.ndarray, point: BranchPoint) -> np.ndarray:
-    """Return the part of a tangent that is the same from any start of the orbit: that of period and parameter."""
+    """Return the entries of a tangent for the period and the parameter, which do not depend on the orbit's start."""
     found = tangent.copy()
     found[: len(point.orbit.start.values)] = 0.0
     return found

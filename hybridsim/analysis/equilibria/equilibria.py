@@ -130,7 +130,7 @@ def equilibria(
 
 
 def _add(found: list[Equilibrium], new: Equilibrium, rounding: np.ndarray) -> None:
-    """Add an equilibrium, but a point on a corner only once, with the larger growth of its two sides."""
+    """Add an equilibrium; a point on a corner is kept once, with the larger growth of its two sides."""
     for i, old in enumerate(found):
         is_same = old.is_point and new.is_point and old.modes == new.modes
         if is_same and (np.abs(old.x - new.x) <= rounding).all():

@@ -166,8 +166,8 @@ def _solve_one(balanced: Callable[[float], float], start: float) -> np.ndarray:
     low = start / _BELOW
     if balanced(low) < low:
         raise DoesNotApply(
-            "the harmonic balance has no solution above 1/1000 of the damping that the frictionless "
-            "motion suggests"
+            "the harmonic balance has no solution: it would need less than 1/1000 of the damping "
+            "estimated from the frictionless motion"
         )
     high = 2.0 * low
     while balanced(high) > high:

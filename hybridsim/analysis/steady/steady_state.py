@@ -402,7 +402,7 @@ class _Search:
         return found
 
     def _without_return(self, passings: Passings) -> SteadyState:
-        """Return the result for a motion that does not come back to earlier states."""
+        """Return the result for a motion that never returns to earlier states."""
         name = self.motion.names[passings.state]
         orbit = Orbit(passings.last, self.duration, 1, math.inf)
         message = (
@@ -466,7 +466,7 @@ def _refuse_what_ends(system: System, has_period: bool) -> None:
     for clock in model.schedules:
         if clock.period is None or clock.count is not None:
             raise UsageError(
-                f"schedule {clock.name} of model {model.name} ends, so there is no steady state before",
+                f"schedule {clock.name} of model {model.name} ends, but a steady state needs schedules without an end",
                 remedy="remove the schedule, or remove its `count`",
             )
         start = evaluate(clock.start, system.values) if clock.start is not None else 0.0

@@ -152,7 +152,9 @@ def _refuse_too_many(lengths: Mapping[str, int], mode: str) -> None:
 
 def _settings(name: str, row: Any) -> tuple[float | Expression, ...]:
     if not is_row(row):
-        raise UsageError(f"the values of {name} are {row!r}", remedy="use a list of numbers or expressions")
+        raise UsageError(
+            f"the values of {name} cannot be {row!r}", remedy="use a list of numbers or expressions"
+        )
     found = tuple(_setting(name, value) for value in islice(row, MOST_POINTS + 1))
     if not found:
         raise UsageError(f"{name} has no values", remedy="use at least one value")

@@ -163,10 +163,10 @@ def _piece(line: Any) -> tuple[list[int], list[Outcome]]:
         For any other content.
     """
     if not (isinstance(line, list) and len(line) == 2 and all(isinstance(part, list) for part in line)):
-        raise ValueError("the line is not a pair of points and results")
+        raise ValueError("the line is not a pair of lists: point numbers and results")
     numbers, rows = line
     if not all(type(number) is int for number in numbers):
-        raise ValueError("the line has an index of a point that is not a number")
+        raise ValueError("the point numbers in the line are not whole numbers")
     return numbers, [_outcome(row) for row in rows]
 
 

@@ -76,7 +76,7 @@ class LastPeriod:
         alone: Callable[[Settings], Outcome],
         watch: Watch,
     ) -> list[Outcome] | None:
-        """Run all points in compiled code except those in `alone`; return None if no point can run so.
+        """Run all points in compiled code except those in `alone`; return None if no point can be run there.
 
         If the watch requests a stop, the outcomes are those of the first points, as far as they were run.
         """

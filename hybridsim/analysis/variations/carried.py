@@ -128,14 +128,14 @@ class Carrier:
         return bool(segment.start.minus(end) >= -time_rounding(self.solution))
 
     def _moves(self, shift: np.ndarray) -> np.ndarray:
-        """Return a mask (M,) of the directions that shift a time with the given derivatives."""
+        """Return a mask (M,) of the directions in which a time with the derivatives `shift` moves."""
         length = self.solution.t_end - self.solution.t_start
         return np.asarray(np.abs(shift) * self._changes.own > _ROUNDING * length)
 
     def _at_end(
         self, last: Last, behind: Segment, Y: np.ndarray, Yd: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the derivatives at an event exactly at the end, which may move beyond the end."""
+        """Return the derivatives if an event is exactly at the end, since a small change may move it beyond the end."""
         before, system = last.segment, self.system
         moves = self._moves(last.shift)
         jumps = bool(

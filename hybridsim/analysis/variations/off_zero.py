@@ -61,7 +61,7 @@ def off_zero(changes: Changes, at: Place) -> tuple[np.ndarray, list[OffZero]]:
 
 
 def limits_reached(changes: Changes, at: Place, components: Sequence[int]) -> list[OffZero]:
-    """Return the force limits that are reached exactly when a component changes its mode."""
+    """Return the force limits that are reached exactly, with no margin, when a component changes its mode."""
     sides = _Sides(changes, at)
     return [one for c in components for one in sides.limits(c)]
 
@@ -97,7 +97,7 @@ class _Sides:
         self.here = self._rates(at.z)
 
     def guards(self) -> list[OffZero]:
-        """Return the guards at zero that do not fire, but would fire with an effect after a small change."""
+        """Return the surfaces that are zero and have different rates on their two sides."""
         guards_here = [
             (c, i, g)
             for c, automaton in enumerate(self.system.automata)

@@ -22,7 +22,7 @@ _ALIKE = 1e-7  # relative; guards fire together if their delays agree
 
 
 def is_knot(system: System, instant: Instant) -> bool:
-    """Return whether an input has a knot at an instant, except for rounding."""
+    """Return whether an input has a knot at an instant, within rounding."""
     slack = 4.0 * math.ulp(float(instant))
     for signal in system.signals:
         knot = signal.next_knot(instant.plus(-slack), True)
@@ -32,7 +32,7 @@ def is_knot(system: System, instant: Instant) -> bool:
 
 
 def batches(happened: Sequence[Occurrence]) -> list[list[Occurrence]]:
-    """Group the events of one instant; a new group begins where the state was recorded again."""
+    """Group the events of one instant; a new group begins where the recorded states differ."""
     found: list[list[Occurrence]] = []
     for one in happened:
         if (

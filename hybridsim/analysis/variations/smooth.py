@@ -154,8 +154,8 @@ def stiff_transition(
         else:
             waiting += [(middle, end, tail), (begin, middle, tail)]
     raise UsageError(
-        f"derivatives between t = {knots[0]:.9g} and {knots[-1]:.9g} (since the last event) are not resolved in {most} "
-        "pieces",
+        f"the derivatives between t = {knots[0]:.9g} (the last event) and {knots[-1]:.9g} vary too fast for {most} "
+        "intervals",
         remedy="simulate a shorter time, or choose parameters for which the motion is slower",
     )
 

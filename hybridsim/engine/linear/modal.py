@@ -220,7 +220,7 @@ def _schur_values(A: np.ndarray) -> np.ndarray:
 
 
 def _partners(values: np.ndarray) -> list[int]:
-    """Return the index of the complex conjugate of each eigenvalue; a real eigenvalue is its own."""
+    """Return the index of the complex conjugate of each eigenvalue; a real eigenvalue is its own conjugate."""
     partners = list(range(len(values)))
     for i, value in enumerate(values):
         if value.imag > 0.0:

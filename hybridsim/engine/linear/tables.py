@@ -193,7 +193,7 @@ def unknown(fields: dict[str, np.ndarray], is_finite: np.ndarray) -> dict[str, n
 
 
 def angles_of(system: System) -> np.ndarray:
-    """Return the range of rounded angles in the run-time vector: the first place, and one after the last."""
+    """Return the range of rounded angles in the run-time vector: its first index, and its last index plus one."""
     return np.array([system.layout.phases_at, system.layout.signals_at], dtype=np.int64)
 
 

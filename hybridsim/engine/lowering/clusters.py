@@ -39,8 +39,8 @@ def normal_loads(
                         f"{component.name} may use the normal force {declared_name(u)} of an impact only as a load to "
                         "which its slip force and its stick limits are proportional",
                         place=component.place,
-                        remedy="use a friction law that is linear in its load; write rates that contain "
-                        f"{declared_name(u)} as the rates of states",
+                        remedy="use a friction law that is linear in its load, and use "
+                        f"{declared_name(u)} elsewhere only in the rates of states",
                     )
                 if own is not None:
                     by_mode = found.setdefault((c, normal[u]), {})

@@ -156,7 +156,7 @@ class HeldStates:
         return None
 
     def _may_share(self, one: Held, other: Held) -> bool:
-        """Return whether two constraints may determine the same state: equal, or never held together."""
+        """Return whether two constraints may determine the same state: they are equal, or never held together."""
         rates = {one, other}
         tied = any(rates == {(tie.gap, 1), (tie.along, 0)} for tie in self.lowering.stop_couplings)
         return tied or self._exclude(one[0], other[0])

@@ -65,13 +65,13 @@ class Products:
         return found
 
     def not_together(self, c: int, pull: Any) -> Any:
-        """Return how strongly surface `c` attracts, negative while a factor of its unknown holds."""
+        """Return the attraction of surface `c`; it is negative while a factor of the product with unknown `c` holds."""
         for d in sorted({e for pair in self.pairs if c in pair for e in pair} - {c}):
             pull = pull * (1 - self._holds(d)) - self._holds(d)
         return pull
 
     def diagonal(self, c: int, entry: Any) -> Any:
-        """Return the effect of unknown `c` on its own surface, plus 1 if `c` and a factor both hold."""
+        """Return the effect of unknown `c` on surface `c`, plus 1 if `c` and a factor of its products both hold."""
         return entry + sum(
             self._holds(c) * self._holds(d)
             for d in sorted({e for p in self.pairs if c in p for e in p} - {c})

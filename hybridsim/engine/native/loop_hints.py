@@ -41,7 +41,7 @@ else:
 
 @inlined
 def index(i: int) -> int:
-    """Return an index that is not negative as one that LLVM knows not to be: it is not counted from the end."""
+    """Mark an index as not negative, so that LLVM does not test whether it counts from the end of an array."""
     return i & _MAX_INDEX
 
 

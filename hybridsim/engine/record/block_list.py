@@ -169,7 +169,7 @@ class SegmentBlockList(BlockList[Segment]):
         return self.window == 0.0
 
     def drop_all_but_end(self) -> None:
-        """Replace all segments by the end of the last one, unless that is already the case."""
+        """Replace all segments by the end of the last one, unless they have been replaced already."""
         last = self.blocks[-1]
         if len(self.blocks) > 1 or len(last) > 1 or not isinstance(last, list) or len(last[0].s) > 1:
             self.set_end(last.at_end())

@@ -72,7 +72,7 @@ def fit(left: Any, right: Any, h: float, shift: Any, inverse: Any, lack: Any, ou
 
 @kernel
 def fit_in_time(left: Any, right: Any, h: float, shift: Any, inverse: Any, lack: Any, out: Any) -> bool:
-    """Write the Hermite polynomial in powers of the time since the step's start; return if it is finite."""
+    """Write the Hermite polynomial in powers of the time since the step's start; return whether it is finite."""
     fit(left, right, h, shift, inverse, lack, out)
     power, total = 1.0, 0.0
     for k in range(out.shape[1]):

@@ -95,7 +95,7 @@ def _layout(
 
 @lru_cache(64)
 def _skipped_rows(first: int, steps: int, count: int) -> np.ndarray:
-    """Return the used rows of each array of the record, of which a method has `count`; last steps begin with 0."""
+    """Return how many rows at the start of each array are omitted; the last `count` arrays belong to the method."""
     return np.array([first, first, first, first + 1, first, first] + [steps] * count, dtype=np.int64)
 
 

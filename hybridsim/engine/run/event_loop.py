@@ -81,7 +81,7 @@ class LoopRecord(NamedTuple):
 
 
 class SegmentStart(NamedTuple):
-    """What a segment kernel is told of a segment, by value: numbers in memory would be read again at each use."""
+    """The input of a segment kernel, passed by value, because numbers in memory would be read at each use."""
 
     mode_row: int  # row of its modes in the tapes
     bound: float  # local time at which it ends at the latest
@@ -92,7 +92,7 @@ class SegmentStart(NamedTuple):
 
 
 class SegmentEnd(NamedTuple):
-    """What a segment kernel answers. Unless `outcome` is FOLLOWED, only that counts; `at` and the rest need a guard."""
+    """The result of a segment kernel: only `outcome` unless that is FOLLOWED; from `at` on only if a guard fired."""
 
     outcome: int
     s: float  # local time of the end
@@ -108,7 +108,7 @@ class SegmentEnd(NamedTuple):
 
 @inlined
 def not_followed(outcome: int) -> SegmentEnd:
-    """Return the answer of a segment kernel that has followed no segment."""
+    """Return the result of a segment kernel that has followed no segment."""
     return SegmentEnd(outcome, 0.0, -1, 0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
 
 

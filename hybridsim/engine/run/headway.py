@@ -123,12 +123,12 @@ class Headway:
             advice = _JUMP if crawls else _EVENTS if has_events else _STEPS
             raise NoHeadway(
                 f"no progress: the last interval led from t = {float(before):.9g} to {float(now):.9g}, and the rest of "
-                f"the run would take at least {to_go / spent:.0e} times as much work",
+                f"the run would take at least {to_go / spent:.0e} times as much work as this interval",
                 advice,
             )
 
     def _fades(self, now: Instant, spent: float, left: float) -> bool:
-        """Return whether several doublings of the cost advanced time only a little, far from the end."""
+        """Return whether the run advanced only a little while its cost doubled several times, far from its end."""
         self._cost += spent
         if self._cost < self._twice:
             return False

@@ -275,7 +275,7 @@ class ModeLoop:
     def _run_compiled(
         self, compiled_loop: CompiledLoop, target: Instant, appointment: Appointment | None
     ) -> tuple[bool, bool]:
-        """Run over ordinary events in compiled code; return if the target was reached, if the run stops."""
+        """Run over ordinary events in compiled code; return (target was reached, run stops)."""
         steps, x_before = self.record.counters.steps, self.lazy_state.read()[0].x.copy()
         while True:
             result = compiled_loop.advance(self.origin, *self.lazy_state.read(), target, self.record)
@@ -528,7 +528,7 @@ class ModeLoop:
         return True
 
     def _gathered(self, limit: Limit) -> bool | None:
-        """Continue from a limit of events along surfaces, in contacts, or as declared; return if it stops.
+        """Continue from a limit of events along surfaces, in contacts, or as declared; return whether the run stops.
 
         The result is None if no motion continues.
         """

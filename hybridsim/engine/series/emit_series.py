@@ -206,7 +206,7 @@ def along_function(name: str, tape: ModeTape, order: int) -> str:
 
 
 def sizes_function(name: str, guards: int, order: int) -> str:
-    """Return the function that writes the powers of h, and for each guard the sum of |c_k| h**k."""
+    """Return the function that writes the powers of h, and the sum of |c_k| h**k for each guard's coefficients c_k."""
     code, size = Lines(), order + 1
     powers = Powers(code, "%s", order)
     powers.store("%out")

@@ -139,7 +139,7 @@ class _Rewriting:
         return (RECIPROCAL + flags, form.base, b, register, out)
 
     def _sum(self, out: int, terms: Sequence[tuple[int, bool]], inner: Sequence[int]) -> None:
-        """Append rows of a sum that adds its latest term last, in the registers of the inner sums."""
+        """Append rows that add the terms of a sum in the order in which they are computed."""
         (total, is_negative), *others = sorted(terms, key=lambda term: self._cycles.get(term[0], _EARLY))
         for (register, turns), to in zip(others, (*inner, out), strict=True):
             if turns == is_negative:

@@ -45,7 +45,7 @@ from hybridsim.engine.system.system import System
 
 @inlined
 def _combine(D: Any, out: int, first: float, a: int, second: float, b: int) -> None:
-    """Set D[out] = first D[a] + second D[b], where zero derivatives times infinite factors are zero."""
+    """Set D[out] = first * D[a] + second * D[b], where a zero derivative times an infinite factor is zero."""
     for j in range(D.shape[1]):
         total = 0.0
         if D[a, j] != 0.0:

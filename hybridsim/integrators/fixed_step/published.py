@@ -148,4 +148,6 @@ class Rk4Sign(Integrator):
 
 def _one_of(integrator: str, option: str, value: str, known: tuple[str, ...]) -> None:
     if value not in known:
-        raise UsageError(f"{integrator}: {option} is {value!r}", remedy=f"use one of {', '.join(known)}")
+        raise UsageError(
+            f"{integrator}: `{option}` cannot be {value!r}", remedy=f"use one of {', '.join(known)}"
+        )

@@ -1,1 +1,1 @@
-"""This package contains Rosenbrock methods for stiff modes, each of which is a tableau and a name."""
+"""This package contains Rosenbrock methods for stiff modes, each defined by a tableau and a name."""

@@ -1,4 +1,4 @@
-"""This package contains explicit embedded Runge-Kutta methods, each of which is a tableau and a name.
+"""This package contains explicit embedded Runge-Kutta methods, each defined by a tableau and a name.
 
 Start with `method`, then `dop853` or `tsit5`. `segments` is the compiled loop.
 """

@@ -17,7 +17,9 @@ def finite(part: Declared, what: str, value: Any) -> float:
     """Return a finite number, or raise an error that names the argument."""
     number = as_real(value)
     if number is None or not math.isfinite(number):
-        raise part._fault(f"{what} is {value!r}", "use finite numbers" + _MOVES * isinstance(value, str))
+        raise part._fault(
+            f"`{what}` cannot be {value!r}", "use finite numbers" + _MOVES * isinstance(value, str)
+        )
     return number
 
 
@@ -26,7 +28,7 @@ def weights(part: Declared, direction: Any) -> tuple[tuple[tuple[int, float], ..
     is_mapping = isinstance(direction, Mapping)
     if not (is_mapping or is_row(direction)):
         raise part._fault(
-            f"`direction` is {direction!r}", "use a row of weights, or a mapping from coordinates"
+            f"`direction` cannot be {direction!r}", "use a row of weights, or a mapping from coordinates"
         )
     row = list(direction.items() if is_mapping else enumerate(direction))
     entries = [(i, finite(part, "direction", w)) for i, w in row]

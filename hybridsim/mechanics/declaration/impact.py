@@ -61,7 +61,8 @@ class MechanicalImpact(Declared):
             object.__setattr__(self, what, finite(self, what, getattr(self, what)))
         if not -ROUNDING <= self.restitution <= 1.0 + ROUNDING:
             raise self._fault(
-                f"`restitution` is {self.restitution!r}", "use a number from 0 (no rebound) to 1 (no loss)"
+                f"`restitution` cannot be {self.restitution!r}",
+                "use a number from 0 (no rebound) to 1 (no loss)",
             )
         object.__setattr__(self, "restitution", min(max(self.restitution, 0.0), 1.0))
         pairs, count = weights(self, self.direction)

@@ -79,7 +79,7 @@ def chain_on_belt(
     belt = finite_number(belt, "belt")
     spread, gap = finite_number(spread, "spread"), None if gap is None else finite_number(gap, "gap")
     if not spread >= 0.0:
-        raise UsageError(f"`spread` is {spread!r}", remedy="use a number >= 0")
+        raise UsageError(f"`spread` cannot be {spread!r}", remedy="use a number >= 0")
     diagonal = np.full(n, leaf + 2.0 * coupling)
     diagonal[0] -= coupling
     diagonal[-1] -= coupling
@@ -90,7 +90,8 @@ def chain_on_belt(
     ]
     if gap is not None and not 2.0 * spread < gap:
         raise UsageError(
-            f"`gap` is {gap!r}, but the blocks start within +-{spread!r}", remedy="use a spread below gap/2"
+            f"`gap` is {gap!r}, and `spread` is {spread!r}: neighbouring blocks could overlap at the start",
+            remedy="use a spread below gap/2",
         )
     stops = range(n - 1) if gap is not None else ()
     return MechanicalSystem(
@@ -193,7 +194,7 @@ def three_coupled_blocks(
     """
     coefficients = numbers(mu, "mu", "use three numbers")
     if len(coefficients) != 3:
-        raise UsageError(f"mu is {mu!r}", remedy="use three numbers")
+        raise UsageError(f"`mu` cannot be {mu!r}", remedy="use three numbers")
     directions = [[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [0.0, -1.0, 1.0]]
     contacts = [
         MechanicalContact(

@@ -52,7 +52,9 @@ class Harmonic:
         for what in ("omega", "sin", "cos"):
             value = as_real(getattr(self, what))
             if value is None or not math.isfinite(value):
-                raise UsageError(f"Harmonic: {what} is {getattr(self, what)!r}", remedy="use a finite number")
+                raise UsageError(
+                    f"Harmonic: `{what}` cannot be {getattr(self, what)!r}", remedy="use a finite number"
+                )
             object.__setattr__(self, what, value)
 
 
@@ -102,7 +104,7 @@ class MechanicalContact(Declared):
         if isinstance(law, str):
             object.__setattr__(self, "law", load_law(law))
         elif not isinstance(law, FrictionLaw):
-            raise self._fault(f"`law` is {law!r}", "use hs.FrictionLaw(...), or the name of a law")
+            raise self._fault(f"`law` cannot be {law!r}", "use hs.FrictionLaw(...), or the name of a law")
         if not self.law.is_set_valued or self.law.tables:
             what = "tables" if self.law.tables else "a direct force instead of slip and stick"
             raise self._fault(
@@ -111,7 +113,7 @@ class MechanicalContact(Declared):
             )
         object.__setattr__(self, "normal", finite(self, "normal", self.normal))
         if not self.normal >= 0.0:
-            raise self._fault(f"`normal` is {self.normal!r}", "use a load >= 0")
+            raise self._fault(f"`normal` cannot be {self.normal!r}", "use a load >= 0")
         if not isinstance(self.base, Harmonic):
             object.__setattr__(self, "base", finite(self, "base", self.base))
         pairs, count = weights(self, self.direction)
@@ -195,7 +197,7 @@ class MechanicalSystem:
     ) -> None:
         for what, text in (("name", name), ("title", title), ("source", source)):
             if not isinstance(text, str):
-                raise UsageError(f"MechanicalSystem: {what} is {text!r}", remedy="use a string")
+                raise UsageError(f"MechanicalSystem: `{what}` cannot be {text!r}", remedy="use a string")
         self.name, self.title, self.source = name, title, source
         self.M = _matrix(M, "M", None)
         require_positive_definite(self.M, name)
@@ -207,7 +209,7 @@ class MechanicalSystem:
         self.q0, self.v0 = self._start(q0, "q0"), self._start(v0, "v0")
         self.names = tuple(f"q{i + 1}" for i in range(self.n)) if names is None else as_tuple(names)
         if not all(isinstance(x, str) for x in self.names):
-            raise UsageError(f"{name}: `names` is {names!r}", remedy=f"use {self.n} strings")
+            raise UsageError(f"{name}: `names` cannot be {names!r}", remedy=f"use {self.n} strings")
         self.velocities = tuple(f"v{i + 1}" if names is None else f"v_{x}" for i, x in enumerate(self.names))
         self._check()
 
@@ -227,7 +229,7 @@ class MechanicalSystem:
         if not isinstance(forcing, Mapping):
             if not is_row(forcing):
                 raise UsageError(
-                    f"{self.name}: `forcing` is {forcing!r}",
+                    f"{self.name}: `forcing` cannot be {forcing!r}",
                     remedy="use one entry for each coordinate, or a mapping from coordinates",
                 )
             forcing = tuple(forcing)
@@ -262,7 +264,7 @@ class MechanicalSystem:
         remedy = f"use {self.n} finite numbers"
         values = np.zeros(self.n) if start is None else real_array(start, f"{self.name}: `{what}`", remedy)
         if values.shape != (self.n,):
-            raise UsageError(f"{self.name}: `{what}` is {start!r}", remedy=remedy)
+            raise UsageError(f"{self.name}: `{what}` cannot be {start!r}", remedy=remedy)
         return values
 
     def _check(self) -> None:

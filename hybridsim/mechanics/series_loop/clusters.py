@@ -76,7 +76,7 @@ def _anchors(arrays: Any, state: Any, first: int, last: int) -> None:
 
 @kernel
 def pseudo_inverse(G: Any, m: int, order: Any, size: int, L: Any, P: Any) -> int:
-    """Set P = (G over `order`)^+ for a positive semidefinite G, and return the rank of G.
+    """Write the pseudo-inverse of the rows and columns `order` of G, which is semidefinite; return the rank.
 
     Pivoted Cholesky gives G = L L^T with L of full column rank; then G^+ = L (L^T L)^-2 L^T.
     """

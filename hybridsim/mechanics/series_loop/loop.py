@@ -126,7 +126,7 @@ def _changes_outside(
     top: int,
     rtol: float,
 ) -> float:
-    """Return the effect of the outermost nodes' new series on other nodes over a time h, in tolerances."""
+    """Return the effect of the outermost nodes' new series on other nodes over a time h, in units of tolerance."""
     worst = 0.0
     for i in range(outer, count):
         j = scratch.nodes[i]

@@ -221,7 +221,7 @@ def sweep(arrays: Any, state: Any, scratch: Any, h: float, tolerance: float) -> 
 def impulses(
     arrays: Any, laws: Any, state: Any, scratch: Any, h: float, tolerance: float, iterations: int
 ) -> bool:
-    """Compute the impulses of a step, with slip forces at the end velocities; return if they converge."""
+    """Compute the impulses of a step, with slip forces at the end velocities; return whether they converge."""
     nc = scratch.speed.shape[0]
     slip_forces(arrays, laws, scratch)
     for _ in range(iterations):

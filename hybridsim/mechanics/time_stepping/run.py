@@ -136,7 +136,7 @@ def _length(system: MechanicalSystem, method: Moreau) -> float:
     for label in ("step", "period", "steps_per_period"):
         value = getattr(method, label)
         if value is not None and not (math.isfinite(value) and value > 0.0):
-            raise UsageError(f"moreau: {label} is {value!r}", remedy="use a positive number")
+            raise UsageError(f"moreau: `{label}` cannot be {value!r}", remedy="use a positive number")
     if method.step is not None:
         return method.step
     rates = [abs(rate) for rate in rates_of(system) if rate != 0.0]

@@ -31,7 +31,11 @@ class Scope:
             return self.model.components_of(contact)
         except ExpressionError as fault:  # in the force, with the arguments in their places
             message = f"contact {contact.name}, law {contact.law.name}: {fault.message}"
-            self.errors.append(ExpressionError(message, place=fault.place, remedy=fault.remedy))
+            arguments = ", ".join(f"{name} = {value.text}" for name, value in contact.arguments.items())
+            remedy = (
+                f"{fault.remedy}; the arguments of the law are {arguments}" if arguments else fault.remedy
+            )
+            self.errors.append(ExpressionError(message, place=fault.place, remedy=remedy))
             return ()
         except ModelError as fault:
             self.errors.append(fault)

@@ -21,7 +21,7 @@ ROUNDING = 1e-12
 
 
 def errors_of_numbers(model: Model, changed: frozenset[str]) -> tuple[ModelError, ...]:
-    """Return the errors of a copy of a valid model with other numbers of some parameters."""
+    """Return the errors of a copy of a valid model that differs in the values of some parameters."""
     checked = model.once_per_expressions("checked names", lambda: checked_names(model))
     if changed.isdisjoint(checked):
         try:

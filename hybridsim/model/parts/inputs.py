@@ -109,7 +109,7 @@ class Input(Declared):
         known = {"place", "name", "kind", *OPTIONAL["held"]}
         extra = [name for name in self.__dataclass_fields__ if name not in known and getattr(self, name)]
         if extra:
-            raise self._fault(f"an input of kind held cannot have '{extra[0]}'", f"remove '{extra[0]}'")
+            raise self._fault(f"an input of kind 'held' cannot have '{extra[0]}'", f"remove '{extra[0]}'")
         assert self.value is not None and self.unit is not None
         return HeldInput(self.name, self.value, self.unit, place=self.place)
 
@@ -120,7 +120,7 @@ class Input(Declared):
 
     @property
     def expressions(self) -> dict[str, Expression]:
-        """The expressions of parameters in the input, by field name."""
+        """The fields of the input that are expressions of parameters, by name."""
         fields = ("amplitude", "period", "phase", "offset", "duty", "f0", "f1", "duration", "value")
         return {name: getattr(self, name) for name in fields if getattr(self, name) is not None}
 

@@ -150,7 +150,7 @@ class Model(Declared):
         self._hold_inputs()
 
     def _hold_inputs(self) -> None:
-        """Move inputs of kind "held" to the discrete states, as which they are computed."""
+        """Move inputs of kind "held" to the discrete states, because the engine computes them as such."""
         held = [declared for declared in self.inputs if declared.kind == "held"]
         if held:
             object.__setattr__(self, "inputs", tuple(i for i in self.inputs if i.kind != "held"))
@@ -461,7 +461,7 @@ class Model(Declared):
 
     @property
     def changed_numbers(self) -> frozenset[str] | None:
-        """The parameters whose numbers are not those of a checked model, in a copy of one; None in another model."""
+        """The parameters with other numbers than in the checked model of which this is a copy; None without one."""
         return self._sound[1] if "_sound" in vars(self) else None
 
     def validate(self) -> Model:

@@ -46,7 +46,7 @@ class TimeStep(Input):
 
     @property
     def expressions(self) -> dict[str, Expression]:
-        """The expressions of parameters in the signal, by field name."""
+        """The fields of the signal that are expressions of parameters, by name."""
         fields = ("shift", "rate", "amplitude", "phase", "period")
         return {name: getattr(self, name) for name in fields if getattr(self, name) is not None}
 

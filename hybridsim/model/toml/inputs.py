@@ -30,7 +30,7 @@ def read_inputs(root: Table, folder: Path) -> Iterable[Input]:
             numbers = _from_file(table, folder)
         else:
             for key in REQUIRED[kind]:
-                table.require(key, f"an input of kind {kind} needs {', '.join(REQUIRED[kind])}")
+                table.require(key, f"an input of kind '{kind}' needs {', '.join(REQUIRED[kind])}")
             numbers = {key: _numbers(table, key) for key in _NUMBERS if key in table.data}
         texts = {key: table.text(key) for key in _TEXTS if key in table.data}
         rest = [key for key in known if key not in (*_TEXTS, *_NUMBERS) and key in table.data]

@@ -96,7 +96,11 @@ def _split(text: str) -> list[str]:
 
 
 def _model(root: Table, folder: Path) -> Model:
-    loose = [key for key, value in root.data.items() if key not in KEYS and type(value) in (int, float)]
+    loose = [
+        key
+        for key, value in root.data.items()
+        if key not in KEYS and (type(value) in (int, float) or (isinstance(value, dict) and "value" in value))
+    ]
     root.only_in(*KEYS, others=loose, remedy="write the line [parameters] above them, if they are parameters")
     if root.data.get("schema", SCHEMA) != SCHEMA:
         root.fail(f"unknown schema {root.data['schema']!r}", f"write schema = {SCHEMA}", "schema")

@@ -106,6 +106,6 @@ class Transitions:
                     )
         for name, amounts in added.items():
             if name in values:
-                raise SimulationError(f"resets at t = {float(point.t)!r} set {name} and add to it")
+                raise SimulationError(f"resets at t = {float(point.t)!r} both set {name} and add to it")
             values[name] = context.fsum([before[name], *amounts])
         return values

@@ -197,7 +197,7 @@ def check_checkpoint(header: Header, arrays: Arrays, system: System, span: tuple
                 np.isnan(arrays["headway"]).any()
                 or np.isinf(np.delete(arrays["headway"], HEADWAY_PACE)).any()
             ):
-                raise ValueError("the pace of the run in the checkpoint is not finite")
+                raise ValueError("a measured speed of the run in the checkpoint is not finite")
         if "taken_over" in arrays:
             check_forms("the checkpoint", arrays, {"taken_over": (float, ())}, {})
             check_finite("the time of a change of method", arrays["taken_over"])
@@ -212,11 +212,11 @@ def _check_pace(row: object, components: int) -> None:
         raise ValueError(f"{what} cannot be {row!r}")
     component, (last, intervals, longest, forecast, steadiest) = row
     if type(component) is not int or not _NOBODY <= component < components:
-        raise ValueError(f"{what} is of {component!r}")
+        raise ValueError(f"{what} refers to the unknown component {component!r}")
     if last is not None:
         check_instant(what, last)
     if not isinstance(intervals, list) or len(intervals) > _MOST_INTERVALS:
-        raise ValueError(f"{what} has the intervals {intervals!r}")
+        raise ValueError(f"{what} has invalid intervals: {intervals!r}")
     for value in (*intervals, longest):
         check_number(what, value, 0.0)
     for values, count in ((forecast, 2), (steadiest, 3)):

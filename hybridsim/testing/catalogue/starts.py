@@ -1,4 +1,4 @@
-"""Scenes in which a start or a jump changes the sides of corners, steps in time and loads."""
+"""Scenes of starts and jumps at which corners, guards and contacts have to choose their sides."""
 
 from __future__ import annotations
 

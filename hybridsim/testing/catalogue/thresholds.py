@@ -81,7 +81,7 @@ def _many_stops() -> Scene:
 
 
 def _between() -> Scene:
-    """Each slip of the pulled slider ends where the spring pushes back with 0.6, between 0.2 and 1.
+    """Return the scene of a pulled slider that stops where the spring force is between slip and stick force.
 
     In a slip e = 0.2 + 0.8 cos(s) + 0.5 sin(s), and it ends at tan(s/2) = -0.8/0.5, where e = 0.2 - 0.8.
     """

@@ -89,7 +89,7 @@ reset.x = "x + 1\""""
         (
             'x = { start = 0, der = "-x + sin(t)" }',
             '[schedules.s]\ntimes = [1.0]\nreset.x = "x + 1"',
-            "ends, so there is no steady state",
+            "ends, but a steady state needs schedules without an end",
         ),
     ],
 )

@@ -56,7 +56,7 @@ def work(
 
 
 def _taken_over(journal: Journal, collected: Collected, chains: int | None) -> np.ndarray:
-    """Return a mask (total,) of points already in a journal; a chain counts only if it is complete."""
+    """Return a mask (total,) of points with a result in the journal; a `warm_start` chain must be complete."""
     total = len(collected.status)
     known = np.zeros(total, dtype=np.bool_)
     for line, (numbers, outcomes) in enumerate(journal.known, start=2):

@@ -136,7 +136,7 @@ class ClusterChoice(EventVerdicts):
         return mask
 
     def _pinned(self, components: list[int]) -> np.ndarray:
-        """Return the states x, with the surfaces of some components exactly zero."""
+        """Return the states x, moved so that the surfaces of some components are exactly zero."""
         z = np.maximum(self.at.z, 0)
         for c in components:
             z[c] = self.system.automata[c].hold

@@ -109,7 +109,7 @@ class EventVerdicts:
         return int(_verdict(self.automata, None, 0, self.judged(z), z, members, continuous, True, 0))
 
     def is_continuous(self, z: np.ndarray, components: Iterable[int]) -> bool:
-        """Return whether all unknowns are unchanged by all changes of mode so far."""
+        """Return whether no change of mode so far has changed an unknown."""
         if self.jumped:
             return False
         members, event = np.array(list(components), dtype=np.int64), self.event()

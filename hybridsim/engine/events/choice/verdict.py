@@ -109,7 +109,7 @@ def is_smooth(automata: Any, event: Any, z: Any, members: Any, jumps: Any) -> bo
 
 @inlined
 def zeros_of_surface(automata: Any, event: Any, z: Any, c: int, continuous: bool) -> int:
-    """Return the zeros that the event decrees for the surface of a component beside it; see `decreed_zeros`."""
+    """Return how many Taylor coefficients of a component's surface are zero by definition of the event."""
     if not event.on_surface[c] or z[c] == automata.hold[c]:
         return 0
     is_rate_zero = continuous and is_release(automata, event, z, c)
@@ -118,7 +118,7 @@ def zeros_of_surface(automata: Any, event: Any, z: Any, c: int, continuous: bool
 
 @inlined
 def decreed_zeros(automata: Any, event: Any, z: Any, c: int, j: int, g: int, continuous: bool) -> int:
-    """Return how many leading coefficients of a guard are zero by definition of the event in the modes `z`.
+    """Return how many Taylor coefficients of a guard are zero by definition of the event in the modes `z`.
 
     g: number of the guard; c, j: its component, and its index in the mode.
 

@@ -140,7 +140,7 @@ def _choose_cluster(
 
 @per_structure
 def surfaces_of(system: System) -> tuple[np.ndarray, ...]:
-    """Return what `plain_start` reads of the tape of the first modes.
+    """Return the arrays that `plain_start` reads from the tape of the first modes.
 
     These are the constant rows, the rows, the registers of the rates and of the surfaces, and the component of each
     surface.

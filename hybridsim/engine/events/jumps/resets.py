@@ -88,9 +88,7 @@ def _contradiction(system: System, name: str, one: _Changes) -> str:
     remedy = f'; to add amounts in any order, write {name} = "+= amount"'
     descriptions = " and ".join(dict.fromkeys(reset_description(system, key) for key in keys))
     if one.added:
-        return (
-            f"at one instant {descriptions} set {name} and add to it, and their order is not declared{remedy}"
-        )
+        return f"at one instant {descriptions} both set {name} and add to it, and their order is not declared{remedy}"
     if any(_reads(system.model, key, name) for key in keys):
         return f"{descriptions} change {name} at one instant, and one of them also reads {name}{remedy}"
     (_, low, low_error), *_, (_, high, high_error) = sorted(one.set, key=lambda c: c[1])

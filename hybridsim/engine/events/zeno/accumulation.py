@@ -198,13 +198,13 @@ class Accumulation:
         return bool(self.under_way)
 
     def is_closing_in(self, now: float) -> bool:
-        """Return whether a series shrinks so fast that its events have to be resolved one by one."""
+        """Return whether the intervals shrink so fast that the events have to be resolved one by one."""
         return self.is_under_way(now) and any(
             _next_turn(self.paces[c])[1] < CLOSING_IN for c in self.under_way
         )
 
     def reach(self, now: float) -> float:
-        """Return how far ahead in time rounding errors do not hide the events of a series."""
+        """Return the time span in which rounding errors do not hide accumulating events."""
         if not self.is_under_way(now):
             return math.inf
         return min(
@@ -218,7 +218,7 @@ class Accumulation:
         self._shrinking, self._unjudged = set(), set(paces)
 
     def forget(self, components: tuple[int, ...]) -> None:
-        """Discard the series of intervals of some components."""
+        """Discard the stored intervals of some components."""
         for c in components:
             self.paces.pop(c, None)
             self._shrinking.discard(c)
@@ -247,7 +247,7 @@ class Accumulation:
         return None
 
     def _paced(self, instants: np.ndarray, owners: np.ndarray, component: int) -> tuple[bool, Pace]:
-        """Return whether the series of a component may end with its new events, and the updated intervals."""
+        """Return whether a component's accumulation may end with its new events, and the updated intervals."""
         pace = self.paces.get(component, BEGINNING)
         known = np.array(pace.intervals) if pace.intervals else _NO_INTERVALS
         at, work, last = (
@@ -276,7 +276,7 @@ class Accumulation:
         return self._shared(self._sign * min(ended)[0], min(ended)[1]) if ended else None
 
     def expected(self, instant: Instant) -> Limit | None:
-        """Return the limit of a series if an instant outside the series is close to the limit, else None."""
+        """Return the limit of accumulating events if it is close to an instant that is not one of them, else None."""
         for c in sorted(self.under_way):
             time = _expected(self.paces[c], instant)
             if time is not None:
@@ -284,7 +284,7 @@ class Accumulation:
         return None
 
     def _shared(self, time: float, first: int) -> Limit:
-        """Return the limit with all components whose series of events converge to it."""
+        """Return the limit with all components whose events accumulate at it."""
         among = {first}
         for c in self.under_way:
             forecast = self.paces[c].forecast
@@ -305,7 +305,7 @@ class Accumulation:
             self._shrinking.discard(component)
 
     def _ahead(self, pace: Pace) -> tuple[float, float]:
-        """Return the limit predicted by the last intervals of a series, and its distance from the last event."""
+        """Return the limit predicted by the last intervals, and its distance from the last event."""
         turn, factor = _next_turn(pace)
         rest = sum(pace.intervals[-turn:]) * factor / (1.0 - factor)
         assert pace.last is not None
@@ -344,7 +344,7 @@ def _next_turn(pace: Pace) -> tuple[int, float]:
 
 
 def _expected(pace: Pace, instant: Instant) -> float | None:
-    """Return the limit of a series if an instant outside the series is close to the limit, else None."""
+    """Return the limit of accumulating events if it is close to an instant that is not one of them, else None."""
     if pace.forecast is None:
         return None
     limit, rest = pace.forecast
@@ -354,7 +354,7 @@ def _expected(pace: Pace, instant: Instant) -> float | None:
 
 
 def _steadier(before: Pace, limit: float, least: float) -> tuple[float, float, float]:
-    """Return the steadiest forecast of a series as (last change, least change, forecast).
+    """Return the forecast of the limit that changed least, as (last change, least change, forecast).
 
     The first forecasts miss the deviation of the series from a geometric one. The last ones are dominated by rounding,
     unless the events are located at zero.
