@@ -199,12 +199,14 @@ def _final(solution: Solution) -> list[tuple[str, float]]:
 
 
 def _summary(solution: Solution) -> list[str]:
+    from hybridsim.solution.event import counted_kind
+
     model, stats = solution.model, solution.stats
     has_events = _has_events(solution)
     found = (
         {kind: n for kind, n in solution._of_model.kinds().items() if kind != "corner"} if has_events else {}
     )
-    counted = ", ".join(f"{n} {kind}{'s' * (n > 1 and kind != 'scheduled')}" for kind, n in found.items())
+    counted = ", ".join(counted_kind(kind, n) for kind, n in found.items())
     lines = [
         f"{model.name}: {model.title}" if model.title else model.name,
         f"  integrator   {solution.integrator}"

@@ -64,7 +64,7 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--list",
         action="store_true",
-        help="combine the k-th values of all parameters, instead of all combinations",
+        help="take the k-th values of all parameters together, instead of all combinations",
     )
     parser.add_argument("--t-end", metavar="TIME", help="end time of each run, for --measure final")
     parser.add_argument(

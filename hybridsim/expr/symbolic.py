@@ -131,7 +131,7 @@ def _convert(node: ast.expr, symbols: Mapping[str, Any]) -> Any:
             return sympy.Piecewise((first, condition), (second, True))
         case ast.Call(func=ast.Name(id=name), args=args):
             return _FUNCTIONS[name](*(_convert(arg, symbols) for arg in args))
-    raise TypeError(f"an unchecked node: {ast.dump(node)}")
+    raise TypeError(f"no checked expression contains {ast.dump(node)}")
 
 
 def _binary(op: ast.operator, left: Any, right: Any) -> Any:

@@ -64,7 +64,7 @@ def value_of(node: ast.expr, values: Mapping[str, float]) -> float | bool:
             return value_of(body if value_of(test, values) else orelse, values)
         case ast.Call(func=ast.Name(id=name), args=args):
             return _finite(node, FUNCTIONS[name].value, *(value_of(arg, values) for arg in args))
-    raise TypeError(f"unchecked node in the evaluation: {ast.dump(node)}")
+    raise TypeError(f"no checked expression contains {ast.dump(node)}")
 
 
 def _finite(node: ast.expr, function: Callable[..., float], *arguments: float) -> float:
@@ -73,10 +73,10 @@ def _finite(node: ast.expr, function: Callable[..., float], *arguments: float) -
     except ZeroDivisionError:
         raise NoValue(node, "division by zero") from None
     except OverflowError:
-        raise NoValue(node, "it is too large for a double") from None
+        raise NoValue(node, "too large for a double") from None
     except ValueError:
         shown = ", ".join(f"{argument:g}" for argument in arguments)
-        raise NoValue(node, f"it is not defined at ({shown})") from None
+        raise NoValue(node, f"not defined at ({shown})") from None
     if not math.isfinite(value):
-        raise NoValue(node, f"it is {value}")
+        raise NoValue(node, f"the result is {value}")
     return value

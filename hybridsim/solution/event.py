@@ -65,6 +65,11 @@ class Event:
         return f"<{self.kind} {self.component}{change} at t = {self.t:.9g}>"
 
 
+def counted_kind(kind: str, count: int) -> str:
+    """Return how many events of one kind happened as text, such as "2 transitions"."""
+    return f"{count} {kind}{'s' * (count > 1 and kind != 'scheduled')}"
+
+
 @dataclass(frozen=True)
 class ModeInterval:
     """A time interval that a component spent in one mode."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from hybridsim.engine.record.time_lookup import Frame, locate_times
 from hybridsim.solution.by_name import ByName
-from hybridsim.solution.event import Event, ModeInterval
+from hybridsim.solution.event import Event, ModeInterval, counted_kind
 from hybridsim.solution.files.tabulated import tabulated
 
 if TYPE_CHECKING:
@@ -286,9 +286,7 @@ class ModelTrajectory:
 
     def summary(self) -> list[str]:
         """Return the end state, the events by kind, and the cost."""
-        counted = ", ".join(
-            f"{n} {kind}{'s' * (n > 1 and kind != 'scheduled')}" for kind, n in sorted(self.kinds().items())
-        )
+        counted = ", ".join(counted_kind(*found) for found in sorted(self.kinds().items()))
         lines, stats = [], self.stats
         if self.segments:
             last = self.segments[-1].x[-1]

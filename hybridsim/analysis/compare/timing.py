@@ -68,7 +68,7 @@ def timed_in_turns(
 
 
 def _warmed_up(run: Callable[[], object], expected: float, until: float) -> float:
-    """Return the likely seconds of a call, after the one-time work of the first calls."""
+    """Return the expected seconds of a further call, without the one-time work of the first calls."""
     calls, spent, likely = 0, 0.0, expected
     while likely < (_TURN if calls else _LONG) and spent < _TURN and calls < _MOST_BEFORE:
         if time.monotonic() + likely > until:

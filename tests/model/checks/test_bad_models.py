@@ -141,7 +141,7 @@ CONTENT = {
     "an output of nothing": (BLOCK + '[outputs]\nu = "u"\n', "output u: unknown name 'u'", 15),
     "no states": ("title = 'x'\n", "model scene has no states", None),
     "an infinite parameter": (changed(BLOCK, "m = 1.0", "m = inf"), "inf is not finite", 3),
-    "a parameter that overflows": (changed(BLOCK, "4*m", "1e300*(m + 1e300)"), "it is inf", 4),
+    "a parameter that overflows": (changed(BLOCK, "4*m", "1e300*(m + 1e300)"), "the result is inf", 4),
     "a start without value": (changed(BLOCK, "start = 1,", "start = 'log(-m)',"), "evaluated with m = 1", 8),
     "nominal zero": (changed(BLOCK, "start = 1,", "start = 1, nominal = 0,"), "'nominal' cannot be 0", 8),
     "negative normal load": (changed(BLOCK, "N = 2.0", "N = -2.0"), "the normal load cannot be -2 (N)", 10),
