@@ -188,7 +188,7 @@ def _engine(report: Report) -> Iterator[str]:
         yield f"contacts whose modes are selected together: {'; '.join(clusters)}"
     written = f", generated in {report.lowering_seconds:.1g} s" if report.lowering_seconds else ""
     cost = (
-        f"compiled once at the first run, in up to about {report.compile_seconds:.1g} s"
+        f"compiled at the first run, in about {report.compile_seconds:.1g} s or less"
         if report.compile_seconds
         else "cached"
     )

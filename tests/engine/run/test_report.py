@@ -35,7 +35,7 @@ def test_the_estimate_is_of_the_size_of_the_measured_time() -> None:
     assert before.lowering_seconds > 0.0
     text = "\n".join(lines_of(model, before, (), ()))
     assert f"({before.operations} operations, generated in {before.lowering_seconds:.1g} s)" in text
-    assert f"compiled once at the first run, in up to about {before.compile_seconds:.1g} s" in text
+    assert f"compiled at the first run, in about {before.compile_seconds:.1g} s or less" in text
     code, start = compiled(model), time.process_time()
     for name in functions_in(code.module.__loader__.get_source(code.module.__name__)):
         code.address(name)
