@@ -45,7 +45,7 @@ FILES = {
     "integrators/fixed_step/moreau_kernels.py": 413,
     "integrators/fixed_step/run.py": 426,
     "integrators/runge_kutta/segments.py": 409,
-    "mechanics/declaration/system.py": 352,
+    "mechanics/declaration/system.py": 350,
     "mechanics/series_loop/expansion.py": 312,
     "mechanics/series_loop/steps.py": 350,
     "mechanics/time_stepping/kernels.py": 379,
@@ -53,7 +53,6 @@ FILES = {
     "model/smoothing/rewriting.py": 534,
     "simulator/simulator.py": 380,
     "solution/explain/explanation.py": 351,
-    "solution/model_trajectory.py": 301,
 }
 FUNCTIONS = {
     "analysis/advise/advise.py::advise": 93,
