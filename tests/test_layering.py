@@ -51,7 +51,6 @@ HANDED_ON = {
     "model.parts.model",
     "model.parts.contact",
     "model.smoothing.rewriting",
-    "engine.lowering.lower",
     "engine.events.choice.event_verdicts",
     "engine.events.resolve",
     "solution.model_trajectory",

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from hybridsim.engine.lowering.lower import Lowering
+from hybridsim.engine.lowering.lowering_state import LoweringState
 
 
 def affine_modes(
-    lowering: Lowering, der: list[Any], definitions: dict[Any, Any], surfaces: dict[int, Any]
+    lowering: LoweringState, der: list[Any], definitions: dict[Any, Any], surfaces: dict[int, Any]
 ) -> dict[str, tuple[bool, ...]]:
     """Return the modes in which the flow is linear in the states, including the solved unknowns."""
     free = set(lowering.states) | {

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Container
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from hybridsim.engine.lowering.lowering_state import LoweringState
 from hybridsim.engine.lowering.program_names import declared_name
 from hybridsim.errors import ModelError
 from hybridsim.expr.simplify import simplified
 
-if TYPE_CHECKING:
-    from hybridsim.engine.lowering.lower import Lowering
-
 
 def normal_loads(
-    lowering: Lowering, unknown: dict[int, Any], definitions: dict[Any, Any]
+    lowering: LoweringState, unknown: dict[int, Any], definitions: dict[Any, Any]
 ) -> dict[tuple[int, int], dict[str, Any]]:
     """Return the derivatives of slip forces with respect to normal forces, by contact, impact and mode.
 

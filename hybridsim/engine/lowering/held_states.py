@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hybridsim.engine.lowering.elimination import eliminated
+from hybridsim.engine.lowering.lowering_state import LoweringState
 from hybridsim.engine.lowering.program import Assign, Item, Switch
 from hybridsim.errors import ModelError
 from hybridsim.expr.simplify import simplified
-
-if TYPE_CHECKING:
-    from hybridsim.engine.lowering.lower import Lowering
 
 # From an error of 1e-3, the largest tolerance, Newton's method reaches rounding after two corrections. The
 # third correction is for stages of a step, which may be farther away.
@@ -38,7 +36,7 @@ class HeldStates:
         projected, too.
     """
 
-    def __init__(self, lowering: Lowering, surfaces: dict[Held, Any]) -> None:
+    def __init__(self, lowering: LoweringState, surfaces: dict[Held, Any]) -> None:
         self.lowering, self.surfaces = lowering, surfaces
         self.states: list[Any] = lowering.states
         self._of_gaps = {x for c, k in surfaces if k == 1 for x in surfaces[c, 0].free_symbols}

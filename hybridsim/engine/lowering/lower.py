@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
 from typing import Any
-
-import sympy as sp
 
 from hybridsim.engine.lowering.affine_modes import affine_modes
 from hybridsim.engine.lowering.clusters import clusters_of, normal_loads
 from hybridsim.engine.lowering.elimination import eliminated
 from hybridsim.engine.lowering.held_states import HeldStates
+from hybridsim.engine.lowering.lowering_state import LoweringState
 from hybridsim.engine.lowering.nonlinear import refuse_powers
 from hybridsim.engine.lowering.products import Products
 from hybridsim.engine.lowering.program import Assign, Item, Switch, changed, ordered
 from hybridsim.engine.lowering.program_names import declared_name, user
-from hybridsim.engine.lowering.second_order import Partner, attraction, partners
+from hybridsim.engine.lowering.second_order import attraction, partners
 from hybridsim.engine.lowering.shared_rates import refuse_changed_rates, shared_rates
 from hybridsim.engine.lowering.stop_coupling import StopCoupling, coupling_help, stop_couplings, without_share
 from hybridsim.engine.series.layout import SIGNAL_SLOTS, Layout
-from hybridsim.errors import ModelError, Place
-from hybridsim.expr.parse import Expression
+from hybridsim.errors import ModelError
 from hybridsim.expr.simplify import is_short, simplified, written_out
-from hybridsim.expr.symbolic import to_sympy, without_distributions
+from hybridsim.expr.symbolic import without_distributions
 from hybridsim.model.parts.model import Model
 from hybridsim.model.parts.switching import ATTRACTION
 
@@ -52,88 +49,8 @@ class Program:
         self.layout = Layout(len(model.parameters), len(model.discrete), len(self.rates), len(model.inputs))
 
 
-class Lowering:
-    """The steps that convert a `Model` to a `Program`, with the symbols that they share."""
-
-    def __init__(self, model: Model) -> None:
-        self.sp = sp
-        self.model = model
-        self.components: tuple[Any, ...] = tuple(model.all_components())
-        names = [p.name for p in model.parameters] + [s.name for s in model.states]
-        names += [d.name for d in model.discrete] + [i.name for i in model.inputs]
-        names += [n for n, _ in model.definitions] + ["t"]
-        names += sorted({n for c in self.components for m in c.modes for n in m.set})
-        names += [c.surface.unknown for c in self.components if c.surface]
-        names += [ATTRACTION + c.surface.unknown for c in self.components if c.surface and c.surface.unique]
-        self.symbols = {n: sp.Symbol(user(n), real=True) for n in names}
-        self.s = sp.Symbol("s", real=True)
-        self.t = self.symbols["t"]
-        self.parameters = {self.symbols[p.name] for p in model.parameters}
-        self.states = [self.symbols[s.name] for s in model.states]
-        self.rates: list[Any] = []
-        self.unknown: dict[int, Any] = {}  # unknown of each surface
-        self.definitions: dict[Any, Any] = {}
-        self.effects: list[Any] = []  # effect of each unknown on the rate of its own surface
-        # held quantity of each unknown: a surface function, or the rate of a gap
-        self.held_rates: dict[int, Any] = {}
-        self.open_rates: list[Any] = []  # rates of the states as functions of the unknowns
-        # components whose unknown does not act on the rate of their surface
-        self.never_held: set[int] = set()
-        self.partners: dict[int, Partner] = {}  # relays that the surface of their rate holds
-        self.stop_couplings: list[StopCoupling] = []
-        self.effect: dict[tuple[int, int], Any] = {}  # effect of unknowns on the rates of held quantities
-        self.angles = self._defined_angles()
-
-    def _defined_angles(self) -> dict[Any, Any]:
-        """Substitute definitions that grow linearly in time, as theta = omega*t, in sines and cosines."""
-        waiting = {self.symbols[n]: to_sympy(e, self.symbols) for n, e in self.model.definitions}
-        found: dict[Any, Any] = {}
-        while True:
-            written_out = {name: e.subs(found) for name, e in waiting.items() if name not in found}
-            grow = {name: e for name, e in written_out.items() if self._rate(e) is not None}
-            if not grow:
-                return found
-            found |= grow
-
-    def _rate(self, e: Any) -> Any:
-        """Return de/dt if it is not zero and depends on parameters only, else None."""
-        if self.t not in e.free_symbols:
-            return None
-        rate = self.sp.diff(e, self.t)
-        return None if rate == 0 or rate.free_symbols - self.parameters else rate
-
-    def convert(self, expression: Expression) -> Any:
-        """Return a declared expression in SymPy, with angles that grow in time relative to the local time."""
-        sp = self.sp
-        value = to_sympy(expression, self.symbols)
-        if value.has(sp.I, sp.nan, sp.zoo, sp.oo):
-            simplified = re.sub(rf"\b{user('')}", "", str(value))
-            raise expression.error(
-                f"'{expression.text}' is not a finite real number: it simplifies to {simplified}",
-                remedy="look for a root or a logarithm of a negative number, or a division by zero",
-            )
-        return self._local_angles(value)
-
-    def _local_angles(self, e: Any) -> Any:
-        sp = self.sp
-        if not e.free_symbols & {self.t, *self.angles}:
-            return e
-
-        def rewrite(argument: Any, kind: Any) -> Any:
-            argument = self._local_angles(argument) if argument.has(sp.sin, sp.cos, sp.tan) else argument
-            written_out = argument.subs(self.angles)
-            rate = self._rate(written_out)
-            if rate is None:
-                return kind(argument)
-            argument = written_out
-            if rate not in self.rates:
-                self.rates.append(rate)
-            phase = sp.Symbol(f"phase_{self.rates.index(rate)}", real=True)
-            return kind(phase + rate * self.s + argument.subs(self.t, 0))
-
-        for kind in (sp.sin, sp.cos, sp.tan):
-            e = e.replace(kind, lambda a, k=kind: rewrite(a, k))
-        return e
+class Lowering(LoweringState):
+    """The steps that convert a `Model` to a `Program`."""
 
     def signal(self, index: int) -> Any:
         """Return the current piece of an input as an expression in local time."""
@@ -216,19 +133,9 @@ class Lowering:
             found[c] = rate
         return found
 
-    def inlined(self, expression: Expression) -> Any:
-        """Return a declared expression in SymPy with all definitions substituted."""
-        return self.inline(self.convert(expression), self.definitions)
-
     def _rate_in_time(self, s: Any) -> Any:
         """Return the rate of an expression in time at constant states."""
         return self.sp.diff(s, self.s) + self.sp.diff(s, self.t)
-
-    def inline(self, e: Any, definitions: dict[Any, Any]) -> Any:
-        """Substitute definitions in an expression, repeatedly, until none is left."""
-        while e.free_symbols & definitions.keys():
-            e = e.subs(definitions)
-        return e
 
     def _check_surfaces(self, surfaces: dict[int, Any]) -> None:
         for c, s in surfaces.items():
@@ -246,24 +153,6 @@ class Lowering:
         allowed = self.parameters | set(self.states) | {self.t, self.s}
         allowed |= {self.symbols[d.name] for d in self.model.discrete}
         return [n for n in e.free_symbols - allowed if n.name.startswith("v_")]
-
-    def title(self, c: int, plural: bool = False) -> str:
-        """Return the term for the function of a surface in messages, such as 'gap' or 'relative velocity'."""
-        one, many = "relative velocity", "relative velocities"
-        if self.components[c].surface.unique:
-            one, many = "switching function", "switching functions"
-        elif self.components[c].surface.is_unilateral:
-            one, many = "gap", "gaps"
-        return many if plural else one
-
-    def written(self, c: int) -> str:
-        """Return the function of a surface as it was declared."""
-        return " ".join(str(self.components[c].surface.function.text).split())
-
-    def place(self, c: int) -> Place | None:
-        """Return the place in the model at which the function of a surface is declared."""
-        component = self.components[c]
-        return component.surface.function.place or component.place
 
     def _mode_variables(self) -> list[Item]:
         items: list[Item] = []
@@ -395,24 +284,6 @@ class Lowering:
             items.append(branches(c, f"right_{c}", hold, without=zero_unknowns))
             right[c] = sp.Symbol(f"right_{c}", real=True)
         return items + eliminated(cluster, unknown, matrix, right)
-
-    def in_modes(self, c: int, name: str, in_hold: Any, otherwise: Any = None, without: Any = None) -> Switch:
-        """Return an item that sets a name to one value in the holding mode, and to another in other modes.
-
-        otherwise : value by mode; without it, the unknown's declared value. without : values substituted in
-            declared values.
-        """
-        component = self.components[c]
-        surface = component.surface
-        rows = []
-        for m in component.modes:
-            value = in_hold
-            if m.name != surface.hold:
-                value = self.convert(m.set[surface.unknown]) if otherwise is None else otherwise[m.name]
-                if without:
-                    value = self.inline(value, self.definitions).subs(without)
-            rows.append((Assign(name, value),))
-        return Switch(c, tuple(rows))
 
     def _derivatives(self, der: list[Any], held: HeldStates) -> tuple[list[Item], list[str]]:
         items: list[Item] = []

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from hybridsim.engine.lowering.lowering_state import LoweringState
 from hybridsim.engine.lowering.program_names import declared_name
 from hybridsim.errors import ModelError
 from hybridsim.expr.simplify import simplified
 
-if TYPE_CHECKING:
-    from hybridsim.engine.lowering.lower import Lowering
 
-
-def refuse_powers(lowering: Lowering, unknown: dict[int, Any], rates: list[Any]) -> None:
+def refuse_powers(lowering: LoweringState, unknown: dict[int, Any], rates: list[Any]) -> None:
     """Raise an error if a rate is nonlinear in a surface's name, because Filippov's rates would differ."""
     for c, u in unknown.items():
         for x, rate in zip(lowering.states, rates, strict=True):
@@ -26,7 +24,7 @@ def refuse_powers(lowering: Lowering, unknown: dict[int, Any], rates: list[Any])
                 )
 
 
-def nonlinear(lowering: Lowering, c: int, d: int, others: set[Any]) -> ModelError:
+def nonlinear(lowering: LoweringState, c: int, d: int, others: set[Any]) -> ModelError:
     """Return the error for an unknown that acts on a surface through a power or a product of unknowns."""
     unknown = lowering.symbols[lowering.components[d].surface.unknown]
     name, component = declared_name(unknown), lowering.components[c]

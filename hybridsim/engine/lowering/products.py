@@ -9,19 +9,17 @@ hold, the rates on the sides do not determine the motion, and such modes are not
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from hybridsim.engine.lowering.lowering_state import LoweringState
 from hybridsim.engine.lowering.nonlinear import nonlinear
 from hybridsim.engine.lowering.program import Assign, Item, Switch
-
-if TYPE_CHECKING:
-    from hybridsim.engine.lowering.lower import Lowering
 
 
 class Products:
     """The values of unknowns in products, and the pairs of unknowns that never hold together."""
 
-    def __init__(self, lowering: Lowering, unknown: dict[int, Any]) -> None:
+    def __init__(self, lowering: LoweringState, unknown: dict[int, Any]) -> None:
         self.lowering, self.unknown = lowering, unknown
         self.number = {u: c for c, u in unknown.items()}
         self.pairs: set[tuple[int, int]] = set()

@@ -10,15 +10,13 @@ relays. Here both take the same fraction of their largest effect.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from hybridsim.engine.lowering.lowering_state import LoweringState
 from hybridsim.engine.lowering.program import Assign, Item, Switch
 from hybridsim.engine.lowering.program_names import user
 from hybridsim.expr.simplify import simplified
 from hybridsim.model.parts.switching import ATTRACTION
-
-if TYPE_CHECKING:
-    from hybridsim.engine.lowering.lower import Lowering
 
 
 @dataclass(frozen=True)
@@ -42,7 +40,10 @@ class Partner:
 
 
 def partners(
-    lowering: Lowering, surfaces: dict[int, Any], rate: dict[int, Any], effect: dict[tuple[int, int], Any]
+    lowering: LoweringState,
+    surfaces: dict[int, Any],
+    rate: dict[int, Any],
+    effect: dict[tuple[int, int], Any],
 ) -> dict[int, Partner]:
     """Return the partners of the relays that do not affect the rate of their own function.
 
@@ -65,7 +66,7 @@ def partners(
     return found
 
 
-def attraction(lowering: Lowering, c: int, partner: Partner, effect: dict[tuple[int, int], Any]) -> Item:
+def attraction(lowering: LoweringState, c: int, partner: Partner, effect: dict[tuple[int, int], Any]) -> Item:
     """Return how strongly relay `c` attracts by the second derivative while its partner holds."""
     sp, other = lowering.sp, lowering.components[partner.component]
     name = user(ATTRACTION + lowering.components[c].surface.unknown)

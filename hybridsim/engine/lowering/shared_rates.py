@@ -9,16 +9,16 @@ reversals.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from hybridsim.engine.lowering.held_states import HeldStates
+from hybridsim.engine.lowering.lowering_state import LoweringState
 from hybridsim.errors import ModelError
 
-if TYPE_CHECKING:
-    from hybridsim.engine.lowering.held_states import HeldStates
-    from hybridsim.engine.lowering.lower import Lowering
 
-
-def shared_rates(lowering: Lowering, i: int, der: list[Any], held: HeldStates) -> Iterator[tuple[int, Any]]:
+def shared_rates(
+    lowering: LoweringState, i: int, der: list[Any], held: HeldStates
+) -> Iterator[tuple[int, Any]]:
     """Yield each relay that determines the rate of state `i` while the relay slides, with the rate.
 
     The relay's held state must be evaluated from its surface and must be another state. Of the rates in ds/dt
@@ -38,7 +38,7 @@ def shared_rates(lowering: Lowering, i: int, der: list[Any], held: HeldStates) -
             yield c, -rest / sp.diff(s, x)
 
 
-def refuse_changed_rates(lowering: Lowering, surfaces: dict[int, Any]) -> None:
+def refuse_changed_rates(lowering: LoweringState, surfaces: dict[int, Any]) -> None:
     """Reject modes that change a rate in ds/dt, because holding forces use the declared rate."""
     for c, s in surfaces.items():
         for x, state in zip(lowering.states, lowering.model.states, strict=True):

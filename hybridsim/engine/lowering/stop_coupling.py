@@ -9,14 +9,12 @@ differ (a stop beside a belt), the two never hold together.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
+from hybridsim.engine.lowering.lowering_state import LoweringState
 from hybridsim.engine.lowering.program import Assign, Item, Switch
 from hybridsim.errors import ModelError
 from hybridsim.expr.simplify import simplified
-
-if TYPE_CHECKING:
-    from hybridsim.engine.lowering.lower import Lowering
 
 
 class StopCoupling(NamedTuple):
@@ -29,7 +27,7 @@ class StopCoupling(NamedTuple):
 
 
 def stop_couplings(
-    lowering: Lowering, surfaces: dict[int, Any], gap_rates: dict[int, Any]
+    lowering: LoweringState, surfaces: dict[int, Any], gap_rates: dict[int, Any]
 ) -> list[StopCoupling]:
     """Return all pairs of a gap and a contact whose velocity is proportional to the rate of the gap."""
     sp, found = lowering.sp, []
@@ -50,7 +48,7 @@ def stop_couplings(
 
 
 def without_share(
-    lowering: Lowering, pairs: list[StopCoupling], c: int, d: int, entry: Any, of_held: Any
+    lowering: LoweringState, pairs: list[StopCoupling], c: int, d: int, entry: Any, of_held: Any
 ) -> tuple[list[Item], Any]:
     """Return a matrix entry of contact `c` that differs while a gap along the contact is closed."""
     items: list[Item] = []
@@ -66,7 +64,7 @@ def without_share(
 
 
 def coupling_help(
-    lowering: Lowering, pairs: list[StopCoupling], p: int, effect: dict[tuple[int, int], Any]
+    lowering: LoweringState, pairs: list[StopCoupling], p: int, effect: dict[tuple[int, int], Any]
 ) -> tuple[list[Item], Any]:
     """Return the pull of sticking friction that keeps a gap closed, and the items that compute it."""
     sp, total = lowering.sp, lowering.sp.Integer(0)
@@ -95,7 +93,7 @@ def coupling_help(
     return items, total
 
 
-def reported_forces(lowering: Lowering, pairs: list[StopCoupling]) -> dict[Any, Any]:
+def reported_forces(lowering: LoweringState, pairs: list[StopCoupling]) -> dict[Any, Any]:
     """Return the forces to report, by name; the pull of a closed stop is reported as friction."""
     sp, found = lowering.sp, {}
     for tie in pairs:

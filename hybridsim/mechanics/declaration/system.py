@@ -50,9 +50,9 @@ class Harmonic:
 
     def __post_init__(self) -> None:
         for what in ("omega", "sin", "cos"):
-            value = as_real(given := getattr(self, what))
+            value = as_real(raw := getattr(self, what))
             if value is None or not math.isfinite(value):
-                raise UsageError(f"Harmonic: `{what}` cannot be {given!r}", remedy="use a finite number")
+                raise UsageError(f"Harmonic: `{what}` cannot be {raw!r}", remedy="use a finite number")
             object.__setattr__(self, what, value)
 
 
