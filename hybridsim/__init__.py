@@ -32,6 +32,7 @@ _HOME = {
     "Output": "hybridsim.model",
     "Parameter": "hybridsim.model",
     "Schedule": "hybridsim.model",
+    "Shape": "hybridsim.model",
     "State": "hybridsim.model",
     "Surface": "hybridsim.model",
     "SwitchingSurface": "hybridsim.model",

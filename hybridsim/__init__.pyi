@@ -52,6 +52,7 @@ from hybridsim.model import Monitor as Monitor
 from hybridsim.model import Output as Output
 from hybridsim.model import Parameter as Parameter
 from hybridsim.model import Schedule as Schedule
+from hybridsim.model import Shape as Shape
 from hybridsim.model import State as State
 from hybridsim.model import Surface as Surface
 from hybridsim.model import SwitchingSurface as SwitchingSurface

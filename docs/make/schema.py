@@ -9,6 +9,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from hybridsim.model.parts.shape import KINDS
+
 FILE = Path(__file__).parents[2] / "hybridsim" / "model" / "toml" / "model.schema.json"
 
 Schema = dict[str, Any]
@@ -188,6 +190,31 @@ OUTPUT = table(
     ("expr",),
 )
 PARAMETER = table({"value": EXPRESSION, "unit": UNIT, "title": TEXT}, ("value",))
+POINT = {"type": "array", "items": EXPRESSION, "minItems": 2, "maxItems": 2}
+OF_SHAPE = {
+    "at": said("the point where it is", POINT),
+    "ends": said("points, or names of other shapes", {"type": "array", "items": {"anyOf": [TEXT, POINT]}}),
+    "points": said("corners", {"type": "array", "items": POINT}),
+    "vector": said("extent in x and y", POINT),
+    "size": said("diameter or width, or width and height", {"anyOf": [EXPRESSION, POINT]}),
+    "length": EXPRESSION, "angle": said("in radians, counter-clockwise", EXPRESSION),
+    "twist": said("angle of the second end against the first", EXPRESSION),
+    "travel": said("distance that the belt has moved to the right", EXPRESSION),
+    "level": said("height of the water", EXPRESSION),
+    "offset": said("sideways, to draw two next to each other", EXPRESSION),
+    "mode_of": said("the contact or component whose mode gives the colour", TEXT), "text": TEXT,
+}  # fmt: skip
+
+
+def shape(kind: str) -> Schema:
+    """A shape of one kind."""
+    required, optional = KINDS[kind]
+    return table(
+        {"kind": {"const": kind}, **{key: OF_SHAPE[key] for key in (*required, *optional)}},
+        ("kind", *required),
+    )
+
+
 DISCRETE = table({"start": START, "unit": UNIT}, ("start",))
 
 MODEL = {
@@ -214,6 +241,10 @@ MODEL = {
             "schedules": named(short(TIMES, SCHEDULE), "events at known times"),
             "clocks": named(CLOCK, "events at equal distances"),
             "outputs": named(short(EXPRESSION, OUTPUT), "what to look at"),
+            "drawing": said(
+                "shapes that show the mechanism, by name",
+                {"type": "object", "additionalProperties": {"oneOf": [shape(kind) for kind in KINDS]}},
+            ),
         }
     ),
 }  # fmt: skip

@@ -9,6 +9,7 @@ from hybridsim.cli import values
 from hybridsim.cli.output import require_writable
 
 PICTURES = (".png", ".pdf", ".svg")
+ANIMATIONS = (".gif", ".html", ".mp4")
 _UNNAMED = Path()  # value of --plot without a file name
 
 

@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, Any
 from hybridsim import __version__
 from hybridsim.cli import options, values
 from hybridsim.cli.output import complain, print_json, require_apart, require_writable, say
+from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.errors import RunInterrupted, SimulationError, UsageError
 
 if TYPE_CHECKING:
+    from hybridsim.model.parts.model import Model
     from hybridsim.solution import Solution
     from hybridsim.solution.explain.explanation import Explanation
 
@@ -31,6 +33,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="stop the run, and keep its result, after this number of events, steps, seconds or megabytes",
     )
     options.add_plot(parser, "the run")
+    parser.add_argument(
+        "--animate",
+        metavar="FILE",
+        type=Path,
+        help="animate the drawing of the model in a .gif, .html or .mp4 file (.mp4 needs ffmpeg)",
+    )
     parser.add_argument("--csv", metavar="FILE", type=Path, help="write the time series as a CSV table")
     parser.add_argument(
         "--npz", metavar="FILE", type=Path, help="write the time series and the events for numpy.load"
@@ -61,6 +69,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def check_arguments(args: argparse.Namespace) -> None:
     """Reject output files that cannot be written before the run starts."""
     options.check_plot(args)
+    if args.animate:
+        require_writable(args.animate, "--animate", options.ANIMATIONS)
     if args.csv:
         require_writable(args.csv, "--csv")
     if args.npz:
@@ -73,7 +83,7 @@ def check_arguments(args: argparse.Namespace) -> None:
             )
         require_writable(args.save, "--save", (".hsol",))
     others = {"the file of the model": Path(args.model)} if Path(getattr(args, "model", "")).is_file() else {}
-    for option in ("plot", "csv", "npz", "save"):
+    for option in ("plot", "animate", "csv", "npz", "save"):
         path = getattr(args, option)
         if path:
             require_apart(path, f"--{option}", others)
@@ -87,6 +97,14 @@ def check_arguments(args: argparse.Namespace) -> None:
 
         if args.points > MOST_POINTS:
             raise UsageError(f"--points cannot be {args.points}", remedy=f"use at most {MOST_POINTS}")
+
+
+def check_drawing(model: Model, args: argparse.Namespace) -> None:
+    """Reject an animation that cannot be made before the run starts."""
+    if args.animate:
+        from hybridsim.plot.animation import check_animation
+
+        check_animation(model, args.animate)
 
 
 def limits(args: argparse.Namespace) -> dict[str, Any]:
@@ -168,6 +186,10 @@ def _write(solution: Solution, args: argparse.Namespace, session: Session) -> No
 
         save(time_history(solution), args.plot)
         session.wrote(args.plot)
+    if args.animate:
+        with Progress(session) as progress:
+            solution.animate(args.animate, progress=progress)
+        session.wrote(args.animate)
 
 
 def _has_events(solution: Solution) -> bool:

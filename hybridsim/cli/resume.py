@@ -42,6 +42,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     outcome.check_arguments(args)
 
     solution = hybridsim.load_solution(args.solution)
+    outcome.check_drawing(solution.model, args)
     t_end = None if args.t_end is None else values.end_time(solution.model, args.t_end)
     with Progress(session) as progress, session.stopping_gently():
         further = outcome.as_far_as_it_came(

@@ -54,7 +54,8 @@ def add_to(commands: Any) -> None:
         metavar="WHAT",
         help="parts of the run to store; the run does not change. all (default): everything. events: the "
         "events, but no states between them. last-period, or a number: the last period, or the last units of time. "
-        "nothing: only the final state. --plot, --csv and --npz need all, last-period or a number; --explain needs all",
+        "nothing: only the final state. --plot, --animate, --csv and --npz need all, last-period or a number; "
+        "--explain needs all",
     )
     outcome.add_arguments(parser)
     parser.set_defaults(
@@ -68,6 +69,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     outcome.check_arguments(args)
     settings = _settings(args)
     model = values.changed_model(args)
+    outcome.check_drawing(model, args)
     t_end = values.end_time(model, args.t_end)
 
     from hybridsim.integrators.registry import UnknownOption, integrator_class, option_names
@@ -116,7 +118,7 @@ def _settings(args: argparse.Namespace) -> dict[str, Any]:
 def _save_setting(args: argparse.Namespace) -> str | float:
     """Return the argument `save` for the run, and reject outputs that need more than it stores."""
     if args.keep in ("events", "nothing"):
-        for option in ("plot", "csv", "npz"):
+        for option in ("plot", "animate", "csv", "npz"):
             if getattr(args, option):
                 raise UsageError(
                     f"--{option} needs the states over time, which --keep {args.keep} does not store",

@@ -15,6 +15,7 @@ from hybridsim.model.parts.model import Model
 from hybridsim.model.parts.monitor import Monitor
 from hybridsim.model.parts.quantities import Discrete, Output, Parameter, State
 from hybridsim.model.parts.schedule import Schedule
+from hybridsim.model.parts.shape import Shape
 from hybridsim.model.parts.switching import SwitchingSurface
 
 __all__ = [
@@ -35,6 +36,7 @@ __all__ = [
     "Output",
     "Parameter",
     "Schedule",
+    "Shape",
     "State",
     "Surface",
     "SwitchingSurface",

@@ -53,3 +53,11 @@ def label_axis(axis: Axis, name: str, unit: str, low: float, high: float) -> Non
         text = f"[$10^{{{power}}}$ {literal(unit)}]" if unit else f"[$10^{{{power}}}$]"
     axis.set_label_text(f"{literal(name)} {text}".rstrip())
     axis.set_major_formatter(Scaled(10.0**power))
+
+
+def with_prefix(value: float, unit: str) -> str:
+    """Return a positive quantity as text, with a prefix if its unit takes one, such as "50 mm"."""
+    power = min(max(3 * math.floor(math.log10(value) / 3 + 1e-9), -12), 9)
+    if power and _TAKES_PREFIX.match(unit):
+        return f"{value / 10.0**power:g} {_PREFIXES[power]}{unit}"
+    return f"{value:g} {unit}"

@@ -136,7 +136,7 @@ def smooth_parts_of(solution: Solution, names: Sequence[str], window: Window) ->
         parts = np.split(_evaluate(solution, name, body, starts), splits)
         last = _evaluate(solution, name, cuts[1:], ends)
         values[name] = [np.append(part, value) for part, value in zip(parts, last)]
-    modes_at = _mode_lookup(solution)
+    modes_at = mode_lookup(solution)
     return [
         SmoothPart(grid, {name: values[name][i] for name in names}, modes_at((grid[0] + grid[-1]) / 2))
         for i, grid in enumerate(grids)
@@ -150,7 +150,7 @@ def _evaluate(solution: Solution, name: str, t: NDArray[np.float64], side: str) 
     return np.asarray(solution.output(name, t, side=side))
 
 
-def _mode_lookup(solution: Solution) -> Callable[[float], dict[str, str]]:
+def mode_lookup(solution: Solution) -> Callable[[float], dict[str, str]]:
     """Return a function from a time to the mode of each component."""
     starts, modes = {}, {}
     for component, intervals in solution.modes.items():

@@ -83,7 +83,7 @@ def time_history(
     for axis in upper:
         axis.tick_params(labelbottom=False)
     label_axis(lowest.xaxis, "t", time_unit(model), window.t0, window.t1)
-    style.head(history.quantities[0], model.title or model.name, window.note)
+    style.head([*upper, lowest][0], model.title or model.name, window.note)
     return history
 
 

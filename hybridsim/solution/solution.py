@@ -12,7 +12,7 @@ from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
 from hybridsim.solution.event import Event
 from hybridsim.solution.explain.explanation import explain
-from hybridsim.solution.files.in_tables import InTables
+from hybridsim.solution.in_pictures import InPictures
 from hybridsim.solution.model_trajectory import ModelTrajectory
 from hybridsim.solution.summary import as_text, in_html
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _GOOD = ("finished", "terminated")
 
 
-class Solution(InTables):
+class Solution(InPictures):
     """The result of `simulate` for every model and integrator; ``sol(t)`` is the dense output.
 
     Attributes

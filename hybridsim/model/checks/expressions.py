@@ -76,6 +76,9 @@ def _of_everything(scope: Scope) -> Iterator[Item]:
         yield f"output {output.name}", output.expr, False
         for key, expr in output.modes.items():
             yield f"output {output.name} in {key}", expr, False
+    for shape in model.drawing:
+        for where, expr in shape.expressions():
+            yield f"shape {shape.name}, {where}", expr, False
 
 
 def _of_component(component: Component) -> Iterator[Item]:

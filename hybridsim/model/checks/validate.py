@@ -5,6 +5,7 @@ from __future__ import annotations
 from hybridsim.errors import ModelError
 from hybridsim.model.checks.automata import check_automata
 from hybridsim.model.checks.contacts import check_contacts
+from hybridsim.model.checks.drawing import check_drawing
 from hybridsim.model.checks.expressions import check_before_run, check_expressions
 from hybridsim.model.checks.functions import check_functions
 from hybridsim.model.checks.impacts import check_impacts
@@ -40,6 +41,7 @@ def find_errors(model: Model) -> tuple[ModelError, ...]:
     check_impacts(scope)
     check_signals(scope)
     check_functions(scope)
+    check_drawing(scope)
     check_expressions(scope)
     if not scope.errors:
         check_velocity_powers(scope)

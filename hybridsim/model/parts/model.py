@@ -21,6 +21,7 @@ from hybridsim.model.parts.inputs import Input
 from hybridsim.model.parts.monitor import Monitor
 from hybridsim.model.parts.quantities import Discrete, Output, Parameter, State
 from hybridsim.model.parts.schedule import Schedule
+from hybridsim.model.parts.shape import Shape
 from hybridsim.model.parts.switching import SwitchingSurface
 
 _PARTS: dict[str, type[Declared]] = {
@@ -35,22 +36,14 @@ _PARTS: dict[str, type[Declared]] = {
     "outputs": Output,
     "surfaces": SwitchingSurface,
     "impacts": Impact,
+    "drawing": Shape,
 }
 
 # methods that other parts of the package call; completion does not offer them
 _INTERNAL = {
-    "affected_by",
-    "changed_numbers",
-    "components_of",
-    "error",
-    "is_known_to_be_sound",
-    "once",
-    "once_per_expressions",
-    "place",
-    "remedy_for_parameter",
-    "structure",
-    "with_values_of",
-}
+    "affected_by", "changed_numbers", "components_of", "error", "is_known_to_be_sound", "once",
+    "once_per_expressions", "place", "remedy_for_parameter", "structure", "with_values_of",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -92,6 +85,8 @@ class Model(Declared):
         Switching surfaces, along which the motion may slide.
     impacts : sequence of Impact, optional
         Unilateral contacts, whose gaps cannot become negative.
+    drawing : sequence of Shape, optional
+        Shapes that show the mechanism, for `hybridsim.plot.mechanism` and `Solution.animate`; runs ignore them.
     place : Place, optional
         Place of the declaration, for error messages.
 
@@ -125,6 +120,7 @@ class Model(Declared):
     flow: Callable[..., Any] | None = None
     surfaces: tuple[SwitchingSurface, ...] = ()
     impacts: tuple[Impact, ...] = ()
+    drawing: tuple[Shape, ...] = ()
 
     # of a checked model: its values; of its copies also the parameters that have other numbers than it
     _sound: ClassVar[tuple[dict[str, float], frozenset[str]]]
@@ -525,7 +521,7 @@ class Model(Declared):
 def _content(model: Model) -> tuple[object, ...]:
     parts = (
         model.states, model.parameters, model.discrete, model.components, model.contacts, model.surfaces, model.inputs,
-        model.monitors, model.schedules, model.outputs, model.definitions, model.impacts,
+        model.monitors, model.schedules, model.outputs, model.definitions, model.impacts, model.drawing,
     )  # fmt: skip
     texts = (model.title, model.source, model.description, model.look, model.duration)
     return (model.name, *parts, *texts, model.flow)

@@ -19,6 +19,7 @@ from hybridsim.model.parts.quantities import Discrete, Output, Parameter, State
 from hybridsim.model.parts.schedule import Schedule
 from hybridsim.model.parts.switching import SwitchingSurface
 from hybridsim.model.toml.automata import read_components
+from hybridsim.model.toml.drawing import read_drawing
 from hybridsim.model.toml.inputs import read_inputs
 from hybridsim.model.toml.laws import read_law_of_contact, read_laws
 from hybridsim.model.toml.positions import positions
@@ -28,7 +29,7 @@ SCHEMA = 1
 KEYS = (
     "schema", "name", "title", "source", "description", "look", "duration", "parameters", "states", "discrete",
     "definitions", "inputs", "laws", "contacts", "surfaces", "impacts", "initial", "limit", "modes", "components",
-    "monitors", "schedules", "clocks", "outputs",
+    "monitors", "schedules", "clocks", "outputs", "drawing",
 )  # fmt: skip
 
 
@@ -119,6 +120,7 @@ def _model(root: Table, folder: Path) -> Model:
         monitors=tuple(_monitors(root)),
         schedules=(*_schedules(root), *_clocks(root)),
         outputs=tuple(_outputs(root)),
+        drawing=tuple(read_drawing(root)),
         definitions=tuple(root.expressions("definitions").items()),
         title=root.text("title"),
         source=root.text("source"),

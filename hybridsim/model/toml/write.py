@@ -15,6 +15,7 @@ from hybridsim.model.parts.inputs import HeldInput, Input
 from hybridsim.model.parts.monitor import Monitor
 from hybridsim.model.parts.quantities import State
 from hybridsim.model.parts.schedule import Schedule
+from hybridsim.model.parts.shape import Shape
 
 if TYPE_CHECKING:
     from hybridsim.model.parts.model import Model
@@ -55,6 +56,7 @@ def _document(model: Model) -> dict[str, Any]:
         "monitors": {monitor.name: _monitor(monitor) for monitor in model.monitors},
         "schedules": {schedule.name: _schedule(schedule) for schedule in model.schedules},
         "outputs": _short("expr", {o.name: _fields(o, "expr", "unit", "modes") for o in model.outputs}),
+        "drawing": {shape.name: _shape(shape) for shape in model.drawing},
     }
 
 
@@ -79,6 +81,11 @@ def _input(signal: Input) -> dict[str, Any]:
 
 def _held(held: HeldInput) -> dict[str, Any]:
     return {"kind": "held", "value": held.start, "unit": held.unit}
+
+
+def _shape(shape: Shape) -> dict[str, Any]:
+    size = {"size": shape.size[0]} if len(shape.size) == 1 else {}
+    return {**_fields(shape, "kind", *shape.fields()), **size}
 
 
 def _state(state: State) -> dict[str, Any]:

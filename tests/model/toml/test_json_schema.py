@@ -109,6 +109,18 @@ jump_below = 0
 up = { guards.g = "x", set = { f = 1 } }
 down = { guards.g = "-x", set = { f = -1 } }
 on = { guards = { up = "1 - f", low = "f + 1" } }
+[drawing]
+mass = { kind = "mass", at = [0, 0] }
+pendulum = { kind = "pendulum", at = [0, 0], length = 1, angle = "x" }
+wall = { kind = "wall", at = [0, 0] }
+belt = { kind = "belt", at = [0, 0], travel = "t" }
+tank = { kind = "tank", at = [0, 0], level = "x" }
+spring = { kind = "spring", ends = ["wall", "mass"] }
+rod = { kind = "rod", ends = ["wall", ["x", 0]] }
+shaft = { kind = "shaft", ends = [[0, 0], [0, 1]] }
+arrow = { kind = "arrow", at = [0, 0], vector = ["x", 0] }
+line = { kind = "line", points = [[0, 0], ["x", 0]] }
+body = { kind = "body", points = [[0, 0], ["x", 0], [1, 1]] }
 """
 
 
@@ -124,6 +136,9 @@ on = { guards = { up = "1 - f", low = "f + 1" } }
         "[parameters]\n'a b' = 1",
         "schema = 2",
         "contact = 1",
+        "[drawing]\na = { kind = 'mass' }",
+        "[drawing]\na = { kind = 'mass', at = [0] }",
+        "[drawing]\na = { kind = 'mas', at = [0, 0] }",
     ],
 )
 def test_what_the_reader_refuses_is_not_valid(text: str) -> None:

@@ -1,0 +1,1 @@
+"""This package turns the drawing of a model into outlines and lines at given times."""

@@ -1,0 +1,61 @@
+"""This module animates a run, as a part of `Solution`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from os import PathLike
+from pathlib import Path
+
+from hybridsim.calls import refusing
+from hybridsim.solution.files.in_tables import InTables
+
+
+class InPictures(InTables):
+    """The animation of a run, as a part of `Solution`."""
+
+    @refusing
+    def animate(
+        self,
+        path: str | PathLike[str],
+        quantities: Sequence[str] | None = None,
+        *,
+        t_span: tuple[float, float] | None = None,
+        speed: float | None = None,
+        fps: float = 20.0,
+        dark: bool = False,
+        progress: Callable[[float], None] | None = None,
+    ) -> Path:
+        """Write the moving mechanism next to its curves and modes to a file; the model needs a `drawing`.
+
+        Parameters
+        ----------
+        path : ends in .gif, .html (a page with a player) or .mp4 (needs the program ffmpeg).
+        quantities : names of the drawn states and outputs; by default the first two states, and [] for none.
+        t_span : part of the run; by default all, or the last few of very many periods.
+        speed : time of the model per second of the animation; by default a round number for about 8 s.
+        fps : frames per second, at most 50; there are at most 1000 frames.
+        dark : whether the background is dark.
+        progress : a function that is called with the finished part, from 0 to 1.
+
+        Returns
+        -------
+        Path
+            The path of the file.
+
+        Raises
+        ------
+        UsageError
+            For a model without a drawing, for too many frames, and for .mp4 if ffmpeg is not installed.
+
+        Examples
+        --------
+        >>> import hybridsim as hs
+        >>> hs.simulate("belt", (0, 30)).animate("belt.gif", ["x"])  # doctest: +SKIP
+        """
+        # The plot package is a layer above this one, so it is imported only on demand.
+        draw = import_module("hybridsim.plot").animate
+        written: Path = draw(
+            self, path, quantities, t_span=t_span, speed=speed, fps=fps, dark=dark, progress=progress
+        )
+        return written
