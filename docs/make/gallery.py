@@ -1,6 +1,7 @@
 """Draws every packaged model over its own duration and writes docs/reference/gallery.md, which shows them all.
 
-python docs/make/gallery.py [NAME ...]
+python docs/make/gallery.py [NAME ...]               pictures, animations, and the page
+python docs/make/gallery.py --animations [NAME ...]  animations and the page
 """
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from hybridsim.plot import friction_loop, phase_portrait, save, time_history
 
 DOCS = Path(__file__).parents[2] / "docs"
 FOLDER = DOCS / "images" / "scenes"
+ANIMATIONS = DOCS / "images" / "animations"
+MOST_BYTES = 400_000  # of an animation
 PERIODS = 20  # of a scene that does not say how long it runs
 
 # what is drawn of a scene, where its run over time is not what shows it
@@ -27,23 +30,55 @@ PICTURES: dict[str, Callable[[hs.Solution], Any]] = {
     "sliding-circle": lambda sol: phase_portrait(sol, "x", "y"),
 }
 
+# The part of a run that is animated, with further settings; all others with a drawing have a picture only.
+MOVES: dict[str, dict[str, Any]] = {
+    "base-isolation": {"t_span": (0, 16), "speed": 2},
+    "belt": {"quantities": ["x"], "t_span": (0, 26), "speed": 4},
+    "bouncing-ball": {"quantities": ["h"], "speed": 0.5},
+    "dfcs": {"t_span": (0.266, 0.296), "speed": 0.005},
+    "drill-string": {"quantities": ["w_bit"], "t_span": (20, 44), "speed": 4},
+    "elastic-gap": {"t_span": (0, 8), "speed": 1},
+    "free-decay": {"quantities": ["x"], "t_span": (0, 18), "speed": 3},
+    "impact-oscillator": {"quantities": ["x"], "t_span": (0, 24), "speed": 4},
+    "mode-coupling": {"t_span": (160, 200), "speed": 5},
+    "rocking-block": {"quantities": ["theta"], "speed": 1},
+    "sampled-servo": {"quantities": ["x"], "t_span": (0, 8), "speed": 1},
+    "static-kinetic": {"quantities": ["v"], "t_span": (0, 8), "speed": 1},
+    "thrown-block": {"speed": 0.25},
+    "valve-stiction": {"quantities": ["x"], "t_span": (40, 100), "speed": 10},
+    "vibrating-table": {"quantities": ["gap"], "t_span": (0, 0.5), "speed": 0.05},
+    "water-tanks": {"quantities": ["x1", "x2"], "speed": 0.5},
+}
+
 HEAD = """# Gallery
 
 Every model that comes with the package: `hybridsim run NAME` runs one over its own duration, `hybridsim check NAME`
 says where it is from and what to look at, `hs.load("NAME")` gives it to Python. Tests hold them against closed forms,
 balances and matrix exponentials. The page and its pictures are made by `docs/make/gallery.py`.
 
+Many files also contain a [drawing](../how-to/draw-a-mechanism.md). `hybridsim run NAME --animate NAME.gif` animates it.
+Contacts have the colours of their modes.
+
 """
 
 
-def main(names: list[str]) -> None:
+def main(names: list[str], with_pictures: bool) -> None:
     """Draw these scenes, all if none is named, and write the page."""
     FOLDER.mkdir(parents=True, exist_ok=True)
+    ANIMATIONS.mkdir(parents=True, exist_ok=True)
     infos = hs.list_models()
     for info in infos:
-        if not names or info.name in names:
-            save(PICTURES.get(info.name, time_history)(run(info.name)), FOLDER / f"{info.name}.png")
-            print(info.name, flush=True)
+        if names and info.name not in names:
+            continue
+        solution = run(info.name)
+        if with_pictures:
+            save(PICTURES.get(info.name, time_history)(solution), FOLDER / f"{info.name}.png")
+        if info.name in MOVES:
+            path = solution.animate(
+                ANIMATIONS / f"{info.name}.gif", **{"quantities": [], "fps": 12} | MOVES[info.name]
+            )
+            assert path.stat().st_size < MOST_BYTES, f"{path} has {path.stat().st_size} bytes"
+        print(info.name, flush=True)
     sections = (section(hs.load(info.name)) for info in infos)
     (DOCS / "reference" / "gallery.md").write_text(HEAD + "\n".join(sections), encoding="utf-8")
 
@@ -58,14 +93,17 @@ def run(name: str) -> hs.Solution:
 
 def section(model: hs.Model) -> str:
     """The part of the page about one scene."""
+    name = model.name
+    moves = f"![The mechanism of {name}](../images/animations/{name}.gif)\n\n" if name in MOVES else ""
     return (
         f"## {model.title}\n\n"
         f"`hybridsim run {model.name}`, declared in [models/{model.name}.toml](../../models/{model.name}.toml). "
         f"{' '.join(model.look.split())}\n\n"
         f"*{' '.join(model.source.split()).rstrip('.')}.*\n\n"
+        f"{moves}"
         f"![{model.name}](../images/scenes/{model.name}.png)\n"
     )
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main([name for name in sys.argv[1:] if name != "--animations"], "--animations" not in sys.argv)

@@ -6,13 +6,14 @@ import math
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator, Sequence
-from numbers import Real
 from os import PathLike
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 from PIL import Image, ImageColor
 
+from hybridsim.arguments import callback, cannot_be, flag, is_row, known_name, number, two_numbers
 from hybridsim.errors import UsageError
 from hybridsim.files import path_text, whole_file, write_text
 from hybridsim.model.checks.units import units_of
@@ -29,6 +30,7 @@ _CURVES = 2  # the default number of quantities
 _COLOURS = 32  # of a GIF or of a page, in one palette for all pictures
 _PAUSE = 1.0  # seconds at the end of a GIF before it begins again
 _SAME = 10  # largest difference of two shades, of 255, that count as one
+_MOST_FPS = 50.0  # browsers show GIFs no faster
 _SAMPLES = 9  # pictures from which the palette is taken
 
 
@@ -58,13 +60,13 @@ def animate(
     refuse_arrays(solution)
     path = Path(path_text(path))
     check_animation(solution.model, path)
-    for name, value, most in (("fps", fps, 50.0), ("speed", 1.0 if speed is None else speed, math.inf)):
-        if not isinstance(value, Real) or not 0 < value < math.inf or value > most:
-            limit = "" if most == math.inf else f" up to {most:g}"
-            raise UsageError(f"{name} cannot be {value!r}", remedy=f"use a positive number{limit}")
-    if quantities is None:
-        quantities = list(units_of(solution.model))[:_CURVES]
-    clip = Clip(solution, quantities, window_of(solution, t_span), speed, fps, DARK if dark else LIGHT)
+    fps = _positive("fps", fps, _MOST_FPS)
+    speed = None if speed is None else _positive("speed", speed, math.inf)
+    if t_span is not None:
+        t_span = two_numbers(t_span, "t_span", "use two times (t0, t1)")
+    progress = callback(progress)
+    theme = DARK if flag(dark, "dark") else LIGHT
+    clip = Clip(solution, _names(solution, quantities), window_of(solution, t_span), speed, fps, theme)
     pictures = _counted(clip, progress)
     suffix = path.suffix.lower()
     if suffix == ".mp4":
@@ -75,6 +77,25 @@ def animate(
         title = solution.model.title or solution.model.name
         write_text(path, page(title, list(_with_one_palette(pictures, clip)), fps, dark))
     return path
+
+
+def _names(solution: Solution, quantities: object) -> list[str]:
+    """Return the names of the quantities to draw."""
+    if quantities is None:
+        return list(units_of(solution.model))[:_CURVES]
+    if not is_row(quantities):
+        raise cannot_be("quantities", quantities, "use a list of names")
+    known = (*solution.names, *solution.quantities)
+    names = list(cast("Sequence[object]", quantities))
+    return [known_name(name, known, "quantities: the run has no", "quantities") for name in names]
+
+
+def _positive(name: str, value: object, most: float) -> float:
+    limit = "" if most == math.inf else f" up to {most:g}"
+    found = number(value, name, f"use a positive number{limit}")
+    if not 0 < found < math.inf or found > most:
+        raise cannot_be(name, value, f"use a positive number{limit}")
+    return found
 
 
 def check_animation(model: Model, path: Path) -> None:

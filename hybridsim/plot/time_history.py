@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from matplotlib.patches import Patch
 
 from hybridsim.errors import UsageError
@@ -25,11 +26,13 @@ from hybridsim.plot.smooth_parts import (
     unit_of,
     window_of,
 )
+from hybridsim.presentation.mode_strip import bars_of
 from hybridsim.solution import Event, Solution
 
 _MOST_QUANTITIES = 4  # the default number of quantities, and of outputs
 _MOST_MARKS = 150  # event lines; more would merge into a grey area
 _VISIBLE = 1e-3  # of the range: a smaller jump is invisible
+_HAIRLINE = 1.0  # points: the least width of a mode in a strip
 _ROW, _STRIP = 1.75, 0.34  # inches
 
 
@@ -153,17 +156,22 @@ def _strip(axis: Axes, solution: Solution, window: Window) -> None:
     """Draw one row per component with its modes as colours; the legend names the modes that occur."""
     colours = style.mode_colours(solution.components)
     components = list(solution.modes)
-    seen: dict[str, None] = {}
+    seen: set[str] = set()
+    is_shared = False
+    columns = _columns(axis)
     for row, component in enumerate(components):
-        bars, faces = [], []
-        for interval in solution.modes[component]:
-            start, end = sorted((interval.t0, interval.t1))
-            start, end = max(start, window.t0), min(end, window.t1)
-            if end > start:
-                bars.append((start, end - start))
-                faces.append(colours[interval.mode])
-                seen[interval.mode] = None
-        axis.broken_barh(bars, (row - 0.38, 0.76), facecolors=faces, linewidth=0)
+        bars, shares = bars_of(solution.modes[component], window.t0, window.t1, columns)
+        is_shared = is_shared or shares
+        seen |= {bar.mode for bar in bars}
+        corners = [
+            [
+                (x, row + 0.38 - 0.76 * y)
+                for x, y in zip((b.start, b.end, b.end, b.start), (b.low, b.low, b.high, b.high))
+            ]
+            for b in bars
+        ]
+        faces = [colours[bar.mode] for bar in bars]
+        axis.add_collection(PolyCollection(corners, facecolors=faces, linewidths=0))
     axis.set_ylim(len(components) - 0.5, -0.5)
     axis.set_yticks(range(len(components)), [style.literal(name) for name in components])
     axis.tick_params(axis="y", length=0, labelsize=9)
@@ -179,4 +187,14 @@ def _strip(axis: Axes, solution: Solution, window: Window) -> None:
         frameon=False,
         fontsize=9,
         handlelength=1.2,
+        title="a divided column:\nseveral short modes" if is_shared else None,
+        title_fontsize=8,
+        alignment="left",
     )
+
+
+def _columns(axis: Axes) -> int:
+    """Return how many lines of the least visible width a strip has room for."""
+    whole = axis.get_figure(root=True)
+    assert whole is not None
+    return max(20, int(72 * whole.get_figwidth() * axis.get_position().width / _HAIRLINE))

@@ -94,7 +94,7 @@ def test_packaged_models_are_drawn(name: str) -> None:
     canvas = Canvas(solution, Window(solution.t_start, solution.t_end), DARK)
     assert np.isfinite([*canvas.low, *canvas.high]).all() and (canvas.high > canvas.low).all()
     assert 0.05 < canvas.aspect < 20
-    assert len(list(canvas.artists(mechanism(solution), solution.t_end))) > 3
+    assert list(canvas.artists(mechanism(solution), solution.t_end))
 
 
 def frames_of(path: Path) -> tuple[list[np.ndarray], list[int]]:
@@ -151,11 +151,11 @@ def test_the_speed_is_round_and_the_number_of_frames_is_bounded(slide: hs.Soluti
     ("settings", "message"),
     [
         ({"path": "a.avi"}, r"unsupported file type '\.avi'\nuse \.gif, \.html, \.mp4"),
-        ({"fps": 51.0}, r"fps cannot be 51\.0\nuse a positive number up to 50"),
-        ({"fps": math.nan}, "fps cannot be nan"),
-        ({"speed": 0.0}, "speed cannot be 0"),
-        ({"speed": "fast"}, "speed cannot be 'fast'"),
-        ({"quantities": ["y"]}, "no quantity 'y'"),
+        ({"fps": 51.0}, r"`fps` cannot be 51\.0\nuse a positive number up to 50"),
+        ({"fps": math.nan}, "`fps` cannot be nan"),
+        ({"speed": 0.0}, "`speed` cannot be 0"),
+        ({"speed": "fast"}, "`speed` cannot be 'fast'"),
+        ({"quantities": ["y"]}, "quantities: the run has no 'y'"),
         ({"t_span": (5, 6)}, "outside the run"),
     ],
 )

@@ -38,9 +38,9 @@ def _field(table: Table, key: str) -> Any:
         return _point(table, table.data[key], key)
     if key in ("ends", "points"):
         items = table.data[key]
-        wanted = "two points or names of shapes" if key == "ends" else "a list of points [x, y]"
+        use = "two points or names of shapes" if key == "ends" else "a list of points [x, y]"
         if not isinstance(items, list) or (key == "ends" and len(items) != 2):
-            table.fail(f"'{key}' cannot be {items!r}", f"use {wanted}", key)
+            table.fail(f"'{key}' cannot be {items!r}", f"use {use}", key)
             return None
         found = [
             item if key == "ends" and isinstance(item, str) else _point(table, item, key, index)

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from hybridsim.model.checks.units import unit_of
 from hybridsim.model.parts.model import Model
 from hybridsim.plot import style
-from hybridsim.plot.drawing.kinds import Frame
+from hybridsim.plot.drawing.frame import Frame
+from hybridsim.plot.drawing.kinds import items_of
 from hybridsim.plot.drawing.layout import layout_of
 from hybridsim.plot.drawing.outlines import Label, Outline, box_of
 from hybridsim.plot.drawing.poses import Poses, poses_at
@@ -44,7 +45,7 @@ class Canvas:
         points = [
             item.points[np.isfinite(item.points).all(axis=1)]
             for poses in samples
-            for item in Frame(poses, self.layout, theme, {}).items()
+            for item in items_of(Frame(poses, self.layout, theme, {}))
             if isinstance(item, Outline)
         ]
         low, high = box_of(points)
@@ -87,7 +88,7 @@ class Canvas:
         """Yield the artists of the drawing at one time, in the order of drawing; they are not yet in the axes."""
         poses = poses or poses_at(self.solution, np.array([t]))[0]
         frame = Frame(poses, self.layout, self.theme, self._colours_at(t))
-        items = list(frame.items())
+        items = list(items_of(frame))
         outlines = sorted((item for item in items if isinstance(item, Outline)), key=lambda item: item.order)
         for style_of, group in itertools.groupby(outlines, key=Outline.style):
             yield _patch([outline.points for outline in group], *style_of)
@@ -106,9 +107,9 @@ class Canvas:
 def _unit_of(model: Model) -> str:
     """Return the unit of the places of a drawing, if the states that place it have one."""
     states = {state.name: state.unit for state in model.states}
-    places = [expr for shape in model.drawing for expr in (shape.at or ())]
-    names = [name for expr in places for name in sorted(expr.names) if name in states]
-    found = {unit for expr in places if states.keys() & expr.names and (unit := unit_of(model, expr))}
+    exprs = [expr for shape in model.drawing for expr in (shape.at or ())]
+    names = [name for expr in exprs for name in sorted(expr.names) if name in states]
+    found = {unit for expr in exprs if states.keys() & expr.names and (unit := unit_of(model, expr))}
     return found.pop() if names and len(found) == 1 else ""
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybridsim.plot.drawing.layout import Layout, bob_of, centre_of, direction_of, ends_of, outline_of
+from hybridsim.plot.drawing.belt import belt
+from hybridsim.plot.drawing.frame import BAR, Frame, Items
+from hybridsim.plot.drawing.layout import bob_of, centre_of, direction_of, ends_of, outline_of
 from hybridsim.plot.drawing.outlines import (
     BEHIND,
     FRONT,
@@ -22,34 +24,10 @@ from hybridsim.plot.drawing.outlines import (
     rectangle,
     turned,
 )
-from hybridsim.plot.drawing.poses import Pose, Poses
+from hybridsim.plot.drawing.poses import Pose
 from hybridsim.plot.drawing.theme import Theme
 
 Points = NDArray[np.float64]
-_BAR = 4.5  # width of a line in the colour of a mode, in points
-_MARKS = 0.55  # distance of the marks of a belt, relative to the unit
-
-
-@dataclass(frozen=True)
-class Frame:
-    """A drawing at one time: all poses, the layout, and the colour of the mode of each shape that shows one."""
-
-    poses: Poses
-    layout: Layout
-    theme: Theme
-    colours: dict[str, str]
-
-    def items(self) -> Iterator[Outline | Label]:
-        """Yield the outlines and labels of all shapes."""
-        for pose in self.poses.values():
-            yield from _DRAWN[pose.shape.kind](pose, self)
-
-    def colour(self, pose: Pose, default: str) -> str:
-        """Return the colour of the mode of a shape, or another one."""
-        return self.colours.get(pose.shape.name, default)
-
-
-Items = Iterator[Outline | Label]
 
 
 def _text(pose: Pose, frame: Frame, point: Points) -> Items:
@@ -65,7 +43,7 @@ def _mass(pose: Pose, frame: Frame) -> Items:
     if pose.shape.name in frame.colours:
         half = np.array([0.5 * width, 0.0])
         edge = turned(np.array([pose.at - half, pose.at + half]), angle, pose.at)
-        yield Outline(edge, frame.colours[pose.shape.name], _BAR, order=FRONT)
+        yield Outline(edge, frame.colours[pose.shape.name], BAR, order=FRONT)
     yield from _text(pose, frame, centre_of(pose, frame.layout))
 
 
@@ -83,17 +61,21 @@ def _ball(pose: Pose, frame: Frame) -> Items:
         yield Outline(
             circle(centre, radius, -0.72 * np.pi, -0.28 * np.pi),
             frame.colours[pose.shape.name],
-            _BAR,
+            BAR,
             order=FRONT,
         )
     yield from _text(pose, frame, centre)
 
 
+def _rim(pose: Pose, frame: Frame, radius: float) -> Items:
+    if pose.shape.name in frame.colours:
+        yield Outline(circle(pose.at, radius), frame.colours[pose.shape.name], BAR, order=FRONT)
+
+
 def _rotor(pose: Pose, frame: Frame) -> Items:
     radius, angle, theme = frame.layout.size(pose)[0] / 2, pose.number("angle"), frame.theme
     yield Outline(circle(pose.at, radius), frame.colour(pose, theme.ink), 1.4, theme.body)
-    if pose.shape.name in frame.colours:
-        yield Outline(circle(pose.at, radius), frame.colours[pose.shape.name], _BAR, order=FRONT)
+    yield from _rim(pose, frame, radius)
     yield Outline(circle(pose.at, 0.78 * radius), theme.rim, 1.0)
     for k in range(6):
         hole = pose.at + 0.52 * radius * np.array(
@@ -114,8 +96,7 @@ def _wheel(pose: Pose, frame: Frame) -> Items:
         spoke = np.array([pose.at, pose.at + [0.8 * radius, 0.0]])
         yield Outline(turned(spoke, angle + k * np.pi / 3, pose.at), theme.ink, 2.4 if k == 0 else 1.2)
     yield Outline(circle(pose.at, 0.16 * radius), theme.ink, 1.2, theme.body)
-    if pose.shape.name in frame.colours:
-        yield Outline(circle(pose.at, radius), frame.colours[pose.shape.name], _BAR, order=FRONT)
+    yield from _rim(pose, frame, radius)
     yield from _text(pose, frame, pose.at)
 
 
@@ -143,7 +124,7 @@ def _pendulum(pose: Pose, frame: Frame) -> Items:
 
 
 def _hatched(start: Points, end: Points, theme: Theme, line: str, depth: float, width: float = 1.6) -> Items:
-    """Draw a line from right to left below the hatching; the hatching is on its right-hand side."""
+    """Draw a line with hatching on its right-hand side."""
     for stroke in hatching(start, end, depth):
         yield Outline(stroke, theme.weak, 0.9, order=BEHIND)
     yield Outline(np.array([start, end]), line, width, order=BEHIND)
@@ -158,56 +139,6 @@ def _wall(pose: Pose, frame: Frame) -> Items:
     shows = pose.shape.name in frame.colours
     line = frame.colour(pose, frame.theme.ink)
     yield from _hatched(start, end, frame.theme, line, frame.layout.hatch, 3.0 if shows else 1.6)
-
-
-def _belt(pose: Pose, frame: Frame) -> Items:
-    theme, direction = frame.theme, direction_of(pose)
-    normal = np.array([-direction[1], direction[0]])
-    radius = frame.layout.size(pose)[0] / 2
-    low, high = frame.layout.spans[pose.shape.name]
-    length, travel = high - low, pose.number("travel")
-    left, right = (pose.at + s * direction - radius * normal for s in (low, high))
-    angle, start = np.arctan2(direction[1], direction[0]), pose.at + low * direction
-    loop = np.vstack(
-        [
-            start,
-            pose.at + high * direction,
-            circle(right, radius, angle + np.pi / 2, angle - np.pi / 2),
-            circle(left, radius, angle - np.pi / 2, angle - 1.5 * np.pi),
-        ]
-    )
-    yield Outline(loop, theme.weak, 3.0, theme.paper, BEHIND)
-    for centre in (left, right):
-        yield Outline(circle(centre, 0.8 * radius), theme.ink, 1.1, theme.body, BEHIND)
-        for k in range(3):
-            turn = angle - travel / radius + k * 2 * np.pi / 3
-            spoke = np.array([centre, centre + 0.8 * radius * np.array([np.cos(turn), np.sin(turn)])])
-            yield Outline(spoke, theme.ink, 1.1, order=BEHIND)
-        yield Outline(circle(centre, 0.15 * radius), theme.ink, 1.1, theme.paper, BEHIND)
-    around = 2 * length + 2 * np.pi * radius
-    count = max(4, round(around / (_MARKS * frame.layout.unit)))
-    for k in range(count):
-        s = (k * around / count + travel) % around
-        yield Outline(_on_loop(s, length, radius, start, right, left, angle), theme.weak, 1.6, order=BEHIND)
-    if pose.shape.name in frame.colours:
-        yield Outline(
-            np.array([start, pose.at + high * direction]), frame.colours[pose.shape.name], _BAR, order=FRONT
-        )
-
-
-def _on_loop(
-    s: float, length: float, radius: float, start: Points, right: Points, left: Points, angle: float
-) -> Points:
-    """Return a short mark inside a belt at the distance s from its upper left corner."""
-    half, inner = np.pi * radius, radius * np.array([1.0, 0.76])
-    if s < length or length + half <= s < 2 * length + half:
-        share, centre, turn = (s, left, np.pi / 2) if s < length else (length + half - s, right, -np.pi / 2)
-        point = centre + share * np.array([np.cos(angle), np.sin(angle)])
-    else:
-        point, first = (right, length) if s < length + half else (left, 2 * length + half)
-        turn = (np.pi / 2 if point is right else -np.pi / 2) - (s - first) / radius
-    way = np.array([np.cos(angle + turn), np.sin(angle + turn)])
-    return np.asarray(point + np.outer(inner, way))
 
 
 def _tank(pose: Pose, frame: Frame) -> Items:
@@ -300,6 +231,12 @@ def _body(pose: Pose, frame: Frame) -> Items:
 
 _DRAWN: dict[str, Callable[[Pose, Frame], Items]] = {
     "mass": _mass, "ball": _ball, "rotor": _rotor, "wheel": _wheel, "pendulum": _pendulum, "ground": _wall,
-    "wall": _wall, "belt": _belt, "tank": _tank, "spring": _spring, "damper": _damper, "rod": _rod, "shaft": _shaft,
+    "wall": _wall, "belt": belt, "tank": _tank, "spring": _spring, "damper": _damper, "rod": _rod, "shaft": _shaft,
     "arrow": _arrow, "line": _line, "body": _body,
 }  # fmt: skip
+
+
+def items_of(frame: Frame) -> Items:
+    """Yield the outlines and labels of all shapes."""
+    for pose in frame.poses.values():
+        yield from _DRAWN[pose.shape.kind](pose, frame)

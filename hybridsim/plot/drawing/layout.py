@@ -56,8 +56,8 @@ class Layout:
 
 def layout_of(poses: Sequence[Poses]) -> Layout:
     """Return the layout of a drawing from its poses at many times."""
-    places = [point for one in poses for pose in one.values() for point in _places(pose)]
-    low, high = box_of(places)
+    anchors = [point for one in poses for pose in one.values() for point in _anchors(pose)]
+    low, high = box_of(anchors)
     declared = [
         pose.size[0] for pose in poses[0].values() if pose.size and pose.shape.kind in ("mass", "ball")
     ]
@@ -84,7 +84,7 @@ def layout_of(poses: Sequence[Poses]) -> Layout:
     return Layout(unit, hatch, spans, sides, rests)
 
 
-def _places(pose: Pose) -> Iterator[Points]:
+def _anchors(pose: Pose) -> Iterator[Points]:
     if pose.shape.at is not None:
         yield pose.at
     yield from (end for end in pose.ends if not isinstance(end, str))
