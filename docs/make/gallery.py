@@ -40,7 +40,7 @@ MOVES: dict[str, dict[str, Any]] = {
     "elastic-gap": {"t_span": (0, 8), "speed": 1},
     "free-decay": {"quantities": ["x"], "t_span": (0, 18), "speed": 3},
     "impact-oscillator": {"quantities": ["x"], "t_span": (0, 24), "speed": 4},
-    "mode-coupling": {"t_span": (160, 200), "speed": 5},
+    "mode-coupling": {"t_span": (176, 192), "speed": 4},
     "rocking-block": {"quantities": ["theta"], "speed": 1},
     "sampled-servo": {"quantities": ["x"], "t_span": (0, 8), "speed": 1},
     "static-kinetic": {"quantities": ["v"], "t_span": (0, 8), "speed": 1},

@@ -102,7 +102,7 @@ def check_animation(model: Model, path: Path) -> None:
     """Raise an error if a model has no drawing, or if a file of this type cannot be written."""
     if path.suffix.lower() not in SUFFIXES:
         raise UsageError(
-            f"{path}: unsupported file type {path.suffix!r}", remedy=f"use {', '.join(SUFFIXES)}"
+            f"path {path}: unsupported file type {path.suffix!r}", remedy=f"use {', '.join(SUFFIXES)}"
         )
     refuse_without_drawing(model)
     if path.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:

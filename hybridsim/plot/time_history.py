@@ -32,7 +32,7 @@ from hybridsim.solution import Event, Solution
 _MOST_QUANTITIES = 4  # the default number of quantities, and of outputs
 _MOST_MARKS = 150  # event lines; more would merge into a grey area
 _VISIBLE = 1e-3  # of the range: a smaller jump is invisible
-_HAIRLINE = 1.0  # points: the least width of a mode in a strip
+_HAIRLINE = 1.2  # points: the least width of a mode in a strip
 _ROW, _STRIP = 1.75, 0.34  # inches
 
 

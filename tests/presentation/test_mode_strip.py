@@ -94,7 +94,7 @@ def test_the_strip_of_the_valve_shows_all_of_its_slips() -> None:
     history = time_history(sol, ["x"])
     figure = history.modes.get_figure()  # type: ignore[union-attr]  # the model has a contact
     FigureCanvasAgg(figure)
-    for dpi in (60, 150):
+    for dpi in (72, 150):
         figure.set_dpi(dpi)
         figure.canvas.draw()
         pixels = np.asarray(figure.canvas.buffer_rgba())[..., :3].astype(int)
