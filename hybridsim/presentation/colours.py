@@ -10,11 +10,18 @@ from hybridsim.model.parts.component import Component
 INK = "#222222"
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7F4F24")
 
+# Modes that have one colour in every picture.
+_RESERVED = {
+    "stick": INK, "rest": INK, "slip+": PALETTE[0], "slip-": PALETTE[1], "open": PALETTE[2], "closed": PALETTE[6],
+}  # fmt: skip
+
 
 def mode_colours(components: Collection[Component]) -> dict[str, str]:
-    """Return a colour for each mode: black for modes that hold a surface, others from the palette."""
+    """Return a colour for each mode: by its name, black if it holds a surface, or from the rest of the palette."""
     held = {component.surface.hold for component in components if component.surface}
     names = dict.fromkeys(mode.name for component in components for mode in component.modes)
-    free = [name for name in names if name not in held]
-    colours = {name: PALETTE[i % len(PALETTE)] for i, name in enumerate(free)}
-    return {name: INK if name in held else colours[name] for name in names}
+    colours = {name: _RESERVED.get(name, INK) for name in names if name in _RESERVED or name in held}
+    free = [colour for colour in PALETTE if colour not in colours.values()] or PALETTE
+    others = [name for name in names if name not in colours]
+    colours |= {name: free[i % len(free)] for i, name in enumerate(others)}
+    return {name: colours[name] for name in names}

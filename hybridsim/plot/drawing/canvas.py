@@ -13,7 +13,6 @@ from matplotlib.path import Path
 from matplotlib.text import Text
 from numpy.typing import NDArray
 
-from hybridsim.model.checks.units import unit_of
 from hybridsim.model.parts.model import Model
 from hybridsim.plot import style
 from hybridsim.plot.drawing.frame import Frame
@@ -105,12 +104,11 @@ class Canvas:
 
 
 def _unit_of(model: Model) -> str:
-    """Return the unit of the places of a drawing, if the states that place it have one."""
+    """Return the unit of the states at which shapes are, if they have one unit."""
     states = {state.name: state.unit for state in model.states}
-    exprs = [expr for shape in model.drawing for expr in (shape.at or ())]
-    names = [name for expr in exprs for name in sorted(expr.names) if name in states]
-    found = {unit for expr in exprs if states.keys() & expr.names and (unit := unit_of(model, expr))}
-    return found.pop() if names and len(found) == 1 else ""
+    coordinates = [expr.text for shape in model.drawing for expr in (shape.at or ())]
+    found = {states[name] for name in coordinates if name in states}
+    return found.pop() if len(found) == 1 else ""
 
 
 def _patch(parts: list[Points], order: float, line: str | None, width: float, fill: str | None) -> Artist:
