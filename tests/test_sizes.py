@@ -49,7 +49,7 @@ FILES = {
     "mechanics/series_loop/expansion.py": 312,
     "mechanics/series_loop/steps.py": 350,
     "mechanics/time_stepping/kernels.py": 379,
-    "model/parts/model.py": 558,
+    "model/parts/model.py": 554,
     "model/smoothing/rewriting.py": 534,
     "simulator/simulator.py": 380,
     "solution/explain/explanation.py": 351,
