@@ -36,6 +36,7 @@ _HOME = {
     "State": "hybridsim.model",
     "Surface": "hybridsim.model",
     "SwitchingSurface": "hybridsim.model",
+    "Use": "hybridsim.model",
     "list_models": "hybridsim.model",
     "load": "hybridsim.model",
     "load_law": "hybridsim.model",

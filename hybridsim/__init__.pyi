@@ -56,6 +56,7 @@ from hybridsim.model import Shape as Shape
 from hybridsim.model import State as State
 from hybridsim.model import Surface as Surface
 from hybridsim.model import SwitchingSurface as SwitchingSurface
+from hybridsim.model import Use as Use
 from hybridsim.model import list_models as list_models
 from hybridsim.model import load as load
 from hybridsim.model import load_law as load_law

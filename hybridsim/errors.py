@@ -30,6 +30,8 @@ class Place:
         Offset into ``text``, counted from 0, under which the caret is drawn.
     text : str, optional
         The offending piece of source text, one line.
+    within : str, optional
+        The part of the model to which the file belongs, such as ``"use.left > use.hub"``.
 
     Examples
     --------
@@ -42,6 +44,7 @@ class Place:
     line: int | None = None
     column: int | None = None
     text: str | None = None
+    within: str = ""
 
     def at(self, text: str, column: int | None = None) -> Place:
         """Return a place in the same file and line, but with another piece of text."""
@@ -49,11 +52,16 @@ class Place:
 
     @property
     def prefix(self) -> str:
-        """The start of a message, ``file:line:`` and a space; an empty string if both are unknown."""
+        """The start of a message, ``file:line:`` and a space; an empty string if the place is unknown."""
         parts = [str(part) for part in (self.file, self.line if self.file else None) if part is not None]
         if not parts and self.line is not None:
             parts = [f"line {self.line}"]
-        return ":".join(parts) + ": " if parts else ""
+        where = ", ".join(text for text in (":".join(parts), self.within) if text)
+        return f"{where}: " if where else ""
+
+    def inside(self, use: str) -> Place:
+        """Return the place as seen from a model that contains the file as its part ``use``."""
+        return replace(self, within=f"{use} > {self.within}" if self.within else use)
 
 
 class HybridsimError(Exception):
@@ -143,6 +151,13 @@ class ModelError(HybridsimError):
     def errors(self) -> tuple[ModelError, ...]:
         """Every single error; a one-element tuple with this error if it contains no others."""
         return self._errors or (self,)
+
+    def inside(self, use: str) -> tuple[ModelError, ...]:
+        """Return every single error as seen from a model that contains the faulty one as its part ``use``."""
+        return tuple(
+            type(error)(error.message, place=(error.place or Place()).inside(use), remedy=error.remedy)
+            for error in self.errors
+        )
 
     @classmethod
     def collect(cls, errors: Iterable[ModelError], title: str) -> ModelError:

@@ -43,6 +43,8 @@ FACES = {
     ("model.parts.model", "model.toml.read"),  # Model.from_toml
     ("model.parts.contact", "model.library"),  # Contact(law="name")
     ("model.toml.laws", "model.library"),  # law = "name" in a file
+    ("model.parts.use", "model.library"),  # Use(model="name")
+    ("model.toml.use", "model.library"),  # model = "name" in a file
     ("mechanics.declaration.system", "mechanics.declaration.as_model"),  # MechanicalSystem.to_model
     ("solution.solution", "solution.files.archive"),  # Solution.save
 }

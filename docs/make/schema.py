@@ -29,7 +29,8 @@ def table(keys: Schema, needed: tuple[str, ...] = ()) -> Schema:
 
 def named(entry: Schema, text: str) -> Schema:
     """A table of entries under names of the author's choice."""
-    names = {"pattern": "^[A-Za-z_][A-Za-z_0-9]*$"}
+    word = "[A-Za-z_][A-Za-z_0-9]*"  # words with dots between them are names in parts
+    names = {"pattern": f"^{word}(\\.{word})*$"}
     return said(text, {"type": "object", "propertyNames": names, "additionalProperties": entry})
 
 
@@ -179,12 +180,13 @@ CHIRP = {
     "kind": {"const": "chirp"}, "f0": EXPRESSION, "f1": EXPRESSION, "duration": EXPRESSION, "amplitude": EXPRESSION,
     "phase": EXPRESSION,
 }  # fmt: skip
+CONNECTED = {"kind": {"const": "connected"}, "unit": UNIT}
 HELD = {"kind": {"const": "held"}, "value": said("until it is set from outside", EXPRESSION), "unit": UNIT}
 POINTS_IN_TIME = {
     "kind": {"const": "table"}, "times": NUMBERS, "values": NUMBERS, "file": said("a CSV beside the model", TEXT),
     "columns": {"type": "array"}, "interpolation": {"enum": ["linear", "cubic"]},
 }  # fmt: skip
-INPUT = {"oneOf": [table(keys, ("kind",)) for keys in (WAVE, CHIRP, POINTS_IN_TIME, HELD)]}
+INPUT = {"oneOf": [table(keys, ("kind",)) for keys in (WAVE, CHIRP, POINTS_IN_TIME, HELD, CONNECTED)]}
 OUTPUT = table(
     {"expr": EXPRESSION, "unit": UNIT, "modes": said('"component.mode" = the expression there', EXPRESSIONS)},
     ("expr",),
@@ -217,6 +219,24 @@ def shape(kind: str) -> Schema:
 
 DISCRETE = table({"start": START, "unit": UNIT}, ("start",))
 
+# a value for all copies of a part, one for each copy, or a table of the names of an inner part
+VALUES = {
+    "type": "object",
+    "additionalProperties": {
+        "anyOf": [EXPRESSION, {"type": "array", "items": EXPRESSION}, {"type": "object"}]
+    },
+}
+USE = table(
+    {
+        "model": said("the file of the part, or the name of a packaged model", TEXT),
+        "parameters": said("new values of parameters of the part", VALUES),
+        "start": said("new initial values of states of the part", VALUES),
+        "connect": said("what each connected input of the part receives", VALUES),
+        "repeat": said("how many copies, NAME1, NAME2, ...; i is the number of a copy", {"type": "integer"}),
+    },
+    ("model",),
+)
+
 MODEL = {
     "$schema": "https://json-schema.org/draft/2020-12/schema",
     "title": "hybridsim model",
@@ -226,6 +246,7 @@ MODEL = {
             "name": TEXT, "title": TEXT, "source": TEXT, "description": TEXT,
             "look": said("what to look at when it runs", TEXT),
             "duration": said("how long to look", EXPRESSION),
+            "use": named(USE, "other models as parts; their names become NAME.x"),
             "parameters": named(short(EXPRESSION, PARAMETER), "numbers, or expressions of other parameters"),
             "states": named(STATE, "what the equations integrate"),
             "discrete": named(short(EXPRESSION, DISCRETE), "what only resets and ticks change"),

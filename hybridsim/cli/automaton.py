@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def lines_of(
-    model: Model, report: Report, primitives: Iterable[Primitive], facts: Iterable[str]
+    model: Model, report: Report | None, primitives: Iterable[Primitive], facts: Iterable[str]
 ) -> Iterator[str]:
     """Yield the description of a model, line by line."""
     yield f"{model.name}: {model.title}" if model.title else model.name
@@ -43,7 +43,8 @@ def lines_of(
     yield from _section("monitors", map(_monitor, model.monitors))
     yield from _section("schedules", map(_schedule, model.schedules))
     yield from _section("outputs", (f"{output.name} = {_flat(output.expr)}" for output in model.outputs))
-    yield from _section("engine", _engine(report))
+    if report is not None:
+        yield from _section("engine", _engine(report))
 
 
 def _primitive(primitive: Primitive) -> str:
@@ -101,16 +102,19 @@ def _discrete(model: Model) -> Iterator[str]:
 def _input(declared: Input) -> str:
     if declared.kind == "table":
         return f"{declared.name}: table of {len(declared.times)} points, {declared.interpolation}"
+    if declared.kind == "connected":
+        return f"{declared.name}: connected by the model that uses this one as a part"
     numbers = ", ".join(f"{name} {_flat(value)}" for name, value in declared.expressions.items())
     return f"{declared.name}: {declared.shape or declared.kind}, {numbers}"
 
 
-def _component(component: Component, report: Report) -> Iterator[str]:
+def _component(component: Component, report: Report | None) -> Iterator[str]:
     yield f"initial mode: {component.initial or 'from the initial state'}"
     sides: tuple[str, ...] = ()
     if surface := component.surface:
         sides = surface.modes
-        held, projected = report.held.get(component.name), report.projected.get(component.name)
+        held = report.held.get(component.name) if report else None
+        projected = report.projected.get(component.name) if report else None
         beyond = (
             f"impact with restitution {_flat(surface.restitution)} when it reaches 0"
             if surface.restitution is not None
@@ -123,7 +127,7 @@ def _component(component: Component, report: Report) -> Iterator[str]:
             + (f" ({', '.join(projected)} projected onto the surface)" if projected else "")
             + (
                 ""
-                if held or projected
+                if held or projected or report is None
                 else f"; the surface can only be crossed, because its rate does not depend on {surface.unknown}"
             )
         )
@@ -131,7 +135,7 @@ def _component(component: Component, report: Report) -> Iterator[str]:
         reset = ", ".join(_flat_reset(name, value, "=") for name, value in limit.reset.items())
         yield f"if its events accumulate: to {limit.to}" + (f" with {reset}" if reset else "")
     for mode in component.modes:
-        linear = " (linear)" if mode.name in report.linear.get(component.name, ()) else ""
+        linear = " (linear)" if report and mode.name in report.linear.get(component.name, ()) else ""
         yield f"mode {mode.name}{linear}"
         yield from (f"    {line}" for line in _mode(mode, [side for side in sides if side != mode.name]))
 

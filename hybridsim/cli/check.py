@@ -30,6 +30,11 @@ def add_to(commands: Any) -> None:
     )
     values.add_model_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
+    parser.add_argument(
+        "--flat",
+        action="store_true",
+        help="print the model as one TOML file, in which the parts ([use.NAME]) are written out",
+    )
     parser.set_defaults(execute=execute)
 
 
@@ -41,11 +46,14 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     from hybridsim.model.smoothing.explicit_corners import smoothing_of
 
     model = values.changed_model(args)
-    report = describe(model)
+    # a part alone has no engine: its equations are complete only inside another model
+    report = None if any(signal.kind == "connected" for signal in model.inputs) else describe(model)
     cautions = warnings_of(model)
     primitives = smoothing_of(model).primitives
     facts = starting_facts(model)
-    if args.json:
+    if args.flat:
+        say(model.to_toml().rstrip())
+    elif args.json:
         print_json(_record(model, report, cautions, primitives, facts))
     else:
         say("\n".join(lines_of(model, report, primitives, facts)))
@@ -56,7 +64,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 def _record(
     model: Model,
-    report: Report,
+    report: Report | None,
     cautions: Iterable[Caution],
     primitives: Iterable[Primitive],
     facts: Iterable[str],
@@ -74,7 +82,7 @@ def _record(
             }
             for component in model.all_components()
         },
-        "engine": asdict(report),
+        "engine": asdict(report) if report else None,
         "primitives": [_primitive_record(primitive) for primitive in primitives],
         "notes": list(facts),
         "warnings": [_caution_record(caution) for caution in cautions],

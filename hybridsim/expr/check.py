@@ -7,11 +7,19 @@ import math
 from collections.abc import Callable, Iterable
 
 from hybridsim.errors import ExpressionError, Place, nearest
-from hybridsim.expr.grammar import BINARY, COMPARISONS, CONSTANTS, FUNCTIONS, MAX_INTEGER, MAX_POWER
+from hybridsim.expr.grammar import (
+    BINARY,
+    COMPARISONS,
+    CONSTANTS,
+    FUNCTIONS,
+    MAX_INTEGER,
+    MAX_POWER,
+    RESERVED,
+)
 from hybridsim.expr.walk import NoValue, value_of
 
 _KINDS = {
-    ast.Attribute: "access to attributes (a dot after a name)",
+    ast.Attribute: "access to attributes (a dot after something that is not a name)",
     ast.Lambda: "a lambda",
     ast.Tuple: "a tuple (a comma outside a call)",
     ast.Starred: "an unpacking with *",
@@ -22,6 +30,8 @@ _KINDS = {
     ast.YieldFrom: "yield",
     ast.Subscript: "a subscript",
 }
+
+_DOTS = "a dot stands between the name of a part and the name of its quantity, such as left.x"
 
 
 class _Checker:
@@ -130,7 +140,10 @@ class _Checker:
             return True
         if name in FUNCTIONS:
             raise self.fail(node, f"'{name}' is a function", f"call the function: {name}(...)")
-        if name.startswith("__"):
+        if "." in name and not RESERVED.isdisjoint(name.split(".")):
+            word = next(word for word in name.split(".") if word in RESERVED)
+            raise self.fail(node, f"the name '{name}' contains the reserved word '{word}'", _DOTS)
+        if name.startswith("__") or ".__" in name:
             raise self.fail(
                 node,
                 f"the name '{name}' is not allowed",

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
-from hybridsim.errors import ExpressionError
+from hybridsim.errors import ExpressionError, Place
 from hybridsim.expr.grammar import TIME
 from hybridsim.expr.parse import Expression, require_names
 from hybridsim.expr.walk import NoValue, value_of
+
+
+class CyclicDependency(ExpressionError):
+    """Raised for expressions that depend on each other in a circle, whose names it lists."""
+
+    def __init__(
+        self, message: str, circle: Sequence[str], *, place: Place | None = None, remedy: str | None = None
+    ) -> None:
+        super().__init__(message, place=place, remedy=remedy)
+        self.circle = tuple(circle)
 
 
 def evaluate(expr: Expression, values: Mapping[str, float]) -> float:
@@ -59,7 +69,7 @@ def dependency_order(expressions: Mapping[str, Expression], kind: str) -> list[s
 
     Raises
     ------
-    ExpressionError
+    CyclicDependency
         For a cyclic definition.
     """
     order: list[str] = []
@@ -77,9 +87,10 @@ def dependency_order(expressions: Mapping[str, Expression], kind: str) -> list[s
             if name in done:
                 continue
             if name in path:
-                circle = " -> ".join([*path[path.index(name) :], name])
-                raise ExpressionError(
-                    f"cyclic dependency among {kind}: {circle}",
+                circle = (*path[path.index(name) :], name)
+                raise CyclicDependency(
+                    f"cyclic dependency among {kind}: {' -> '.join(circle)}",
+                    circle,
                     place=expressions[path[-1]].error("").place,
                     remedy="set one of them to an independent value",
                 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -59,6 +60,15 @@ TIME = "t"
 RESERVED = (
     frozenset(FUNCTIONS) | frozenset(CONSTANTS) | {TIME, "True", "False", "and", "or", "not", "if", "else"}
 )
+
+# A name: an identifier, or the names of nested parts and an identifier with dots between them.
+NAME = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*")
+
+
+def is_name(text: str) -> bool:
+    """Return whether a text is a single name, such as x or left.x."""
+    return NAME.fullmatch(text) is not None
+
 
 BINARY: Mapping[type[ast.operator], str] = MappingProxyType(
     {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}

@@ -10,7 +10,7 @@ from hybridsim.errors import ExpressionError, Place
 from hybridsim.expr.parse import Expression, parse, substitute
 
 ADDS = "+="  # prefix of the text of an increment
-_HEAD = ADDS + " "
+HEAD = ADDS + " "
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Increment(Expression):
     ) -> ExpressionError:
         """Return an error that points at this amount, or at a node of its tree."""
         column = None if node is None else getattr(node, "col_offset", None)
-        place = (self.place or Place()).at(self.text, None if column is None else column + len(_HEAD))
+        place = (self.place or Place()).at(self.text, None if column is None else column + len(HEAD))
         return ExpressionError(message, place=place, remedy=remedy)
 
 
@@ -45,4 +45,4 @@ def assignment(name: str, expr: Expression, sign: str = "=") -> str:
 
 
 def _increment(amount: Expression) -> Increment:
-    return Increment(_HEAD + amount.text, amount.names, amount.place, amount.tree)
+    return Increment(HEAD + amount.text, amount.names, amount.place, amount.tree)

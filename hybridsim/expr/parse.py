@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import math
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from numbers import Integral, Real
 from typing import SupportsFloat
@@ -21,7 +21,7 @@ from hybridsim.expr.grammar import (
     MAX_INTEGER,
     MAX_LENGTH,
 )
-from hybridsim.expr.python_tree import python_tree
+from hybridsim.expr.python_tree import python_tree, with_dotted_names
 from hybridsim.expr.rebuild import with_names
 from hybridsim.expr.write import write
 
@@ -40,7 +40,7 @@ _ADVICE = {
     "|": "write 'or' instead of '|'",
     "~": "write 'not' instead of '~'",
     "%": "the remainder is not available; declare a periodic signal as an input of kind 'wave'",
-    "[": "expressions cannot contain lists or subscripts",
+    "[": "expressions cannot contain lists or subscripts; part 3 of the repeated part 'block' is block3",
     "{": "expressions cannot contain sets or tables",
     ":": "expressions cannot contain slices, lambdas or assignments",
     ";": "write a single expression",
@@ -121,11 +121,23 @@ def parse(text: str | float | bool | Expression, place: Place | None = None) -> 
     if isinstance(text, float) and math.isfinite(text):
         return _of_number(float(text), place)
     where = place or Place()
-    text = _as_text(text, where)
-    text = re.sub(r"[ \t\r\n]", " ", text).strip()
-    _check_text(text, where)
+    text = one_line(_as_text(text, where))
+    check_text(text, where)
+    tree, names = checked_tree(text, where, with_dotted_names)
+    return Expression(text, names, place, tree)
+
+
+def one_line(text: str) -> str:
+    """Return a text without line breaks and without blanks at its ends."""
+    return re.sub(r"[ \t\r\n]", " ", text).strip()
+
+
+def checked_tree(
+    text: str, where: Place, prepare: Callable[[ast.expr], ast.expr]
+) -> tuple[ast.expr, frozenset[str]]:
+    """Return the tree of a text after a preparation and the check against the whitelist, and its names."""
     try:
-        tree = python_tree(text, "eval").body
+        tree = prepare(python_tree(text, "eval").body)
         check_size(tree, text, where, MAX_DEPTH, MAX_LENGTH)
         names = check_tree(tree, text, where)
     except (SyntaxError, ValueError) as fault:
@@ -147,7 +159,7 @@ def parse(text: str | float | bool | Expression, place: Place | None = None) -> 
             place=where.at(text),
             remedy="move parts of it to [definitions]",
         ) from None
-    return Expression(text, names, place, tree)
+    return tree, names
 
 
 def _of_number(number: float, place: Place | None) -> Expression:
@@ -165,7 +177,7 @@ def require_names(expr: Expression, known: Iterable[str]) -> None:
         return
     allowed = set(known)
     nodes = [n for n in ast.walk(expr.tree) if isinstance(n, ast.Name) and n.id in unknown]
-    node = min(nodes, key=lambda n: n.col_offset)
+    node = min(nodes, key=lambda n: getattr(n, "col_offset", 0))
     if node.id.lower() in ("nan", "inf", "infinity"):
         raise expr.error(f"'{node.id}' is not finite", node=node, remedy="use a finite number")
     remedy = nearest(node.id, allowed | set(FUNCTIONS) | set(CONSTANTS))
@@ -202,8 +214,8 @@ def of_tree(tree: ast.expr, place: Place | None = None) -> Expression:
     return Expression(write(tree), frozenset(identifiers - CONSTANTS.keys() - FUNCTIONS.keys()), place, tree)
 
 
-def _check_text(text: str, where: Place) -> None:
-    """Reject a text that is empty, too long, or contains invalid characters."""
+def check_text(text: str, where: Place, also: str = "") -> None:
+    """Reject a text that is empty, too long, or contains invalid characters, except those in ``also``."""
     if not text:
         raise ExpressionError(
             "the expression is empty", place=where, remedy="write a number or an expression"
@@ -215,7 +227,7 @@ def _check_text(text: str, where: Place) -> None:
             remedy="move parts of it to [definitions]",
         )
     for column, character in enumerate(text):
-        if not _ALLOWED.match(character):
+        if not (_ALLOWED.match(character) or character in also):
             shown = character if character.isprintable() else f"U+{ord(character):04X}"
             printable = "".join(c if c.isprintable() else "?" for c in text)
             advice = _ADVICE.get(

@@ -8,7 +8,7 @@ import re
 from collections.abc import Mapping
 from fractions import Fraction
 
-from hybridsim.expr.grammar import FUNCTIONS
+from hybridsim.expr.grammar import FUNCTIONS, NAME
 from hybridsim.expr.write import write
 
 Monomial = tuple[tuple[str, int], ...]
@@ -18,7 +18,7 @@ Polynomial = Mapping[Monomial, Fraction]
 
 _MOST_TERMS = 200  # a product with more terms is not expanded and counts as one factor
 _HIGHEST = 8  # a higher power is not expanded either
-_DIVISOR = re.compile(r"1/\(1\*([A-Za-z_]\w*)\^1\)")
+_DIVISOR = re.compile(rf"1/\(1\*({NAME.pattern})\^1\)")
 _COMPARE = {
     ast.Lt: lambda d: d < 0,
     ast.LtE: lambda d: d <= 0,

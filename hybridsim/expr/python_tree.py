@@ -1,4 +1,4 @@
-"""Python's parser, used by one thread at a time and without warnings."""
+"""Python's parser, used by one thread at a time and without warnings, and names with dots in its trees."""
 
 from __future__ import annotations
 
@@ -20,3 +20,23 @@ def python_tree(text: str, mode: str = "exec") -> Any:
     with _lock, warnings.catch_warnings():
         warnings.simplefilter("ignore")  # no warnings about spellings such as `1if x else 2`
         return ast.parse(text, mode=mode)
+
+
+def with_dotted_names(tree: ast.expr) -> ast.expr:
+    """Return a tree in which names that are joined by dots are single names; the tree may be changed."""
+    if not any(isinstance(node, ast.Attribute) for node in ast.walk(tree)):
+        return tree
+    joined: ast.expr = _Joined().visit(tree)
+    return joined
+
+
+class _Joined(ast.NodeTransformer):
+    """Replaces a chain of attributes of a name by one name; any other attribute is left for the whitelist."""
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+        """Return the single name, or the node itself if something other than a name stands before its dot."""
+        value = self.visit(node.value)
+        if not isinstance(value, ast.Name):
+            node.value = value
+            return node
+        return ast.copy_location(ast.Name(f"{value.id}.{node.attr}", ast.Load()), node)

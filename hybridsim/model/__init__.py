@@ -17,6 +17,7 @@ from hybridsim.model.parts.quantities import Discrete, Output, Parameter, State
 from hybridsim.model.parts.schedule import Schedule
 from hybridsim.model.parts.shape import Shape
 from hybridsim.model.parts.switching import SwitchingSurface
+from hybridsim.model.parts.use import Use
 
 __all__ = [
     "Choice",
@@ -40,6 +41,7 @@ __all__ = [
     "State",
     "Surface",
     "SwitchingSurface",
+    "Use",
     "list_laws",
     "list_models",
     "load",

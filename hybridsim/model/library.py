@@ -20,8 +20,11 @@ _MAX_LOADED = 64  # most models kept in memory
 # A file that was written this many nanoseconds ago may change again without a change of its time stamp.
 _MIN_AGE = 200_000_000
 
-# Where each model lies, by the argument of `load`: the path, the state of the file when it was read, and the model.
-_loaded: dict[str, tuple[str, tuple[int, ...], Model]] = {}
+State = tuple[tuple[int, ...], ...]
+"""What changes when one of the files of a model changes: device, inode, time stamp and size of each."""
+
+# Where each model lies, by the argument of `load`: the path, the state of its files when it was read, and the model.
+_loaded: dict[str, tuple[str, State, Model]] = {}
 
 
 @dataclass(frozen=True)
@@ -74,37 +77,60 @@ def loaded(name_or_path: str | os.PathLike[str]) -> Model:
             remedy = "for rates from a function f(t, x, p) use hs.Model('m', states={'x': 1.0}, flow=f)"
         raise UsageError(f"The model cannot be {argument!r}", remedy=remedy)
     text = os.fspath(name_or_path)
-    is_path = isinstance(name_or_path, os.PathLike) or text.endswith(".toml") or "/" in text or os.sep in text
+    is_path = isinstance(name_or_path, os.PathLike) or _is_path(text)
     known = _loaded.get(text)
-    if known is not None and known[1] == _state_of(known[0]) and is_path == (known[0] == text):
-        return known[2]
-    path = Path(text)
-    if not is_path:
-        path = models_folder() / f"{text}.toml"
-        names = [info.stem for info in _model_files()]
-        if text not in names:
-            raise ModelError(
-                f"there is no model '{text}'",
-                remedy=nearest(text, names, kind="models")
-                + "; for your own file pass its path, ending in .toml",
-            )
-    state = _state_of(str(path))
-    model = Model.from_toml(read_text(path), str(path))
+    if known is not None and is_path == (known[0] == text):
+        path, state, model = known
+        if state == _state_of(path, *model._part_files):
+            return model
+    path = text if is_path else str(path_of(text, Path()))
+    before = _state_of(path)
+    model = Model.from_toml(read_text(Path(path)), path)
+    state = (*before, *_state_of(*model._part_files))
     # a table may lie in a file of its own, which may change alone
-    if state and time.time_ns() - state[2] > _MIN_AGE and not any(i.kind == "table" for i in model.inputs):
+    tables = any(signal.kind == "table" for signal in model.inputs)
+    if all(state) and not tables and time.time_ns() - max(file[2] for file in state) > _MIN_AGE:
         if len(_loaded) >= _MAX_LOADED:
             _loaded.clear()
-        _loaded[text] = (text if is_path else str(path)), state, model
+        _loaded[text] = path, state, model
     return model
 
 
-def _state_of(path: str) -> tuple[int, ...]:
-    """Return the device, inode, time stamp and size of a file, which differ after a change; () without a file."""
-    try:
-        found = os.stat(path)
-    except (OSError, ValueError):
-        return ()
-    return found.st_dev, found.st_ino, found.st_mtime_ns, found.st_size
+def path_of(name_or_path: str, folder: Path) -> Path:
+    """Return the path of a model: of a packaged model by its name, or a path relative to a folder.
+
+    Raises
+    ------
+    ModelError
+        For an unknown name; the message lists similar names.
+    """
+    if _is_path(name_or_path):
+        return folder / name_or_path
+    names = [info.stem for info in _model_files()]
+    if name_or_path not in names:
+        raise ModelError(
+            f"there is no model '{name_or_path}'",
+            remedy=nearest(name_or_path, names, kind="models")
+            + "; for your own file pass its path, ending in .toml",
+        )
+    return models_folder() / f"{name_or_path}.toml"
+
+
+def _is_path(text: str) -> bool:
+    return text.endswith(".toml") or "/" in text or os.sep in text
+
+
+def _state_of(*paths: str) -> State:
+    """Return the state of files; an empty one for a file that does not exist."""
+    states: list[tuple[int, ...]] = []
+    for path in paths:
+        try:
+            found = os.stat(path)
+        except (OSError, ValueError):
+            states.append(())
+        else:
+            states.append((found.st_dev, found.st_ino, found.st_mtime_ns, found.st_size))
+    return tuple(states)
 
 
 def list_models() -> tuple[ModelInfo, ...]:

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hybridsim.errors import ExpressionError, Place
-from hybridsim.expr import Expression, parse, require_names
+from hybridsim.expr import Expression, evaluate, parse, require_names
 from hybridsim.expr.grammar import FUNCTIONS
 
 ALLOWED_NODES = (
@@ -25,8 +25,11 @@ ALLOWED_NODES = (
 REFUSED = {
     "": "empty",
     "   ": "empty",
-    "x.y": "attributes",
-    "x.__class__.__mro__": "attributes",
+    "sin(x).y": "attributes",
+    "x.__class__.__mro__": "'x.__class__.__mro__' is not allowed",
+    "sin.x": "the reserved word 'sin'",
+    "x.t": "the reserved word 't'",
+    "x.y(1)": "unknown function 'x.y'",
     "().__class__": "attributes",
     "(1).real": "attributes",
     "__import__(x)": "__import__",
@@ -228,12 +231,21 @@ def test_unknown_name_points_at_it_and_suggests() -> None:
     require_names(expr, {"F0", "omga", "t", "more"})
 
 
+def test_a_name_may_have_dots_between_its_words() -> None:
+    expr = parse("left.x**2 - sin(left . hub.v)/2.0")
+    assert expr.names == {"left.x", "left.hub.v"}
+    assert evaluate(expr, {"left.x": 3.0, "left.hub.v": 0.0}) == 9.0
+    with pytest.raises(ExpressionError, match=r"unknown name 'left\.v'") as caught:
+        require_names(parse("1 + left.v"), {"left.x", "t"})
+    assert caught.value.place is not None and caught.value.place.column == 4
+
+
 def test_a_long_line_is_cut_around_the_caret() -> None:
     with pytest.raises(ExpressionError) as caught:
-        parse("a * " * 30 + "b.c" + " * d" * 30, Place("m.toml", 1))
+        parse("a * " * 30 + "b[c]" + " * d" * 30, Place("m.toml", 1))
     _, shown, caret, _ = str(caught.value).splitlines()
     assert len(shown) < 120
-    assert shown[caret.index("^")] == "b"
+    assert shown[caret.index("^")] == "["
 
 
 def test_a_file_cannot_steer_the_terminal() -> None:

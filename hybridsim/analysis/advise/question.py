@@ -100,13 +100,12 @@ class Question:
     @property
     def name(self) -> str:
         """The state, output or contact to which the quantity refers."""
-        return self.text.split(".")[1] if "." in self.text else ""
+        return _name_and_number(self.text.partition(".")[2])[0]
 
     @property
     def number(self) -> int:
         """The number of the harmonic or of the event; 1 by default."""
-        parts = self.text.split(".")
-        return int(parts[2]) if len(parts) > 2 else 1
+        return int(_name_and_number(self.text.partition(".")[2])[1] or 1)
 
     def ask(self, model: Model, progress: Callable[[float], None] | None = None) -> Answer:
         """Compute the quantity from a steady state or a run, and measure the cost without compiling.
@@ -266,7 +265,6 @@ def speeds(model: Model, motion: Measures) -> tuple[dict[str, float], float]:
 
 
 # -- from text to a question
-# --------------------------------------------------------------------------------------
 
 
 def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None, accuracy: float) -> Question:
@@ -284,9 +282,10 @@ def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None,
             f"`quantity` cannot be {quantity!r}",
             remedy=f"use a name such as {'amplitude.x'!r}, or a function",
         )
-    head, *rest = quantity.split(".")
+    head, _, rest = quantity.partition(".")
+    name, number = _name_and_number(rest)
     if head not in HEADS:
-        meant = [".".join((other, *rest)) for other in near(head, HEADS)]
+        meant = [f"{other}.{rest}" if rest else other for other in near(head, HEADS)]
         named = nearest(quantity, meant) if meant else nearest(head, HEADS, kind="quantities")
         raise UsageError(f"`quantity` is unknown: {quantity!r}", remedy=named)
     if head in OF_RUN and t_span is None:
@@ -302,18 +301,19 @@ def question_of(model: Model, quantity: Any, t_span: tuple[float, float] | None,
             )
         return Question(quantity, None, None, accuracy)
     names = _names(model, head)
-    if not rest or rest[0] not in names:
-        remedy = nearest(rest[0] if rest else "", names, kind=head)
-        raise UsageError(f"`quantity` is unknown: {quantity!r}", remedy=remedy)
-    numbered = head in ("harmonic", "event_time")
-    if len(rest) > 2 or (len(rest) == 2 and not (numbered and rest[1].isdecimal())):
-        raise UsageError(
-            f"`quantity` cannot be {quantity!r}",
-            remedy=f"write {head}.{rest[0]}" + (".1" if numbered else ""),
-        )
-    if head == "event_time" and len(rest) == 2 and int(rest[1]) < 1:
+    if name not in names:
+        raise UsageError(f"`quantity` is unknown: {quantity!r}", remedy=nearest(name, names, kind=head))
+    if number and head not in ("harmonic", "event_time"):
+        raise UsageError(f"`quantity` cannot be {quantity!r}", remedy=f"write {head}.{name}")
+    if head == "event_time" and number and int(number) < 1:
         raise UsageError(f"`quantity` cannot be {quantity!r}", remedy="use an event number from 1 on")
     return Question(quantity, None, t_span, accuracy)
+
+
+def _name_and_number(text: str) -> tuple[str, str]:
+    """Split the name of a quantity, which may contain dots, from the number that may follow it."""
+    name, _, number = text.rpartition(".")
+    return (name, number) if name and number.isdecimal() else (text, "")
 
 
 def _names(model: Model, head: str) -> list[str]:

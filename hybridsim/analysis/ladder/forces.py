@@ -31,7 +31,7 @@ def with_forces(model: Model, forces: Mapping[str, Expression], mode: str, title
         if not _is_copy(c, part)
     )
     outputs = tuple(
-        replace(output, modes={p: e for p, e in output.modes.items() if p.split(".")[0] not in forces})
+        replace(output, modes={p: e for p, e in output.modes.items() if p.rpartition(".")[0] not in forces})
         for output in model.outputs
     )
     return replace(

@@ -55,7 +55,9 @@ class Lowering(LoweringState):
     def signal(self, index: int) -> Any:
         """Return the current piece of an input as an expression in local time."""
         sp = self.sp
-        kind = self.model.inputs[index].kind
+        declared = self.model.inputs[index]
+        if (kind := declared.kind) == "connected":
+            raise declared.not_connected(self.model.name)
         c = [sp.Symbol(f"signal_{index}_{j}", real=True) for j in range(SIGNAL_SLOTS)]
         d = self.s - c[4]
         if kind == "step":
@@ -140,7 +142,7 @@ class Lowering(LoweringState):
     def _check_surfaces(self, surfaces: dict[int, Any]) -> None:
         for c, s in surfaces.items():
             if wrong := self._foreign(s):
-                names = ", ".join(sorted(n.name.removeprefix("v_") for n in wrong))
+                names = ", ".join(sorted(map(declared_name, wrong)))
                 raise ModelError(
                     f"{self.components[c].name}: the {self.title(c)} '{self.written(c)}' uses {names}, which "
                     "depends on a mode",

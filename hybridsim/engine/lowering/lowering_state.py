@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 import sympy as sp
 
 from hybridsim.engine.lowering.program import Assign, Switch
-from hybridsim.engine.lowering.program_names import user
+from hybridsim.engine.lowering.program_names import shown, user
 from hybridsim.errors import Place
 from hybridsim.expr.parse import Expression
 from hybridsim.expr.symbolic import to_sympy
@@ -71,9 +70,8 @@ class LoweringState:
         sp = self.sp
         value = to_sympy(expression, self.symbols)
         if value.has(sp.I, sp.nan, sp.zoo, sp.oo):
-            simplified = re.sub(rf"\b{user('')}", "", str(value))
             raise expression.error(
-                f"'{expression.text}' is not a finite real number: it simplifies to {simplified}",
+                f"'{expression.text}' is not a finite real number: it simplifies to {shown(str(value))}",
                 remedy="look for a root or a logarithm of a negative number, or a division by zero",
             )
         return self._local_angles(value)

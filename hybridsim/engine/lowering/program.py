@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from hybridsim.engine.lowering.program_names import shown
 from hybridsim.errors import ModelError
 
 
@@ -67,7 +68,7 @@ def ordered(items: Iterable[Item]) -> list[Item]:
     while waiting:
         independent = [i for i in waiting if not any(pending.get(n, 0) for n in used(i))]
         if not independent:
-            loop = sorted({n.removeprefix("v_") for i in waiting for n in assigned(i)})
+            loop = sorted({shown(n) for i in waiting for n in assigned(i)})
             raise ModelError(
                 f"the quantities {', '.join(loop)} depend on each other in a circle",
                 remedy="remove one of these dependencies, or declare one of the quantities as a state",

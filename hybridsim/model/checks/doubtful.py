@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import ast
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from hybridsim.errors import HybridsimError, Place
 from hybridsim.expr import Expression
-from hybridsim.expr.grammar import TIME
+from hybridsim.expr.grammar import NAME, TIME
 from hybridsim.model.checks.pulses import pulse_in
 from hybridsim.model.laws.force_signs import wrong_reactions, wrong_signs
 from hybridsim.model.laws.velocity_powers import velocity_powers
@@ -256,7 +255,7 @@ def _of_jumps(model: Model) -> Iterator[Caution]:
             continue
         reason = one.remark.removeprefix(f"{JUMPS}: ")
         what = f"'{one.text}' in {', '.join(one.where)}"
-        names = meanings.depended_on(re.findall(r"[A-Za-z_]\w*", one.text))
+        names = meanings.depended_on(NAME.findall(one.text))
         in_events_only = all(where.startswith(("monitor ", "guard ")) for where in one.where)
         if names & states and not in_events_only:
             yield Caution(

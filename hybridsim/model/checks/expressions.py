@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from hybridsim.errors import ExpressionError, ModelError
 from hybridsim.expr import Expression, evaluate, substitute
-from hybridsim.expr.evaluate import dependency_order
+from hybridsim.expr.evaluate import CyclicDependency, dependency_order
 from hybridsim.expr.grammar import MAX_DERIVED_NODES
 from hybridsim.model.checks.scope import Scope
 from hybridsim.model.parts.component import Component
@@ -116,8 +116,8 @@ def _circles(scope: Scope) -> None:
     over_modes = {name: _over_modes(exprs) for name, exprs in edges.items()}
     try:
         order = dependency_order(over_modes, "definitions and variables")
-    except ExpressionError as fault:
-        scope.errors.append(fault)
+    except CyclicDependency as fault:
+        scope.errors.append(_algebraic_loop(fault))
         return
     sizes: dict[str, int] = {}
     for name in order:
@@ -127,6 +127,19 @@ def _circles(scope: Scope) -> None:
             remedy = f"at most {MAX_DERIVED_NODES} are allowed; nest the definitions less"
             scope.errors.append(edges[name][0].error(message, remedy=remedy))
             return
+
+
+def _algebraic_loop(fault: CyclicDependency) -> ExpressionError:
+    """Return the error for a circle; a circle through several parts is an algebraic loop between them."""
+    parts = {name.rpartition(".")[0] for name in fault.circle}
+    if len(parts) == 1:
+        return fault
+    return ExpressionError(
+        f"algebraic loop between parts: {' -> '.join(fault.circle)}",
+        place=fault.place,
+        remedy="each of these values is computed from the others at the same instant; connect a state instead of one "
+        "of them, or write the equations of the loop in one part",
+    )
 
 
 def _over_modes(exprs: list[Expression]) -> Expression:

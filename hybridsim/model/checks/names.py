@@ -7,11 +7,10 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from hybridsim.expr.grammar import RESERVED
+from hybridsim.expr.grammar import RESERVED, is_name
 from hybridsim.model.checks.scope import Scope
 from hybridsim.model.parts.declared import Declared
 
-_IDENTIFIER = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _LABEL = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_+-]*")
 
 
@@ -75,26 +74,33 @@ def _events(scope: Scope, seen: Mapping[str, str]) -> None:
 
 def check_identifier(scope: Scope, part: Declared, kind: str, name: object) -> bool:
     """Return whether a name can be used in expressions, and report it if not."""
-    good = isinstance(name, str) and _IDENTIFIER.fullmatch(name) and not name.startswith("__")
-    if not isinstance(name, str) or not good:
+    segments = name.split(".") if isinstance(name, str) else []
+    good = isinstance(name, str) and name.isascii() and is_name(name)
+    if not good or any(word.startswith("__") for word in segments):
         scope.fail(
             part,
             f"{kind} '{name}': not a valid name",
             "use ASCII letters, digits and _, without a digit at the start",
         )
         return False
-    if name in RESERVED or keyword.iskeyword(name):
+    if any(word in RESERVED or keyword.iskeyword(word) for word in segments):
         scope.fail(
             part,
             f"{kind} '{name}': the name is reserved",
-            "functions, pi, t (time) and keywords of Python are reserved",
+            "functions, pi, t (time) and keysegments of Python are reserved",
         )
         return False
     return True
 
 
 def _label(scope: Scope, part: Declared, kind: str, name: object) -> None:
-    if not isinstance(name, str) or not _LABEL.fullmatch(name):
+    # names of components and events inside a part contain dots
+    segments = (
+        name.split(".")
+        if isinstance(name, str) and kind in ("component", "event", "output", "shape")
+        else [name]
+    )
+    if not all(isinstance(word, str) and _LABEL.fullmatch(word) for word in segments):
         scope.fail(part, f"{kind} {name!r}: not a valid name", "use ASCII letters, digits, _, - and +")
 
 

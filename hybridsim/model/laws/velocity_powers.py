@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from hybridsim.errors import Place
 from hybridsim.expr import Expression
-from hybridsim.expr.grammar import WHOLE_POWERS
+from hybridsim.expr.grammar import WHOLE_POWERS, is_name
 from hybridsim.expr.write import write
 from hybridsim.model.meanings import Family, Meanings
 from hybridsim.model.parts.component import Component
@@ -169,7 +169,7 @@ def _vanishes(node: ast.expr, family: Family, numbers: Mapping[str, float], mean
 
 def _rounded(base: str, power: float | None, is_force: bool) -> str:
     """Return the remedy: replace the power by a smooth function that contains a small speed b."""
-    if power is None or power < 0.0 or not base.isidentifier():
+    if power is None or power < 0.0 or not is_name(base):
         return (
             "use a smooth function with a small speed b, such as (v**2 + b**2)**0.75 - b**1.5 for abs(v)**1.5"
         )

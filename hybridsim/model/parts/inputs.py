@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from hybridsim.errors import ModelError
 from hybridsim.expr import Expression
 from hybridsim.model.parts.declared import Declared
 from hybridsim.model.parts.quantities import Discrete
 
-KINDS = ("table", "wave", "chirp", "held")
+KINDS = ("table", "wave", "chirp", "held", "connected")
 SHAPES = ("square", "triangle", "sawtooth", "sine")
 INTERPOLATIONS = ("linear", "cubic")
 # Required fields of each kind (REQUIRED), and fields with defaults (OPTIONAL).
@@ -17,12 +18,14 @@ REQUIRED = {
     "wave": ("shape", "period"),
     "chirp": ("f0", "f1", "duration"),
     "held": (),
+    "connected": (),
 }
 OPTIONAL = {
     "table": ("interpolation",),
     "wave": ("amplitude", "phase", "offset", "duty"),
     "chirp": ("amplitude", "phase"),
     "held": ("value", "unit"),
+    "connected": ("unit",),
 }
 _DEFAULTS: dict[str, dict[str, object]] = {
     "table": {"interpolation": "linear"},
@@ -49,13 +52,15 @@ class Input(Declared):
     held
         A value that `Simulator` sets from outside; it is constant between two calls. It is ``value`` at the start, and
         during the whole of a run by `simulate`. ``x0`` can replace it. A model lists it in ``discrete``.
+    connected
+        A signal that a part receives: the model that contains the part gives it an expression (see `Use`).
 
     Parameters
     ----------
     name : str
         Name of the input in expressions.
     kind : str
-        "table", "wave", "chirp" or "held".
+        "table", "wave", "chirp", "held" or "connected".
     times, values : sequence of float, optional
         Times and values (k,) of a table.
     interpolation : str, optional
@@ -65,7 +70,7 @@ class Input(Declared):
     amplitude, period, phase, offset, duty, f0, f1, duration, value : str or float, optional
         Expressions of parameters.
     unit : str, optional
-        Unit of a held input.
+        Unit of a held or a connected input.
     place : Place, optional
         Place of the declaration, for error messages.
 
@@ -112,6 +117,14 @@ class Input(Declared):
             raise self._fault(f"an input of kind 'held' cannot have '{extra[0]}'", f"remove '{extra[0]}'")
         assert self.value is not None and self.unit is not None
         return HeldInput(self.name, self.value, self.unit, place=self.place)
+
+    def not_connected(self, model: str) -> ModelError:
+        """Return the error for a run of a model in which nothing is connected to this input."""
+        return self.error(
+            f"nothing is connected to the input '{self.name}' of model {model}",
+            f'use the model as a part of another one, by [use.NAME] with connect = {{ {self.name} = "..." }}, '
+            "or replace the input by a parameter",
+        )
 
     @property
     def subject(self) -> str:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from numbers import Real
 from typing import Any, ClassVar
 
-from hybridsim.errors import ExpressionError, ModelError, Place, UsageError, nearest
+from hybridsim.errors import ModelError, UsageError, nearest
 from hybridsim.expr import Expression, evaluate, parse, resolve
 from hybridsim.expr.evaluate import dependency_order
 from hybridsim.files import path_text
+from hybridsim.model.flattening.flatten import flattened
 from hybridsim.model.laws.law_with_states import ContactState
+from hybridsim.model.parts.changes import changed_value, require_known
 from hybridsim.model.parts.component import Component, Corner
 from hybridsim.model.parts.contact import Contact
 from hybridsim.model.parts.declared import Declared
@@ -23,6 +24,7 @@ from hybridsim.model.parts.quantities import Discrete, Output, Parameter, State
 from hybridsim.model.parts.schedule import Schedule
 from hybridsim.model.parts.shape import Shape
 from hybridsim.model.parts.switching import SwitchingSurface
+from hybridsim.model.parts.use import Use
 
 _PARTS: dict[str, type[Declared]] = {
     "states": State,
@@ -37,6 +39,7 @@ _PARTS: dict[str, type[Declared]] = {
     "surfaces": SwitchingSurface,
     "impacts": Impact,
     "drawing": Shape,
+    "use": Use,
 }
 
 # methods that other parts of the package call; completion does not offer them
@@ -54,7 +57,7 @@ class Model(Declared):
     ----------
     name : str
         Name of the model.
-    states : sequence of State, or mapping of str to float
+    states : sequence of State, or mapping of str to float, optional
         Continuous states with their rates.
     parameters : sequence of Parameter, or mapping of str to str or float, optional
         `Parameter` objects, or a dict of names and numbers or expressions.
@@ -87,6 +90,9 @@ class Model(Declared):
         Unilateral contacts, whose gaps cannot become negative.
     drawing : sequence of Shape, optional
         Shapes that show the mechanism, for `hybridsim.plot.mechanism` and `Solution.animate`; runs ignore them.
+    use : sequence of Use, optional
+        Other models as parts. Their declarations become declarations of this model, with names such as ``left.x``,
+        and ``use`` is empty afterwards.
     place : Place, optional
         Place of the declaration, for error messages.
 
@@ -101,7 +107,7 @@ class Model(Declared):
     """
 
     name: str
-    states: tuple[State, ...]
+    states: tuple[State, ...] = ()
     parameters: tuple[Parameter, ...] = ()
     discrete: tuple[Discrete, ...] = ()
     components: tuple[Component, ...] = ()
@@ -121,7 +127,10 @@ class Model(Declared):
     surfaces: tuple[SwitchingSurface, ...] = ()
     impacts: tuple[Impact, ...] = ()
     drawing: tuple[Shape, ...] = ()
+    use: tuple[Use, ...] = ()
 
+    # files of its parts, if it was read from a file
+    _part_files: ClassVar[tuple[str, ...]] = ()
     # of a checked model: its values; of its copies also the parameters that have other numbers than it
     _sound: ClassVar[tuple[dict[str, float], frozenset[str]]]
 
@@ -142,8 +151,12 @@ class Model(Declared):
             remedy = "use a dict of names and expressions, or a list of pairs"
             raise self._fault(f"`definitions` cannot be {self.definitions!r}", remedy) from None
         object.__setattr__(self, "definitions", definitions)
-        object.__setattr__(self, "states", tuple(self._with_those_of_laws()))
         self._hold_inputs()
+        if self.use:
+            for field, parts in flattened(self).items():
+                object.__setattr__(self, field, parts)
+            object.__setattr__(self, "use", ())
+        object.__setattr__(self, "states", tuple(self._with_those_of_laws()))
 
     def _hold_inputs(self) -> None:
         """Move inputs of kind "held" to the discrete states, because the engine computes them as such."""
@@ -223,11 +236,11 @@ class Model(Declared):
             For a value that is not a valid expression.
         """
         positions = self._positions()
-        _known(changes, positions, "parameter", self.name, self.remedy_for_parameter)
+        require_known(changes, positions, "parameter", self.name, self.remedy_for_parameter)
         parameters, are_numbers = list(self.parameters), True
         for name in changes:
             former = parameters[positions[name]]
-            parameters[positions[name]] = changed = former.with_value(_changed_value(changes, name))
+            parameters[positions[name]] = changed = former.with_value(changed_value(changes, name))
             are_numbers = are_numbers and former.value.is_constant and changed.value.is_number
         copy = self._valued(parameters=tuple(parameters))
         if are_numbers:
@@ -256,12 +269,12 @@ class Model(Declared):
     def with_start(self, /, **changes: Expression | str | float) -> Model:
         """Return a copy with changed initial values of (discrete) states: ``model.with_start(x=0.1)``."""
         names = [*(part.name for part in self.states), *(part.name for part in self.discrete)]
-        _known(changes, names, "state", self.name)
+        require_known(changes, names, "state", self.name)
         contacts = tuple(self._started(contact, changes) for contact in self.contacts)
 
         def changed(parts: Iterable[Any]) -> tuple[Any, ...]:
             return tuple(
-                replace(part, start=_changed_value(changes, part.name)) if part.name in changes else part
+                replace(part, start=changed_value(changes, part.name)) if part.name in changes else part
                 for part in parts
             )
 
@@ -525,30 +538,3 @@ def _content(model: Model) -> tuple[object, ...]:
     )  # fmt: skip
     texts = (model.title, model.source, model.description, model.look, model.duration)
     return (model.name, *parts, *texts, model.flow)
-
-
-def _changed_value(changes: Mapping[str, Any], name: str) -> Expression:
-    """Return a changed value as an expression, or raise an error that names the changed quantity."""
-    try:
-        return parse(changes[name])
-    except ExpressionError as error:
-        where = error.place or Place()
-        place = replace(where, file=where.file or name)
-        raise ExpressionError(error.message, place=place, remedy=error.remedy) from None
-
-
-def _known(
-    changes: Mapping[str, Any],
-    allowed: Collection[str],
-    kind: str,
-    model: str,
-    remedy: Callable[[str], str] | None = None,
-) -> None:
-    for name, value in changes.items():
-        if not isinstance(value, Expression | str | Real):
-            raise UsageError(f"{kind} {name} cannot be {value!r}", remedy="use a number or an expression")
-        if name not in allowed:
-            raise UsageError(
-                f"the model '{model}' has no {kind} '{name}'",
-                remedy=remedy(name) if remedy else nearest(name, list(allowed), kind=f"{kind}s"),
-            )

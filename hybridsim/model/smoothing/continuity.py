@@ -6,6 +6,7 @@ import ast
 import re
 from collections.abc import Iterator, Set
 
+from hybridsim.expr.grammar import is_name
 from hybridsim.expr.polynomial import Polynomial, difference, is_multiple, number_tree, polynomial
 from hybridsim.expr.rebuild import exchanged, with_names
 from hybridsim.model.meanings import Family, Meanings
@@ -33,7 +34,7 @@ def _solved(border: ast.expr) -> Iterator[dict[str, ast.expr]]:
     """Yield solutions of border = 0 for each name in which it is linear."""
     p = difference(border, ast.Constant(0))
     for name in sorted({factor for monomial in p for factor, _ in monomial}):
-        if not name.isidentifier():
+        if not is_name(name):
             continue
         others = {m: c for m, c in p.items() if m != ((name, 1),)}
         coefficient = p.get(((name, 1),))
@@ -101,4 +102,4 @@ def has_root_beside_sign(meanings: Meanings, node: ast.expr) -> bool:
 def _depends(p: Polynomial, name: str) -> bool:
     """Return whether a polynomial depends on a name, also inside factors that are not names."""
     factors = {factor for monomial in p for factor, _ in monomial}
-    return any(name == factor or (not factor.isidentifier() and name in factor) for factor in factors)
+    return any(name == factor or (not is_name(factor) and name in factor) for factor in factors)

@@ -7,14 +7,13 @@ follows A. F. Filippov's convention (see `SwitchingSurface`).
 from __future__ import annotations
 
 import ast
-import re
 from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from zlib import crc32
 
 from hybridsim.expr import of_tree, parse
-from hybridsim.expr.grammar import TIME
+from hybridsim.expr.grammar import NAME, TIME, is_name
 from hybridsim.expr.polynomial import Monomial, Polynomial, polynomial, tree_of
 from hybridsim.expr.rebuild import with_names
 from hybridsim.model.meanings import Meanings
@@ -26,7 +25,6 @@ from hybridsim.model.smoothing.one_sided import names_of
 from hybridsim.model.smoothing.steps_in_time import lasting
 
 SIGN = "__sign_"  # prefix of the name of a sign; declared names cannot start with two underscores
-_WORD = re.compile(r"[A-Za-z_]\w*")
 
 
 @dataclass
@@ -139,7 +137,7 @@ class Borders:
         """Return the coefficients of the states in a border, or None if it is not linear."""
         slopes = dict.fromkeys(sorted(self._moving), Fraction(0))
         for monomial, coefficient in polynomial(self._meanings.written_out(argument)).items():
-            moved = [factor for factor in monomial if not self._moving.isdisjoint(_WORD.findall(factor[0]))]
+            moved = [factor for factor in monomial if not self._moving.isdisjoint(NAME.findall(factor[0]))]
             size = coefficient
             for name, power in monomial:
                 size *= 1 if (name, power) in moved else (1 + Fraction(crc32(name.encode()), 2**32)) ** power
@@ -182,7 +180,7 @@ def apart_by(
     p, q = (polynomial(meanings.written_out(argument)) for argument in (first, second))
 
     def is_constant(one: Polynomial) -> bool:
-        return all(name.isidentifier() and name not in meanings.moving for m in one for name, _ in m)
+        return all(is_name(name) and name not in meanings.moving for m in one for name, _ in m)
 
     moved = [m for m in p if any(name in meanings.moving for name, _ in m)]
     for other in q if moved else ():
@@ -243,7 +241,7 @@ def not_linear(trees: Iterable[tuple[str, ast.expr]], carried: Mapping[str, Set[
             factors = [factor for factor, power in monomial for _ in range(power)]
             signs = [sign for factor in factors if factor in carried for sign in carried[factor]]
             names_in_factors = {
-                word for factor in factors if factor not in carried for word in _WORD.findall(factor)
+                word for factor in factors if factor not in carried for word in NAME.findall(factor)
             }
             found.update(*(carried[name] for name in names_in_factors & carried.keys()))
             found.update(sign for sign in signs if signs.count(sign) > 1)

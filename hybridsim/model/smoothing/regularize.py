@@ -49,7 +49,8 @@ def regularized(model: Model, kind: str, v0: Expression | str | float) -> Model:
     gone = {contact.name for contact in model.contacts}
     outputs = tuple(
         replace(
-            output, modes={place: e for place, e in output.modes.items() if place.split(".")[0] not in gone}
+            output,
+            modes={place: e for place, e in output.modes.items() if place.rpartition(".")[0] not in gone},
         )
         for output in model.outputs
     )

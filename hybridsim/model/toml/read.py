@@ -24,10 +24,11 @@ from hybridsim.model.toml.inputs import read_inputs
 from hybridsim.model.toml.laws import read_law_of_contact, read_laws
 from hybridsim.model.toml.positions import positions
 from hybridsim.model.toml.table import Source, Table
+from hybridsim.model.toml.use import PartFiles, read_uses
 
 SCHEMA = 1
 KEYS = (
-    "schema", "name", "title", "source", "description", "look", "duration", "parameters", "states", "discrete",
+    "schema", "name", "title", "source", "description", "look", "duration", "use", "parameters", "states", "discrete",
     "definitions", "inputs", "laws", "contacts", "surfaces", "impacts", "initial", "limit", "modes", "components",
     "monitors", "schedules", "clocks", "outputs", "drawing",
 )  # fmt: skip
@@ -41,11 +42,10 @@ def read_model(text: str, path: str | None = None) -> Model:
     ModelError
         For invalid TOML (with line and column), for all errors of the tables, or for all errors of the model.
     """
-    root = open_text(text, path, "the model")
-    model = _model(root, Path(path).parent if path else Path())
-    if root.source.errors:
-        raise ModelError.collect(root.source.errors, path or f"model {model.name}")
-    return model.validate()
+    files = PartFiles(_model, path)
+    model = _model(text, path, files).validate()
+    vars(model)["_part_files"] = files.files
+    return model
 
 
 def open_text(text: str, path: str | None, kind: str) -> Table:
@@ -96,7 +96,23 @@ def _split(text: str) -> list[str]:
     return [line.rstrip("\r") for line in text.split("\n")]
 
 
-def _model(root: Table, folder: Path) -> Model:
+def _model(text: str, path: str | None, files: PartFiles) -> Model:
+    """Build a model from a text, or raise all errors of its tables and of its parts."""
+    root = open_text(text, path, "the model")
+    name = root.text("name") or (Path(root.source.file).stem if root.source.file else "model")
+    errors = root.source.errors
+    try:
+        model = _declared(root, name, files)
+    except ModelError as fault:
+        errors.extend(fault.errors)
+    if errors:
+        raise ModelError.collect(errors, root.source.file or f"model {name}")
+    return model
+
+
+def _declared(root: Table, name: str, files: PartFiles) -> Model:
+    """Return the model that the tables of a file declare; errors of tables are left in the source."""
+    folder = Path(root.source.file).parent if root.source.file else Path()
     loose = [
         key
         for key, value in root.data.items()
@@ -105,10 +121,11 @@ def _model(root: Table, folder: Path) -> Model:
     root.only_in(*KEYS, others=loose, remedy="write the line [parameters] above them, if they are parameters")
     if root.data.get("schema", SCHEMA) != SCHEMA:
         root.fail(f"unknown schema {root.data['schema']!r}", f"write schema = {SCHEMA}", "schema")
-    name = root.text("name") or (Path(root.source.file).stem if root.source.file else "model")
     laws = read_laws(root)
+    uses = tuple(read_uses(root, folder, files))
     return Model(
         name=name,
+        use=() if root.source.errors else uses,
         states=tuple(_states(root)),
         parameters=tuple(_parameters(root)),
         discrete=tuple(_discrete(root)),

@@ -118,9 +118,7 @@ class Table:
     def required(self, key: str, remedy: str) -> Expression:
         return self.expression(key, remedy) or _ZERO
 
-    def parsed(
-        self, value: Any, *keys: str | int, form: Callable[[Any, Place], Expression] = parse
-    ) -> Expression:
+    def parsed(self, value: Any, *keys: str | int, form: Callable[[Any, Place], Any] = parse) -> Any:
         """Parse the TOML value at a key of this table as an expression."""
         place = self.source.place((*self.path, *keys))
         try:
@@ -131,7 +129,11 @@ class Table:
             if fault.place is None or fault.place.text is None:
                 fault = ExpressionError(fault.message, place=place, remedy=fault.remedy)
             self.source.errors.append(ExpressionError(message, place=fault.place, remedy=fault.remedy))
-            return _ZERO
+            return form(0, place)
+
+    def mapping(self, key: str) -> dict[str, Any]:
+        """Return a table as it is, or an empty one if the key is missing."""
+        return dict(self._typed(key, dict, "a table of expressions", {}))
 
     def expressions(self, key: str) -> dict[str, Expression]:
         """Return a table of expressions, or an empty one if the key is missing."""

@@ -76,7 +76,8 @@ def _short(key: str, entries: dict[str, dict[str, Any]]) -> dict[str, Any]:
 
 
 def _input(signal: Input) -> dict[str, Any]:
-    return {**_fields(signal, "kind", "times", "values", "interpolation", "shape"), **signal.expressions}
+    fields = ("kind", "times", "values", "interpolation", "shape", "unit")
+    return {**_fields(signal, *fields), **signal.expressions}
 
 
 def _held(held: HeldInput) -> dict[str, Any]:

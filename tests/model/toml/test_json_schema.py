@@ -89,6 +89,9 @@ n = { start = 1 }
 [inputs]
 u = { kind = "chirp", f0 = 1, f1 = 2, duration = 3, amplitude = 1 }
 h = { kind = "held", value = 1, unit = "N" }
+z = { kind = "connected", unit = "m" }
+[use.part]
+model = "belt"
 [monitors]
 m = "x - 1"
 [schedules.s]
@@ -132,6 +135,8 @@ body = { kind = "body", points = [[0, 0], ["x", 0], [1, 1]] }
         "[contacts.f]\nvelocity = 'v'\nnormal = 1\nlaw = { mu = 1 }",
         "[impacts.p]\ngap = 'h'",
         "[inputs.u]\nkind = 'wavy'",
+        "[use.a]\nrepeat = 2",
+        "[use.a]\nmodel = 'belt'\nfirst.x = 1",
         "[monitors.m]\nexpr = 'x'\ndirection = 'sideways'",
         "[parameters]\n'a b' = 1",
         "schema = 2",

@@ -1,0 +1,102 @@
+"""This module defines the use of one model as a part of another one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from numbers import Integral
+from typing import TYPE_CHECKING, Any
+
+from hybridsim.errors import ExpressionError
+from hybridsim.model.flattening.indexed import IndexedExpression, parse_indexed
+from hybridsim.model.parts.declared import Declared
+from hybridsim.model.parts.frozen_map import FrozenMap
+
+if TYPE_CHECKING:
+    from hybridsim.model.parts.model import Model
+
+# Largest number of copies of a part; a chain of a thousand blocks is better declared by `hs.MechanicalSystem`.
+MAX_REPEAT = 1_000
+
+
+@dataclass(frozen=True)
+class Use(Declared):
+    """A model that is a part of another model; its quantity x is named ``NAME.x`` there.
+
+    The part is an ordinary model. Its inputs of kind "connected" receive expressions of the whole model. Every quantity
+    of a part can be used in the whole model by its name with a dot.
+
+    A part that is repeated 20 times is named NAME1 to NAME20. Its values may use the index i. ``NAME[i-1].x`` is a
+    quantity of a neighbour. A condition on i alone is decided first, so a neighbour that does not exist may stand in
+    the other branch.
+
+    Parameters
+    ----------
+    name : str
+        Name of the part.
+    model : Model, str or path
+        The model, or the name or path of one.
+    parameters : mapping of str to str or float, optional
+        New values of parameters of the part, numbers or expressions of the parameters of the whole model.
+    start : mapping of str to str or float, optional
+        New initial values of states and discrete states of the part.
+    connect : mapping of str to str or float, optional
+        Expression of each connected input of the part.
+    repeat : int, optional
+        Number of copies. The values of the mappings may then be lists with one value per copy.
+    place : Place, optional
+        Place of the declaration, for error messages.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> tank = hs.Model("tank", states=[hs.State("h", 1, "inflow - h")], inputs=[hs.Input("inflow", "connected")])
+    >>> upper = hs.Use("upper", tank, connect={"inflow": 0})
+    >>> lower = hs.Use("lower", tank, start={"h": 0}, connect={"inflow": "upper.h"})
+    >>> [state.name for state in hs.Model("cascade", use=[upper, lower]).states]
+    ['upper.h', 'lower.h']
+    """
+
+    name: str
+    model: Model
+    parameters: Mapping[str, tuple[IndexedExpression, ...]] = field(default_factory=FrozenMap)
+    start: Mapping[str, tuple[IndexedExpression, ...]] = field(default_factory=FrozenMap)
+    connect: Mapping[str, tuple[IndexedExpression, ...]] = field(default_factory=FrozenMap)
+    repeat: int | None = None
+
+    def __post_init__(self) -> None:
+        self._texts("name")
+        model: object = self.model
+        if not (isinstance(model, Declared) and hasattr(model, "contacts")):
+            from hybridsim.model.library import loaded
+
+            object.__setattr__(self, "model", loaded(model))  # type: ignore[arg-type]  # it refuses other objects
+        repeat: object = self.repeat
+        if repeat is not None:
+            number = 0 if isinstance(repeat, bool) or not isinstance(repeat, Integral) else int(repeat)
+            if not 1 <= number <= MAX_REPEAT:
+                remedy = f"use a whole number from 1 to {MAX_REPEAT}, or omit `repeat`"
+                raise self._fault(f"`repeat` cannot be {repeat!r}", remedy)
+            object.__setattr__(self, "repeat", number)
+        for name in ("parameters", "start", "connect"):
+            items = getattr(self, name)
+            if not isinstance(items, Mapping) or not all(isinstance(key, str) for key in items):
+                raise self._fault(f"`{name}` cannot be {items!r}", "use a dict of names and expressions")
+            values = {key: self._values(f"{name}[{key!r}]", value) for key, value in items.items()}
+            object.__setattr__(self, name, FrozenMap(values))
+
+    def _values(self, what: str, value: Any) -> tuple[IndexedExpression, ...]:
+        """Return one expression for all copies, or one for each copy."""
+        listed = value if isinstance(value, list | tuple) else [value]
+        if len(listed) != 1 and len(listed) != self.repeat:
+            copies = f"{self.repeat} copies" if self.repeat else "one copy"
+            raise self._fault(f"`{what}` has {len(listed)} values for {copies}", "use one value per copy")
+        try:
+            return tuple(parse_indexed(single, self.place) for single in listed)
+        except ExpressionError as fault:
+            message = f"{self._title}, {what}: {fault.message}"
+            raise ExpressionError(message, place=fault.place, remedy=fault.remedy) from None
+
+    def numbers(self) -> tuple[int | None, ...]:
+        """Return the number of each copy, from 1; a single None for a part that is not repeated."""
+        return (None,) if self.repeat is None else tuple(range(1, self.repeat + 1))
