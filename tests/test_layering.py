@@ -53,8 +53,6 @@ HANDED_ON = {
     "model.parts.model",
     "model.parts.contact",
     "model.smoothing.rewriting",
-    "engine.events.choice.event_verdicts",
-    "engine.events.resolve",
     "solution.model_trajectory",
     "solution.solution",
     "solution.run",

@@ -102,7 +102,7 @@ WRITERS = {
     "engine/events/jumps/impact.py::_on_gaps": "all gaps held, to project the states",
     "engine/events/jumps/impact.py::_opens": "a gap that opens in an impact",
     "engine/events/resolve.py::_transitions": "the targets of declared transitions",
-    "engine/events/resolve.py::take_sides": "modes by the signs of the surfaces",
+    "engine/events/event_data.py::take_sides": "modes by the signs of the surfaces",
     "engine/events/zeno/hidden_bounces.py::_series": "the mode of flight between bounces",
     "engine/events/zeno/limits.py::_at_declared_limit": "the declared mode at a limit",
     "engine/events/zeno/limits.py::_gathered": "modes held at a limit",

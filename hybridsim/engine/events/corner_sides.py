@@ -14,19 +14,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.engine.events.choice.verdict import side_after, side_before
+from hybridsim.engine.events.event_data import EventData
 from hybridsim.engine.events.input_jumps import gaps_jump
 from hybridsim.engine.events.outcome import Change
 
 if TYPE_CHECKING:
-    from hybridsim.engine.events.choice.event_verdicts import EventVerdicts
-    from hybridsim.engine.events.resolve import EventResolution
     from hybridsim.engine.system.system import Automaton
 
 _ROUNDS_PER_MODE = 4  # orders of a series: each order settles at least one more component
 
 
 def sides_along(
-    resolution: EventVerdicts, z: np.ndarray, x: np.ndarray, has_flow: bool = True
+    resolution: EventData, z: np.ndarray, x: np.ndarray, has_flow: bool = True
 ) -> tuple[np.ndarray, dict[int, int]]:
     """Return the modes `z` with each corner and load on its side along the flow, and the guards at zero.
 
@@ -64,7 +63,7 @@ def _way_back(automaton: Automaton, mode: int, to: int) -> int:
     return next(g for g, targets in ways if to in targets)
 
 
-def take_corners(resolution: EventResolution) -> bool:
+def take_corners(resolution: EventData) -> bool:
     """Set the corners and loads of an event to their sides; return whether any side changed."""
     at, system = resolution.at, resolution.system
     if not system.led:

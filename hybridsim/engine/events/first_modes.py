@@ -11,6 +11,7 @@ import numpy as np
 
 from hybridsim.engine.events.choice.verdict import side_after, side_before
 from hybridsim.engine.events.corner_sides import sides_along
+from hybridsim.engine.events.event_data import EventData
 from hybridsim.engine.series.bounded import ORDER
 from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.model.meanings import Meanings
@@ -18,7 +19,6 @@ from hybridsim.model.smoothing.one_sided import names_of
 
 if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Situation
-    from hybridsim.engine.events.resolve import EventResolution
     from hybridsim.engine.system.system import System
 
 
@@ -54,7 +54,7 @@ def as_read_by_conditions(system: System, at: Situation, jumped: bool = False) -
     return replace(at, z=z, p=p)
 
 
-def certainly_leaving(resolution: EventResolution) -> set[int]:
+def certainly_leaving(resolution: EventData) -> set[int]:
     """Return the automata with a guard that becomes negative in every mode of the surfaces at zero.
 
     The sides of their guards are set accordingly. If these surfaces have too many combinations of modes, only values of
@@ -83,7 +83,7 @@ def certainly_leaving(resolution: EventResolution) -> set[int]:
     return {int(system.owner[g]) for g in negative}
 
 
-def _modes_on_sides(resolution: EventResolution) -> tuple[np.ndarray, list[int]]:
+def _modes_on_sides(resolution: EventData) -> tuple[np.ndarray, list[int]]:
     """Return the modes by the signs of the surfaces, and the components whose surfaces are zero."""
     at, system = resolution.at, resolution.system
     p = at.p.copy()
@@ -101,7 +101,7 @@ def _modes_on_sides(resolution: EventResolution) -> tuple[np.ndarray, list[int]]
     return z, on
 
 
-def _negative(resolution: EventResolution, owners: list[int], z: np.ndarray, order: int = ORDER) -> set[int]:
+def _negative(resolution: EventData, owners: list[int], z: np.ndarray, order: int = ORDER) -> set[int]:
     """Return the guards that become negative in the modes `z`, by their Taylor terms up to an order."""
     series = resolution.series_of(z)
     side_of = side_after if resolution.forward else side_before

@@ -45,14 +45,10 @@ class EventResolution(ClusterChoice):
         scope: Iterable[int] | None = None,
         inputs: np.ndarray | None = None,
     ) -> None:
-        super().__init__(system, at, before, forward)
+        super().__init__(system, at, before, forward, scope)
         self.inputs = inputs
-        self.scope = set(range(len(system.automata))) if scope is None else set(scope)
         self.rounds = 0
         self.most_rounds = _ROUNDS_PER_MODE * (1 + sum(len(a.modes) for a in system.automata))
-        self.is_kinked = False  # whether a corner changed its side: the flow is continuous, its slope is not
-        # position of each guard in the order in which they reached zero
-        self.rank: dict[int, int] = {}
 
     # -- the rounds -----------------------------------------------------------------------------------------
 
@@ -145,33 +141,6 @@ class EventResolution(ClusterChoice):
                 return failure
             take_corners(self)
         return None
-
-    def take_sides(self, open_: set[int]) -> None:
-        """Set each component with a surface to the mode of the side on which the state lies.
-
-        open_: the components to be decided on their surfaces. A component that a reset moved off its surface is
-        removed, and one that came to its surface is added.
-        """
-        at, system = self.at, self.system
-        free = at.p.copy()
-        free[system.layout.pin_at] = 0.0  # the states as they are, not projected by a holding mode
-        series = system.series(at.s, at.x, free, np.maximum(at.z, 0), at.x_error, at.s_error, at.is_put)
-        for k, c in enumerate(system.surface_of):
-            automaton, value = system.automata[c], series.surfaces[k, 0]
-            if abs(value) <= series.surface_bounds[k, 0]:
-                if at.z[c] in (-1, automaton.hold) or self.on_surface[c] or automaton.is_unique:
-                    open_.add(c)
-                continue
-            if value < 0.0 and automaton.is_unilateral:
-                open_.add(c)
-                continue
-            open_.discard(c)
-            self.on_surface[c] = False
-            side = automaton.above if value > 0.0 else automaton.below
-            self.fired[automaton.guards[side][0]] = False  # it was located at its surface before the reset
-            if at.z[c] not in (-1, side):
-                self.changes.append(Change(c, "reset", int(at.z[c]), side, at.x, at.x))
-            at.z[c] = side
 
     def _surface_components(self) -> set[int]:
         return {c for c, a in enumerate(self.system.automata) if a.has_surface and c in self.scope}

@@ -8,17 +8,14 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
+from hybridsim.engine.events.choice.cluster_choice import ClusterChoice
 from hybridsim.engine.events.choice.verdict import LEAVES
 from hybridsim.engine.events.corner_sides import take_corners
 from hybridsim.engine.events.jumps.impact import strike
 
-if TYPE_CHECKING:
-    from hybridsim.engine.events.resolve import EventResolution
 
-
-def cancelled_by_surfaces(resolution: EventResolution, automata: set[int], surfaces: set[int]) -> set[int]:
+def cancelled_by_surfaces(resolution: ClusterChoice, automata: set[int], surfaces: set[int]) -> set[int]:
     """Return the automata whose located guards do not fire after the modes at surfaces are chosen."""
     ahead = copy(resolution)
     ahead.at = replace(resolution.at, z=resolution.at.z.copy())

@@ -130,11 +130,6 @@ class ClusterChoice(EventVerdicts):
                 return "step-failure", lost
         return "nonunique", self._say(components, candidates, _SEVERAL_MOTIONS)
 
-    def pinned_states(self, components: list[int]) -> np.ndarray:
-        mask = np.zeros(self.system.n, dtype=np.bool_)
-        mask[[i for c in components for i in self.system.pins.get(c, ())]] = True
-        return mask
-
     def _pinned(self, components: list[int]) -> np.ndarray:
         """Return the states x, moved so that the surfaces of some components are exactly zero."""
         z = np.maximum(self.at.z, 0)

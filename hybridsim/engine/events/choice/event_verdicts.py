@@ -6,10 +6,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from hybridsim.engine.events.choice.surface_intersection import can_hold
 from hybridsim.engine.events.choice.verdict import (
     LEAVES,
-    NO_SIDE,
     RELEASED,
     UNCHANGED,
     UNDECIDED,
@@ -19,68 +17,18 @@ from hybridsim.engine.events.choice.verdict import (
     verdict,
 )
 from hybridsim.engine.events.corner_sides import sides_along
-from hybridsim.engine.events.outcome import Change, Situation
+from hybridsim.engine.events.event_data import EventData
 from hybridsim.engine.native.kernels import Precompiled
 from hybridsim.engine.series.bounded import ORDER
-from hybridsim.engine.series.short_series import Series
-from hybridsim.engine.system.programs.mode_tables import automata_of
-from hybridsim.engine.system.system import System
 
 _NO_SERIES = np.zeros((2, 0, ORDER + 1))
 _verdict, _kind_of_change, _is_smooth = map(Precompiled, (verdict, kind_of_change, is_smooth))
 
 
-class EventVerdicts:
-    """The verdicts on modes at one event; `before` contains the modes at the event, -1 for none."""
+class EventVerdicts(EventData):
+    """The verdicts on modes at one event."""
 
     is_thorough = False  # whether to judge all candidates, even if the choice does not need them
-
-    def __init__(self, system: System, at: Situation, before: np.ndarray, forward: bool) -> None:
-        self.system, self.at, self.before, self.forward = system, at, before, forward
-        self.automata = automata_of(system)
-        components, guards = len(system.automata), system.guard_count
-        self.fired = np.zeros(guards, dtype=np.bool_)
-        self.on_surface = np.zeros(components, dtype=np.bool_)
-        self.released_to = np.full(components, NO_SIDE, dtype=np.int64)
-        self.decreed = np.zeros(guards, dtype=np.int64)
-        self.sides = np.ones(guards, dtype=np.int64)
-        self.orders, self.floors = np.zeros(guards, dtype=np.int64), np.zeros(guards)
-        self.changes: list[Change] = []
-        self.warnings: list[str] = []
-        self.jumped = False  # whether a reset or an unknown made the flow jump
-        # Taylor series by modes, and the arrays at which they were computed; those are replaced, never modified
-        self.series: dict[bytes, Series] = {}
-        self.behind: tuple[object, ...] = (None,) * 4
-
-    def locate(self, located: set[int]) -> None:
-        """Store the guards at which the event was located, and the components that the guards release."""
-        self.fired[list(located)] = True
-        for c, automaton in enumerate(self.system.automata):
-            if automaton.has_surface and self.before[c] == automaton.hold:
-                guards = enumerate(automaton.guards[automaton.hold])
-                self.released_to[c] = next((j for j, g in guards if g in located), NO_SIDE)
-
-    def series_of(self, z: np.ndarray, x: np.ndarray | None = None) -> Series:
-        """Return the Taylor series along the flow of the modes `z`, at the present state or at `x`."""
-        at = self.at
-        x = at.x if x is None else x
-        behind = (at.s, x, at.p, at.x_error)
-        if not all(a is b for a, b in zip(behind, self.behind, strict=True)):
-            self.behind, self.series = behind, {}
-        key = z.tobytes()
-        if key not in self.series:
-            self.series[key] = self.system.series(at.s, x, at.p, z, at.x_error, at.s_error, at.is_put)
-        return self.series[key]
-
-    def fired_guards(self) -> list[tuple[int, int, int]]:
-        """Return (component, index in its mode, guard number) of the located guards."""
-        table = self.system.guards_of(self.at.z)
-        return [
-            (c, j, int(g))
-            for c, row in enumerate(table)
-            for j, g in enumerate(row)
-            if g >= 0 and self.fired[g]
-        ]
 
     def event(self, judged: np.ndarray = _NO_SERIES) -> JudgedEvent:
         """Return the data for verdicts, with the series of the guards and their error bounds (2, G, 4)."""
@@ -101,7 +49,15 @@ class EventVerdicts:
         """Return whether the guards of some components admit the modes `z` just after the event."""
         components = list(components)
         found = self.verdict_on_guards(z, components, self.is_continuous(z, components))
-        return LEAVES if found == UNDECIDED and not can_hold(self, components, z) else found
+        return LEAVES if found == UNDECIDED and not self._can_hold(components, z) else found
+
+    def _can_hold(self, members: list[int], z: np.ndarray) -> bool:
+        """Return whether all surfaces held in the modes `z` can be held together by forces."""
+        automata = self.system.automata
+        if sum(automata[c].has_surface and z[c] == automata[c].hold for c in members) < 2:
+            return True
+        numbers = self.system.guards_of(z)[members]
+        return bool(np.isfinite(self.series_of(z).guards[numbers[numbers >= 0], 0]).all())
 
     def verdict_on_guards(self, z: np.ndarray, components: list[int], continuous: bool) -> int:
         """Return the verdict on the guards, without a check that the held surfaces are compatible."""

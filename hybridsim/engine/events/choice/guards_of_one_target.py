@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from hybridsim.engine.events.event_data import EventData
 from hybridsim.engine.lowering.reset_keys import amounts_of
 
 if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Situation
-    from hybridsim.engine.events.resolve import EventResolution
 
 Failure = tuple[str, str]  # status and message
 
 
 def guards_taken_together(
-    resolution: EventResolution, read_from: Situation, component: int, leaving: Sequence[int]
+    resolution: EventData, read_from: Situation, component: int, leaving: Sequence[int]
 ) -> tuple[list[tuple[int, int]], Failure | None]:
     """Return the guards whose transitions are taken, with the numbers of their choices, or an error.
 
@@ -54,7 +54,7 @@ def guards_taken_together(
     return ([], ("nonunique", apart)) if apart else (taken, None)
 
 
-def _apart(resolution: EventResolution, component: int, taken: Sequence[tuple[int, int]]) -> str:
+def _apart(resolution: EventData, component: int, taken: Sequence[tuple[int, int]]) -> str:
     """Return an error text if several guards lead to different modes, else an empty text."""
     automaton, mode = resolution.system.automata[component], int(resolution.at.z[component])
     targets = [automaton.modes[automaton.targets[mode][j][number]] for j, number in taken]

@@ -12,17 +12,15 @@ P-matrix, a motion that slides along several surfaces is not unique.
 from __future__ import annotations
 
 from itertools import combinations
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.events.choice.event_verdicts import EventVerdicts
 from hybridsim.engine.events.choice.verdict import FINE
 from hybridsim.engine.events.fatal_guards import message_of_every_mode
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.model.meanings import Meanings
-
-if TYPE_CHECKING:
-    from hybridsim.engine.events.choice.event_verdicts import EventVerdicts
 
 _SAME = 64.0 * UNIT  # relative difference of two series of one motion, by the rounding of a few operations
 
@@ -51,15 +49,6 @@ def is_one_motion(resolution: EventVerdicts, members: list[int], candidates: np.
         return False
     sizes = np.abs(motions).max(axis=0)
     return all((np.abs(other - motions[0]) <= _SAME * sizes).all() for other in motions[1:])
-
-
-def can_hold(resolution: EventVerdicts, members: list[int], z: np.ndarray) -> bool:
-    """Return whether all surfaces held in the modes `z` can be held together by forces."""
-    automata = resolution.system.automata
-    if sum(automata[c].has_surface and z[c] == automata[c].hold for c in members) < 2:
-        return True
-    numbers = resolution.system.guards_of(z)[members]
-    return bool(np.isfinite(resolution.series_of(z).guards[numbers[numbers >= 0], 0]).all())
 
 
 def on_its_side(resolution: EventVerdicts, members: list[int], candidates: np.ndarray) -> int:

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.events.event_data import EventData
 from hybridsim.engine.events.jumps.impulse import MAX_COMBINATIONS, Answer, ImpactProblem, answers, count
 from hybridsim.engine.events.jumps.rest_impulses import loaded, stopped
 from hybridsim.engine.events.outcome import Change
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.model.parts.impact import ROUNDING
-
-if TYPE_CHECKING:
-    from hybridsim.engine.events.resolve import EventResolution
 
 # The error of location is rounding, so one Newton correction makes the gap zero within rounding. The second correction
 # is for steps that end slightly inside.
@@ -23,7 +21,7 @@ _CORRECTIONS = 2
 Failure = tuple[str, str]
 
 
-def strike(resolution: EventResolution, open_: set[int]) -> Failure | None:
+def strike(resolution: EventData, open_: set[int]) -> Failure | None:
     """Compute the collision of contacts whose gaps close; contacts at rest after it stay in `open_`.
 
     A contact at zero gap with a velocity of separation is open from now on.
@@ -51,7 +49,7 @@ def strike(resolution: EventResolution, open_: set[int]) -> Failure | None:
     return None
 
 
-def _surfaces(resolution: EventResolution) -> tuple[np.ndarray, np.ndarray]:
+def _surfaces(resolution: EventData) -> tuple[np.ndarray, np.ndarray]:
     """Return the Taylor coefficients of the surfaces, with bounds, at states without projection."""
     at, system = resolution.at, resolution.system
     free = at.p.copy()
@@ -70,7 +68,7 @@ class _Collision:
     """One collision of the contacts of a cluster, in which some gaps have reached zero."""
 
     def __init__(
-        self, resolution: EventResolution, cluster: tuple[int, ...], mine: list[int], open_: set[int]
+        self, resolution: EventData, cluster: tuple[int, ...], mine: list[int], open_: set[int]
     ) -> None:
         self.resolution, self.cluster, self.open_ = resolution, cluster, open_
         self.system, self.at = resolution.system, resolution.at
