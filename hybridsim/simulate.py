@@ -129,6 +129,7 @@ def simulate(
             save=save, limits=limits, progress=progress, params=params, z0=z0, first_step=first_step, **options,
         )  # fmt: skip
     from hybridsim.preparation import prepared
+    from hybridsim.solution.running import carried_out
 
     model = arguments.chosen_model(model, params)
     on_progress = arguments.callback(progress)
@@ -148,7 +149,7 @@ def simulate(
         options=options,
         keywords=KEYWORDS,
     )
-    return run.carried_out(on_progress, compile_time)
+    return carried_out(run, on_progress, compile_time)
 
 
 _DECLARED = signature(simulate)

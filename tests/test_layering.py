@@ -46,7 +46,9 @@ FACES = {
     ("model.parts.use", "model.library"),  # Use(model="name")
     ("model.toml.use", "model.library"),  # model = "name" in a file
     ("mechanics.declaration.system", "mechanics.declaration.as_model"),  # MechanicalSystem.to_model
+    ("solution.solution", "solution.explain.explanation"),  # Solution.explain
     ("solution.solution", "solution.files.archive"),  # Solution.save
+    ("solution.solution", "solution.resume"),  # Solution.resume
 }
 # Objects that a module hands to the helpers it calls, whose files name its class as a type and for nothing else.
 HANDED_ON = {
@@ -54,8 +56,6 @@ HANDED_ON = {
     "model.parts.contact",
     "model.smoothing.rewriting",
     "solution.model_trajectory",
-    "solution.solution",
-    "solution.run",
 }
 # A family of integrators takes nothing from another one, but these.
 SHARED = {

@@ -13,6 +13,7 @@ from hybridsim.engine.record.time_lookup import Frame, locate_times
 from hybridsim.solution.by_name import ByName
 from hybridsim.solution.event import Event, ModeInterval, counted_kind
 from hybridsim.solution.files.tabulated import tabulated
+from hybridsim.solution.run import Run
 
 if TYPE_CHECKING:
     from hybridsim.engine.record.block_list import SegmentBlockList
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from hybridsim.engine.record.trajectory import Trajectory
     from hybridsim.model.parts.component import Component
     from hybridsim.presentation.tables import Table
-    from hybridsim.solution.run import Run
 
 
 def relative_velocity(contact: str) -> str:

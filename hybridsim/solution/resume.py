@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from hybridsim import arguments
 from hybridsim.arguments import cannot_be
 from hybridsim.errors import UsageError
-
-if TYPE_CHECKING:
-    from hybridsim.solution.solution import Solution
+from hybridsim.solution.running import carried_out
+from hybridsim.solution.solution import Solution
 
 _EARLY = ("limit", "interrupted")
 
@@ -46,6 +44,5 @@ def resumed(
         )
     record = trajectory.up_to_checkpoint(run.system)
     task = replace(task, t1=end, limits=arguments.run_limits(limits), record=record)
-    return replace(run, task=task).carried_out(
-        arguments.callback(progress), solution.stats["compile_time"], solution.stats["wall_time"]
-    )
+    run, stats = replace(run, task=task), solution.stats
+    return carried_out(run, arguments.callback(progress), stats["compile_time"], stats["wall_time"])

@@ -14,13 +14,13 @@ from hybridsim.solution.event import Event
 from hybridsim.solution.explain.explanation import explain
 from hybridsim.solution.in_pictures import InPictures
 from hybridsim.solution.model_trajectory import ModelTrajectory
+from hybridsim.solution.run import Run
 from hybridsim.solution.summary import as_text, in_html
 
 if TYPE_CHECKING:
     from hybridsim.engine.record.block_list import SegmentBlockList
     from hybridsim.engine.system.system import System
     from hybridsim.solution.explain.explanation import Explanation
-    from hybridsim.solution.run import Run
 
 _GOOD = ("finished", "terminated")
 
@@ -255,8 +255,8 @@ class Solution(InPictures):
         return [monitor.name for monitor in getattr(self.model, "monitors", ())]
 
     def __repr__(self) -> str:
-        return as_text(self)
+        return as_text(self._trajectory)
 
     def _repr_html_(self) -> str:
         """Return the HTML for notebooks: a summary, a strip of modes for each component, and the events."""
-        return in_html(self)
+        return in_html(self._trajectory, self.success)

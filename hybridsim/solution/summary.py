@@ -3,39 +3,36 @@
 from __future__ import annotations
 
 from html import escape
-from typing import TYPE_CHECKING
 
 from hybridsim.errors import printable
 from hybridsim.presentation.notebook import run_html
 from hybridsim.solution.model_trajectory import ModelTrajectory
-
-if TYPE_CHECKING:
-    from hybridsim.solution.solution import Solution
+from hybridsim.solution.run_trajectory import RunTrajectory
 
 
-def as_text(solution: Solution) -> str:
+def as_text(run: RunTrajectory) -> str:
     """Return a summary as text: status, end state, events by kind, cost and warnings."""
     lines = [
-        f"Solution of {solution.model.name} by {solution.integrator}: {solution.status}",
-        f"  {solution.message}",
-        *solution._trajectory.summary(),
-        *(f"  warning: {w}" for w in solution.warnings),
+        f"Solution of {run.model.name} by {run.integrator}: {run.status}",
+        f"  {run.message}",
+        *run.summary(),
+        *(f"  warning: {w}" for w in run.warnings),
     ]
     return printable("\n".join(lines))
 
 
-def in_html(solution: Solution) -> str:
+def in_html(run: RunTrajectory, success: bool) -> str:
     """Return a summary as HTML: status, a strip of modes for each component, events and warnings."""
-    if not isinstance(solution._trajectory, ModelTrajectory):
-        return f"<pre>{escape(as_text(solution))}</pre>"
-    stats, model = solution.stats, solution.model
+    if not isinstance(run, ModelTrajectory):
+        return f"<pre>{escape(as_text(run))}</pre>"
+    stats, model = run.stats, run.model
     head = {
-        solution.status: f"{model.title or model.name}, by {solution.integrator}",
+        run.status: f"{model.title or model.name}, by {run.integrator}",
         "cost": f"{stats['steps']} steps ({stats['rejected']} rejected), "
         f"{stats['rhs_evaluations']} right-hand sides, {stats['wall_time']:.3g} s",
     }
-    head |= {} if solution.success else {"message": solution.message}
-    span = (solution.t_start, solution.t_end) if solution._segments else None
-    known = solution._save != "nothing"
-    modes, events = (solution.modes, solution.events) if known else ({}, ())
-    return run_html(solution.components, head, solution.success, span, modes, events, solution.warnings)
+    head |= {} if success else {"message": run.message}
+    span = (run.t_start, run.t_end) if run.segments else None
+    known = run.save != "nothing"
+    modes, events = (run.modes, run.events) if known else ({}, ())
+    return run_html(run.components, head, success, span, modes, events, run.warnings)

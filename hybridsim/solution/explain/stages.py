@@ -19,13 +19,13 @@ from hybridsim.engine.series.bounded import UNIT
 from hybridsim.integrators.contract import Integrator
 from hybridsim.solution.explain.one_instant import LOCATED
 from hybridsim.solution.explain.recorded_resolution import RecordedResolution
+from hybridsim.solution.run import Run
 
 if TYPE_CHECKING:
     from hybridsim.engine.events.outcome import Change, Outcome
     from hybridsim.engine.record.segments import Occurrence, Segment
     from hybridsim.engine.system.instant import Instant
     from hybridsim.engine.system.system import System
-    from hybridsim.solution.run import Run
 
 
 @dataclass(frozen=True)
