@@ -25,6 +25,8 @@ from hybridsim.engine.run.event_loop import (
     FOLLOWED,
     FULL,
     MIN_STEPS_IN_PART,
+    SEGMENTS,
+    STEPS,
     STOPPED,
     SegmentEnd,
     any_holding,
@@ -196,14 +198,14 @@ def begin_segment(start: Any, model: Any, call: Any, state: Any, work: Any, own:
 
 
 @inlined
-def next_step(start: Any, call: Any, own: Any, rows: Any, s: float) -> int:
+def next_step(call: Any, own: Any, rows: Any, s: float) -> int:
     """Return CONTINUES, FOLLOWED if the segment is to be divided at s, or another outcome of the segment."""
     taken = own.counts[TAKEN]
     if s > call.longest[0]:
         return STOPPED
-    if start.step + taken < rows.steps.shape[0]:
+    if call.int_slots[STEPS] + taken < rows.steps.shape[0]:
         return CONTINUES
-    return FULL if start.number > 0 or taken < MIN_STEPS_IN_PART else FOLLOWED
+    return FULL if call.int_slots[SEGMENTS] > 0 or taken < MIN_STEPS_IN_PART else FOLLOWED
 
 
 @inlined
@@ -254,9 +256,9 @@ def guards_at_end(start: Any, model: Any, own: Any, s: float, x: Any) -> None:
 
 
 @inlined
-def record_step(start: Any, call: Any, work: Any, own: Any, rows: Any, s: float, d: float, end: Any) -> None:
+def record_step(call: Any, work: Any, own: Any, rows: Any, s: float, d: float, end: Any) -> None:
     """Write the step from s to s + d to the record, and its end to ``work.y``."""
-    row = start.step + own.counts[TAKEN]
+    row = call.int_slots[STEPS] + own.counts[TAKEN]
     own.counts[TAKEN] += 1
     put(end, work.y)
     rows.steps[row, 0], rows.steps[row, 1] = s, d

@@ -111,7 +111,7 @@ def segment(start, model, call, state, work, own, rows):
     h = first_length(k[0], y, bound, tolerances)
     contract.forget(method.memory)
     while number < 0 and s < bound:
-        code = contract.next_step(start, call, own, rows, s)
+        code = contract.next_step(call, own, rows, s)
         if code == contract.FOLLOWED:
             break  # the segment is divided
         if code != contract.CONTINUES:
@@ -158,7 +158,7 @@ def segment(start, model, call, state, work, own, rows):
             return contract.not_followed(contract.STOPPED)
         if number >= 0:
             interpolate(y, k, d, own.polynomial)
-        contract.record_step(start, call, work, own, rows, s, d, end)
+        contract.record_step(call, work, own, rows, s, d, end)
         s = bound if is_last else s + d
         contract.call(flow, s, y, p, z, k[0])
     return contract.end_segment(start, model, call, state, work, own, s, d, number)

@@ -81,12 +81,10 @@ class LoopRecord(NamedTuple):
 
 
 class SegmentStart(NamedTuple):
-    """The input of a segment kernel, passed by value, because numbers in memory would be read at each use."""
+    """The input of a segment kernel, passed by value. Its rows in the record are in memory: they need no register."""
 
     mode_row: int  # row of its modes in the tapes
     bound: float  # local time at which it ends at the latest
-    step: int  # row of its first step in the record
-    number: int  # its row in the record
     is_ahead: bool  # whether p is as the kernel left it, with the origin of this segment
     is_rejected: bool  # whether the last segment of this kernel is not committed
 
@@ -154,7 +152,7 @@ def event_loop(
         put(z, record.modes[i])
         put(p, record.vectors[i])
         put(x, jumps[i, 0])
-        start = SegmentStart(k, bound, step, i, is_ahead, is_rejected)
+        start = SegmentStart(k, bound, is_ahead, is_rejected)
         end = segment(start, model, call, state, work, own, rows)
         if end.outcome != FOLLOWED:
             return end.outcome

@@ -39,7 +39,8 @@ class MethodKernels(ABC):
        the bound without a guard divides the segment.
     4. For a guard write also the rates to ``work.slopes``. Its ``bend`` is 0 if the guard is certain to become
        negative.
-    5. Write steps from row ``start.step`` of the record on, and other data in row ``start.number``.
+    5. Write steps from row ``call.int_slots[STEPS]`` of the record on, and other data in row
+       ``call.int_slots[SEGMENTS]``.
     6. A kernel may set the origin of the next segment in ``state.p`` and return ``at = 0`` and ``is_ahead``. If
        ``start.is_ahead`` is set then, nothing has changed p since.
     7. If ``start.is_rejected`` is set, the last segment is not committed: restore what the kernel remembers of it, and

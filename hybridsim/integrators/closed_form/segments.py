@@ -34,6 +34,7 @@ from hybridsim.engine.run.event_loop import (
     FULL,
     ORIGIN_AT,
     PHASES_AT,
+    SEGMENTS,
     STOPPED,
     SegmentEnd,
     any_holding,
@@ -136,7 +137,8 @@ def closed_form_segment(
     The result is FULL also after POINTS evaluations of guards; the rest of the run then begins in another call.
     """
     ints, lin, hints, former = loop.int_slots, model.lin, own.hints, own.former
-    k, bound, _, number, is_ahead, is_rejected = start
+    k, bound, is_ahead, is_rejected = start
+    number = ints[SEGMENTS]
     if is_rejected:
         return stopped(hints, k, former)
     if number == 0:

@@ -22,6 +22,8 @@ from hybridsim.engine.run.event_loop import (
     FOLLOWED,
     FULL,
     MIN_STEPS_IN_PART,
+    SEGMENTS,
+    STEPS,
     STOPPED,
     SegmentEnd,
     any_holding,
@@ -246,7 +248,8 @@ def runge_kutta_segment(
 
     own: `hybridsim.integrators.runge_kutta.compiled_loop.RungeKuttaArrays`.
     """
-    k, bound, first_step, number, _, is_rejected = start
+    k, bound, _, is_rejected = start
+    n_steps = first_step = loop.int_slots[STEPS]
     if is_rejected:
         return not_followed(STOPPED)
     automata, tapes, inputs, functions = model.automata, model.tapes, model.inputs, called_by(work)
@@ -260,9 +263,7 @@ def runge_kutta_segment(
     W, left, right = own.W, own.left, own.right
     scale, slopes, y, y1 = loop.scale, work.slopes, work.y, work.x_after
     side_now, order_now, floor_now = own.sides, own.orders, own.floors
-    steps, series = rows.steps, rows.series
-    n, terms, tolerances = x.shape[0], left.shape[1], (rtol, atol)
-    n_steps = first_step
+    steps, series, n, terms, tolerances = rows.steps, rows.series, x.shape[0], left.shape[1], (rtol, atol)
     guard_rows = parts.rows[parts.start[k] : parts.start[k + 1]]
     step_rows = parts.step_rows[parts.step_start[k] : parts.step_start[k + 1]]
     is_linear = parts.is_linear[k]
@@ -278,9 +279,8 @@ def runge_kutta_segment(
     put(state.sides, side_now)
     put(state.orders, order_now)
     put(state.floors, floor_now)
-    s, fired, is_holding, is_sure = 0.0, -1, any_holding(automata, z), True
-    is_projected = any_projecting(automata, z)
-    value, slope, bend, d = 0.0, 0.0, 0.0, 0.0
+    s, fired, is_sure, value, slope, bend, d = 0.0, -1, True, 0.0, 0.0, 0.0, 0.0
+    is_holding, is_projected = any_holding(automata, z), any_projecting(automata, z)
     forget(own.memory)
     put(x, y)
     for i in range(n):
@@ -302,7 +302,7 @@ def runge_kutta_segment(
         return not_followed(STOPPED)
     while fired < 0 and s < bound:
         if n_steps >= steps.shape[0]:
-            if number > 0 or n_steps < MIN_STEPS_IN_PART:
+            if loop.int_slots[SEGMENTS] > 0 or n_steps < MIN_STEPS_IN_PART:
                 return not_followed(FULL)
             first[0] = h  # the next call continues with it
             break

@@ -28,6 +28,8 @@ from hybridsim.engine.run.event_loop import (
     FOLLOWED,
     FULL,
     MIN_STEPS_IN_PART,
+    SEGMENTS,
+    STEPS,
     STOPPED,
     SegmentEnd,
     any_holding,
@@ -88,7 +90,8 @@ def taylor_segment(
 
     own: `hybridsim.integrators.taylor.compiled_loop.TaylorArrays`.
     """
-    k, bound, first_step, number, _, is_rejected = start
+    k, bound, _, is_rejected = start
+    n_steps = first_step = loop.int_slots[STEPS]
     if is_rejected:
         return not_followed(STOPPED)
     automata, tapes, inputs = model.automata, model.tapes, model.inputs
@@ -101,7 +104,6 @@ def taylor_segment(
     y, scale = work.y, loop.scale
     side_now, order_now, floor_now = own.sides, own.orders, own.floors
     steps, series, n = rows.steps, rows.series, x.shape[0]
-    n_steps = first_step
     tape = tapes.optimised[tapes.optimised_start[k] : tapes.optimised_start[k + 1]]
     high = tapes.high[tapes.high_start[k] : tapes.high_start[k + 1]]
     flow_registers = (inputs.time[0], inputs.states, tapes.derivatives[k])
@@ -128,7 +130,7 @@ def taylor_segment(
     fill(own.largest, 0.0)
     while fired < 0 and s < bound:
         if n_steps >= steps.shape[0]:
-            if number > 0 or n_steps < MIN_STEPS_IN_PART:
+            if loop.int_slots[SEGMENTS] > 0 or n_steps < MIN_STEPS_IN_PART:
                 return not_followed(FULL)
             break
         if s > longest:
