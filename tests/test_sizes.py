@@ -56,7 +56,7 @@ FILES = {
 }
 FUNCTIONS = {
     "analysis/advise/advise.py::advise": 93,
-    "integrators/runge_kutta/segments.py::runge_kutta_segment": 159,
+    "integrators/runge_kutta/segments.py::runge_kutta_segment": 157,
     "integrators/taylor/segments.py::taylor_segment": 143,
     "mechanics/simulate.py::simulate_mechanical": 81,
     "testing/catalogue/coincidences.py::scenes": 105,
