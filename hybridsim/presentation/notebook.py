@@ -12,6 +12,7 @@ from hybridsim.presentation.colours import INK, mode_colours
 # Limits of the size of the HTML: rectangles in all strips, strips, first and last rows of the table, warnings.
 _RECTANGLES, _MAX_BARS, _FIRST, _LAST, _WARNINGS = 1000, 20, 20, 5, 10
 _WIDTH, _HEIGHT = 1000, 24  # size of a strip in its own units; the page stretches its width
+_NARROWEST = 1.5  # width of a rectangle, so that a short mode is visible
 _OVERLAP = 0.3  # added width of a rectangle, so that no gap is visible between neighbours
 _GOOD, _BAD = "#009E73", "#D55E00"  # readable on black and on white
 _CELL = "padding:0 .8em 0 0;text-align:left;border:none"
@@ -117,12 +118,15 @@ def _rectangles(
     """Yield a rectangle for each interval, or columns with the fraction of each mode if there are many."""
     scale = _WIDTH / (t1 - t0)
     if len(intervals) <= most:
-        for interval in intervals:
-            start, end = sorted((interval.t0, interval.t1))
-            title = f"{interval.mode}: {start:.9g} to {end:.9g}"
-            yield _rectangle(
-                (start - t0) * scale, 0, (end - start) * scale, _HEIGHT, colours[interval.mode], title
-            )
+        ends = [sorted((interval.t0, interval.t1)) for interval in intervals]
+        is_narrow = [(end - start) * scale < 3 * _NARROWEST for start, end in ends]
+        # narrow ones are last, and so above their neighbours
+        for k in sorted(range(len(intervals)), key=is_narrow.__getitem__):
+            (start, end), mode = ends[k], intervals[k].mode
+            width = max((end - start) * scale, _NARROWEST)
+            middle = (0.5 * (start + end) - t0) * scale
+            title = f"{mode}: {start:.9g} to {end:.9g}"
+            yield _rectangle(middle - width / 2, 0, width, _HEIGHT, colours[mode], title)
         return
     names = [mode for mode in colours if any(interval.mode == mode for interval in intervals)]
     columns = max(most // len(names), 1)

@@ -13,6 +13,7 @@ import pytest
 import hybridsim as hs
 from hybridsim.presentation.colours import INK, mode_colours
 from hybridsim.presentation.notebook import run_html
+from hybridsim.solution.event import ModeInterval
 
 VOID = {"br", "hr", "img"}
 HOSTILE = '<script>alert("x")</script><b>&\''
@@ -70,6 +71,20 @@ def test_a_strip_is_the_modes(rubbing: hs.Solution) -> None:
         assert float(attributes["width"]) == pytest.approx(1e4 * (interval.t1 - interval.t0), abs=0.35)
     (svg,) = page.all("svg")
     assert svg[0]["width"] == "100%" and svg[0]["viewbox"].startswith("0 0 1000 ")
+
+
+def test_short_modes_can_be_seen() -> None:
+    """Slips of 2 ms among sticks of seconds are drawn last, as lines of a visible width."""
+    ends = [0.0, 10.0, 10.002, 20.0, 20.002, 30.0]
+    modes = [ModeInterval(m, a, b) for m, a, b in zip(["stick", "slip+"] * 3, ends, ends[1:])]
+    dfcs = hs.load("dfcs").all_components()
+    page = Page(run_html(dfcs, {"run": "by hand"}, True, (0.0, 30.0), {"f": modes}, [], []))
+    rectangles = page.all("rect")
+    assert [title.split(":")[0] for _, title in rectangles] == ["stick"] * 3 + ["slip+"] * 2
+    for (attributes, _), middle in zip(rectangles[3:], (10.001, 20.001)):
+        width = float(attributes["width"] or 0)
+        assert 1.5 <= width < 2
+        assert float(attributes["x"] or 0) + width / 2 == pytest.approx(1000 * middle / 30, abs=0.2)
 
 
 def test_the_events_are_listed(rubbing: hs.Solution) -> None:
