@@ -14,6 +14,8 @@ from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.retention import ALL, EVENTS
 from hybridsim.engine.record.segments import end_point
 from hybridsim.engine.record.trajectory import Task, Trajectory
+from hybridsim.engine.run.mode_loop import ModeLoop
+from hybridsim.engine.run.resume_point import ResumePoint
 from hybridsim.engine.run.setup import setup_of
 from hybridsim.engine.system.instant import Instant
 from hybridsim.errors import SimulationError, UsageError, nearest
@@ -34,47 +36,61 @@ class Position:
     Parameters
     ----------
     run : the model, the system, the method and the settings.
-    checkpoint : the state just after the last committed event.
+    point : the state just after the last committed event.
     events : events that happened but were not returned yet, because an exception ended the call.
     ended : why the run has ended, or nothing.
     """
 
     run: Run
-    checkpoint: Checkpoint
-    counters: Counters
+    point: ResumePoint
     warnings: dict[str, int]
     events: tuple[Event, ...] = ()
     ended: str = ""
 
+    @classmethod
+    def at(cls, run: Run, checkpoint: Checkpoint, counters: Counters, *rest: Any) -> Position:
+        """Return the position at a checkpoint of the run."""
+        point = ResumePoint(setup_of(run.system, run.method, run.task), run.task, checkpoint, counters)
+        return cls(run, point, *rest)
+
+    @property
+    def checkpoint(self) -> Checkpoint:
+        """Return the checkpoint at this position."""
+        return self.point.checkpoint
+
     @property
     def t(self) -> float:
         """Return the time."""
-        return float(self.checkpoint.instant)
+        return float(self.point.instant)
 
     @property
     def x(self) -> np.ndarray:
         """Return the states (n,)."""
-        return self.checkpoint.arrays["x"]
+        return self.point.x
 
     @property
     def z(self) -> np.ndarray:
         """Return the modes (C,)."""
-        return self.checkpoint.arrays["z"]
+        return self.point.z
 
     @property
     def discrete(self) -> np.ndarray:
-        """Return the discrete states and held inputs, which methods with fixed steps store separately."""
-        arrays = self.checkpoint.arrays
-        return self.run.system.discrete(arrays["p"]) if "p" in arrays else arrays["discrete"]
+        """Return the discrete states and held inputs."""
+        return self.point.discrete
 
     @property
     def held_indices(self) -> dict[str, int]:
         """Return the index of each held input in `discrete`."""
-        return {d.name: k for k, d in enumerate(self.run.model.discrete) if isinstance(d, HeldInput)}
+        model = self.run.model
+        found: dict[str, int] = model.once(
+            "held inputs",
+            lambda: {d.name: k for k, d in enumerate(model.discrete) if isinstance(d, HeldInput)},
+        )
+        return found
 
     def value(self, name: str) -> float:
         """Return a state, an output or another quantity."""
-        system, instant = self.run.system, self.checkpoint.instant
+        system, instant = self.run.system, self.point.instant
         p = system.vector(instant, self.discrete)
         trajectory = ModelTrajectory(self.run, Trajectory(system), 0.0, 0.0)
         known = (*trajectory.names, *trajectory.quantities)
@@ -90,7 +106,7 @@ class Position:
 def begun(run: Run, commit: Callable[[Position], None]) -> None:
     """Pass the position just after the start of a run to the function `commit`."""
     run = stepped(run)
-    empty = Position(run, Checkpoint(Instant(run.task.t0), {}, None, {}), Counters(), {})
+    empty = Position.at(run, Checkpoint(Instant(run.task.t0), {}, None, {}), Counters(), {})
     _follow(empty, run.task, lambda task: run.method.run(run.system, task), commit)
 
 
@@ -102,13 +118,25 @@ def stepped(run: Run) -> Run:
 
 def advanced(position: Position, to: float, commit: Callable[[Position], None]) -> None:
     """Pass the position at a later time to `commit`; after an error, the position at the last event."""
-    run = position.run
-    _follow(position, _task(position, to), lambda task: run.method.run(run.system, task), commit)
+    run, step = position.run, position.point.step(Instant(to))
+    if isinstance(step, ResumePoint):
+        commit(Position(run, step, position.warnings, position.events))
+        return
+
+    def go(task: Task) -> Trajectory:
+        if step is None:
+            return run.method.run(run.system, task)
+        return ModeLoop(run.system, run.method, task, None, step).run()
+
+    _follow(position, _task(position, to), go, commit)
 
 
 def changed(position: Position, discrete: np.ndarray, commit: Callable[[Position], None]) -> None:
     """Pass a position with other values of discrete states and held inputs to the function `commit`."""
-    run = position.run
+    run, point = position.run, position.point.changed(discrete)
+    if point is not None:
+        commit(Position(run, point, position.warnings, position.events))
+        return
     if type(run.method).run is Integrator.run:
         task = _task(position, position.t)
         _follow(
@@ -116,15 +144,17 @@ def changed(position: Position, discrete: np.ndarray, commit: Callable[[Position
         )
         return
     # a method with fixed steps judges modes at the beginning of its next step
-    arrays = position.checkpoint.arrays | {"discrete": discrete, "turned": np.array(True)}
-    commit(replace(position, checkpoint=replace(position.checkpoint, arrays=arrays)))
+    checkpoint = position.checkpoint
+    arrays = checkpoint.arrays | {"discrete": discrete, "turned": np.array(True)}
+    rest = position.point.counters, position.warnings, position.events, position.ended
+    commit(Position.at(run, replace(checkpoint, arrays=arrays), *rest))
 
 
 def _task(position: Position, to: float) -> Task:
     """Return the task from a position to a time."""
     run, record = position.run, Trajectory(position.run.system, position.run.task.retention)
     record.checkpoint = position.checkpoint
-    record.counters, record.warnings = copy(position.counters), dict(position.warnings)
+    record.counters, record.warnings = position.point.counters.copy(), dict(position.warnings)
     task = replace(run.task, t0=position.t, t1=to, record=record)
     setup = copy(setup_of(run.system, run.method, run.task))  # its compiled loop serves all spans
     setup.origin, setup.end = Instant(task.t0), Instant(task.t1)
@@ -167,11 +197,8 @@ def _commit(position: Position, record: Trajectory, commit: Callable[[Position],
     events = [Event(float(o.instant), *o[1:]) for o in happened if o.kind != "corner"]
     checkpoint = replace(checkpoint, segments=0, occurrences=0)
     ended = record.message if record.status == "terminated" else ""
-    commit(
-        Position(
-            position.run, checkpoint, record.counters, record.warnings, (*position.events, *events), ended
-        )
-    )
+    rest = record.counters, record.warnings, (*position.events, *events), ended
+    commit(Position.at(position.run, checkpoint, *rest))
 
 
 def require_running(position: Position | None, call: str) -> Position:

@@ -51,7 +51,13 @@ class SavedState:
         run, task = position.run, position.run.task
         method = run.method.name, vars(run.method), run.reason
         begin = task.t0, task.x0, task.z0, task.discrete, task.tolerances
-        rest = position.checkpoint, position.counters, position.warnings, position.events, position.ended
+        rest = (
+            position.checkpoint,
+            position.point.counters,
+            position.warnings,
+            position.events,
+            position.ended,
+        )
         return _unpickled, (source_of(run.model), method, begin, rest, self.about)
 
 
@@ -89,4 +95,4 @@ def _unpickled(
     successor = successor_of(name, run.system) if reason else None
     task = replace(run.task, x0=x0, z0=z0, discrete=discrete, tolerances=tolerances, successor=successor)
     run = stepped(replace(run, task=task, reason=reason))
-    return SavedState(Position(run, checkpoint, counters, warnings, events, ended), about)
+    return SavedState(Position.at(run, checkpoint, counters, warnings, events, ended), about)

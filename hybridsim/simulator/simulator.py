@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from os import PathLike
 from typing import Any
@@ -20,6 +18,7 @@ from hybridsim.model import Model
 from hybridsim.preparation import prepared
 from hybridsim.simulate import KEYWORDS, simulate
 from hybridsim.simulator.current_state import CurrentState
+from hybridsim.simulator.ownership import Ownership
 from hybridsim.simulator.position import Position, advanced, begun, changed, require_running
 from hybridsim.simulator.saved_state import SavedState, model_of, require_fit, source_of
 from hybridsim.solution.event import Event
@@ -91,31 +90,7 @@ class Simulator(CurrentState):
         self._prepared((0.0, 0.0), self.model, None, None)  # checks the arguments, and binds the model once
         self._position: Position | None = None
         self._first: Position | None = None  # just after the last start
-        self._own()
-
-    def _own(self) -> None:
-        """Make the current thread the owner of the simulator."""
-        self._owner, self._busy = threading.current_thread(), False
-
-    @contextmanager
-    def _mine(self, call: str) -> Iterator[None]:
-        """Raise an error for calls of other threads, and for calls from within a call."""
-        here = threading.current_thread()
-        if self._owner is not here:
-            raise UsageError(
-                f"the simulator of model {self.model.name} belongs to thread {self._owner.name!r}, and {here.name!r} "
-                f"called {call}()",
-                remedy="let the other thread work on its own sim.copy()",
-            )
-        if self._busy:
-            raise UsageError(
-                f"{call}() was called during another call of the same simulator", remedy="use sim.copy()"
-            )
-        self._busy = True
-        try:
-            yield
-        finally:
-            self._busy = False
+        self._mine = Ownership(self.model.name)
 
     def _prepared(self, t_span: tuple[float, float], model: Model, x0: Any, z0: Any) -> Run:
         """Return a prepared run with the settings of the simulator."""
@@ -315,7 +290,7 @@ class Simulator(CurrentState):
         """
         other = object.__new__(type(self))
         vars(other).update(vars(self))
-        other._own()
+        other._mine = Ownership(self.model.name)
         return other
 
     __copy__ = copy

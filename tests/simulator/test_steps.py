@@ -164,10 +164,10 @@ def test_wrong_calls_are_refused_and_change_nothing() -> None:
         (lambda: sim.advance(math.nan), "`to` cannot be nan"),
         (lambda: sim.advance(2.0, {"G": 1.0}), "`inputs` contains 'G', which is not a held input"),
         (lambda: sim.advance(2.0, {"F": math.inf}), "`inputs` of F cannot be inf"),
-        (lambda: sim.set(3.0), "`inputs` cannot be 3.0"),  # type: ignore[arg-type]
+        (lambda: sim.set(3.0), "`inputs` cannot be 3.0"),
         (lambda: sim.output("q"), "no quantity 'q'"),
-        (lambda: sim.restore(3), "`saved` cannot be 3"),  # type: ignore[arg-type]
+        (lambda: sim.restore(3), "`saved` cannot be 3"),
     ):
         with pytest.raises(hs.UsageError, match=message):
-            call()  # type: ignore[no-untyped-call]
+            call()
         assert (sim.t, sim.state) == (1.0, before)

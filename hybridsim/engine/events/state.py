@@ -27,6 +27,7 @@ class StateArrays(NamedTuple):
 
 
 _FIELDS = StateArrays._fields
+_ONE = np.ones(1, dtype=np.int64).view(float)[0]  # a double with the bits of the integer 1
 _INTEGERS = ("z", "sides", "orders")
 _View = tuple[tuple[int], np.dtype[Any], int]  # shape, dtype, and offset in bytes
 
@@ -72,6 +73,13 @@ class HybridState:
         values: np.ndarray = np.ndarray(shape, dtype, self.memory, offset)
         setattr(self, name, values)
         return values
+
+    def divide(self) -> None:
+        """Make this the start of a new segment in the same modes, at which all guards are away from zero."""
+        memory, views = self.memory, self._views  # views of arrays cost more than this
+        sides, orders, floors, end = (views[name][2] // 8 for name in ("sides", "orders", "floors", "z"))
+        memory[floors:end] = memory[orders:] = 0.0
+        memory[sides:orders] = _ONE
 
     def copy(self) -> HybridState:
         """Return a copy with its own memory."""

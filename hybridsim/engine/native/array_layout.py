@@ -116,6 +116,11 @@ class ArrayLayout:
             ]
         )
 
+    def item(self, blocks: tuple[np.ndarray, ...], name: str, i: int) -> Any:
+        """Return number `i` of a vector with the given name."""
+        _, dtype, k, offset = self._specs[self._kind._fields.index(name)]
+        return np.ndarray((), dtype, blocks[k], offset + i * dtype.itemsize).item()
+
     def row(self, blocks: tuple[np.ndarray, ...], name: str, i: int) -> np.ndarray:
         """Return a copy of row `i` of the array with the given name."""
         shape, dtype, k, offset = self._specs[self._kind._fields.index(name)]

@@ -16,3 +16,9 @@ class Counters:
     events: int = 0
     restarts: int = 0
     kernel_time: float = 0.0  # seconds in the compiled mode loop
+
+    def copy(self) -> Counters:
+        """Return a copy, on which other work is counted."""
+        other = object.__new__(Counters)
+        other.__dict__.update(self.__dict__)
+        return other

@@ -69,12 +69,16 @@ class KernelRun:
 
     def __post_init__(self) -> None:
         assert self.memory is not None
-        self._happened = rows = self.array_layout.rows((None, self.memory[1]))
-        first, count = self.first, self.count
+        self._event_memory, last = self.memory[1], self.first + self.count - 1
         self.events = 0  # number of segments that an event ended: all, or all except the last
-        if count:
-            self.events = count if rows.fires[first + count - 1] >= 0 else count - 1
+        if self.count:
+            self.events = self.count - (self.array_layout.item(self.memory, "fires", last) < 0)
         self._event_block: EventBlock | None = None
+
+    @cached_property
+    def _happened(self) -> Any:
+        """Return the arrays of the record that are kept with the events."""
+        return self.array_layout.rows((None, self._event_memory))
 
     @cached_property
     def rows(self) -> Any:

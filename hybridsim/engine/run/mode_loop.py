@@ -25,7 +25,6 @@ from hybridsim.engine.run.appointment_events import events_before_appointment
 from hybridsim.engine.run.compiled_loop import CompiledLoop
 from hybridsim.engine.run.headway import Headway, NoHeadway, TakenOver
 from hybridsim.engine.run.kernel_run import ARRIVED, PAUSED
-from hybridsim.engine.run.lazy_state import LazyState
 from hybridsim.engine.run.located import (
     Located,
     errors_when_due,
@@ -37,7 +36,7 @@ from hybridsim.engine.run.located import (
 from hybridsim.engine.run.notices import Notices
 from hybridsim.engine.run.recording import Recorder, passed_events
 from hybridsim.engine.run.segment_run import Arrival, SegmentRun
-from hybridsim.engine.run.setup import setup_of
+from hybridsim.engine.run.setup import LazyState, setup_of
 from hybridsim.engine.run.stepping import Method, Watch
 from hybridsim.engine.system.failures import Collapsed, StepFailure
 from hybridsim.engine.system.instant import Instant
@@ -302,6 +301,9 @@ class ModeLoop:
         if appointment is None:
             self._tell(self.origin)
             return True, True
+        if appointment is self.timetable.step_end:
+            self._divide(target)
+            return True, True
         x, error = self.outcome.x, self.outcome.x_error
         if not appointment.is_renewal:
             self.timetable.mark_done(target)
@@ -310,6 +312,13 @@ class ModeLoop:
             error = np.maximum(error, errors)
         settled = self._resolve_appointment(target, self.outcome, x, appointment.schedules, error)
         return True, self._adopt(target, settled, x, appointment.schedules)
+
+    def _divide(self, target: Instant) -> None:
+        """Divide the motion at the end of a step, which a compiled loop has reached with all guards away from zero."""
+        self.timetable.mark_done(target)
+        if self.adopted != target:  # otherwise an event happened there
+            self.adopted, outcome = target, self.outcome
+            outcome.sides[:], outcome.orders[:], outcome.guard_floors[:] = 1, 0, 0.0
 
     def _at_target(self, target: Instant) -> Situation:
         """Return the state just before an instant that a compiled loop has reached."""
@@ -326,28 +335,13 @@ class ModeLoop:
         system, outcome = self.system, self.outcome
         numbers = np.flatnonzero(system.active(outcome.z))
         watch = Watch(
-            numbers,
-            outcome.sides,
-            outcome.orders,
-            outcome.monitor_sides,
-            outcome.monitor_orders,
-            outcome.x_error,
-            outcome.guard_floors,
-            outcome.monitor_floors,
-        )
+            numbers, outcome.sides, outcome.orders, outcome.monitor_sides, outcome.monitor_orders, outcome.x_error,
+            outcome.guard_floors, outcome.monitor_floors,
+        )  # fmt: skip
         run = SegmentRun(
-            system,
-            self.method,
-            self.origin,
-            self.p,
-            outcome.z,
-            outcome.x,
-            watch,
-            self.task.tolerances,
-            self.record.counters,
-            self.forward,
-            self._stepped,
-        )
+            system, self.method, self.origin, self.p, outcome.z, outcome.x, watch, self.task.tolerances,
+            self.record.counters, self.forward, self._stepped,
+        )  # fmt: skip
         origin, progress = run.origin, self._progress  # not the run, which would refer to itself
         run.flow.look = lambda s: progress(origin.plus(s))
         return run

@@ -28,7 +28,7 @@ from hybridsim.engine.system.system import System
 _EVENTS, _SHARE = 200, 1e-3
 _FASTER = 0.5  # intervals that shrink by more over these events are an accumulation instead
 # Stiffness: number of examined steps, how many must be near the stability limit, and the fraction that counts as near.
-_STEPS, _LOOKS, _MIN_NEAR_LIMIT, _NEAR = 500, 8, 6, 0.6
+STEPS_PER_LOOK, _LOOKS, _MIN_NEAR_LIMIT, _NEAR = 500, 8, 6, 0.6
 _DECAYING = 0.25  # least ratio of the decay rate to the magnitude of an eigenvalue
 _ITERATIONS, _ALIGNED = 12, 0.9  # of the power method, and the required alignment of its vector with a decay
 
@@ -96,7 +96,7 @@ class Notices:
         if counters.events - self._events >= _EVENTS:
             self._events = counters.events
             self._look_for_chattering()
-        if self.method.stable_to and counters.steps - self._steps >= _STEPS and self.record.segments:
+        if self.method.stable_to and counters.steps - self._steps >= STEPS_PER_LOOK and self.record.segments:
             self._steps = counters.steps
             block = self.record.segments.blocks[-1]
             self._look_for_stiffness(_sampled(block), lambda i: Instant(*block.origins[i].tolist()))
@@ -104,12 +104,16 @@ class Notices:
     def look_on_the_way(self, run: SegmentRun) -> bool:
         """Examine the steps of an unfinished segment; return whether a stiff method takes over."""
         counters = self.record.counters
-        if not self.method.stable_to or counters.steps - self._steps < _STEPS or len(run.knots) <= _STEPS:
+        if (
+            not self.method.stable_to
+            or counters.steps - self._steps < STEPS_PER_LOOK
+            or len(run.knots) <= STEPS_PER_LOOK
+        ):
             return False
-        self._steps, first = counters.steps, len(run.knots) - _STEPS
+        self._steps, first = counters.steps, len(run.knots) - STEPS_PER_LOOK
         samples = [
             (0, run.knots[k], run.knots[k + 1] - run.knots[k], run.states[k], run.flow.p, run.flow.z)
-            for k in (first + number for number in _evenly(_STEPS - 1, _LOOKS))
+            for k in (first + number for number in _evenly(STEPS_PER_LOOK - 1, _LOOKS))
         ]
         self._look_for_stiffness(samples, lambda _: run.origin)
         return self.takes_over

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections import deque
+from collections.abc import Callable
+from functools import cached_property
 
 import numpy as np
 
@@ -11,7 +14,6 @@ from hybridsim.engine.events.start import settled_start, start_by_kernel
 from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.record.trajectory import Task
 from hybridsim.engine.run.compiled_loop import CompiledLoop
-from hybridsim.engine.run.lazy_state import LazyState
 from hybridsim.engine.run.stepping import Method
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
@@ -19,6 +21,41 @@ from hybridsim.engine.system.system import System
 # Number of turns of the fastest angle after which a segment without events is restarted, because rounding then reaches
 # 1e-13.
 _RENEWAL_TURNS = 100
+
+
+class LazyState:
+    """The outcome of the last event and the run-time vector, both computed on demand.
+
+    Parameters
+    ----------
+    make : makes the outcome.
+    shared : outcome and vector stored elsewhere, for reading only.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        instant: Instant,
+        forward: bool,
+        make: Callable[[], Outcome],
+        shared: tuple[Outcome, np.ndarray] | None = None,
+    ) -> None:
+        self._system, self._instant, self._forward = system, instant, forward
+        self._make, self._shared = make, shared
+
+    @cached_property
+    def outcome(self) -> Outcome:
+        """Return the outcome of the last event."""
+        return self._make()
+
+    @cached_property
+    def p(self) -> np.ndarray:
+        """Return the run-time vector: parameters, inputs and discrete states."""
+        return self._system.vector(self._instant, self._system.discrete(self.outcome.p), self._forward)
+
+    def read(self) -> tuple[Outcome, np.ndarray]:
+        """Return the outcome and the run-time vector for reading; they must not be modified."""
+        return self._shared or (self.outcome, self.p)
 
 
 class RunSetup:
@@ -29,6 +66,7 @@ class RunSetup:
         self.origin, self.end = Instant(task.t0), Instant(task.t1)
         self.renewal = _RENEWAL_TURNS * 2.0 * math.pi / system.fastest if system.fastest else math.inf
         self._pattern = self._compiled_loop(task)
+        self.idle_loops: deque[CompiledLoop] = deque()  # of runs in steps, which reuse their arrays
         self.begins_silently = False  # set by `_at_start`: whether nothing is recorded at the start
         self._start: tuple[Outcome, np.ndarray] | None = None
         self._buffer: HybridState | None = None  # the same in the layout of compiled loops

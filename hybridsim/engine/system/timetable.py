@@ -31,7 +31,7 @@ class Timetable:
 
     def __init__(self, system: System, end: Instant, has_end: bool = False) -> None:
         self._end = end
-        self._last = Appointment(end, ()) if has_end else None
+        self.step_end = Appointment(end, ()) if has_end else None
         self.settled: Instant | None = None  # last completed appointment, or the start of the run
         values = system.values
         self._signals = system.signals
@@ -72,7 +72,7 @@ class Timetable:
             if knot is not None:
                 found.append((knot, -1))
         if not found:
-            return self._last
+            return self.step_end
         nearest = min(found, key=lambda f: abs(f[0].minus(after)))[0]
         slack = self._slack(nearest)
         together = [k for time, k in found if abs(time.minus(nearest)) <= slack]
@@ -82,7 +82,7 @@ class Timetable:
         if abs(self._end.minus(nearest)) <= slack:
             latest = self._end
         elif (self._end.minus(nearest) < 0.0) == forward:
-            return self._last
+            return self.step_end
         due = sorted(k for k in together if k >= 0)
         return Appointment(latest, tuple(k for k in due for _ in range(self._count(k, nearest))))
 

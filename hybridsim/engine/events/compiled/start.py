@@ -160,8 +160,8 @@ def _is_supported(system: System) -> bool:
     )  # fmt: skip
 
 
-class _Scratch:
-    """The arrays of one call of `plain_start`."""
+class StartScratch:
+    """The arrays of one call that judges modes at an instant without an event; modes: those that have tapes."""
 
     def __init__(self, system: System) -> None:
         n, count, guards, whole = system.n, len(system.automata), system.guard_count, np.int64
@@ -174,6 +174,7 @@ class _Scratch:
         self.as_packed, self.work, self.nothing = self.state.packed(), work_space(system), no_tables()
         cache = tape_cache_of(system)
         cache.surround(blank.z)
+        self.modes = cache.tapes.modes
         # the code for short series does not know the roundoff of numbers, as it counts at a start
         without = {"bounds": np.zeros_like(cache.tapes.bounds), "lacked": np.zeros_like(cache.tapes.lacked)}
         self.tapes = packed(cache.tapes.arrays._replace(**without))  # type: ignore[attr-defined]  # of a pack
@@ -203,7 +204,7 @@ def compiled_start(system: System, x0: np.ndarray, x_error: np.ndarray, p: np.nd
     try:
         scratch = spare.pop()
     except IndexError:
-        scratch = _Scratch(system)
+        scratch = StartScratch(system)
     state = scratch.state
     state.x[:], state.x_error[:], state.p[:] = x0, x_error, p
     system.registers.fill(scratch.values, p)

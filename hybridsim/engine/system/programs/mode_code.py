@@ -159,18 +159,24 @@ class ModeCompiler:
         self.system, self.kind, self.functions, self._text = system, kind, functions, text
         self._lock = SharedLock()
         self._engines: list[Any] = []  # references that keep the code alive
+        self._absent: set[int] = set()  # modes whose code is not on disk
 
     def prepare(self, modes: np.ndarray, lacked: np.ndarray, put: Callable[[int, list[int]], None]) -> None:
         """Compile code for modes with many steps; `put(k, addresses)` receives the result."""
-        if not ENABLED or max(lacked.tolist(), default=0) < KNOWN:
+        counts = lacked.tolist()
+        if not ENABLED or max(counts, default=0) < KNOWN:
             return
-        for k in np.flatnonzero(lacked >= KNOWN).tolist():
+        for k, count in enumerate(counts):
+            if count < (WORTH if k in self._absent else KNOWN):
+                continue
             place = code_path(self.system, self.kind, modes[k])
-            if lacked[k] >= WORTH or is_stored(place):
-                with self._lock:
-                    if lacked[k] >= KNOWN:  # otherwise another thread was first
-                        lacked[k] = NEVER
-                        self._make(modes[k], place, partial(put, k))
+            if count < WORTH and not is_stored(place):
+                self._absent.add(k)
+                continue
+            with self._lock:
+                if lacked[k] >= KNOWN:  # otherwise another thread was first
+                    lacked[k] = NEVER
+                    self._make(modes[k], place, partial(put, k))
 
     def _make(self, z: np.ndarray, place: Path | None, put: Callable[[list[int]], None]) -> None:
         text = self._text(mode_tape(self.system, z), z)
