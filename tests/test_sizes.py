@@ -36,7 +36,7 @@ FILES = {
     "engine/native/kernels.py": 510,
     "engine/roots/roots.py": 355,
     "engine/run/compiled_loop.py": 301,
-    "engine/run/mode_loop.py": 622,
+    "engine/run/mode_loop.py": 616,
     "engine/run/segment_run.py": 496,
     "engine/series/bounded.py": 401,
     "engine/series/interpreter.py": 485,
@@ -51,7 +51,7 @@ FILES = {
     "mechanics/time_stepping/kernels.py": 379,
     "model/parts/model.py": 540,
     "model/smoothing/rewriting.py": 534,
-    "simulator/simulator.py": 380,
+    "simulator/simulator.py": 355,
     "solution/explain/explanation.py": 351,
 }
 FUNCTIONS = {
