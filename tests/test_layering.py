@@ -40,6 +40,11 @@ COMPILES = ("engine/native/", "engine/system/user_functions/")
 # Methods of what users hold, which import what does their work when they are called: each closes a circle.
 FACES = {
     ("model.parts.model", "model.checks.validate"),  # Model.validate
+    ("model.parts.model", "model.flattening.flatten"),  # Model(..., use=...)
+    ("model.parts.model", "model.parts.use"),  # Use(..., model)
+    ("model.parts.model", "model.smoothing.regularize"),  # Model.regularized
+    ("model.parts.model", "model.smoothing.structure"),  # Model.structure
+    ("model.parts.model", "model.toml.write"),  # Model.to_toml
     ("model.parts.model", "model.toml.read"),  # Model.from_toml
     ("model.parts.contact", "model.library"),  # Contact(law="name")
     ("model.toml.laws", "model.library"),  # law = "name" in a file
@@ -52,7 +57,6 @@ FACES = {
 }
 # Objects that a module hands to the helpers it calls, whose files name its class as a type and for nothing else.
 HANDED_ON = {
-    "model.parts.model",
     "model.parts.contact",
     "model.smoothing.rewriting",
     "solution.model_trajectory",

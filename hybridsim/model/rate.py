@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from hybridsim.errors import ModelError
 from hybridsim.expr import Expression, parse, substitute
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.model import Model
+from hybridsim.model.parts.quantities import State
 
 
-def rate_along(model: Model, quantity: Expression, what: str) -> Expression:
+def rate_along(
+    quantity: Expression,
+    what: str,
+    states: Sequence[State],
+    definitions: Iterable[tuple[str, Expression]],
+    constants: Iterable[Any],  # `Parameter` and `Discrete`
+) -> Expression:
     """Return the time derivative of a quantity along the flow, by the chain rule.
+
+    constants : quantities that are constant along the flow.
 
     Raises
     ------
@@ -22,20 +28,20 @@ def rate_along(model: Model, quantity: Expression, what: str) -> Expression:
     """
     from hybridsim.expr.slope import slope
 
-    definitions = dict(model.definitions)
-    inner = inlined(quantity, definitions)
-    known = {state.name for state in model.states} | {p.name for p in model.parameters} | {"t"}
-    if foreign := sorted(inner.names - known - {d.name for d in model.discrete}):
+    formulas = dict(definitions)
+    inner = inlined(quantity, formulas)
+    known = {"t", *(part.name for part in (*states, *constants))}
+    if foreign := sorted(inner.names - known):
         raise ModelError(
             f"{what} depends on {', '.join(foreign)}, whose time derivative is unknown",
             place=quantity.place,
             remedy="use only states, parameters and t",
         )
     rate = slope(inner, "t")
-    for state in model.states:
+    for state in states:
         part = slope(inner, state.name)
         if part.text != "0":
-            der = inlined(state.der, definitions)
+            der = inlined(state.der, formulas)
             rate = substitute(parse("rate + part*der"), {"rate": rate, "part": part, "der": der})
     return rate
 

@@ -25,6 +25,7 @@ from hybridsim.model.parts.schedule import Schedule
 from hybridsim.model.parts.shape import Shape
 from hybridsim.model.parts.switching import SwitchingSurface
 from hybridsim.model.parts.use import Use
+from hybridsim.model.rate import rate_along
 
 _PARTS: dict[str, type[Declared]] = {
     "states": State,
@@ -179,9 +180,8 @@ class Model(Declared):
         yield from brought.values()
 
     def _load_rate(self, contact: Contact) -> Expression:
-        from hybridsim.model.rate import rate_along
-
-        return rate_along(self, contact.normal, f"the normal load of contact {contact.name}")
+        what, constants = f"the normal load of contact {contact.name}", (*self.parameters, *self.discrete)
+        return rate_along(contact.normal, what, self.states, self.definitions, constants)
 
     def _state(self, name: str, start: Any) -> State:
         if self.flow is None:

@@ -197,7 +197,8 @@ def _holding_force(model: Model, contact: Contact) -> Expression:
             "does not support",
             remedy="use 'tanh' or 'arctan'",
         )
-    rate = rate_along(model, velocity, f"the velocity of contact {contact.name}")
+    what, constants = f"the velocity of contact {contact.name}", (*model.parameters, *model.discrete)
+    rate = rate_along(velocity, what, model.states, model.definitions, constants)
     others = rate.names & {c.name for c in model.contacts if c is not contact}
     if others:
         raise UsageError(
