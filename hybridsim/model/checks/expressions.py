@@ -130,12 +130,11 @@ def _circles(scope: Scope) -> None:
 
 
 def _algebraic_loop(fault: CyclicDependency) -> ExpressionError:
-    """Return the error for a circle; a circle through several parts is an algebraic loop between them."""
-    parts = {name.rpartition(".")[0] for name in fault.circle}
-    if len(parts) == 1:
+    """Return the error for a circle; a circle through parts, which have none alone, is an algebraic loop."""
+    if not any("." in name for name in fault.circle):
         return fault
     return ExpressionError(
-        f"algebraic loop between parts: {' -> '.join(fault.circle)}",
+        f"algebraic loop through parts: {' -> '.join(fault.circle)}",
         place=fault.place,
         remedy="each of these values is computed from the others at the same instant; connect a state instead of one "
         "of them, or write the equations of the loop in one part",

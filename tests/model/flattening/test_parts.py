@@ -299,7 +299,9 @@ def test_an_algebraic_loop_is_named(folder: Path) -> None:
         "[use.a]\nmodel = 'spring.toml'\nconnect.u = 'b.pull'\n"
         "[use.b]\nmodel = 'spring.toml'\nconnect.u = 'a.pull'\n",
     )
-    assert fault.message == "algebraic loop between parts: a.u -> b.pull -> b.u -> a.pull -> a.u"
+    assert fault.message == "algebraic loop through parts: a.u -> b.pull -> b.u -> a.pull -> a.u"
+    own = refused(folder, "[use.a]\nmodel = 'spring.toml'\nconnect.u = 'a.pull'\n")
+    assert own.message == "algebraic loop through parts: a.u -> a.pull -> a.u"
 
 
 def test_a_loop_through_a_state_is_none(folder: Path) -> None:

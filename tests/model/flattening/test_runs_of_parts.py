@@ -5,6 +5,8 @@ from __future__ import annotations
 import csv
 import json
 import math
+import re
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -135,7 +137,7 @@ def test_values_of_parts_are_named_in_measures_and_questions() -> None:
     assert table["amplitude.a.x"] == pytest.approx([gain, 2 * gain], rel=1e-6)
     assert np.abs(table["harmonic.a.x.1"]) == pytest.approx([gain, 2 * gain], rel=1e-6)
     for quantity, message in (
-        ("amplitude.a.y", "amplitude.a.x"),
+        ("amplitude.a.y", "did you mean 'a.x'"),
         ("amplitude.a.x.2", "write amplitude.a.x"),
         ("event_time.a.x.0", "event_time"),
     ):
@@ -175,3 +177,16 @@ def test_signs_corners_and_jumps_are_replaced_in_parts_as_elsewhere() -> None:
     assert sol.output("a.w", 0.5) == pytest.approx(2 * math.exp(-0.5) - 1, abs=1e-12)
     smooth = hs.simulate(whole.regularized("tanh", v0=1e-4), (0, 0.5), integrator="dop853")
     assert smooth.output("a.w", 0.5) == pytest.approx(2 * math.exp(-0.5) - 1, abs=1e-6)
+
+
+def test_the_page_on_parts_prints_what_it_says(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page = EXAMPLES.parents[1] / "how-to" / "parts.md"
+    code = "\n".join(re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL))
+    shown = re.findall(r"^print\(.*\)  # (.+)$", code, re.MULTILINE)
+    monkeypatch.chdir(EXAMPLES)  # the page assumes that its files lie next to the script
+    (tmp_path / "shown.py").write_text(code, encoding="utf-8")
+    runpy.run_path(str(tmp_path / "shown.py"))
+    assert capsys.readouterr().out.splitlines() == shown
+    assert len(shown) == 5
