@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from matplotlib.axes import Axes
 
+from hybridsim.model.checks.units import time_unit
 from hybridsim.plot import style
 from hybridsim.plot.drawing.canvas import Canvas
 from hybridsim.plot.drawing.theme import DARK, LIGHT
 from hybridsim.plot.smooth_parts import refuse_arrays, window_of
 from hybridsim.solution import Solution
 
-_WIDTH, _LEAST, _MOST = 6.4, 1.6, 5.0  # inches
+_WIDTH, _LEAST, _MOST, _HEAD = 6.4, 1.2, 5.0, 0.3  # inches
 
 
 def mechanism(
@@ -29,10 +30,25 @@ def mechanism(
     refuse_arrays(solution)
     canvas = Canvas(solution, window_of(solution, None), DARK if dark else LIGHT)
     if axes is None:
-        figure = style.figure(_WIDTH, min(max(_WIDTH * canvas.aspect, _LEAST), _MOST))
+        figure = style.figure(_WIDTH, min(max(_WIDTH * canvas.aspect, _LEAST), _MOST) + _HEAD)
         figure.set_facecolor(canvas.theme.paper)
         axes = figure.subplots()
     canvas.prepare(axes)
-    for artist in canvas.artists(axes, solution.t_end if t is None else float(t)):
+    t = solution.t_end if t is None else float(t)
+    for artist in canvas.artists(axes, t):
         axes.add_artist(artist)
+    ink = canvas.theme.ink
+    axes.set_title(f"t = {t:.4g} {time_unit(solution.model)}".rstrip(), fontsize=9, loc="left", color=ink)
+    if handles := canvas.handles(t):
+        axes.legend(
+            handles=handles,
+            loc="lower right",
+            bbox_to_anchor=(1.0, 1.0),
+            ncols=len(handles),
+            frameon=False,
+            fontsize=9,
+            labelcolor=ink,
+            handlelength=1.2,
+            borderaxespad=0.2,
+        )
     return axes

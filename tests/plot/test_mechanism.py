@@ -76,6 +76,10 @@ def test_a_contact_has_the_colour_of_its_mode(slide: hs.Solution) -> None:
     for t, colour in zip((1.0, 3.0), colours):
         thick = [p for p in mechanism(slide, t).patches if isinstance(p, PathPatch) and p.get_linewidth() > 4]
         assert [to_hex(p.get_edgecolor()) for p in thick] == [colour.lower()]
+        axes = mechanism(slide, t)
+        assert axes.get_title(loc="left") == f"t = {t:g} s"
+        mode = "stick" if colour == INK else "slip-"
+        assert [text.get_text() for text in axes.get_legend().get_texts()] == [f"f: {mode}"]
 
 
 def test_pictures_of_one_run_have_one_scale(slide: hs.Solution) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.patches import PathPatch
+from matplotlib.patches import Patch, PathPatch
 from matplotlib.path import Path
 from matplotlib.text import Text
 from numpy.typing import NDArray
@@ -92,6 +92,20 @@ class Canvas:
         for style_of, group in itertools.groupby(outlines, key=Outline.style):
             yield _patch([outline.points for outline in group], *style_of)
         yield from (_text(item) for item in items if isinstance(item, Label))
+
+    def handles(self, t: float) -> list[Patch]:
+        """Return entries for a legend: the components whose modes are shown, with their modes at one time."""
+        modes = self.modes(t)
+        shown = dict.fromkeys(
+            shape.mode_of for shape in self.solution.model.drawing if shape.mode_of in modes
+        )
+        return [
+            Patch(
+                color=self.theme.mode(self.colours[modes[name]]),
+                label=style.literal(f"{name}: {modes[name]}"),
+            )
+            for name in shown
+        ]
 
     def _colours_at(self, t: float) -> dict[str, str]:
         """Return the colour of the mode of each shape that shows one."""

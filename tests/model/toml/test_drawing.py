@@ -59,6 +59,23 @@ def test_a_regularised_model_keeps_its_drawing() -> None:
     assert hs.load("dfcs").regularized("tanh", v0=1e-3).validate().drawing
 
 
+def test_a_part_brings_its_drawing() -> None:
+    part = hs.Model(
+        "block",
+        [hs.State("x", 0, "v"), hs.State("v", 1, "-f")],
+        contacts=[hs.Contact("f", "v", 1, "coulomb", {"mu": 0.2})],
+        drawing=[
+            hs.Shape("b", "mass", at=("x", 0), mode_of="f", text="m"),
+            hs.Shape("s", "rod", ends=("b", (2, "x"))),
+        ],
+    )
+    whole = hs.Model("two", [], use=[hs.Use("left", part), hs.Use("right", part)]).validate()
+    assert [shape.name for shape in whole.drawing] == ["left.b", "left.s", "right.b", "right.s"]
+    block, rod = whole.drawing[2:]
+    assert (block.at[0].text, block.mode_of, block.text) == ("right.x", "right.f", "m")
+    assert rod.ends[0] == "right.b" and rod.ends[1][1].text == "right.x"
+
+
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
