@@ -58,7 +58,6 @@ FACES = {
 # Objects that a module hands to the helpers it calls, whose files name its class as a type and for nothing else.
 HANDED_ON = {
     "model.parts.contact",
-    "model.smoothing.rewriting",
     "solution.model_trajectory",
 }
 # A family of integrators takes nothing from another one, but these.

@@ -20,7 +20,8 @@ from hybridsim.model.parts.frozen_map import FrozenMap
 from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.jumps import not_linear
 from hybridsim.model.smoothing.nonsmooth import MODE, Primitive, sides_of, uses_primitives
-from hybridsim.model.smoothing.rewriting import IN_EVENTS, IN_VELOCITY, Found, Here, Rewriting
+from hybridsim.model.smoothing.rewriting import Rewriting
+from hybridsim.model.smoothing.rewriting_state import IN_EVENTS, IN_VELOCITY, Found, Here
 
 # Largest number of corners and jumps to replace. Each event checks all components, and compiled loops store a table of
 # the combinations of modes.

@@ -8,18 +8,14 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
-from hybridsim.expr.rebuild import rebuilt
 from hybridsim.model.meanings import Family, Meanings
 from hybridsim.model.smoothing.conditions import TooManyConditions, single_comparisons
 from hybridsim.model.smoothing.nonsmooth import sides_of
-
-if TYPE_CHECKING:
-    from hybridsim.model.smoothing.rewriting import Here, Rewriting
+from hybridsim.model.smoothing.rewriting_state import Here, RewritingState
 
 
-def jump_inside(work: Rewriting, node: ast.expr, here: Here) -> ast.expr | None:
+def jump_inside(work: RewritingState, node: ast.expr, here: Here) -> ast.expr | None:
     """Return the argument of a jump in which a tree is nonlinear, or None if there is none.
 
     Jumps that depend on time alone are excluded, because the modes or signals for them have only two values.
@@ -41,7 +37,7 @@ def jump_inside(work: Rewriting, node: ast.expr, here: Here) -> ast.expr | None:
     return next((border for part in parts for border in open_jumps(work, part, here).values()), None)
 
 
-def open_jumps(work: Rewriting, node: ast.expr, here: Here) -> Mapping[Family, ast.expr]:
+def open_jumps(work: RewritingState, node: ast.expr, here: Here) -> Mapping[Family, ast.expr]:
     """Return by family the arguments at which a tree jumps and a surface can replace the jump."""
     if not work.has_jumps:
         return {}
@@ -72,17 +68,3 @@ def _parts(meanings: Meanings, tree: ast.expr) -> Iterator[ast.expr]:
                 yield from _parts(meanings, single)
         elif isinstance(part, ast.Call):
             yield part
-
-
-def resolved(meanings: Meanings, node: ast.expr, signs: Mapping[Family, int]) -> ast.expr:
-    """Return a tree with definitions inserted and with the sides selected by known signs."""
-
-    def side(part: ast.expr) -> ast.expr:
-        sides = sides_of(part)
-        if sides is not None and meanings.moves(sides[0]):
-            family, own = meanings.family(sides[0])
-            if family in signs:
-                return side(sides[(3, 1, 2)[own * signs[family]]])
-        return rebuilt(part, side)
-
-    return side(meanings.written_out(node))

@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Mapping, Set
-from dataclasses import dataclass, field, replace
-from types import MappingProxyType
+from collections.abc import Mapping
+from dataclasses import replace
 
-from hybridsim.errors import ModelError, Place
+from hybridsim.errors import ModelError
 from hybridsim.expr import parse
 from hybridsim.expr.rebuild import rebuilt, with_names
 from hybridsim.expr.write import write
-from hybridsim.model.meanings import Family, Meanings
-from hybridsim.model.parts.model import Model
+from hybridsim.model.meanings import Family
 from hybridsim.model.parts.switching import blend
 from hybridsim.model.smoothing.conditions import TooManyConditions, single_comparisons
 from hybridsim.model.smoothing.continuity import (
     has_root_beside_sign,
-    is_continuous,
     rooted_in,
     sides_of_product,
 )
-from hybridsim.model.smoothing.hoisting import jump_inside, resolved
-from hybridsim.model.smoothing.jumps import SIGN, Borders, Jump, product_of_signs
+from hybridsim.model.smoothing.hoisting import jump_inside
+from hybridsim.model.smoothing.jumps import SIGN, Jump, product_of_signs
 from hybridsim.model.smoothing.nonsmooth import (
     COMPONENT,
     JUMPS,
@@ -37,90 +34,24 @@ from hybridsim.model.smoothing.nonsmooth import (
     is_whole,
     limited,
     sides_of,
-    uses_conditions,
-    uses_sign,
 )
-from hybridsim.model.smoothing.one_sided import names_of, never_negative, number_of
-from hybridsim.model.smoothing.steps_in_time import STEP, TimeStep, lasting, step_of
+from hybridsim.model.smoothing.one_sided import names_of, number_of
+from hybridsim.model.smoothing.rewriting_state import (
+    IN_EVENTS,
+    IN_VELOCITY,
+    Found,
+    Here,
+    RewritingState,
+    resolved,
+)
+from hybridsim.model.smoothing.steps_in_time import STEP, TimeStep, step_of
 
 _EITHER = parse("p*a + (1 - p)*b").tree
-IN_VELOCITY = "it is part of a relative velocity"
-IN_EVENTS = "a guard, a monitor or another corner depends on it"
 VARIABLE = "__corner_"  # declared names cannot start with two underscores
 
 
-@dataclass(frozen=True)
-class Here:
-    """The context of a tree: its place in the model, the known signs, and the allowed replacements.
-
-    `untouched` is the reason why nothing may be replaced here, or empty. `jumps` is the reason why jumps of states are
-    kept; it is empty in a rate, where a motion may slide along a jump. `is_passing` allows jumps that a motion can only
-    cross. `times` is the reason why a jump in time becomes a signal and not a component; it is empty in a rate.
-    """
-
-    where: str
-    place: Place | None
-    signs: Mapping[Family, int] = field(default_factory=dict)
-    untouched: str = ""
-    jumps: str = IN_EVENTS
-    is_passing: bool = False
-    times: str = IN_EVENTS
-    rooted: frozenset[Family] = frozenset()
-
-
-@dataclass
-class Found:
-    """A replaced corner: its component, its argument, and its variables with their values."""
-
-    name: str
-    argument: ast.expr
-    sign: int
-    values: dict[str, tuple[ast.expr, ...]] = field(default_factory=dict)
-
-
-class Rewriting:
-    """Rewrites the expressions of a model once, and stores the corners and jumps.
-
-    Parameters
-    ----------
-    refusal : reason why no corner or jump may become a component, or empty.
-    refused : reasons for single borders.
-    shared : borders with jumps and corners.
-    timed : borders in time that must be signals everywhere, because they occur in a contact or a guard.
-    """
-
-    def __init__(
-        self,
-        model: Model,
-        refusal: str = "",
-        refused: Mapping[Family, str] = MappingProxyType({}),
-        shared: Set[Family] = frozenset(),
-        timed: Set[Family] = frozenset(),
-    ) -> None:
-        self.model, self.refusal, self.refused, self.shared, self.timed = (
-            model,
-            refusal,
-            refused,
-            shared,
-            timed,
-        )
-        self.meanings = Meanings(model)
-        self.borders, self._has_sign = Borders(model, self.meanings), uses_sign(model)
-        self.has_jumps = self._has_sign or uses_conditions(model)
-        self._parameters = {parameter.name for parameter in model.parameters} | lasting(model)
-        self.components = model.all_components()
-        self.signs = [[self.meanings.signs(c, mode) for mode in c.modes] for c in self.components]
-        self.corners: dict[Family, Found] = {}
-        self.jumps: dict[Family, Jump] = {}
-        self.faults: list[ModelError] = []
-        self._single: dict[int, tuple[ast.expr, ast.expr]] = {}
-        self.steps: dict[Family, tuple[TimeStep, int]] = {}  # with the sign of the expression in its family
-        self._known_signs: dict[frozenset[tuple[Family, int]], Mapping[Family, int]] = {}
-        self.implied: dict[int, dict[str, tuple[ast.expr, ...]]] = {}  # component -> variable -> its values
-        self._accounts: dict[tuple[str, str, str], tuple[list[str], Place | None]] = {}
-        self.count = 0
-        self._met: dict[int, tuple[ast.expr, frozenset[Family | None]]] = {}
-        self._walked: dict[tuple[object, ...], tuple[ast.expr, Here, ast.expr]] = {}
+class Rewriting(RewritingState):
+    """Rewrites the expressions of a model once, and stores the corners and jumps."""
 
     def primitives(self) -> tuple[Primitive, ...]:
         """Return the treatment of each non-smooth function, in order of appearance."""
@@ -226,24 +157,6 @@ class Rewriting:
         """Return whether an expression has neither corners nor jumps, by its form."""
         parts = ast.walk(self.meanings.written_out(argument))
         return not any(isinstance(part, ast.IfExp) or sides_of(part) for part in parts)  # type: ignore[arg-type]  # others have none
-
-    def is_open(self, family: Family, argument: ast.expr, here: Here) -> bool:
-        """Return whether a switching surface may represent a jump at this place of the model."""
-        return bool(
-            family
-            and not self.never_negative(argument)
-            and self._owner(family) is None
-            and family not in here.rooted
-            and not self.borders.is_timed(argument)
-            and not self._left(family, argument, here)
-        )
-
-    def _left(self, family: Family, argument: ast.expr, here: Here) -> str:
-        """Return why a jump is not replaced, or an empty text."""
-        reason = here.jumps
-        if here.is_passing and self.borders.is_only_passed(argument):
-            reason = ""
-        return reason or self.refusal or self.refused.get(family, "") or self._border(family, argument)
 
     def _signs(self, here: Here, family: Family, sign: int) -> Mapping[Family, int]:
         """Return the known signs, with the sign of one more family."""
@@ -464,12 +377,6 @@ class Rewriting:
         text = f"(o + (a + b)/2)/2 + {way}*(u*((a + b)/2 - o)/2 + (a - b)/4*uw) + (a - b)/4*w"
         return with_names(parse(text).tree, {**parts, "uw": with_names(product, parts)})
 
-    def _border(self, family: Family, argument: ast.expr) -> str:
-        """Return why a border cannot become a switching surface, or an empty text."""
-        if family in self.jumps:
-            return ""
-        return self.borders.refusal(argument) or self.borders.conflict(argument, self.jumps.values())
-
     def _jump_at(self, family: Family, argument: ast.expr, sign: int) -> Jump:
         if family not in self.jumps:
             self.count += 1
@@ -477,23 +384,6 @@ class Rewriting:
             timed = self.borders.is_timed(argument)
             self.jumps[family] = Jump(name, f"{SIGN}{self.count}", argument, sign, timed)
         return self.jumps[family]
-
-    def agrees(self, node: ast.expr, parts: Sides) -> bool:
-        """Return whether the two sides of a non-smooth function are equal at its border."""
-        argument, above, below, _ = parts
-        if isinstance(node, ast.IfExp):
-            family, sign = self.meanings.family(argument)
-            sides = ((above, sign), (below, -sign))
-            first, second = (resolved(self.meanings, tree, {family: s}) for tree, s in sides)
-            return is_continuous(self.meanings, argument, first, second)
-        return not (isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "sign")
-
-    def _owner(self, family: Family) -> int | None:
-        """Return a component whose modes determine the side of an expression, or None."""
-        for c, modes in enumerate(self.signs):
-            if modes and all(family in signs for signs in modes):
-                return c
-        return None
 
     def _variable(self, values: dict[str, tuple[ast.expr, ...]], row: tuple[ast.expr, ...]) -> ast.Name:
         texts = [write(tree) for tree in row]
@@ -528,7 +418,3 @@ class Rewriting:
         where, _ = self._accounts.setdefault((write(node), became, remark), ([], here.place))
         if here.where not in where:
             where.append(here.where)
-
-    def never_negative(self, node: ast.expr) -> bool:
-        """Return whether a tree is never negative for all values of the parameters."""
-        return never_negative(node, {}, self.meanings.lookup) is not None
