@@ -50,7 +50,7 @@ FILES = {
     "mechanics/series_loop/steps.py": 350,
     "mechanics/time_stepping/kernels.py": 379,
     "model/parts/model.py": 540,
-    "model/smoothing/rewriting.py": 534,
+    "model/smoothing/rewriting.py": 420,
     "simulator/simulator.py": 355,
     "solution/explain/explanation.py": 351,
 }
