@@ -64,7 +64,7 @@ _METHODS = {
     "Model": {"from_toml", "regularized"},
     "Simulator": {"run", "start", "advance", "set", "output", "restore"},
 }
-_NOT_CALLED = {"Place.at"}
+_NOT_CALLED = {"Place.at", "Place.inside"}
 
 
 def wrong_values() -> Iterator[tuple[str, Any]]:
@@ -186,6 +186,10 @@ CALLS: dict[str, tuple[Callable[[], Callable[..., Any]], Callable[[], dict[str, 
     "LawTable": (lambda: hs.LawTable, lambda: {"name": "mu", "at": [0, 1], "values": [1, 2]}),
     "Impact": (lambda: hs.Impact, lambda: {"name": "i", "gap": "x", "restitution": 0.5}),
     "Input": (lambda: hs.Input, lambda: {"name": "u", "kind": "table", "times": [0, 1], "values": [0, 1]}),
+    "Use": (
+        lambda: hs.Use,
+        lambda: {"name": "part", "model": hs.load("belt"), "start": {"x": 1}, "repeat": 2},
+    ),
     "Harmonic": (lambda: hs.Harmonic, lambda: {"omega": 1.0}),
     "MechanicalContact": (
         lambda: hs.MechanicalContact,

@@ -184,7 +184,7 @@ CONNECTED = {"kind": {"const": "connected"}, "unit": UNIT}
 HELD = {"kind": {"const": "held"}, "value": said("until it is set from outside", EXPRESSION), "unit": UNIT}
 POINTS_IN_TIME = {
     "kind": {"const": "table"}, "times": NUMBERS, "values": NUMBERS, "file": said("a CSV beside the model", TEXT),
-    "columns": {"type": "array"}, "interpolation": {"enum": ["linear", "cubic"]},
+    "columns": {"type": "array"}, "interpolation": {"enum": ["linear", "cubic", "previous"]},
 }  # fmt: skip
 INPUT = {"oneOf": [table(keys, ("kind",)) for keys in (WAVE, CHIRP, POINTS_IN_TIME, HELD, CONNECTED)]}
 OUTPUT = table(

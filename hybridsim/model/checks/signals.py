@@ -109,7 +109,7 @@ def _table(scope: Scope, signal: Input, what: str) -> None:
             )
             scope.fail(signal, message, "sort the table by time")
             return
-        if jump and (signal.interpolation == "cubic" or (index > 1 and times[index - 2] == times[index])):
+        if jump and (signal.interpolation != "linear" or (index > 1 and times[index - 2] == times[index])):
             message = f"{what}: the time {times[index]!r} occurs more than once (point {index})"
             scope.fail(signal, message, "only a linear table may contain a time twice, which makes a jump")
             return

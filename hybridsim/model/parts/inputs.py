@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
+from os import PathLike
+from pathlib import Path
 
 from hybridsim.errors import ModelError
 from hybridsim.expr import Expression
+from hybridsim.files import path_text
 from hybridsim.model.parts.declared import Declared
 from hybridsim.model.parts.quantities import Discrete
+from hybridsim.model.toml.table_file import read_columns
 
 KINDS = ("table", "wave", "chirp", "held", "connected")
 SHAPES = ("square", "triangle", "sawtooth", "sine")
-INTERPOLATIONS = ("linear", "cubic")
+INTERPOLATIONS = ("linear", "cubic", "previous")
 # Required fields of each kind (REQUIRED), and fields with defaults (OPTIONAL).
 REQUIRED = {
     "table": ("times", "values"),
@@ -41,7 +47,8 @@ class Input(Declared):
 
     table
         Values at increasing times with linear or natural cubic interpolation, and constant beyond both ends. Two equal
-        times make a jump (linear only).
+        times make a jump (linear only). With "previous" each value holds until the next time, where it jumps; such a
+        table becomes a linear one with jumps.
     wave
         offset + amplitude s((t - phase)/period), s of period 1; ``phase`` is a delay in time.
         square: +1 for a fraction below ``duty`` (0.5), else -1; sine: sin(2 pi tau); triangle: 0 at 0, 1 at 1/4, -1 at
@@ -64,13 +71,18 @@ class Input(Declared):
     times, values : sequence of float, optional
         Times and values (k,) of a table.
     interpolation : str, optional
-        Interpolation of a table, "linear" or "cubic".
+        Interpolation of a table, "linear", "cubic" or "previous".
     shape : str, optional
         Shape of a wave, "square", "sine", "triangle" or "sawtooth".
     amplitude, period, phase, offset, duty, f0, f1, duration, value : str or float, optional
         Expressions of parameters.
     unit : str, optional
         Unit of a held or a connected input.
+    file : str or path, optional
+        Path of a CSV file with the times and values of a table, instead of ``times`` and ``values``. It is read at
+        once; the input contains the numbers.
+    columns : pair of str or int, optional
+        Names or indices of the columns of ``file`` with time and value; the first two by default.
     place : Place, optional
         Place of the declaration, for error messages.
 
@@ -97,9 +109,15 @@ class Input(Declared):
     duration: Expression | None = None
     value: Expression | None = None
     unit: str | None = None
+    file: str | PathLike[str] | None = None
+    columns: Sequence[str | int] | None = None
 
     def __post_init__(self) -> None:
         self._texts("name", "kind", "interpolation", "shape", "unit")
+        if self.file is not None:
+            self._read_file()
+        elif self.columns is not None:
+            raise self._fault("`columns` is set without `file`", "set `file`, the path of a CSV file")
         defaults = dict(_DEFAULTS.get(self.kind, {}))
         if self.shape == "square":
             defaults["duty"] = 0.5
@@ -108,6 +126,37 @@ class Input(Declared):
                 object.__setattr__(self, name, value)
         self._expressions("amplitude", "period", "phase", "offset", "duty", "f0", "f1", "duration", "value")
         self._numbers("times", "values")
+        if self.interpolation == "previous":
+            self._write_steps()
+
+    def _write_steps(self) -> None:
+        """Write a table whose values hold as a linear one with jumps; a faulty one is left for the checks."""
+        rises = all(before < after for before, after in pairwise(self.times))
+        if rises and len(self.times) == len(self.values) >= 2:
+            first, *later = zip(self.times, self.values, strict=True)
+            points = [first]
+            for time, value in later:
+                points += [(time, points[-1][1]), (time, value)]
+            times, values = zip(*points, strict=True)
+            for name, entry in {"times": times, "values": values, "interpolation": "linear"}.items():
+                object.__setattr__(self, name, entry)
+
+    def _read_file(self) -> None:
+        """Read the times and values of a table from its file; the input has them as numbers afterwards."""
+        assert self.file is not None
+        extra = [name for name in ("times", "values") if getattr(self, name)]
+        if self.kind != "table" or extra:
+            what = f"`{extra[0]}`" if extra else f"the kind '{self.kind}'"
+            raise self._fault(
+                f"`file` and {what} cannot be combined", "use `file` for an input of kind 'table'"
+            )
+        columns = (0, 1) if self.columns is None else self.columns
+        pair = columns if isinstance(columns, list | tuple) else ()
+        if len(pair) != 2 or not all(isinstance(c, str | int) and not isinstance(c, bool) for c in pair):
+            raise self._fault(f"`columns` cannot be {columns!r}", "use two names or indices, [time, value]")
+        times, values = read_columns(Path(path_text(self.file)), pair)
+        for name, entry in {"times": times, "values": values, "file": None, "columns": None}.items():
+            object.__setattr__(self, name, entry)
 
     def as_held(self) -> HeldInput:
         """Return an input of kind "held" as the part that a model keeps."""

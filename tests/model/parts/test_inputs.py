@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
@@ -151,3 +152,69 @@ def test_a_field_of_another_kind_is_refused() -> None:
             [hs.State("x", 0, "u")],
             inputs=[hs.Input("u", "chirp", f0=1, f1=2, duration=3, period=2)],
         ).validate()
+
+
+def test_an_input_in_python_reads_a_file_as_one_in_a_model_file(tmp_path: Path) -> None:
+    (tmp_path / "road.csv").write_text("height,t\n1,0\n3,2\n2,4\n", encoding="utf-8")
+    declared = hs.Input("u", "table", file=tmp_path / "road.csv", columns=("t", "height"))
+    assert declared == hs.Input("u", "table", times=[0, 2, 4], values=[1, 3, 2])
+    model = hs.Model("m", states=[hs.State("x", 0, "u")], inputs=[declared]).validate()
+    assert model == hs.Model.from_toml(model.to_toml())
+    # the integral of 1 + t up to t = 2, and of 3 - (t - 2)/2 after it
+    sol = hs.simulate(model, (0, 4), integrator="taylor")
+    assert sol.output("x", 2.0) == pytest.approx(4.0, abs=1e-12)
+    assert sol.output("x", 4.0) == pytest.approx(9.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        (
+            {"kind": "wave", "shape": "sine", "file": "road.csv"},
+            "`file` and the kind 'wave' cannot be combined",
+        ),
+        ({"kind": "table", "times": [0, 1], "file": "road.csv"}, "`file` and `times` cannot be combined"),
+        ({"kind": "table", "columns": (0, 1)}, "`columns` is set without `file`"),
+        ({"kind": "table", "file": "road.csv", "columns": 3}, "`columns` cannot be 3"),
+        ({"kind": "table", "file": "road.csv", "columns": (0, True)}, "`columns` cannot be (0, True)"),
+        ({"kind": "table", "file": 3}, "A path cannot be 3"),
+        ({"kind": "table", "file": "none.csv"}, "the file none.csv does not exist"),
+        ({"kind": "table", "file": "road.csv", "columns": ("t", "w")}, "column 'w' does not exist"),
+        ({"kind": "table", "file": "road.csv", "columns": ("t", "note")}, "'dry' is not a number"),
+    ],
+)
+def test_a_wrong_file_of_an_input_in_python_is_refused(
+    fields: dict, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "road.csv").write_text("t,u,note\n0,1,dry\n2,3,dry\n", encoding="utf-8")
+    with pytest.raises(hs.HybridsimError) as caught:
+        hs.Input("u", **fields)
+    assert message in caught.value.message
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853", "scipy-radau", "cvode-bdf"])
+def test_a_table_may_hold_its_values(integrator: str) -> None:
+    """u = 2 until t = 1, then -1 until t = 3, then 4; x' = u - x has a closed form on each piece."""
+    held = hs.Input("u", "table", times=[0, 1, 3], values=[2, -1, 4], interpolation="previous")
+    model = hs.Model("m", states=[hs.State("x", 0, "u - x")], inputs=[held]).validate()
+    assert hs.Model.from_toml(model.to_toml()) == model
+    sol = hs.simulate(model, (0, 4), integrator=integrator, rtol=1e-10)
+    assert (sol.output("u", 1.0, side="-"), sol.output("u", 1.0), sol.output("u", 2.9)) == (2.0, -1.0, -1.0)
+    x1 = 2 * (1 - math.exp(-1))
+    x3 = -1 + (x1 + 1) * math.exp(-2)
+    assert sol.output("x", 3.0) == pytest.approx(x3, abs=1e-8)
+    assert sol.output("x", 4.0) == pytest.approx(4 + (x3 - 4) * math.exp(-1), abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("times", "message"),
+    [
+        ([0, 1, 1], "the time 1.0 occurs more than once"),
+        ([0, 2, 1], "the times decrease from 2.0 to 1.0 at point 2"),
+    ],
+)
+def test_a_table_that_holds_its_values_needs_increasing_times(times: list, message: str) -> None:
+    held = hs.Input("u", "table", times=times, values=[2, -1, 4], interpolation="previous")
+    with pytest.raises(hs.ModelError, match=message):
+        hs.Model("m", states=[hs.State("x", 0, "u - x")], inputs=[held]).validate()
