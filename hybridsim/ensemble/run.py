@@ -6,14 +6,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.events.compiled.known_time import SEGMENTS as SEGMENTS_AT
+from hybridsim.engine.events.compiled.known_time import set_origin
 from hybridsim.engine.events.compiled.scratch import EVENT_LOOP
 from hybridsim.engine.events.compiled.start import plain_start
 from hybridsim.engine.linear.motion_summary import sum_up
 from hybridsim.engine.native.kernels import call_kernel, inlined, kernel
 from hybridsim.engine.native.loop_hints import fill, put
 from hybridsim.engine.native.struct_pack import pack_at
-from hybridsim.engine.run.event_loop import AT_TARGET, FULL, set_origin
-from hybridsim.engine.run.event_loop import SEGMENTS as SEGMENTS_AT
+from hybridsim.engine.run.event_loop import AT_TARGET, FULL
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.instant import two_sum
 from hybridsim.ensemble.start import keeps_holding

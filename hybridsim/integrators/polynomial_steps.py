@@ -14,6 +14,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from hybridsim.engine.events.compiled.at_end import may_vanish
+from hybridsim.engine.events.compiled.known_time import SEGMENTS, STEPS
 from hybridsim.engine.events.compiled.scratch import called_by
 from hybridsim.engine.native.kernels import call as call_function
 from hybridsim.engine.native.kernels import call_noinline, call_series, inlined, kernel
@@ -25,8 +26,6 @@ from hybridsim.engine.run.event_loop import (
     FOLLOWED,
     FULL,
     MIN_STEPS_IN_PART,
-    SEGMENTS,
-    STEPS,
     STOPPED,
     SegmentEnd,
     any_holding,

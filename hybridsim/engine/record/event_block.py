@@ -14,16 +14,27 @@ from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
 
+AT_KNOWN_TIME = -2  # kind k of a known time is AT_KNOWN_TIME - k in place of a guard
+
 
 @kernel
 def _taking_part(
-    fired: Any, before: Any, after: Any, owner: Any, has_surface: Any, participants: Any
-) -> tuple[int, bool]:
-    """Return how many components change mode or are reset, and whether each event has exactly one.
+    fired: Any,
+    before: Any,
+    after: Any,
+    owner: Any,
+    has_surface: Any,
+    due_start: Any,
+    due: Any,
+    participants: Any,
+) -> tuple[int, int, bool]:
+    """Return the number of all participants, that of schedules among them, and whether each event has exactly one.
 
-    participants (2, m): receives event and component of each, up to its length.
+    A participant is a component that changes its mode or is reset, or a schedule that is due.
+    due_start, due: the schedules of each kind of known time. participants (2, m): receives event and component of each,
+    up to its length; a schedule follows the components.
     """
-    count, is_plain = 0, True
+    count, schedules, is_plain = 0, 0, True
     for e in range(fired.shape[0]):
         for c in range(before.shape[1]):
             is_owner = fired[e] >= 0 and c == owner[fired[e]]
@@ -31,8 +42,14 @@ def _taking_part(
                 if count < participants.shape[1]:
                     participants[0, count], participants[1, count] = e, c
                 count += 1
+        if fired[e] <= AT_KNOWN_TIME:
+            kind = AT_KNOWN_TIME - fired[e]
+            for i in range(due_start[kind], due_start[kind + 1]):
+                if count < participants.shape[1]:
+                    participants[0, count], participants[1, count] = e, before.shape[1] + due[i]
+                count, schedules = count + 1, schedules + 1
         is_plain = is_plain and count == e + 1
-    return count, is_plain
+    return count, schedules, is_plain
 
 
 @kernel
@@ -59,6 +76,7 @@ def _states_at(states: Any, participants: Any, first: int, component: int, side:
     return count
 
 
+SCHEDULED = "scheduled"  # kind of the event of a schedule
 _take_part, _times_of_one = Precompiled(_taking_part), Precompiled(_times_at)
 
 
@@ -68,9 +86,10 @@ class EventBlock(Sequence[Occurrence]):
     Parameters
     ----------
     instants : (E, 2), high and low.
-    fired : (E,), number of the guard that fired; -1 for none.
+    fired : (E,), number of the guard that fired; -1 for none; AT_KNOWN_TIME - k for kind k of a known time.
     before, after : (E, C), modes on both sides.
     states : (E, 2, n), x- and x+.
+    due : the schedules of each kind of known time.
     """
 
     def __init__(
@@ -81,17 +100,20 @@ class EventBlock(Sequence[Occurrence]):
         before: np.ndarray,
         after: np.ndarray,
         states: np.ndarray,
+        due: Sequence[tuple[int, ...]] = (),
     ) -> None:
         self._system, self._instants, self._fired = system, instants, fired
         self._before, self._after, self._states = before, after, states
         self._first = 0
         participants = np.empty((2, len(fired)), dtype=np.int64)
-        found = _take_part(fired, before, after, system.owner, system.has_surface, participants)
-        self._count, self._is_plain = found
+        kinds = np.cumsum([0, *map(len, due)]), np.array([k for one in due for k in one], dtype=np.int64)
+        arrays = fired, before, after, system.owner, system.has_surface, *kinds
+        self._count, schedules, self._is_plain = _take_part(*arrays, participants)
         if self._count != len(fired):
             participants = np.empty((2, self._count), dtype=np.int64)
-            _take_part(fired, before, after, system.owner, system.has_surface, participants)
+            _take_part(*arrays, participants)
         self._all_participants = participants
+        self.changes = self._count - schedules  # number of changes of mode
 
     def __len__(self) -> int:
         return self._count - self._first
@@ -104,7 +126,7 @@ class EventBlock(Sequence[Occurrence]):
     @property
     def until(self) -> Instant:
         """Return the instant of the last event."""
-        return Instant(*self._instants[-1].tolist())
+        return Instant(*self._instants[self._all_participants[0, -1]].tolist())
 
     @property
     def times(self) -> np.ndarray:
@@ -113,9 +135,9 @@ class EventBlock(Sequence[Occurrence]):
         return times[self._first :] if self._is_plain else times[self._participants[0]]
 
     def times_of(self, component: str, kind: str | None) -> np.ndarray:
-        """Return the times of a component's events, which are all transitions or changes at a corner."""
-        for c, automaton in enumerate(self._system.automata):
-            if automaton.name == component and kind in (None, automaton.kind):
+        """Return the times of the events of a component or schedule."""
+        for c, (name, own) in enumerate(self._named):
+            if name == component and kind in (None, own):
                 times = np.empty(len(self))
                 count = _times_of_one(self._instants, self._all_participants, self._first, c, times)
                 return times if count == len(times) else times[:count]
@@ -123,8 +145,8 @@ class EventBlock(Sequence[Occurrence]):
 
     def states_of(self, component: str, kind: str | None, side: int) -> np.ndarray:
         """Return a new array of states (k, n) at events, before (side 0) or after (side 1) each event."""
-        for c, automaton in enumerate(self._system.automata):
-            if automaton.name == component and kind in (None, automaton.kind):
+        for c, (name, own) in enumerate(self._named):
+            if name == component and kind in (None, own):
                 states = np.empty((len(self), self._system.n))
                 # called directly, because the states of some loops are not contiguous
                 count = _states_at(self._states, self._all_participants, self._first, c, side, states)
@@ -134,16 +156,26 @@ class EventBlock(Sequence[Occurrence]):
     def kinds(self) -> Counter[str]:
         """Return the number of events of each kind."""
         found: Counter[str] = Counter()
-        for automaton, count in zip(self._system.automata, np.bincount(self._participants[1]).tolist()):
-            found[automaton.kind] += count
+        for (_, kind), count in zip(self._named, np.bincount(self._participants[1]).tolist()):
+            found[kind] += count
         return +found
+
+    @property
+    def _named(self) -> list[tuple[str, str]]:
+        """Return the names of components and schedules, each with the kind of its events."""
+        schedules = [(schedule.name, SCHEDULED) for schedule in self._system.model.schedules]
+        return [(automaton.name, automaton.kind) for automaton in self._system.automata] + schedules
 
     def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
         """Return instants (k, 2) and states (k, 2, n) of the transitions from a given event on."""
         has_corners = len(self._system.declared) < len(self._system.automata)
-        if self._is_plain and not has_corners:
+        has_schedules = self.changes < self._count
+        if self._is_plain and not (has_corners or has_schedules):
             return self._instants[self._first + first :], self._states[self._first + first :]
         events, components = self._participants[:, first:]
+        if has_schedules:
+            is_change = components < len(self._system.automata)
+            events, components = events[is_change], components[is_change]
         if has_corners:
             events = events[~self._system.is_corner[components]]
         return self._instants[events], self._states[events]
@@ -157,21 +189,21 @@ class EventBlock(Sequence[Occurrence]):
     def __getitem__(self, i: Any, /) -> Any:
         if isinstance(i, slice):
             return list(self._made(i))
-        e, c = self._participants[:, range(len(self))[i]].tolist()
-        fired, source, target = int(self._fired[e]), int(self._before[e, c]), int(self._after[e, c])
-        x_minus, x_plus = self._states[e]
-        return self._occurrence(c, fired, source, target, self._instants[e].tolist(), x_minus, x_plus)
+        place = range(len(self))[i]
+        return next(self._made(slice(place, place + 1)))
 
     def __iter__(self) -> Iterator[Occurrence]:
         return self._made(slice(None))
 
     def _made(self, chosen: slice) -> Iterator[Occurrence]:
         e, c = (participants[chosen] for participants in self._participants)
+        own = np.minimum(c, self._before.shape[1] - 1)  # of no meaning for a schedule
+        has_modes = self._before.shape[1] > 0
         rows = zip(
             c.tolist(),
             self._fired[e].tolist(),
-            self._before[e, c].tolist(),
-            self._after[e, c].tolist(),
+            self._before[e, own].tolist() if has_modes else c.tolist(),
+            self._after[e, own].tolist() if has_modes else c.tolist(),
             self._instants[e].tolist(),
             self._states[e],
             strict=True,
@@ -189,10 +221,13 @@ class EventBlock(Sequence[Occurrence]):
         x_minus: np.ndarray,
         x_plus: np.ndarray,
     ) -> Occurrence:
+        at, number = Instant(*instant), component - len(self._system.automata)
+        if number >= 0:
+            name = self._system.model.schedules[number].name
+            return Occurrence(at, SCHEDULED, name, "", "", "", 0, x_minus, x_plus)
         automaton, guard, modes = self._system.automata[component], "", self._system.automata[component].modes
         if fired >= 0 and component == self._system.owner[fired]:
             guard = automaton.guard_names[source][automaton.guards[source].index(fired)]
-        at = Instant(*instant)
         return Occurrence(
             at, automaton.kind, automaton.name, guard, modes[source], modes[target], -1, x_minus, x_plus
         )

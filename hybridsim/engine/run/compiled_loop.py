@@ -4,12 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from functools import lru_cache
 from time import perf_counter
 from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.events.compiled.known_time import (
+    KNOWN,
+    ORIGIN_AT,
+    PHASES_AT,
+    SEGMENTS,
+    SIGNALS_AT,
+    STEPS,
+    known_time_arrays,
+    store_known_times,
+)
 from hybridsim.engine.events.compiled.scratch import functions_of, work_space
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.events.state import HybridState
@@ -24,21 +33,25 @@ from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.trajectory import Trajectory
 from hybridsim.engine.run.event_loop import (
     MIN_STEPS_IN_PART,
-    ORIGIN_AT,
-    PHASES_AT,
-    SEGMENTS,
-    STEPS,
     LoopCall,
     LoopModel,
     LoopRecord,
     call_event_loop,
     link_event_loop,
 )
-from hybridsim.engine.run.kernel_run import ARRIVED, BEFORE_SOMETHING, PAUSED, KernelRun, LoopResult
+from hybridsim.engine.run.kernel_run import (
+    ARRIVED,
+    BEFORE_SOMETHING,
+    PAUSED,
+    KernelRun,
+    LoopResult,
+    record_layout,
+    skipped_rows,
+)
 from hybridsim.engine.run.method_kernels import NOT_LINEAR, MethodKernels
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.instant import Instant
-from hybridsim.engine.system.per_structure import per_structure
+from hybridsim.engine.system.known_times import TimesAhead
 from hybridsim.engine.system.programs.mode_tables import automata_of, tape_cache_of
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tolerances import Tolerances
@@ -73,32 +86,6 @@ def compile_loops(system: System, make: Callable[[System, Tolerances, float], Me
         _compiled.append(make)
 
 
-@per_structure
-def _layout(
-    system: System, steps: int, rows: Any, keeps_starts: bool, *fields: tuple[Any, tuple[int, ...]]
-) -> ArrayLayout:
-    """Return the layout of the arrays that the kernels write; events are kept longer than steps."""
-    return ArrayLayout(
-        (LoopRecord, rows),
-        (
-            # one row more, for the end of the last segment
-            (float, (MAX_SEGMENTS + 1, 2), 1),
-            (np.int64, (MAX_SEGMENTS + 1, len(system.automata)), 1),
-            (float, (MAX_SEGMENTS, system.layout.size), 0),
-            (np.int64, (MAX_SEGMENTS + 1,), 0),
-            (np.int64, (MAX_SEGMENTS,), 1),
-            (float, (MAX_SEGMENTS, 3 if keeps_starts else 2, system.n), 1),
-            *((dtype, (steps, *shape), 0) for dtype, shape in fields),
-        ),
-    )
-
-
-@lru_cache(64)
-def _skipped_rows(first: int, steps: int, count: int) -> np.ndarray:
-    """Return how many rows at the start of each array are omitted; the last `count` arrays belong to the method."""
-    return np.array([first, first, first, first + 1, first, first] + [steps] * count, dtype=np.int64)
-
-
 class CallArrays:
     """The arrays of one call of a compiled loop, which later calls reuse.
 
@@ -115,15 +102,17 @@ class CallArrays:
         self.work = work_space(system, len(lin.kinds), len(lin.factors))
         self.call: LoopCall = packed(
             LoopCall(
-                int_slots=np.zeros(4, dtype=np.int64),
+                int_slots=np.zeros(6, dtype=np.int64),
                 longest=np.zeros(1),
                 times=np.zeros(4),
                 rates=np.zeros(layout.phases),
                 scale=np.empty(system.n),
                 pace=np.empty(3),
+                known=known_time_arrays(system),
             )
         )
-        self.call.int_slots[ORIGIN_AT], self.call.int_slots[PHASES_AT] = layout.origin_at, layout.phases_at
+        offsets = layout.origin_at, layout.phases_at, layout.signals_at
+        self.call.int_slots[[ORIGIN_AT, PHASES_AT, SIGNALS_AT]] = offsets
         self.rates: np.ndarray | None = None  # those in `call`
         self.own = kernels.arrays()
         self.model: LoopModel = packed(LoopModel(automata_of(system), tapes, system.registers.inputs, lin))
@@ -143,6 +132,7 @@ class CompiledLoop:
         self.kernels, self.system = kernels, kernels.system
         self.tape_cache, layout = tape_cache_of(self.system), self.system.layout
         self.kernel_run: KernelRun | None = None  # a call made beforehand, which `advance` takes first
+        self.times_ahead: TimesAhead | None = None  # known times of the run, which calls pass
         self.array_layout: ArrayLayout  # of `memory`
         self._layouts: dict[tuple[int, int], ArrayLayout] = {}  # those met so far, also by copies
         self.steps = MAX_SEGMENTS  # largest number of steps in one call
@@ -201,11 +191,11 @@ class CompiledLoop:
             key = self.steps, kernels.columns
             if key not in self._layouts:
                 kind = kernels.rows, kernels.keeps_starts, *kernels.fields()
-                self._layouts[key] = _layout(self.system, self.steps, *kind)
+                self._layouts[key] = record_layout(self.system, self.steps, *kind)
             self.array_layout = self._layouts[key]
             self.memory = self.array_layout.blank()
         steps, first = self.used
-        skipped = _skipped_rows(first, steps, len(kernels.rows._fields))
+        skipped = skipped_rows(first, steps, len(kernels.rows._fields))
         record, rows = self.array_layout.packed(self.memory, skipped)
         try:
             arrays = spare.pop()
@@ -215,10 +205,13 @@ class CompiledLoop:
                 kernels.loop, arrays.model, arrays.call, arrays.as_packed, arrays.work, record,
                 kernels.begin(arrays.own, tapes), rows,
             )  # fmt: skip
-        call, own = arrays.call, kernels.begin(arrays.own, tapes)
+        call, own, known = arrays.call, kernels.begin(arrays.own, tapes), None
+        if self.times_ahead is not None:
+            known = self.times_ahead.after(origin).up_to(target)
+            store_known_times(call.known, known, self.times_ahead.resets)
         arrays.state.memory[:] = state.memory
         times = call.times
-        (times[0], times[1]), (times[2], times[3]) = target, origin
+        (times[0], times[1]), (times[2], times[3]) = known.first if known else target, origin
         call.longest[0] = kernels.longest
         if arrays.rates is not self.system.rates:
             arrays.rates = call.rates[:] = self.system.rates
@@ -228,6 +221,8 @@ class CompiledLoop:
         began = perf_counter()
         code = _event_loop(model, call, arrays.as_packed, arrays.work, record, opaque(own), opaque(rows))
         seconds = perf_counter() - began
+        if known is not None:
+            call.known.kinds[0] = -1  # another run with these arrays may have no known times ahead
         if lin is NOT_LINEAR:
             tape_cache.look()
         result = kernels.end(own, tapes, lin)
@@ -238,7 +233,7 @@ class CompiledLoop:
         has_news = counts[SEGMENTS] > 0 and len(tape_cache.tapes.modes) != len(tapes.modes)
         return KernelRun(
             self.system, self.array_layout, self.memory, steps, first, code, counts[STEPS], counts[SEGMENTS],
-            clock, end, has_news, seconds, result,
+            clock, end, has_news, seconds, result, known, counts[KNOWN],
         )  # fmt: skip
 
     def advance(
@@ -248,7 +243,9 @@ class CompiledLoop:
         run = self.kernel_run or self.go(origin, HybridState.of(outcome, p), target)
         self.kernel_run = None
         if run is None:
-            return LoopResult(origin, outcome.copy, BEFORE_SOMETHING, np.zeros((0, 2)), _NO_OWNERS)
+            return LoopResult(
+                origin, outcome.copy, BEFORE_SOMETHING, np.zeros((0, 2)), _NO_OWNERS, None, None
+            )
         self.kernels.take(run.result)
         self.count(run, record.counters)
         if run.count:
@@ -257,7 +254,9 @@ class CompiledLoop:
             self.renew()
         may_continue = run.is_full or run.has_news
         end = ARRIVED if run.is_at_target else PAUSED if may_continue else BEFORE_SOMETHING
-        return LoopResult(Instant(*run.clock), run.end.outcome, end, run.instants, run.owners)
+        return LoopResult(
+            Instant(*run.clock), run.end.outcome, end, run.instants, run.owners, run.adopted, run.known_passed
+        )
 
     def count(self, run: KernelRun, counters: Counters) -> None:
         """Add the cost of one call to the counters of the run."""

@@ -24,7 +24,18 @@ from hybridsim.engine.events.compiled.after_segment import (
     spread,
     state_errors,
 )
-from hybridsim.engine.events.compiled.scratch import EVENT_LOOP, ROW, SPREAD
+from hybridsim.engine.events.compiled.known_time import (
+    KNOWN,
+    ORIGIN_AT,
+    PHASES_AT,
+    SEGMENTS,
+    SIGNALS_AT,
+    STEPS,
+    resolve_known_time,
+    set_inputs,
+    set_origin,
+)
+from hybridsim.engine.events.compiled.scratch import EVENT_LOOP, KNOWN_TIME, ROW, SPREAD
 from hybridsim.engine.native.kernels import (
     call_kernel,
     call_noinline,
@@ -34,17 +45,18 @@ from hybridsim.engine.native.kernels import (
     kernel_address,
 )
 from hybridsim.engine.native.loop_hints import index, put, short_loop
+from hybridsim.engine.record.event_block import AT_KNOWN_TIME
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.series.interpreter import advance
-from hybridsim.engine.system.instant import phase_of
 from hybridsim.engine.system.programs.modes_index import find_modes
 
 AT_TARGET, STOPPED, FULL = 0, 1, 2  # why a call ended
 # Least number of steps in a part of a segment; with less space the next call takes the segment.
 MIN_STEPS_IN_PART = 64
 FOLLOWED = 3  # returned by a segment kernel that has followed a segment
-# Indices of `LoopCall.int_slots`; the last two count what is committed
-ORIGIN_AT, PHASES_AT, STEPS, SEGMENTS = range(4)
+# An event this close before a known time, relative to the segment or to the time, may belong to that time.
+_NEAR_KNOWN, _NEAR_IN_TIME = 2.0**-20, 2.0**-40
+NO_GUARD = -1  # the end of a segment without an event
 
 
 class LoopModel(NamedTuple):
@@ -59,12 +71,13 @@ class LoopModel(NamedTuple):
 class LoopCall(NamedTuple):
     """The arrays of one call of the event loop, for all methods."""
 
-    int_slots: np.ndarray  # (4,) integers at ORIGIN_AT, ...
+    int_slots: np.ndarray  # (6,) integers at ORIGIN_AT, ...
     longest: np.ndarray  # (1,) longest segment
     times: np.ndarray  # (4,) target, and clock: the origin of the segment, which is advanced
     rates: np.ndarray  # (R,) rates of the angles
     scale: np.ndarray  # (n,) largest states on the segment
     pace: np.ndarray  # (3,), see `is_crowded`
+    known: Any  # `hybridsim.engine.events.compiled.known_time.KnownTimeArrays`
 
 
 class LoopRecord(NamedTuple):
@@ -74,7 +87,7 @@ class LoopRecord(NamedTuple):
     modes: np.ndarray  # (., C) modes
     vectors: np.ndarray  # (., P) run-time vector
     last_steps: np.ndarray  # number of steps up to the end of the segment
-    fires: np.ndarray  # the guard that fired, -1 for none
+    fires: np.ndarray  # the guard that fired, NO_GUARD, or AT_KNOWN_TIME less the kind of the known time
     jumps: (
         np.ndarray
     )  # (., 2, n) states before and after the end, or (., 3, n), preceded by the state at the start
@@ -110,13 +123,25 @@ def not_followed(outcome: int) -> SegmentEnd:
     return SegmentEnd(outcome, 0.0, -1, 0, 0.0, 0.0, 0.0, 0.0, 0.0, False)
 
 
-@inlined
-def set_origin(place: Any, rates: Any, hi: float, lo: float, p: Any) -> None:
-    """Set the run-time vector for a segment that starts at a given instant; the inputs stay unchanged."""
-    origin_at, phases_at = place
-    p[origin_at] = hi + lo
-    for i in range(rates.shape[0]):
-        p[phases_at + i] = phase_of(hi, lo, rates[i], 0.0)
+@inline_always
+def end_without_event(call: Any, state: Any, work: Any, s: float, is_divided: bool) -> int:
+    """Adopt the states at the end of the last segment of a call, and return why the call ends there.
+
+    A segment that is too long is divided: it goes on in the same modes, where active guards are positive.
+    """
+    target, clock, scale, x_error = call.times[:2], call.times[2:], call.scale, state.x_error
+    put(work.y, state.x)
+    for j in range(scale.shape[0]):
+        short_loop()
+        x_error[j] = 4.0 * UNIT * scale[j] + x_error[j]
+    if not is_divided:
+        clock[0], clock[1] = target[0], target[1]
+        return AT_TARGET
+    clock[0], clock[1] = moved_on(clock[0], clock[1], s)
+    for g in range(state.sides.shape[0]):
+        short_loop()
+        state.sides[g], state.orders[g], state.floors[g] = 1, 0, 0.0
+    return FULL
 
 
 @inline_always
@@ -133,21 +158,24 @@ def event_loop(
     target, clock, pace, scale, rates = call.times[:2], call.times[2:], call.pace, call.scale, call.rates
     x, x_error, z, p = state.x, state.x_error, state.z, state.p
     y, jumps, place = work.y, record.jumps, (ints[ORIGIN_AT], ints[PHASES_AT])
-    before, after = jumps.shape[1] - 2, jumps.shape[1] - 1
+    before, after, known = jumps.shape[1] - 2, jumps.shape[1] - 1, call.known
     pace[0], pace[1], pace[2] = math.inf, math.inf, 0.0
-    ints[STEPS] = ints[SEGMENTS] = step = i = 0
+    ints[STEPS] = ints[SEGMENTS] = ints[KNOWN] = step = i = 0
+    since = 0.0  # from the last event to the last known time after it
     is_ahead, is_rejected, k = False, False, find_modes(tapes, z)
     while True:
         bound = (target[0] - clock[0]) + (target[1] - clock[1])
         if not bound > 0.0:
             return AT_TARGET
-        if k < 0:
+        kind, near = known.kinds[index(ints[KNOWN])], _NEAR_IN_TIME * abs(clock[0])
+        if k < 0 or (kind >= 0 and bound <= near):
             return STOPPED
         k = index(k)
         if i >= record.fires.shape[0]:
             return FULL
         if not is_ahead:
             set_origin(place, rates, clock[0], clock[1], p)
+            set_inputs(ints[SIGNALS_AT], known.starts, clock[0], clock[1], p)
         record.clocks[i, 0], record.clocks[i, 1] = clock[0], clock[1]
         put(z, record.modes[i])
         put(p, record.vectors[i])
@@ -159,34 +187,41 @@ def event_loop(
         fired, s, step_after = end.fired, end.s, step + end.steps
         record.last_steps[i], record.fires[i] = step_after, fired
         put(y, jumps[i, before])
+        if (
+            not s < bound
+            and kind >= 0
+            and call_kernel(work.entry_points[KNOWN_TIME], (model, call, state, work, k, s, end.steps)) != 0
+        ):
+            record.fires[i] = AT_KNOWN_TIME - kind
+            put(x, jumps[i, after])
+            clock[0], clock[1] = target[0], target[1]
+            ints[KNOWN] += 1
+            target[0], target[1] = known.times[index(ints[KNOWN]), 0], known.times[index(ints[KNOWN]), 1]
+            step, i = step_after, i + 1
+            ints[STEPS], ints[SEGMENTS] = step, i
+            since, is_ahead = since + s, False
+            continue
         if fired < 0:
             put(y, jumps[i, after])
-            put(y, x)
-            for j in range(x.shape[0]):
-                short_loop()
-                x_error[j] = 4.0 * UNIT * scale[j] + x_error[j]
             ints[STEPS], ints[SEGMENTS] = step_after, i + 1
-            if not s < bound:
-                clock[0], clock[1] = target[0], target[1]
-                return AT_TARGET
-            # a segment that is too long is divided: it goes on in the same modes, where active guards are positive
-            clock[0], clock[1] = moved_on(clock[0], clock[1], s)
-            for g in range(state.sides.shape[0]):
-                short_loop()
-                state.sides[g], state.orders[g], state.floors[g] = 1, 0, 0.0
-            return FULL
+            return end_without_event(call, state, work, s, s < bound)
         fired = index(fired)
         at, error, slope, bend, is_ahead = end.at, end.error, end.slope, end.bend, end.is_ahead
         state_errors(automata, error, y, scale, x_error, z, work.slopes, work.y_error)
         work.float_slots[SPREAD], work.int_slots[ROW] = spread(end.steps, STAGES), k
-        is_rejected = is_crowded(s, clock, pace) or (
-            is_shallow(slope, bend, end.last_step)
-            and is_hidden(model, fired, slope, bend, at, error, state, work)
+        is_rejected = (
+            is_crowded(since + s, clock, pace)
+            or (kind >= 0 and bound - s <= max(near, _NEAR_KNOWN * bound))
+            or (
+                is_shallow(slope, bend, end.last_step)
+                and is_hidden(model, fired, slope, bend, at, error, state, work)
+            )
         )
         if is_rejected or not resolve(model, at, error, fired, state, work):
             is_rejected, is_ahead = True, False  # the kernel of the segment returns STOPPED
             continue
         put(work.x_after, jumps[i, after])
+        since = 0.0
         clock[0], clock[1] = moved_on(clock[0], clock[1], s)
         step, i = step_after, i + 1
         ints[STEPS], ints[SEGMENTS] = step, i
@@ -211,6 +246,10 @@ def link_event_loop(
 ) -> None:
     """Compile the kernels that a call needs, and store their addresses for other kernels."""
     link_event_resolution(model, state, work)
+    if call.known.times.shape[0] > 1:  # there may be more than the target
+        work.entry_points[KNOWN_TIME] = kernel_address(
+            resolve_known_time, model, call, state, work, 0, 0.0, 0
+        )
     work.entry_points[EVENT_LOOP] = kernel_address(loop, model, call, state, work, record, own, rows)
 
 

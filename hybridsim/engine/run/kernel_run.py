@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,14 +12,44 @@ import numpy as np
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.native.array_layout import ArrayLayout
+from hybridsim.engine.native.constants import MAX_SEGMENTS
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.event_block import EventBlock
 from hybridsim.engine.record.segments import Segment, end_point
-from hybridsim.engine.run.event_loop import AT_TARGET, FULL
+from hybridsim.engine.run.event_loop import AT_TARGET, FULL, NO_GUARD, LoopRecord
 from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.known_times import KnownTimes
+from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.system import System
 
 ARRIVED, PAUSED, BEFORE_SOMETHING = 0, 1, 2  # why a compiled call ended
+_NO_STATES = np.zeros(0)
+
+
+@per_structure
+def record_layout(
+    system: System, steps: int, rows: Any, keeps_starts: bool, *fields: tuple[Any, tuple[int, ...]]
+) -> ArrayLayout:
+    """Return the layout of the arrays that the kernels write; events are kept longer than steps."""
+    return ArrayLayout(
+        (LoopRecord, rows),
+        (
+            # one row more, for the end of the last segment
+            (float, (MAX_SEGMENTS + 1, 2), 1),
+            (np.int64, (MAX_SEGMENTS + 1, len(system.automata)), 1),
+            (float, (MAX_SEGMENTS, system.layout.size), 0),
+            (np.int64, (MAX_SEGMENTS + 1,), 0),
+            (np.int64, (MAX_SEGMENTS,), 1),
+            (float, (MAX_SEGMENTS, 3 if keeps_starts else 2, system.n), 1),
+            *((dtype, (steps, *shape), 0) for dtype, shape in fields),
+        ),
+    )
+
+
+@lru_cache(64)
+def skipped_rows(first: int, steps: int, count: int) -> np.ndarray:
+    """Return how many rows at the start of each array are omitted; the last `count` arrays belong to the method."""
+    return np.array([first, first, first, first + 1, first, first] + [steps] * count, dtype=np.int64)
 
 
 class LoopResult(NamedTuple):
@@ -27,6 +57,7 @@ class LoopResult(NamedTuple):
 
     end: ARRIVED at the target, PAUSED because the arrays are full, or BEFORE_SOMETHING that is not ordinary. instants
     (E, 2): instants of the events. owners (E,): the components whose guards fired. outcome: makes the state on demand.
+    adopted: the last instant at which anything was resolved. passed: the known times on the way.
     """
 
     origin: Instant
@@ -34,6 +65,20 @@ class LoopResult(NamedTuple):
     end: int
     instants: np.ndarray
     owners: np.ndarray
+    adopted: Instant | None
+    passed: KnownTimesPassed | None
+
+
+class KnownTimesPassed(NamedTuple):
+    """The known times that a compiled call passed.
+
+    last: the last one. steps: number of steps since then. x: state (n,) just after it. ahead: those not passed.
+    """
+
+    last: Instant | None
+    steps: int
+    x: np.ndarray
+    ahead: KnownTimes
 
 
 @dataclass(eq=False)
@@ -49,6 +94,7 @@ class KernelRun:
     has_news : whether it met modes without tables, so that another call may continue.
     seconds : time in compiled code.
     result : further results of the method.
+    known, passed : the known times ahead of the call, and how many it passed.
     vector : the last run-time vector, if only the events are kept.
     """
 
@@ -65,6 +111,8 @@ class KernelRun:
     has_news: bool
     seconds: float
     result: Any
+    known: KnownTimes | None
+    passed: int
     vector: np.ndarray | None = None
 
     def __post_init__(self) -> None:
@@ -72,7 +120,7 @@ class KernelRun:
         self._event_memory, last = self.memory[1], self.first + self.count - 1
         self.events = 0  # number of segments that an event ended: all, or all except the last
         if self.count:
-            self.events = self.count - (self.array_layout.item(self.memory, "fires", last) < 0)
+            self.events = self.count - (self.array_layout.item(self.memory, "fires", last) == NO_GUARD)
         self._event_block: EventBlock | None = None
 
     @cached_property
@@ -98,8 +146,9 @@ class KernelRun:
 
     @property
     def instants(self) -> np.ndarray:
-        """Return the instants (E, 2) of the events."""
-        return self._happened.clocks[self.first + 1 : self.first + 1 + self.events]
+        """Return the instants (E, 2) at which guards fired."""
+        found: np.ndarray = self._happened.clocks[self.first + 1 : self.first + 1 + self.events]
+        return found[self._have_fired] if self.passed else found
 
     @property
     def owners(self) -> np.ndarray:
@@ -107,9 +156,33 @@ class KernelRun:
         return self.system.owner[self.fires]
 
     @property
+    def adopted(self) -> Instant | None:
+        """Return the last instant at which a guard fired or a known time was passed."""
+        return Instant(*self._happened.clocks[self.first + self.events].tolist()) if self.events else None
+
+    @property
+    def known_passed(self) -> KnownTimesPassed | None:
+        """Return the known times that were passed, or None for a call without any."""
+        if self.known is None:
+            return None
+        ahead = self.known.since(self.passed)
+        if not self.passed:
+            return KnownTimesPassed(None, 0, _NO_STATES, ahead)
+        rows = self.rows
+        last = self.first + int(np.flatnonzero(~self._have_fired)[-1])
+        steps = self.steps - int(rows.last_steps[last + 1])
+        return KnownTimesPassed(self.known.instant(self.passed - 1), steps, rows.jumps[last, -1], ahead)
+
+    @property
     def fires(self) -> np.ndarray:
         """Return the indices (E,) of the guards that fired."""
-        return self._happened.fires[self._ended]
+        found: np.ndarray = self._happened.fires[self._ended]
+        return found[self._have_fired] if self.passed else found
+
+    @property
+    def _have_fired(self) -> np.ndarray:
+        """Return whether a guard ended each segment; otherwise a known time did."""
+        return np.asarray(self._happened.fires[self._ended] >= 0)
 
     @property
     def event_block(self) -> EventBlock | None:
@@ -124,6 +197,7 @@ class KernelRun:
                 rows.modes[ended],
                 rows.modes[after],
                 rows.jumps[ended, -2:],  # the states at its end, after the state at its start
+                self.known.due if self.known is not None and self.passed else (),
             )
         return self._event_block
 
@@ -137,7 +211,7 @@ class KernelRun:
         counters.kernel_time += self.seconds
         counters.steps += self.steps
         counters.restarts += self.count
-        counters.events += len(self.event_block or ())
+        counters.events += self.event_block.changes if self.event_block is not None else 0
 
     @property
     def last_end(self) -> Segment:

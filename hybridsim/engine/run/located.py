@@ -11,7 +11,7 @@ import numpy as np
 from hybridsim.engine.events.choice.verdict import side_after, side_before
 from hybridsim.engine.events.compiled.after_segment import spread
 from hybridsim.engine.events.monitor_sides import MonitorSides
-from hybridsim.engine.events.outcome import Situation
+from hybridsim.engine.events.outcome import Outcome, Situation
 from hybridsim.engine.run.segment_run import Arrival, SegmentRun
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.instant import Instant
@@ -227,12 +227,15 @@ def located_backward(system: System, origin: Instant, arrival: Arrival, segment:
 
 
 def errors_when_due(
-    system: System, target: Instant, at: Situation, steps: int, rounding: float, before: np.ndarray
+    system: System, target: Instant, outcome: Outcome, steps: int, rounding: float, before: np.ndarray
 ) -> np.ndarray:
     """Return the state errors at a scheduled time that a compiled loop reached in the given number of steps.
 
-    rounding: of the method. before: the states at which the loop began.
+    outcome: the last one, with the states just before the target. rounding: of the method. before: the states at which
+    the loop began.
     """
+    p = system.vector(target, system.discrete(outcome.p), forward=False)
+    at = Situation(0.0, outcome.x, p, outcome.z, outcome.x_error, 0.0)
     way = np.abs(at.x - before)
     scale = np.maximum(np.abs(before), np.abs(at.x)) + way
     slopes = np.abs(system.flow(at.s, at.x, at.p, at.z)) if system.n else 0.0

@@ -41,8 +41,8 @@ class MethodKernels(ABC):
        negative.
     5. Write steps from row ``call.int_slots[STEPS]`` of the record on, and other data in row
        ``call.int_slots[SEGMENTS]``.
-    6. A kernel may set the origin of the next segment in ``state.p`` and return ``at = 0`` and ``is_ahead``. If
-       ``start.is_ahead`` is set then, nothing has changed p since.
+    6. A kernel may set origin and inputs of the next segment in ``state.p`` (`set_origin`, `set_inputs`), and return
+       ``at = 0`` and ``is_ahead``. If ``start.is_ahead`` is set then, nothing has changed p since.
     7. If ``start.is_rejected`` is set, the last segment is not committed: restore what the kernel remembers of it, and
        the outcome is STOPPED.
     """

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from hybridsim.engine.events.backward import cross_backward, has_no_past, held, message_on_direction
+from hybridsim.engine.events.compiled.known_time import has_known_times
 from hybridsim.engine.events.diagnosis import advice_on_sizes, in_the_way
 from hybridsim.engine.events.fatal_guards import is_only_fatal
 from hybridsim.engine.events.input_jumps import surfaces_jump
@@ -40,6 +41,7 @@ from hybridsim.engine.run.setup import LazyState, setup_of
 from hybridsim.engine.run.stepping import Method, Watch
 from hybridsim.engine.system.failures import Collapsed, StepFailure
 from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.known_times import TimesAhead
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.timetable import Appointment, Timetable
 
@@ -71,6 +73,8 @@ class ModeLoop:
         self.last_limits: dict[int, float] = {}  # component -> time
         self.headway = Headway(system, self.record.counters, self.origin, self.end)
         self.compiled_loop = compiled_loop or setup.compiled_loop()
+        if self.compiled_loop is not None and has_known_times(system):
+            self.compiled_loop.times_ahead = TimesAhead(system, self.timetable, self.end)
         self._led = set(system.led)
         is_replaceable = task.successor is not None and method is not task.successor
         stiffness_monitor = self.headway if is_replaceable else None
@@ -157,13 +161,13 @@ class ModeLoop:
             step_size = task.tolerances.first_step
         while not stop and self.origin != self.end:
             self._mark(step_size)
-            appointment = self.timetable.next(self.origin, self.forward)
-            target = appointment.instant if appointment else self.end
+            target, appointment = self._next_target()
             if self.compiled_loop is not None and not self.accumulation.is_closing_in(float(self.origin)):
                 before = self.origin
                 arrived, stop = self._run_compiled(self.compiled_loop, target, appointment)
                 if not (arrived or stop or self.notices.takes_over) and self._reach() == self.renewal:
                     # the limit on segment length may be the only reason why compiled code stopped
+                    target, appointment = self._next_target()
                     nearer, renewal = self._no_farther(target, appointment)
                     if nearer != target:
                         arrived, stop = self._run_compiled(self.compiled_loop, nearer, renewal)
@@ -178,6 +182,7 @@ class ModeLoop:
                     self._take_over()
                 if arrived:
                     continue
+                target, appointment = self._next_target()
             target, appointment = self._no_farther(target, appointment)
             segment = self._segment_run()
             bound = target.minus(self.origin)
@@ -209,6 +214,11 @@ class ModeLoop:
                 self._take_over()
         if task.is_stepped and self.record.status in ("finished", "terminated"):
             self._mark(None)  # t1 may have cut the last step short
+
+    def _next_target(self) -> tuple[Instant, Appointment | None]:
+        """Return the next known time, or the end of the run."""
+        appointment = self.timetable.next(self.origin, self.forward)
+        return appointment.instant if appointment else self.end, appointment
 
     def _reach(self) -> float:
         """Return the length of the longest segment allowed from the present instant."""
@@ -274,16 +284,24 @@ class ModeLoop:
     def _run_compiled(
         self, compiled_loop: CompiledLoop, target: Instant, appointment: Appointment | None
     ) -> tuple[bool, bool]:
-        """Run over ordinary events in compiled code; return (target was reached, run stops)."""
+        """Run over ordinary events in compiled code; return (target was reached, run stops).
+
+        Without a renewal the target is the first known time that the loop cannot pass.
+        """
         steps, x_before = self.record.counters.steps, self.lazy_state.read()[0].x.copy()
+        if compiled_loop.times_ahead is not None and not (appointment and appointment.is_renewal):
+            known = compiled_loop.times_ahead.after(self.origin)
+            target, appointment = known.target, known.appointment
         while True:
             result = compiled_loop.advance(self.origin, *self.lazy_state.read(), target, self.record)
             self.origin = result.origin
             self._set_state(self.origin, result.outcome)
             self.notices.look()
             arrived = result.end == ARRIVED
-            if len(result.instants):
-                self.adopted = Instant(*result.instants[-1].tolist())
+            self.adopted = result.adopted or self.adopted
+            if result.passed is not None and result.passed.last is not None:
+                self.timetable.mark_done(result.passed.last)
+                steps, x_before = self.record.counters.steps - result.passed.steps, result.passed.x
             limit = self.accumulation.limit_of_all(result.instants, result.owners)
             if limit is None and len(result.owners) and not self.system.has_surface[result.owners[-1]]:
                 blocks = self.record.occurrences.blocks
@@ -298,6 +316,9 @@ class ModeLoop:
             self.headway.check_compiled(self.origin)
         if not arrived:
             return False, False
+        if result.passed is not None and len(result.passed.ahead.kinds):  # one that was not ordinary
+            target, due = result.passed.ahead.first, result.passed.ahead
+            appointment = Appointment(target, due.due[due.kinds[0]])
         if appointment is None:
             self._tell(self.origin)
             return True, True
@@ -307,8 +328,8 @@ class ModeLoop:
         x, error = self.outcome.x, self.outcome.x_error
         if not appointment.is_renewal:
             self.timetable.mark_done(target)
-            at, steps = self._at_target(target), self.record.counters.steps - steps
-            errors = errors_when_due(self.system, target, at, steps, self.method.rounding, x_before)
+            steps = self.record.counters.steps - steps
+            errors = errors_when_due(self.system, target, self.outcome, steps, self.method.rounding, x_before)
             error = np.maximum(error, errors)
         settled = self._resolve_appointment(target, self.outcome, x, appointment.schedules, error)
         return True, self._adopt(target, settled, x, appointment.schedules)
@@ -319,12 +340,6 @@ class ModeLoop:
         if self.adopted != target:  # otherwise an event happened there
             self.adopted, outcome = target, self.outcome
             outcome.sides[:], outcome.orders[:], outcome.guard_floors[:] = 1, 0, 0.0
-
-    def _at_target(self, target: Instant) -> Situation:
-        """Return the state just before an instant that a compiled loop has reached."""
-        outcome = self.outcome
-        p = self.system.vector(target, self.system.discrete(outcome.p), not self.forward)
-        return Situation(0.0, outcome.x.copy(), p, outcome.z.copy(), outcome.x_error.copy(), 0.0)
 
     def _is_event(self, found: Located) -> bool:
         """Return whether an event happens at the end of the run; changes of side at corners do not count."""
@@ -529,8 +544,7 @@ class ModeLoop:
         is_again = any(self.last_limits.get(c) == limit.time for c in limit.components)
         if not self.forward or is_again:  # a limit leads back into its own series
             return None
-        appointment = self.timetable.next(self.origin, self.forward)
-        target = appointment.instant if appointment else self.end
+        target, appointment = self._next_target()
         available = target.minus(self.origin)
         ahead = min(
             max(Instant(limit.time).minus(self.origin), 0.0), available

@@ -79,7 +79,7 @@ class RunSetup:
             or not task.forward
             or system.n == 0
             or model.monitors
-            or model.inputs
+            or not all(signal.is_polynomial for signal in system.signals)
         ):
             return None
         return self.method.compiled_loop(system, task.tolerances, self.renewal)

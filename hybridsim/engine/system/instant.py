@@ -6,7 +6,7 @@ Error-free sums and products after T. J. Dekker, Numer. Math. 18 (1971) 224, doi
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -56,6 +56,24 @@ def two_product(a: float, b: float) -> tuple[float, float]:
     b_high = t - (t - b)
     b_low = b - b_high
     return product, ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
+
+
+def multiples(start: float, k: np.ndarray, period: float) -> np.ndarray:
+    """Return the scheduled times (m, 2) with the numbers k (m,), bit for bit as `multiple` does."""
+    high, error = _plain(two_product)(k.astype(float), period)
+    total, rest = _plain(two_sum)(start, high)
+    return np.stack(_plain(two_sum)(total, rest + error), axis=1)
+
+
+def later(instants: np.ndarray, step: float) -> np.ndarray:
+    """Return instants (m, 2) plus a number, bit for bit as `Instant.plus` does."""
+    high, error = _plain(two_sum)(instants[:, 0], step)
+    return np.stack(_plain(two_sum)(high, error + instants[:, 1]), axis=1)
+
+
+def _plain(kernel: Any) -> Any:
+    """Return the Python function of a kernel, which takes arrays as well."""
+    return getattr(kernel, "py_func", kernel)
 
 
 def times(instant: Instant, factor: float) -> Instant:

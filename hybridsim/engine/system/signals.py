@@ -9,7 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from hybridsim.engine.system.instant import Instant, multiple
+from hybridsim.engine.system.instant import Instant, later, multiple, multiples
 from hybridsim.errors import ModelError
 from hybridsim.expr import evaluate
 from hybridsim.model.parts.inputs import Input
@@ -31,6 +31,7 @@ class Signal:
         self._number = {name: evaluate(e, values) for name, e in declared.expressions.items()}
         if self.kind == "table":
             self._knots, self._coefficients = _table(declared)
+            self._rows: np.ndarray | None = None  # the knots and the pieces, made at first use
         elif self.kind == "step":
             self._first, self._turns, self._period = step_turns(self._number, declared)
         elif self.kind == "wave" and self.shape != "sine":
@@ -72,6 +73,63 @@ class Signal:
         if not ahead_of:
             return None
         return min(ahead_of, key=float) if forward else max(ahead_of, key=float)
+
+    @property
+    def is_polynomial(self) -> bool:
+        """Return whether each piece is a polynomial of time."""
+        return not (self.kind == "chirp" or self.shape == "sine")
+
+    def ahead(self, after: Instant, most: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the next knots (m, 2), at most so many, and the pieces (m + 1, 6) up to each knot and after the last.
+
+        A piece is given by four coefficients and the instant from which its time is counted, or nan for a constant.
+        """
+        if self.kind == "table":
+            return self._table_ahead(after, most)
+        knots, rows = self._repeated(after, most)
+        first = int(np.count_nonzero((knots[:, 0] - after.high) + (knots[:, 1] - after.low) <= 0.0))
+        if self.kind == "step":
+            rows = np.vstack([[self._step_value(after, True), 0.0, 0.0, 0.0, math.nan, 0.0], rows[first:]])
+        else:
+            rows = rows[first - 1 :]  # a wave has knots before each instant
+        return knots[first : first + most], rows[: min(most, len(knots) - first) + 1]
+
+    def _table_ahead(self, after: Instant, most: int) -> tuple[np.ndarray, np.ndarray]:
+        if self._rows is None:
+            knots = np.array(self._knots)
+            starts = np.concatenate([knots[:1], knots])
+            self._rows = np.hstack([self._coefficients, starts])
+        first = bisect_right(self._knots, after)
+        rows = self._rows[first : first + most + 1]
+        return self._rows[first + 1 : first + most + 1, 4:], rows
+
+    def _repeated(self, after: Instant, most: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the knots (m, 2) of a wave or step from before an instant on, and the pieces (m, 6) from there."""
+        number = self._number
+        if self.kind == "step":
+            corners = [(time, (value, 0.0, 0.0, 0.0)) for time, value in self._turns]
+            period, phase = self._period, 0.0
+        else:
+            scale, period, phase = number["amplitude"], number["period"], number["phase"]
+            corners = [
+                (fraction, (number["offset"] + scale * value, scale * slope / period, 0.0, 0.0))
+                for fraction, value, slope in self._corners
+            ]
+        if not corners:
+            return np.empty((0, 2)), np.empty((0, 6))
+        k0 = math.floor((float(after) - phase) / period) - 2 if period else 0
+        k = np.arange(k0, k0 + most // len(corners) + 7) if period else np.zeros(1)
+        found = []
+        for place, coefficients in corners:
+            if self.kind == "step":
+                knots = multiples(place, k, period)
+            else:
+                knots = later(multiples(phase, k, period), place * period)
+            starts = np.full_like(knots, (math.nan, 0.0)) if self.kind == "step" else knots
+            found.append((knots, np.hstack([np.tile(coefficients, (len(k), 1)), starts])))
+        knots, rows = (np.concatenate(part) for part in zip(*found, strict=True))
+        order = np.lexsort((knots[:, 1], knots[:, 0]))
+        return knots[order], rows[order]
 
     def _step_turns(self, near: Instant) -> list[tuple[Instant, float]]:
         """Return the changes of a step input near an instant, each with the new value."""

@@ -6,7 +6,9 @@ import math
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 
-from hybridsim.engine.system.instant import Instant, multiple
+import numpy as np
+
+from hybridsim.engine.system.instant import Instant, multiple, multiples
 from hybridsim.engine.system.system import System
 from hybridsim.expr import evaluate
 
@@ -85,6 +87,25 @@ class Timetable:
             return self.step_end
         due = sorted(k for k in together if k >= 0)
         return Appointment(latest, tuple(k for k in due for _ in range(self._count(k, nearest))))
+
+    def ahead(self, k: int, after: Instant, most: int) -> np.ndarray:
+        """Return the next times (m, 2) of a schedule after an instant, at most so many, with repetitions."""
+        times, start, period, count = self._schedules[k]
+        if times:
+            first = bisect_right(times, after)
+            return np.array(times[first : first + most]).reshape(-1, 2)
+        if period == 0.0:
+            found = np.array([[start, 0.0]])
+        else:
+            near = max(math.floor((float(after) - start) / period) - 1, 0)
+            end = near + most + 3 if count is None else min(near + most + 3, count)
+            found = multiples(start, np.arange(near, end), period)
+        return found[(found[:, 0] - after.high) + (found[:, 1] - after.low) > 0.0][:most]
+
+    def slacks(self, near: np.ndarray) -> np.ndarray:
+        """Return the rounding errors of scheduled times near some times."""
+        largest = max((abs(start) for _, start, _, _ in self._schedules), default=0.0)
+        return np.asarray(2.0 * np.spacing(np.maximum(np.abs(near), largest)))
 
     def _count(self, k: int, instant: Instant) -> int:
         """Return how many times of a due schedule are equal to an instant within rounding; 1 for a clock."""

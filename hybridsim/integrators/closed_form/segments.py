@@ -9,6 +9,14 @@ import numpy as np
 
 from hybridsim.engine.events.compiled.after_segment import moved_on
 from hybridsim.engine.events.compiled.at_end import may_vanish_linear
+from hybridsim.engine.events.compiled.known_time import (
+    ORIGIN_AT,
+    PHASES_AT,
+    SEGMENTS,
+    SIGNALS_AT,
+    set_inputs,
+    set_origin,
+)
 from hybridsim.engine.events.compiled.scratch import called_by
 from hybridsim.engine.linear.motion import (
     POINTS,
@@ -32,15 +40,11 @@ from hybridsim.engine.roots.first_exit import FOUND, OPEN
 from hybridsim.engine.run.event_loop import (
     FOLLOWED,
     FULL,
-    ORIGIN_AT,
-    PHASES_AT,
-    SEGMENTS,
     STOPPED,
     SegmentEnd,
     any_holding,
     event_loop,
     not_followed,
-    set_origin,
 )
 
 _NO_GUARD, _OPEN = -1, -2  # no guard becomes negative; undecided because of rounding
@@ -178,6 +182,7 @@ def closed_form_segment(
         # the event is resolved at the origin of the next segment, to which these functions of time belong
         high, low = moved_on(clock[0], clock[1], s)
         set_origin((ints[ORIGIN_AT], ints[PHASES_AT]), loop.rates, high, low, p)
+        set_inputs(ints[SIGNALS_AT], loop.known.starts, high, low, p)
         functions_of_time(lin, 0.0, p, work.factors, work.w)
         value = dot(lin.series, (k, fired, 0), (y, work.w))
         slope = dot(lin.series, (k, fired, 1), (y, work.w))

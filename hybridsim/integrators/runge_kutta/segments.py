@@ -11,6 +11,7 @@ from typing import Any
 
 from hybridsim.engine.events.compiled.after_segment import fill_guard_series, state_errors
 from hybridsim.engine.events.compiled.at_end import may_vanish
+from hybridsim.engine.events.compiled.known_time import SEGMENTS, STEPS
 from hybridsim.engine.events.compiled.scratch import called_by
 from hybridsim.engine.native.kernels import call, call_noinline, call_series, inlined, kernel
 from hybridsim.engine.native.loop_hints import put
@@ -22,8 +23,6 @@ from hybridsim.engine.run.event_loop import (
     FOLLOWED,
     FULL,
     MIN_STEPS_IN_PART,
-    SEGMENTS,
-    STEPS,
     STOPPED,
     SegmentEnd,
     any_holding,

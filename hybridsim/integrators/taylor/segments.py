@@ -7,6 +7,7 @@ from typing import Any
 
 from hybridsim.engine.events.compiled.after_segment import differ_by_rounding
 from hybridsim.engine.events.compiled.at_end import is_clear, may_vanish
+from hybridsim.engine.events.compiled.known_time import SEGMENTS, STEPS
 from hybridsim.engine.events.compiled.scratch import called_by
 from hybridsim.engine.native.constants import IN_A_ROW, STANDSTILL
 from hybridsim.engine.native.kernels import call, call_noinline, call_series, inlined
@@ -28,8 +29,6 @@ from hybridsim.engine.run.event_loop import (
     FOLLOWED,
     FULL,
     MIN_STEPS_IN_PART,
-    SEGMENTS,
-    STEPS,
     STOPPED,
     SegmentEnd,
     any_holding,

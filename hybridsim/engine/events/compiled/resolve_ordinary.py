@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from hybridsim.engine.events.choice.verdict import FINE, NO_SIDE, side_after, value_of
+from hybridsim.engine.events.choice.verdict import FINE, LEAVES, NO_SIDE, side_after, value_of
 from hybridsim.engine.events.compiled.guard_series import guard_series, is_continuous
 from hybridsim.engine.events.compiled.resolve_clear import resolve_clear
 from hybridsim.engine.events.compiled.resolve_surface import choose_surface_modes, row_verdict
@@ -54,6 +54,15 @@ def is_alone(automata: Any, tapes: Any, lin: Any, k: int, fired: int, z: Any, wo
         if side_after(work.judged[0, g], work.judged[1, g], 1)[0] < 0:
             return False
     return True
+
+
+@inlined
+def way_back(automata: Any, c: int, mode: int, to: int) -> int:
+    """Return the guard through which a mode of a corner leads back to the previous mode, or NOBODY."""
+    for j in range(automata.guards_of.shape[2]):
+        if automata.guards_of[c, mode, j] >= 0 and automata.target[c, mode, j, 0] == to:
+            return int(automata.guards_of[c, mode, j])
+    return NOBODY
 
 
 @inline_always
@@ -131,7 +140,7 @@ def resolve_ordinary(
         guard_series(tapes, inputs, lin, k, at, x, x_error, work)
         if not is_alone(automata, tapes, lin, k, fired, at.z, work):
             return -1
-    c = automata.owner[fired]
+    c, back = automata.owner[fired], NOBODY
     for i in range(automata.cluster_start[c], automata.cluster_start[c + 1]):
         if automata.is_unilateral[automata.cluster[i]]:
             return -1
@@ -154,15 +163,20 @@ def resolve_ordinary(
             errors_of_time(lin, at.s_error, work.factors, work.w_error)
             measure_point(lin, work)
         number, continuous, vector = 0, False, p
-        work.is_zero[fired] = automata.is_corner[c]  # a corner is at zero on both sides
+        work.is_zero[fired] = False
+        back = way_back(automata, c, z[c], at.z[c]) if automata.is_corner[c] else NOBODY
+        if back >= 0:
+            work.is_zero[back] = True  # a corner is at zero on both sides
         put(z, work.now)
         work.int_slots[ROW] = find_modes(tapes, z)
-    k = work.int_slots[ROW]
-    if k < 0:
-        return -1
-    after = LocatedEvent(at.s, at.s_error, x, x_error, vector, at.z)
-    guard_series(tapes, inputs, lin, k, after, x, x_error, work)
-    return number if row_verdict(automata, lin, k, z, everything, continuous, number, work) == FINE else -1
+    k, found = work.int_slots[ROW], LEAVES
+    if k >= 0:
+        after = LocatedEvent(at.s, at.s_error, x, x_error, vector, at.z)
+        guard_series(tapes, inputs, lin, k, after, x, x_error, work)
+        found = row_verdict(automata, lin, k, z, everything, continuous, number, work)
+    if back >= 0:
+        work.is_zero[back] = False
+    return number if found == FINE else -1
 
 
 def resolve_event(automata: Any, tapes: Any, inputs: Any, lin: Any, state: Any, work: Any) -> int:

@@ -17,7 +17,7 @@ from hybridsim.engine.system.per_structure import per_structure
 MAX_JOINT_COMPONENTS = 3
 FIRED, DISCRETE, DISCRETE_AT, ROW = range(4)  # indices of `EventScratch.int_slots`
 AT, AT_ERROR, SPREAD = range(3)  # indices of `EventScratch.float_slots`
-RESOLVE, EVENT_LOOP, SERIES = range(3)  # indices of `EventScratch.entry_points`
+RESOLVE, EVENT_LOOP, SERIES, KNOWN_TIME = range(4)  # indices of `EventScratch.entry_points`
 NOBODY = -1  # no guard fired
 
 
@@ -49,7 +49,7 @@ class EventScratch(NamedTuple):
     """
 
     functions: np.ndarray  # addresses (5,): `Functions`
-    entry_points: np.ndarray  # addresses (3,) of kernels at RESOLVE, EVENT_LOOP, SERIES
+    entry_points: np.ndarray  # addresses (4,) of kernels at RESOLVE, EVENT_LOOP, SERIES, KNOWN_TIME
     int_slots: np.ndarray  # integers at FIRED, DISCRETE, DISCRETE_AT, ROW
     # numbers at AT, AT_ERROR, SPREAD (bounds by which simultaneous guards may be from zero)
     float_slots: np.ndarray
@@ -120,7 +120,7 @@ def work_space(system: Any, atoms: int = 0, monomials: int = 0) -> EventScratch:
     work: EventScratch = packed(
         EventScratch(
             functions=np.array(functions_of(system), dtype=np.int64 if ENABLED else object),
-            entry_points=numbers(3),
+            entry_points=numbers(4),
             int_slots=np.array(
                 [-1, len(system.model.discrete), system.layout.discrete_at, -1], dtype=np.int64
             ),
@@ -179,5 +179,5 @@ def functions_of(system: Any) -> Functions:
         system.address("project") if has_surface else none,
         system.address("jumps") if has_surface else none,
         system.address("choose") if has_choice else none,
-        system.address("reset") if has_choice else none,
+        system.address("reset") if has_choice or system.model.schedules else none,
     )
