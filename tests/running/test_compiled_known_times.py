@@ -204,7 +204,7 @@ def test_the_known_times_are_those_of_the_timetable(seed) -> None:
             assert known.due[known.kinds[i]] == appointment.schedules
             at, count = appointment.instant, count + 1
             timetable.mark_done(at)
-            for piece, signal in zip(known.input_pieces[i + 1], system.signals, strict=True):
+            for piece, signal in zip(known.polynomials[i + 1], system.signals, strict=True):
                 start = 0.0 if math.isnan(piece[4]) else Instant(*piece[4:].tolist()).minus(at)
                 assert (*piece[:4].tolist(), start, 0.0) == signal.piece(at, True)
         appointment = timetable.next(at, True)

@@ -31,7 +31,7 @@ class KnownTimes(NamedTuple):
     ----------
     instants : (m, 2), high and low.
     kinds : (m,), indices of the schedules that are due, see `TimesAhead.due`.
-    input_pieces : (m + 1, S, 6), pieces of the inputs up to each of the times, and after the last one: four
+    polynomials : (m + 1, S, 6), the pieces of the inputs up to each of the times, and after the last one: four
         coefficients and the start.
     due : the schedules of each kind.
     target, appointment : the next known time after these, or the end of the run and None.
@@ -39,7 +39,7 @@ class KnownTimes(NamedTuple):
 
     instants: np.ndarray
     kinds: np.ndarray
-    input_pieces: np.ndarray
+    polynomials: np.ndarray
     due: list[tuple[int, ...]]
     target: Instant
     appointment: Appointment | None
@@ -61,14 +61,14 @@ class KnownTimes(NamedTuple):
         return self._replace(
             instants=self.instants[:m],
             kinds=self.kinds[:m],
-            input_pieces=self.input_pieces[: m + 1],
+            polynomials=self.polynomials[: m + 1],
             target=target,
         )
 
     def since(self, first: int) -> KnownTimes:
         """Return the known times from a given number on."""
         return self._replace(
-            instants=self.instants[first:], kinds=self.kinds[first:], input_pieces=self.input_pieces[first:]
+            instants=self.instants[first:], kinds=self.kinds[first:], polynomials=self.polynomials[first:]
         )
 
 
@@ -159,15 +159,15 @@ class TimesAhead:
             kinds.append(kind)
         m = len(kinds)
         instants = times[last[:m]]
-        input_pieces = np.empty((m + 1, len(signals), 6))
+        polynomials = np.empty((m + 1, len(signals), 6))
         for i, (_, rows) in enumerate(ahead):
-            input_pieces[0, i] = rows[0]
-            input_pieces[1:, i] = rows[np.cumsum(sources == -1 - i)[last[:m]]]
+            polynomials[0, i] = rows[0]
+            polynomials[1:, i] = rows[np.cumsum(sources == -1 - i)[last[:m]]]
         until = Instant(*instants[-1].tolist()) if m else origin
         appointment = self.timetable.next(until, True)
         target = appointment.instant if appointment else self.end
         return KnownTimes(
-            instants, np.array(kinds, dtype=np.int64), input_pieces, self.due, target, appointment
+            instants, np.array(kinds, dtype=np.int64), polynomials, self.due, target, appointment
         )
 
     def _kind_at(self, members: list[int]) -> int | None:

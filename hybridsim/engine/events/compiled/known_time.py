@@ -39,7 +39,7 @@ class KnownTimeArrays(NamedTuple):
     times: np.ndarray  # (K, 2) instants (high, low)
     kinds: np.ndarray  # (K,) rows of `resets`
     # (K, S, 6) pieces of the inputs up to each time: 4 coefficients, and the start or (nan, 0)
-    input_pieces: np.ndarray
+    polynomials: np.ndarray
     starts: np.ndarray  # (S, 2) starts of the present pieces
     resets: np.ndarray  # numbers of the resets of each kind, ended by NO_RESET
 
@@ -56,7 +56,7 @@ def known_time_arrays(system: System) -> Any:
         KnownTimeArrays(
             times=np.zeros((most, 2)),
             kinds=np.full(most, -1, dtype=np.int64),
-            input_pieces=np.zeros((most, len(system.signals), 6)),
+            polynomials=np.zeros((most, len(system.signals), 6)),
             starts=np.zeros((len(system.signals), 2)),
             resets=np.full((MAX_KINDS, len(system.model.schedules) + 1), -1, dtype=np.int64),
         )
@@ -68,7 +68,7 @@ def store_known_times(arrays: Any, known: KnownTimes, resets: np.ndarray) -> Non
     m = len(known.kinds)
     arrays.times[:m], arrays.times[m] = known.instants, known.target
     arrays.kinds[:m], arrays.kinds[m] = known.kinds, -1
-    arrays.input_pieces[: m + 1], arrays.starts[:] = known.input_pieces, known.input_pieces[0, :, START:]
+    arrays.polynomials[: m + 1], arrays.starts[:] = known.polynomials, known.polynomials[0, :, START:]
     arrays.resets[:] = resets
 
 
@@ -174,11 +174,11 @@ def resolve_known_time(model: Any, loop: Any, state: Any, work: Any, k: int, s: 
     errors_at_known_time(model, loop, s, steps, state, work)
     put(state.p, p)
     set_origin((ints[ORIGIN_AT], ints[PHASES_AT]), loop.rates, hi, lo, p)
-    input_pieces = known.input_pieces[j + 1]
-    for i in range(input_pieces.shape[0]):
+    polynomials = known.polynomials[j + 1]
+    for i in range(polynomials.shape[0]):
         for m in range(START):
-            p[ints[SIGNALS_AT] + SIGNAL_SLOTS * i + m] = input_pieces[i, m]
-    set_inputs(ints[SIGNALS_AT], input_pieces[:, START:], hi, lo, p)
+            p[ints[SIGNALS_AT] + SIGNAL_SLOTS * i + m] = polynomials[i, m]
+    set_inputs(ints[SIGNALS_AT], polynomials[:, START:], hi, lo, p)
     if not apply_resets(loop, known.kinds[j], state, work):
         return 0
     x, x_error = work.x_after, work.slopes
@@ -200,6 +200,6 @@ def resolve_known_time(model: Any, loop: Any, state: Any, work: Any, k: int, s: 
     put(work.all_sides[0], state.sides)
     put(work.all_orders[0], state.orders)
     put(work.all_floors[0], state.floors)
-    for i in range(input_pieces.shape[0]):
-        known.starts[i, 0], known.starts[i, 1] = input_pieces[i, START], input_pieces[i, START + 1]
+    for i in range(polynomials.shape[0]):
+        known.starts[i, 0], known.starts[i, 1] = polynomials[i, START], polynomials[i, START + 1]
     return 1
