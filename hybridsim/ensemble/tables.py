@@ -9,11 +9,10 @@ import numpy as np
 from hybridsim.engine.linear.matrix_template import template_of
 from hybridsim.engine.linear.tables import (
     LinearTables,
-    angles_of,
+    atoms_of,
     horizon_class,
-    leave_out,
     of_matrices,
-    unknown,
+    usable_modes,
 )
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.system.system import System
@@ -95,15 +94,16 @@ def _group(
     system: System, template: Any, numbers: np.ndarray, registers: np.ndarray, horizon: float
 ) -> EnsembleTables | None:
     A, rows = template.matrices(registers)
-    is_finite = leave_out(A, rows, system.n)
-    known = is_finite.any(axis=1)
-    numbers, registers, A, rows, is_finite = (
-        part[known] for part in (numbers, registers, A, rows, is_finite)
-    )
-    if not len(numbers):
-        return None
     modes = A.shape[1]
     A, rows = (part.reshape(-1, *part.shape[2:]) for part in (A, rows))  # stacked along the first axis
-    of_modes = unknown(of_matrices(A, rows, system.n, horizon), is_finite.ravel())
-    fields = template.atoms(registers) | {"phases": angles_of(system)} | of_modes
-    return EnsembleTables(numbers, {name: np.ascontiguousarray(a) for name, a in fields.items()}, modes)
+    usable = usable_modes(A, rows, system.n)
+    known = usable.reshape(-1, modes).any(axis=1)
+    numbers, registers = numbers[known], registers[known]
+    A, rows, usable = (part[np.repeat(known, modes)] for part in (A, rows, usable))
+    if not len(numbers):
+        return None
+    first, _ = of_matrices(atoms_of(system, template, registers[0]), A, rows, usable, system.n, horizon)
+    fields = {name: getattr(first, name) for name in LinearTables._fields}
+    atoms = zip(LinearTables._fields, atoms_of(system, template, registers), strict=False)
+    fields |= {name: np.ascontiguousarray(array) for name, array in atoms if name in _COMPUTED}
+    return EnsembleTables(numbers, fields, modes)

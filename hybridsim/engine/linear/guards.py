@@ -7,6 +7,7 @@ from typing import Any
 
 from hybridsim.engine.native.constants import BOUND_TERMS
 from hybridsim.engine.native.kernels import kernel
+from hybridsim.engine.native.simd_products import LANES
 from hybridsim.engine.series.bounded import ORDER, UNIT
 
 _FACTORIAL = float(math.factorial(BOUND_TERMS))
@@ -15,35 +16,36 @@ _ROUNDINGS = 8.0  # roundings of a coefficient read from the tape, for a chain o
 
 
 @kernel
-def guard_series(A: Any, rows: Any, series: Any, roundings: Any) -> None:
-    """Compute the Taylor coefficients of guards along y' = A y, and the rounding error of each entry.
+def guard_series(A: Any, rows: Any, n: int, series: Any, roundings: Any, largest: Any) -> None:
+    """Compute the Taylor coefficients of guards along y' = A y, the rounding error of each entry, and the largest.
 
-    rows (K, G, m) are functions of y and are overwritten. A (K, m, m). series, roundings (K, G, ORDER + 1,
-    m).
+    rows (K, G, m) are functions of y. A (K, m, m). series, roundings (K, G, ORDER + 1, .) are zero; the entries behind
+    the states begin at a multiple of four. largest (K, G, ORDER + 1).
     """
     modes, guards, size = rows.shape
+    behind = -n % LANES
     for k in range(modes):
         for g in range(guards):
-            row, is_zero = rows[k, g], True
+            row, own, errors = rows[k, g], series[k, g], roundings[k, g]
             for m in range(size):
-                series[k, g, 0, m] = row[m]
-                roundings[k, g, 0, m] = abs(row[m])
-                is_zero = is_zero and row[m] == 0.0
-            if is_zero:  # a guard of other modes
-                series[k, g, :, :] = 0.0
-                roundings[k, g, :, :] = 0.0
-                continue
+                at = m if m < n else m + behind
+                own[0, at], errors[0, at] = row[m], abs(row[m])
             for order in range(ORDER):
                 for m in range(size):
                     total = bound = 0.0
                     for i in range(size):
-                        total += series[k, g, order, i] * A[k, i, m]
-                        bound += roundings[k, g, order, i] * abs(A[k, i, m])
-                    series[k, g, order + 1, m] = total / (order + 1)
-                    roundings[k, g, order + 1, m] = bound / (order + 1)
-            for m in range(size):
-                for order in range(ORDER + 1):
-                    roundings[k, g, order, m] *= (size + (order + 1) * (_ROUNDINGS + size)) * UNIT
+                        at = i if i < n else i + behind
+                        total += own[order, at] * A[k, i, m]
+                        bound += errors[order, at] * abs(A[k, i, m])
+                    at = m if m < n else m + behind
+                    own[order + 1, at], errors[order + 1, at] = total / (order + 1), bound / (order + 1)
+            for order in range(ORDER + 1):
+                most, factor = 0.0, (size + (order + 1) * (_ROUNDINGS + size)) * UNIT
+                for at in range(errors.shape[1]):
+                    errors[order, at] *= factor
+                    if errors[order, at] > most or errors[order, at] != errors[order, at]:
+                        most = errors[order, at]
+                largest[k, g, order] = most
 
 
 @kernel
@@ -62,17 +64,17 @@ def modal_guards(
     """Compute the Taylor series of guards in modal coordinates, with bounds and undamped oscillations.
 
     flows: `hybridsim.engine.linear.modal.Modals` with |B**BOUND_TERMS|; gamma (J,) is scratch space. The
-    other arrays are described in `hybridsim.engine.linear.tables` and are initialised for guards that are
-    zero.
+    other arrays are described in `hybridsim.engine.linear.tables` and are zero.
     """
     counts, values, upper, ends, basis = flows.counts, flows.values, flows.upper, flows.ends, flows.full_basis
     modes, guards, size = rows.shape
     for k in range(modes):
         for g in range(guards):
+            farthest[k, g], grown[k, g], waves[k, g] = math.inf, 1.0, -1
             is_zero = True
             for m in range(size):
                 is_zero = is_zero and rows[k, g, m] == 0.0
-            if is_zero:  # a guard of other modes: the initial values are right
+            if is_zero:  # a guard of other modes
                 continue
             for j in range(counts[k]):
                 total = 0.0 + 0.0j

@@ -69,22 +69,20 @@ class MatrixTemplate:
         used = sorted({a for m in monomials for a, _ in m})
         met_atoms = [atoms.known[a] for a in used]
         terms = [term for a in met_atoms for term in a.terms]
-        self._computed = {
-            name: np.array([numbers.place(value) for value in values], dtype=np.int64)
-            for name, values in (
-                ("rates", [a.rate for a in met_atoms]),
-                ("offsets", [a.offset for a in met_atoms]),
-                ("weights", [weight for _, weight in terms]),
+        self._computed = [
+            np.array([numbers.place(value) for value in values], dtype=np.int64)
+            for values in (
+                [a.rate for a in met_atoms],
+                [a.offset for a in met_atoms],
+                [weight for _, weight in terms],
             )
-        }
-        self._fixed = {
-            "kinds": np.array([a.kind for a in met_atoms], dtype=np.int64),
-            "term_start": np.cumsum([0, *(len(a.terms) for a in met_atoms)]).astype(np.int64),
-            "sources": np.array([source for source, _ in terms], dtype=np.int64),
-            "factors": _factors(
-                [[2 * used.index(a) + part for a, part in m] for m in monomials], 2 * len(met_atoms)
-            ),
-        }
+        ]
+        self._fixed = (
+            np.array([a.kind for a in met_atoms], dtype=np.int64),
+            np.cumsum([0, *(len(a.terms) for a in met_atoms)]).astype(np.int64),
+            np.array([source for source, _ in terms], dtype=np.int64),
+            _factors([[2 * used.index(a) + part for a, part in m] for m in monomials], 2 * len(met_atoms)),
+        )
         self.recipe: Recipe = Recipe(numbers, None if begun is None else begun.recipe)
 
     def _first_read(self, system: System, met: np.ndarray) -> Iterable[Monomial]:
@@ -109,9 +107,11 @@ class MatrixTemplate:
             matrix.reshape(*lead, -1)[..., positions] = registers[..., sources]
         return A, rows
 
-    def atoms(self, registers: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the basic functions of time and their monomials as arrays."""
-        return self._fixed | {name: registers[..., positions] for name, positions in self._computed.items()}
+    def atoms(self, registers: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Return the basic functions of time and their monomials as arrays, in the order of `LinearTables`."""
+        kinds, term_start, sources, factors = self._fixed
+        rates, offsets, weights = (registers[..., positions] for positions in self._computed)
+        return kinds, rates, offsets, term_start, sources, weights, factors
 
 
 def _factors(monomials: Sequence[Sequence[int]], one: int) -> np.ndarray:

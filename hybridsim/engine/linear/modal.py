@@ -10,21 +10,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.linear.diagonal import CONDITION, balance, judge, real_columns, write_diagonal
 from hybridsim.engine.linear.small_entries import with_small_rows
-from hybridsim.engine.native.kernels import kernel
+from hybridsim.engine.native.kernels import Precompiled
 
-_CONDITION = 1e2  # largest condition of the basis: factor of rounding errors in a change of basis
-_MISSED = 2.0**-48  # largest error of A v - lambda v, relative to the largest entry of A
-_GROWING, _SILENT = (
-    3.0,
-    1e-12,
-)  # growth that matters, as a product with the horizon and relative to the largest entry
-_SLOWEST = 4.0  # product with the horizon; the run time is 1 to 1/16 of the horizon
-_SWEEPS = 8  # most sweeps of balancing
+_balance, _real_columns = Precompiled(balance), Precompiled(real_columns)
+_judge, _diagonal = Precompiled(judge), Precompiled(write_diagonal)
 
 
 @dataclass(frozen=True)
@@ -91,38 +86,27 @@ class Modals(NamedTuple):
 
 def modal(A: np.ndarray, horizon: float = math.inf) -> Modal:
     """Return the block diagonal form of a square real matrix (m, m), for times up to about `horizon`."""
-    return Modal(*(field[0] for field in modals(A[None], horizon)[1:-1]))
+    return Modal(*(field[0] for field in modals(np.ascontiguousarray(A[None]), horizon)[1:-1]))
 
 
 def modals(
     A: np.ndarray, horizon: float = math.inf, exponent: int = 1, multiple: int = 1, least: int = 0
 ) -> Modals:
     """Return the block diagonal forms of many matrices (K, m, m), padded to a common size."""
-    scales = np.ones(A.shape[:2])
-    _balance(np.abs(A), _SLOWEST / horizon, scales)
-    balanced = A * scales[:, None, :] / scales[:, :, None]
+    scales, counts = np.empty(A.shape[:2]), np.empty(len(A), dtype=np.int64)
+    balanced, basis = np.empty(A.shape), np.empty(A.shape)
+    is_diagonal, are_right = np.empty(len(A), dtype=np.bool_), np.empty(len(A), dtype=np.bool_)
+    _balance(A, horizon, basis, scales, balanced)
+    # NumPy calls LAPACK here in 25 us, where a kernel would need 15 us: it would need SciPy for LAPACK's address, and
+    # importing SciPy takes 0.1 s
     values, vectors = np.linalg.eig(balanced)
     values, vectors = values.astype(complex, copy=False), vectors.astype(complex, copy=False)
-    # Real and imaginary part of an eigenvector represent it and its conjugate. A complex inverse would make the two
-    # conjugates of each other only to within the condition of the basis.
-    inverses = _inverses(np.where((values.imag < 0.0)[:, None, :], -vectors.imag, vectors.real))
-    # the Frobenius norm bounds the 2-norm of the inverse; no column of the basis has a norm above 1
-    with np.errstate(over="ignore", invalid="ignore"):  # inverses of nearly singular matrices
-        is_diagonal = A.shape[1] * (inverses**2).sum(axis=(1, 2)) <= _CONDITION**2
-    # LAPACK balances again, without the diagonal, so that negligible entries may dominate an eigenvector
-    missed = np.abs(balanced @ vectors - vectors * values[:, None, :]).max(axis=(1, 2), initial=0.0)
-    largest = np.abs(balanced).max(axis=(1, 2), initial=0.0)
-    are_right = missed <= _MISSED * largest
-    # rounding errors of the basis grow with a growing motion
-    grows = values.real.max(axis=1, initial=0.0) > np.maximum(_GROWING / horizon, _SILENT * largest)
-    is_diagonal &= are_right & ~grows
-    others = {
-        int(k): _by_blocks(balanced[k], values[k], vectors[k], scales[k], bool(are_right[k]))
-        for k in np.flatnonzero(~is_diagonal)
-    }
-    counts = (values.imag >= 0.0).sum(axis=1)
-    for k, flow in others.items():
-        counts[k] = len(flow.values)
+    _real_columns(values, vectors, basis)
+    inverses, others = _inverses(basis), {}
+    if not _judge(balanced, values, vectors, inverses, horizon, counts, is_diagonal, are_right):
+        for k in np.flatnonzero(~is_diagonal).tolist():
+            others[k] = _by_blocks(balanced[k], values[k], vectors[k], scales[k], bool(are_right[k]))
+            counts[k] = len(others[k].values)
     count, size, widest = *A.shape[:2], -(-int(counts.max(initial=least)) // multiple) * multiple
     result = Modals(
         counts,
@@ -148,30 +132,6 @@ def _inverses(vectors: np.ndarray) -> np.ndarray:
         if len(vectors) == 1:
             return np.full_like(vectors, np.inf)
         return np.concatenate([_inverses(one[None]) for one in vectors])
-
-
-@kernel
-def _diagonal(
-    values: Any, vectors: Any, inverses: Any, scales: Any, chosen: Any, exponent: int, out: Any
-) -> None:
-    """Write one block for each eigenvalue."""
-    for k in range(values.shape[0]):
-        if not chosen[k]:
-            continue
-        j, size = 0, values.shape[1]
-        for i in range(size):
-            value = values[k, i]
-            if not value.imag >= 0.0:
-                continue
-            twice = 2.0 if value.imag > 0.0 else 1.0
-            for m in range(size):
-                out.full_basis[k, m, j] = twice * vectors[k, m, i] * scales[k, m]
-                imaginary = inverses[k, i + 1, m] if value.imag > 0.0 else 0.0
-                out.inverse[k, j, m] = complex(inverses[k, i, m], -imaginary) / (twice * scales[k, m])
-            out.values[k, j], out.ends[k, j], out.growth[k, j] = value, j + 1, value.real
-            out.speeds[k, j] = abs(value)
-            out.powers[k, j] = out.speeds[k, j] ** exponent
-            j += 1
 
 
 def _by_blocks(
@@ -201,7 +161,7 @@ def _by_blocks(
         ]
     else:
         blocks = [found(c) for c in clusters]
-    while not _condition(clusters, blocks) <= _CONDITION and not (len(clusters) == 1 and clusters[0].folded):
+    while not _condition(clusters, blocks) <= CONDITION and not (len(clusters) == 1 and clusters[0].folded):
         clusters = _combined(clusters, values)
         blocks = [found(c) for c in clusters]
     return _joined(balanced, clusters, blocks, scale)
@@ -226,54 +186,6 @@ def _partners(values: np.ndarray) -> list[int]:
         if value.imag > 0.0:
             partners[i], partners[i + 1] = i + 1, i
     return partners
-
-
-@kernel
-def _balance(sizes: Any, slowest: float, scales: Any) -> None:
-    """Write powers of two to `scales` that make the rows and columns of D^-1 A D about equally large.
-
-    The method is that of E. E. Osborne, J. ACM 7 (1960) 338. sizes (k, m, m), the absolute values of A, are
-    overwritten.
-
-    The 2-norms include the diagonal. Without it, couplings that are negligible compared with the diagonal
-    would be scaled up with its roundings (R. James, J. Langou and B. R. Lowery, arXiv:1401.5766). Couplings
-    below the rate `slowest` are not scaled up either: they have almost no effect during the run, and
-    exponentials close to 1 would have to cancel.
-    """
-    for k in range(sizes.shape[0]):
-        size, scale = sizes[k], scales[k]
-        m = size.shape[0]
-        for i in range(m):
-            size[i, i] += slowest
-        for _ in range(_SWEEPS):
-            moved = False
-            for i in range(m):
-                row = column = 0.0  # largest off-diagonal entries
-                for j in range(m):
-                    if j != i:
-                        row, column = max(row, size[i, j]), max(column, size[j, i])
-                if row == 0.0 and column == 0.0:
-                    continue
-                row, column = max(row, size[i, i]), max(column, size[i, i])
-                if row == 0.0 or column == 0.0:  # a horizon of infinity
-                    continue
-                rows = columns = 0.0
-                for j in range(m):
-                    rows += (size[i, j] / row) ** 2
-                    columns += (size[j, i] / column) ** 2
-                ratio = (row / column) * math.sqrt(rows / columns)
-                if not 0.0 < ratio < math.inf:
-                    continue
-                steps = round(0.5 * math.log2(ratio))
-                if steps != 0:
-                    moved = True
-                    factor = math.ldexp(1.0, steps)
-                    scale[i] *= factor
-                    for j in range(m):
-                        size[j, i] *= factor
-                        size[i, j] /= factor
-            if not moved:
-                break
 
 
 def _columns(clusters: list[_Cluster], blocks: list[_Block]) -> np.ndarray:

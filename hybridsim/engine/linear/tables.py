@@ -4,27 +4,25 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybridsim.engine.linear.guards import guard_series, modal_guards
-from hybridsim.engine.linear.matrix_template import template_of
+from hybridsim.engine.linear.matrix_template import MatrixTemplate, template_of
 from hybridsim.engine.linear.modal import modals
+from hybridsim.engine.linear.table_rows import leave_out, write_bases, write_lengths
+from hybridsim.engine.native.array_layout import ArrayLayout
 from hybridsim.engine.native.constants import BOUND_TERMS
-from hybridsim.engine.native.simd_products import LANES, row_blocks_of, rows_of
+from hybridsim.engine.native.kernels import ENABLED, Precompiled
+from hybridsim.engine.native.simd_products import LANES, filled_up
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.bounded import ORDER
 from hybridsim.engine.system.per_structure import per_structure, spare_scratch
 from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
 
-_LARGEST = 1e150  # its square is still finite
-_MAX_GROWTH_EXPONENT = 300.0  # exponent within a segment: doubles go from exp(-745) to exp(709)
-_PARTING = 2.0  # exponent by which coordinates of one block may grow apart
-# In units of the fastest rate: within this time of its start, a state that grows from zero is lost to cancellation in
-# modal coordinates, and the first terms of its series suffice.
-_NEAR, _SLOWEST = 0.125, 1e-300
 _MAX_CACHED = 64  # most tables per structure, one for each set of parameter values
 _MAX_BYTES = 1 << 28  # most bytes of all these tables except the last
 
@@ -93,48 +91,76 @@ def no_tables() -> LinearTables:
     return tables
 
 
+@lru_cache(256)
+def _layout(atoms: tuple[int, ...], guards: int, n: int, size: int, widest: int, rows: int) -> ArrayLayout:
+    """Return the layout of tables; atoms: the numbers of atoms, of their terms, and of factors of a monomial."""
+    i, c, (count, terms, degree) = np.int64, complex, atoms
+    wide, double, blocks = filled_up(n) + filled_up(size - n), filled_up(2 * widest), filled_up(n) // LANES
+    of_atoms: list[tuple[Any, tuple[int, ...]]] = [
+        (i, (count,)), (float, (count,)), (float, (count,)), (i, (count + 1,)), (i, (terms,)), (float, (terms,)),
+        (i, (size - n, degree)), (i, (2,)),
+    ]  # fmt: skip
+    of_rows: list[tuple[Any, tuple[int, ...]]] = [
+        (float, (guards, ORDER + 1, wide)), (float, (guards, ORDER + 1, wide)), (float, (guards, ORDER + 1)), (i, ()),
+        (c, (widest,)), (c, (widest, widest)), (i, (widest,)), (c, (n, widest)),
+        (float, (double // LANES, wide, LANES)), (float, (blocks, double, LANES)),
+        (float, (blocks, filled_up(widest), LANES)), (float, (blocks, wide, LANES)),
+        (float, (guards, widest, 2, BOUND_TERMS)), (float, (guards, widest)), (float, (guards, widest)),
+        (float, (guards,)), (float, (guards,)), (float, (guards,)), (i, (guards,)), (float, ()),
+        (float, (size, size)), (float, ()),
+    ]  # fmt: skip
+    fields = [*of_atoms, *((dtype, (rows, *shape)) for dtype, shape in of_rows)]
+    return ArrayLayout((LinearTables,), [(dtype, shape, 0) for dtype, shape in fields])
+
+
 class _Rows:
-    """The fields with one row per combination of modes, with spare rows for later modes.
+    """The memory of tables, with spare rows for later modes.
 
     Existing rows do not change, so that earlier tables are views of the same memory.
     """
 
-    def __init__(self, fields: dict[str, np.ndarray]) -> None:
-        self.count, self._fields = len(fields["counts"]), fields
-        self.size = sum(field.nbytes for field in fields.values())  # bytes
+    def __init__(self, form: tuple[Any, ...], rows: int) -> None:
+        self.form, self.most, self.count = form, rows, 0
+        self._layout = _layout(*form, rows)
+        self._memory = self._layout.blank()
+        self._memory[0][:] = 0
+        self.size = self._memory[0].nbytes
+        self.fields: LinearTables = self._layout.rows(self._memory)
 
-    def first(self, count: int) -> dict[str, np.ndarray]:
-        """Return the first `count` rows of each field."""
-        return {name: field[:count] for name, field in self._fields.items()}
+    def first(self, count: int) -> LinearTables:
+        """Return tables of the first `count` rows."""
+        atoms, rows = self.fields[: len(_ATOMS)], self.fields[len(_ATOMS) :]
+        tables: LinearTables
+        if count < self.most or not ENABLED:
+            tables = packed(LinearTables(*atoms, *(row[:count] for row in rows)))
+        else:
+            (tables,) = self._layout.packed(self._memory)
+            vars(tables).update(self.fields._asdict())
+        return tables
 
-    def gone_on_with(self, first: int, new: dict[str, np.ndarray]) -> _Rows:
-        """Return the first rows followed by new rows, which use the spare rows if they are free."""
-        count = first + len(new["counts"])
+    def gone_on_with(self, first: int, count: int) -> _Rows:
+        """Return `count` rows that begin with the first rows, in the spare rows behind them if these are free."""
         with _lock:
             rows = self
-            if self.count != first or count > len(self._fields["counts"]):
-                rows = _Rows(
-                    {name: _extended(field[:first], 2 * count) for name, field in self._fields.items()}
-                )
-            for name, field in rows._fields.items():
-                field[first:count] = new[name]
+            if self.count != first or count > self.most:
+                rows = _Rows(self.form, 2 * count)
+                for name, known, new in zip(LinearTables._fields, self.fields, rows.fields, strict=True):
+                    kept = slice(None) if name in _ATOMS else slice(first)
+                    new[kept] = known[kept]
             rows.count = count
         return rows
 
 
-def _extended(field: np.ndarray, count: int) -> np.ndarray:
-    larger = np.zeros((count, *field.shape[1:]), dtype=field.dtype)
-    larger[: len(field)] = field
-    return larger
+_ATOMS = LinearTables._fields[:8]  # the fields that describe functions of time
 
 
 class Made(NamedTuple):
-    """Tables of linear modes at one set of parameter values, and the matrices that define them."""
+    """Tables of linear modes at one set of parameter values, their memory, and the matrices that define them."""
 
     tables: LinearTables
+    rows: _Rows
     flows: np.ndarray
     guards: np.ndarray
-    rows: _Rows
 
 
 def linear_tables(
@@ -147,131 +173,85 @@ def linear_tables(
     """
     template, registers = template_of(system, met, p)
     A, guards = template.matrices(registers)
-    is_finite = leave_out(A, guards, system.n)
-    if not is_finite.any():
+    usable = np.empty(len(A), dtype=np.bool_)
+    if not _leave_out(A, guards, system.n, usable):
         return None
-    rows = None if begun is None else _gone_on_with(begun, A, guards, is_finite, system.n, horizon)
-    rows = rows or _Rows(unknown(of_matrices(A, guards, system.n, horizon), is_finite))
-    tables: LinearTables = packed(
-        LinearTables(**template.atoms(registers), phases=angles_of(system), **rows.first(len(met)))
-    )
-    return Made(tables, A, guards, rows)
+    atoms = atoms_of(system, template, registers)
+    if begun is not None:
+        first, former = len(begun.flows), (getattr(begun.tables, name) for name in _ATOMS)
+        same = zip((begun.flows, begun.guards, *former), (A[:first], guards[:first], *atoms), strict=True)
+        if not all(np.array_equal(one, other) for one, other in same):
+            begun = None
+    return Made(*of_matrices(atoms, A, guards, usable, system.n, horizon, begun), A, guards)
 
 
-def _gone_on_with(
-    begun: Made, A: np.ndarray, guards: np.ndarray, is_finite: np.ndarray, n: int, horizon: float
-) -> _Rows | None:
-    """Extend existing rows by rows of further matrices; return None if the first matrices differ."""
-    first, widest = len(begun.flows), begun.tables.values.shape[1]
-    if not (np.array_equal(begun.flows, A[:first]) and np.array_equal(begun.guards, guards[:first])):
-        return None
-    new = unknown(of_matrices(A[first:], guards[first:], n, horizon, widest), is_finite[first:])
-    return begun.rows.gone_on_with(first, new) if new["values"].shape[1] == widest else None
+_leave_out, _guard_series, _modal_guards, _write_bases, _write_lengths = map(
+    Precompiled, (leave_out, guard_series, modal_guards, write_bases, write_lengths)
+)
 
 
-def leave_out(A: np.ndarray, guards: np.ndarray, n: int) -> np.ndarray:
-    """Return a mask of modes with usable coefficients; the guards of the other modes become -1.
-
-    A (..., K, m, m), guards (..., K, G, m). Two surfaces that cannot be held together give modes with
-    non-finite numbers, which runs have only as neighbours. `unknown` stops a run that is in such a mode.
-    """
-    is_finite = np.logical_and(*((np.abs(part) < _LARGEST).all(axis=(-2, -1)) for part in (A, guards)))
-    A[~is_finite, :n] = 0.0
-    guards[~is_finite] = 0.0
-    guards[~is_finite, :, n] = -1.0  # the first function of time is 1
-    return np.asarray(is_finite)
+def usable_modes(A: np.ndarray, guards: np.ndarray, n: int) -> np.ndarray:
+    """Return a mask of the modes with usable coefficients; see `leave_out`."""
+    usable = np.empty(len(A), dtype=np.bool_)
+    _leave_out(A, guards, n, usable)
+    return usable
 
 
-def unknown(fields: dict[str, np.ndarray], is_finite: np.ndarray) -> dict[str, np.ndarray]:
-    """Set the motion of omitted modes to NaN.
-
-    A compiled loop then stops there, and no state counts as resting there.
-    """
-    for name in ("inverse", "slopes", "flows"):
-        fields[name][~is_finite] = np.nan
-    return fields
-
-
-def angles_of(system: System) -> np.ndarray:
-    """Return the range of rounded angles in the run-time vector: its first index, and its last index plus one."""
-    return np.array([system.layout.phases_at, system.layout.signals_at], dtype=np.int64)
+def atoms_of(system: System, template: MatrixTemplate, registers: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return the fields that describe functions of time; the last is the range of rounded angles in p."""
+    angles = np.array([system.layout.phases_at, system.layout.signals_at], dtype=np.int64)
+    return *template.atoms(registers), angles
 
 
 def of_matrices(
-    A: np.ndarray, rows: np.ndarray, n: int, horizon: float, least: int = 0
-) -> dict[str, np.ndarray]:
-    """Return the table fields with one row per combination of modes, from the matrices of flows and guards.
+    atoms: tuple[np.ndarray, ...],
+    A: np.ndarray,
+    guards: np.ndarray,
+    usable: np.ndarray,
+    n: int,
+    horizon: float,
+    begun: Made | None = None,
+) -> tuple[LinearTables, _Rows]:
+    """Return tables with one row per combination of modes, and their memory.
 
-    least: smallest J.
+    atoms: the fields that describe functions of time. A (K, m, m), guards (K, G, m), usable (K,): see `leave_out`.
+    begun: tables with the first rows.
     """
-    count, guards, size = rows.shape
-    flows = modals(A, horizon, BOUND_TERMS, multiple=LANES // 2, least=least)
+    count, surfaces, size = guards.shape
+    first, least = (0, 0) if begun is None else (len(begun.flows), begun.rows.form[-1])
+    flows = modals(A[first:], horizon, BOUND_TERMS, multiple=LANES // 2, least=least)
     widest = flows.values.shape[1]
-    series, roundings = (np.empty((count, guards, ORDER + 1, size)) for _ in range(2))
-    guard_series(A, rows, series, roundings)
-    terms = np.zeros((count, guards, widest, 2, BOUND_TERMS))
-    sizes, rests = np.zeros((count, guards, widest)), np.zeros((count, guards, widest))
-    farthest, grown = np.full((count, guards), np.inf), np.ones((count, guards))
-    turning = np.zeros((count, guards))
-    waves = np.full((count, guards), -1, dtype=np.int64)
-    modal_guards(
-        rows,
-        flows,
-        np.empty(widest, dtype=complex),
-        terms,
-        sizes,
-        rests,
-        farthest,
-        grown,
-        turning,
-        waves,
+    if begun is not None and widest == least:
+        rows = begun.rows.gone_on_with(first, count)
+    else:
+        if first:
+            first, flows = 0, modals(A, horizon, BOUND_TERMS, multiple=LANES // 2)
+            widest = flows.values.shape[1]
+        kinds, _, _, _, sources, _, factors, _ = atoms
+        rows = _Rows(((len(kinds), len(sources), factors.shape[1]), surfaces, n, size, widest), count)
+        rows.count = count
+    if not first:
+        for own, array in zip(rows.fields, atoms, strict=False):
+            own[...] = array
+    new = LinearTables(*atoms, *(field[first:count] for field in rows.fields[len(atoms) :]))
+    A, guards, usable = A[first:], guards[first:], usable[first:]
+    new.counts[:], new.values[:], new.upper[:], new.ends[:] = (
+        flows.counts,
+        flows.values,
+        flows.upper,
+        flows.ends,
     )
-    parts, basis = (n, size - n), flows.full_basis[:, :n].copy()
-    inverse = np.stack([flows.inverse.real, flows.inverse.imag], axis=2).reshape(count, 2 * widest, size)
-    return {
-        "series": rows_of(series, parts),
-        "roundings": rows_of(roundings, parts),
-        "largest": roundings.max(axis=-1),
-        "counts": flows.counts,
-        "values": flows.values,
-        "upper": flows.upper,
-        "ends": flows.ends,
-        "basis": basis,
-        "inverse": row_blocks_of(inverse, parts),
-        "states": row_blocks_of(np.stack([basis.real, -basis.imag], axis=-1).reshape(count, n, 2 * widest)),
-        "spreads": row_blocks_of(np.abs(basis.real) + np.abs(basis.imag)),
-        "slopes": row_blocks_of(A[:, :n], parts),
-        "terms": terms,
-        "sizes": sizes,
-        "rests": rests,
-        "farthest": farthest,
-        "grown": grown,
-        "turning": turning,
-        "waves": waves,
-        "lasting": np.array(
-            [_lasting(*row) for row in zip(flows.values.real, flows.ends, flows.counts, strict=True)]
-        ),
-        "flows": A.copy(),
-        "near": _NEAR / np.maximum(flows.speeds.max(axis=1, initial=0.0), _SLOWEST),
-    }
-
-
-def _lasting(rates: np.ndarray, ends: np.ndarray, count: int) -> float:
-    """Return how long a motion can be computed before numbers overflow or blocks lose accuracy.
-
-    Coordinates of one block have errors relative to the largest of them. If one grows faster than the others,
-    such as a load that is still very small, the rounding error grows as fast.
-    """
-    lasting, j = np.inf, 0
-    while j < count:
-        block = rates[j : ends[j]]
-        fastest, slowest = block.max(), max(block.min(), 0.0)
-        if fastest > 0.0:
-            lasting = min(lasting, _MAX_GROWTH_EXPONENT / fastest)
-        if fastest > slowest:
-            lasting = min(lasting, _PARTING / (fastest - slowest))
-        j = ends[j]
-    return float(lasting)
+    new.basis[:], new.flows[:] = flows.full_basis[:, :n], A
+    _guard_series(A, guards, n, new.series, new.roundings, new.largest)
+    _write_bases(A, n, flows, new.inverse, new.states, new.spreads, new.slopes)
+    if not usable.all():
+        new.inverse[~usable], new.slopes[~usable], new.flows[~usable] = np.nan, np.nan, np.nan
+    _write_lengths(flows, new.lasting, new.near)
+    _modal_guards(
+        guards, flows, np.empty(widest, dtype=complex), new.terms, new.sizes, new.rests, new.farthest, new.grown,
+        new.turning, new.waves,
+    )  # fmt: skip
+    return rows.first(count), rows
 
 
 def horizon_class(horizon: float) -> float:

@@ -1,0 +1,149 @@
+"""This module decides in compiled code whether eigenvectors are a good basis, and writes the modes in that basis."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from hybridsim.engine.native.kernels import kernel
+
+CONDITION = 1e2  # largest condition of the basis: factor of rounding errors in a change of basis
+_MISSED = 2.0**-48  # largest error of A v - lambda v, relative to the largest entry of A
+# growth that matters, as a product with the horizon and relative to the largest entry
+_GROWING, _SILENT = 3.0, 1e-12
+_SLOWEST = 4.0  # product with the horizon; the run time is 1 to 1/16 of the horizon
+_SWEEPS = 8  # most sweeps of balancing
+
+
+@kernel
+def balance(A: Any, horizon: float, sizes: Any, scales: Any, balanced: Any) -> None:
+    """Write powers of two to `scales` that make the rows and columns of D^-1 A D about equally large, and the product.
+
+    The method is that of E. E. Osborne, J. ACM 7 (1960) 338. sizes (k, m, m) is scratch.
+
+    The 2-norms include the diagonal. Without it, couplings that are negligible compared with the diagonal
+    would be scaled up with its roundings (R. James, J. Langou and B. R. Lowery, arXiv:1401.5766). Couplings
+    with almost no effect before the horizon are not scaled up either, because exponentials close to 1 would have to
+    cancel.
+    """
+    for k in range(A.shape[0]):
+        size, scale = sizes[k], scales[k]
+        m = size.shape[0]
+        for i in range(m):
+            scale[i] = 1.0
+            for j in range(m):
+                size[i, j] = abs(A[k, i, j])
+            size[i, i] += _SLOWEST / horizon
+        for _ in range(_SWEEPS):
+            moved = False
+            for i in range(m):
+                row = column = 0.0  # largest off-diagonal entries
+                for j in range(m):
+                    if j != i:
+                        row, column = max(row, size[i, j]), max(column, size[j, i])
+                if row == 0.0 and column == 0.0:
+                    continue
+                row, column = max(row, size[i, i]), max(column, size[i, i])
+                if row == 0.0 or column == 0.0:  # a horizon of infinity
+                    continue
+                rows = columns = 0.0
+                for j in range(m):
+                    rows += (size[i, j] / row) ** 2
+                    columns += (size[j, i] / column) ** 2
+                ratio = (row / column) * math.sqrt(rows / columns)
+                if not 0.0 < ratio < math.inf:
+                    continue
+                steps = round(0.5 * math.log2(ratio))
+                if steps != 0:
+                    moved = True
+                    factor = math.ldexp(1.0, steps)
+                    scale[i] *= factor
+                    for j in range(m):
+                        size[j, i] *= factor
+                        size[i, j] /= factor
+            if not moved:
+                break
+        for i in range(m):
+            for j in range(m):
+                balanced[k, i, j] = A[k, i, j] * scale[j] / scale[i]
+
+
+@kernel
+def real_columns(values: Any, vectors: Any, out: Any) -> None:
+    """Write the real part of each eigenvector, but the imaginary part of the second of two conjugates.
+
+    Both represent the pair. A complex inverse would make the two conjugates of each other only to within the
+    condition of the basis.
+    """
+    for k in range(values.shape[0]):
+        for j in range(values.shape[1]):
+            for i in range(values.shape[1]):
+                entry = vectors[k, i, j]
+                out[k, i, j] = -entry.imag if values[k, j].imag < 0.0 else entry.real
+
+
+@kernel
+def judge(
+    balanced: Any,
+    values: Any,
+    vectors: Any,
+    inverses: Any,
+    horizon: float,
+    counts: Any,
+    chosen: Any,
+    right: Any,
+) -> bool:
+    """Write how many coordinates each matrix has, and whether its eigenvectors are a good basis, and are right at all.
+
+    inverses: those of `real_columns`. Return whether all are good.
+    """
+    all_chosen = True
+    for k in range(values.shape[0]):
+        size, total, largest, fastest = values.shape[1], 0.0, 0.0, 0.0
+        counts[k] = 0
+        for i in range(size):
+            fastest = max(fastest, values[k, i].real)
+            if values[k, i].imag >= 0.0:
+                counts[k] += 1
+            for j in range(size):
+                total += inverses[k, i, j] * inverses[k, i, j]
+                largest = max(largest, abs(balanced[k, i, j]))
+        # LAPACK balances again, without the diagonal, so that negligible entries may dominate an eigenvector
+        right[k] = True
+        for i in range(size):
+            for j in range(size):
+                missed = -vectors[k, i, j] * values[k, j]
+                for m in range(size):
+                    missed += balanced[k, i, m] * vectors[k, m, j]
+                if not abs(missed) <= _MISSED * largest:
+                    right[k] = False
+        # rounding errors of the basis grow with a growing motion
+        grows = fastest > max(_GROWING / horizon, _SILENT * largest)
+        # the Frobenius norm bounds the 2-norm of the inverse; no column of the basis has a norm above 1
+        chosen[k] = right[k] and not grows and size * total <= CONDITION**2
+        all_chosen = all_chosen and chosen[k]
+    return all_chosen
+
+
+@kernel
+def write_diagonal(
+    values: Any, vectors: Any, inverses: Any, scales: Any, chosen: Any, exponent: int, out: Any
+) -> None:
+    """Write one block for each eigenvalue of the chosen matrices to `out`, `hybridsim.engine.linear.modal.Modals`."""
+    for k in range(values.shape[0]):
+        if not chosen[k]:
+            continue
+        j, size = 0, values.shape[1]
+        for i in range(size):
+            value = values[k, i]
+            if not value.imag >= 0.0:
+                continue
+            twice = 2.0 if value.imag > 0.0 else 1.0
+            for m in range(size):
+                out.full_basis[k, m, j] = twice * vectors[k, m, i] * scales[k, m]
+                imaginary = inverses[k, i + 1, m] if value.imag > 0.0 else 0.0
+                out.inverse[k, j, m] = complex(inverses[k, i, m], -imaginary) / (twice * scales[k, m])
+            out.values[k, j], out.ends[k, j], out.growth[k, j] = value, j + 1, value.real
+            out.speeds[k, j] = abs(value)
+            out.powers[k, j] = out.speeds[k, j] ** exponent
+            j += 1

@@ -1,0 +1,92 @@
+"""This module writes parts of the tables of linear modes in compiled code, for each combination of modes."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from hybridsim.engine.native.kernels import kernel
+from hybridsim.engine.native.simd_products import LANES
+
+_LARGEST = 1e150  # its square is still finite
+_MAX_GROWTH_EXPONENT = 300.0  # exponent within a segment: doubles go from exp(-745) to exp(709)
+_PARTING = 2.0  # exponent by which coordinates of one block may grow apart
+# In units of the fastest rate: within this time of its start, a state that grows from zero is lost to cancellation in
+# modal coordinates, and the first terms of its series suffice.
+_NEAR, _SLOWEST = 0.125, 1e-300
+
+
+@kernel
+def leave_out(A: Any, guards: Any, n: int, usable: Any) -> int:
+    """Write which modes have usable coefficients, and return their number; the guards of the others become -1.
+
+    A (K, m, m), guards (K, G, m). Two surfaces that cannot be held together give modes with numbers that are not
+    finite, which runs have only as neighbours. In the tables their motion is NaN, so that a compiled loop stops there,
+    and no state counts as resting there.
+    """
+    total, size = 0, A.shape[1]
+    for k in range(A.shape[0]):
+        usable[k] = True
+        for m in range(size):
+            for i in range(size):
+                usable[k] = usable[k] and abs(A[k, i, m]) < _LARGEST
+            for g in range(guards.shape[1]):
+                usable[k] = usable[k] and abs(guards[k, g, m]) < _LARGEST
+        if usable[k]:
+            total += 1
+            continue
+        for m in range(size):
+            for i in range(n):
+                A[k, i, m] = 0.0
+            for g in range(guards.shape[1]):
+                guards[k, g, m] = -1.0 if m == n else 0.0  # the first function of time is 1
+    return total
+
+
+@kernel
+def write_bases(A: Any, n: int, flows: Any, inverse: Any, states: Any, spreads: Any, slopes: Any) -> None:
+    """Write the changes of basis between modal coordinates and states, and the rates of states, in blocks of four rows.
+
+    flows: `hybridsim.engine.linear.modal.Modals`. The other arrays are described in `hybridsim.engine.linear.tables`
+    and are zero.
+    """
+    size, behind = A.shape[1], -n % LANES
+    for k in range(A.shape[0]):
+        for m in range(size):
+            column = m if m < n else m + behind
+            for i in range(n):
+                slopes[k, i // LANES, column, i % LANES] = A[k, i, m]
+            for j in range(flows.values.shape[1]):
+                entry = flows.inverse[k, j, m]
+                inverse[k, 2 * j // LANES, column, 2 * j % LANES] = entry.real
+                inverse[k, 2 * j // LANES, column, 2 * j % LANES + 1] = entry.imag
+        for j in range(flows.values.shape[1]):
+            for i in range(n):
+                entry, q, lane = flows.full_basis[k, i, j], i // LANES, i % LANES
+                states[k, q, 2 * j, lane], states[k, q, 2 * j + 1, lane] = entry.real, -entry.imag
+                spreads[k, q, j, lane] = abs(entry.real) + abs(entry.imag)
+
+
+@kernel
+def write_lengths(flows: Any, lasting: Any, near: Any) -> None:
+    """Write how long motions can be computed from one point, and how long they are near it.
+
+    They last until numbers overflow or blocks lose accuracy. Coordinates of one block have errors relative to the
+    largest of them. If one grows faster than the others, such as a load that is still very small, the rounding error
+    grows as fast.
+    """
+    for k in range(lasting.shape[0]):
+        values, ends, speed, j = flows.values[k], flows.ends[k], _SLOWEST, 0
+        lasting[k] = math.inf
+        while j < flows.counts[k]:
+            fastest = slowest = values[j].real
+            speed = max(speed, flows.speeds[k, j])
+            for i in range(j + 1, ends[j]):
+                fastest, slowest = max(fastest, values[i].real), min(slowest, values[i].real)
+            slowest = max(slowest, 0.0)
+            if fastest > 0.0:
+                lasting[k] = min(lasting[k], _MAX_GROWTH_EXPONENT / fastest)
+            if fastest > slowest:
+                lasting[k] = min(lasting[k], _PARTING / (fastest - slowest))
+            j = ends[j]
+        near[k] = _NEAR / speed
