@@ -83,7 +83,7 @@ def real_columns(values: Any, vectors: Any, out: Any) -> None:
 
 
 @kernel
-def judge(
+def check_eigenvectors(
     balanced: Any,
     values: Any,
     vectors: Any,

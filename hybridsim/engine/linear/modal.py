@@ -14,12 +14,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.linear.diagonal import CONDITION, balance, judge, real_columns, write_diagonal
+from hybridsim.engine.linear.diagonal import (
+    CONDITION,
+    balance,
+    check_eigenvectors,
+    real_columns,
+    write_diagonal,
+)
 from hybridsim.engine.linear.small_entries import with_small_rows
 from hybridsim.engine.native.kernels import Precompiled
 
 _balance, _real_columns = Precompiled(balance), Precompiled(real_columns)
-_judge, _diagonal = Precompiled(judge), Precompiled(write_diagonal)
+_check_eigenvectors, _diagonal = Precompiled(check_eigenvectors), Precompiled(write_diagonal)
 
 
 @dataclass(frozen=True)
@@ -103,7 +109,7 @@ def modals(
     values, vectors = values.astype(complex, copy=False), vectors.astype(complex, copy=False)
     _real_columns(values, vectors, basis)
     inverses, others = _inverses(basis), {}
-    if not _judge(balanced, values, vectors, inverses, horizon, counts, is_diagonal, are_right):
+    if not _check_eigenvectors(balanced, values, vectors, inverses, horizon, counts, is_diagonal, are_right):
         for k in np.flatnonzero(~is_diagonal).tolist():
             others[k] = _by_blocks(balanced[k], values[k], vectors[k], scales[k], bool(are_right[k]))
             counts[k] = len(others[k].values)

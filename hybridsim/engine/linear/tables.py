@@ -145,8 +145,8 @@ class _Rows:
             if self.count != first or count > self.most:
                 rows = _Rows(self.form, 2 * count)
                 for name, known, new in zip(LinearTables._fields, self.fields, rows.fields, strict=True):
-                    kept = slice(None) if name in _ATOMS else slice(first)
-                    new[kept] = known[kept]
+                    part = slice(None) if name in _ATOMS else slice(first)
+                    new[part] = known[part]
             rows.count = count
         return rows
 
