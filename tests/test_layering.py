@@ -46,6 +46,7 @@ FACES = {
     ("model.parts.model", "model.smoothing.structure"),  # Model.structure
     ("model.parts.model", "model.toml.write"),  # Model.to_toml
     ("model.parts.model", "model.toml.read"),  # Model.from_toml
+    ("model.parts.contact", "model.laws.law_with_states"),  # Contact.components, Contact.states
     ("model.parts.contact", "model.library"),  # Contact(law="name")
     ("model.toml.laws", "model.library"),  # law = "name" in a file
     ("model.parts.use", "model.library"),  # Use(model="name")
@@ -54,11 +55,6 @@ FACES = {
     ("solution.solution", "solution.explain.explanation"),  # Solution.explain
     ("solution.solution", "solution.files.archive"),  # Solution.save
     ("solution.solution", "solution.resume"),  # Solution.resume
-}
-# Objects that a module hands to the helpers it calls, whose files name its class as a type and for nothing else.
-HANDED_ON = {
-    "model.parts.contact",
-    "solution.model_trajectory",
 }
 # A family of integrators takes nothing from another one, but these.
 SHARED = {
@@ -110,24 +106,22 @@ def imports_for_types(path: Path) -> set[int]:
 
 
 @cache
-def edges() -> tuple[tuple[str, str, bool], ...]:
-    """Which module imports which, by any kind of import, and whether for types alone."""
-    found: dict[tuple[str, str], bool] = {}
-    for path in SOURCES:
-        for_types, name = imports_for_types(path), named(path)
-        for module, line in MAP["imports"](path):
-            pair = name, module.removeprefix("hybridsim").removeprefix(".")
-            if pair[1] not in ("", name):
-                found[pair] = found.get(pair, True) and line in for_types
-    return tuple((*pair, for_types) for pair, for_types in found.items())
+def edges() -> frozenset[tuple[str, str]]:
+    """Which module imports which, by any kind of import."""
+    found = {
+        (named(path), module.removeprefix("hybridsim").removeprefix("."))
+        for path in SOURCES
+        for module, _ in MAP["imports"](path)
+    }
+    return frozenset(pair for pair in found if pair[1] not in ("", pair[0]))
 
 
-def import_graph(faces: set[tuple[str, str]], handed_on: set[str]) -> dict[str, set[str]]:
+def import_graph(faces: set[tuple[str, str]]) -> dict[str, set[str]]:
     """The modules that each module imports, but for these exceptions."""
     graph: dict[str, set[str]] = {}
-    for name, target, for_types in edges():
-        if (name, target) not in faces and not (for_types and target in handed_on):
-            graph.setdefault(name, set()).add(target)
+    for pair in edges():
+        if pair not in faces:
+            graph.setdefault(pair[0], set()).add(pair[1])
     return graph
 
 
@@ -235,8 +229,8 @@ def test_imports_point_down_only() -> None:
 
 
 def test_no_modules_import_each_other_in_a_circle() -> None:
-    """Imports for types and inside functions count; the exceptions are the closed lists above."""
-    assert circles(import_graph(FACES, HANDED_ON)) == []
+    """Imports for types and inside functions count; the exceptions are the closed list above."""
+    assert circles(import_graph(FACES)) == []
 
 
 def test_every_module_can_be_loaded_first() -> None:
@@ -246,12 +240,7 @@ def test_every_module_can_be_loaded_first() -> None:
 
 @pytest.mark.parametrize("face", sorted(FACES), ids=str)
 def test_each_face_is_needed(face: tuple[str, str]) -> None:
-    assert circles(import_graph(FACES - {face}, HANDED_ON)), "take it off the list"
-
-
-@pytest.mark.parametrize("name", sorted(HANDED_ON))
-def test_each_object_that_is_handed_on_is_needed(name: str) -> None:
-    assert circles(import_graph(FACES, HANDED_ON - {name})), "take it off the list"
+    assert circles(import_graph(FACES - {face})), "take it off the list"
 
 
 def test_a_circle_is_seen() -> None:

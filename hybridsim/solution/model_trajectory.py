@@ -12,8 +12,9 @@ import numpy as np
 from hybridsim.engine.record.time_lookup import Frame, locate_times
 from hybridsim.solution.by_name import ByName
 from hybridsim.solution.event import Event, ModeInterval, counted_kind
-from hybridsim.solution.files.tabulated import tabulated
+from hybridsim.solution.files.tabulated import at_steps, tabulated
 from hybridsim.solution.run import Run
+from hybridsim.solution.run_trajectory import relative_velocity
 
 if TYPE_CHECKING:
     from hybridsim.engine.record.block_list import SegmentBlockList
@@ -21,11 +22,6 @@ if TYPE_CHECKING:
     from hybridsim.engine.record.trajectory import Trajectory
     from hybridsim.model.parts.component import Component
     from hybridsim.presentation.tables import Table
-
-
-def relative_velocity(contact: str) -> str:
-    """Return the name of the relative velocity of a contact in `Solution.output`."""
-    return f"v_rel({contact})"
 
 
 class ModelTrajectory:
@@ -179,7 +175,12 @@ class ModelTrajectory:
 
     def table(self, times: np.ndarray | None) -> Table:
         """Return states, quantities and modes at given times as columns."""
-        return tabulated(self, times)
+        if times is None:
+            t, x, parts = self.own_times, self.own_states.T, at_steps(self.segments)
+        else:
+            nothing: tuple[np.ndarray, list[Any]] = np.zeros((0, len(self.names))), []
+            t, (x, parts) = times, self.by_segment(times, "+") if len(times) else nothing
+        return tabulated(self.run, self.status, t, x, parts, self.values_in)
 
     # -- events and modes -----------------------------------------------------------------------------------
 

@@ -11,6 +11,11 @@ from hybridsim.presentation.tables import Table
 from hybridsim.solution.event import Event, ModeInterval
 
 
+def relative_velocity(contact: str) -> str:
+    """Return the name of the relative velocity of a contact in `Solution.output`."""
+    return f"v_rel({contact})"
+
+
 class RunTrajectory(Protocol):
     """The trajectory of a run, which `Solution` evaluates after checking the arguments."""
 

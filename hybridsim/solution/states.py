@@ -10,7 +10,7 @@ import numpy as np
 from hybridsim.arguments import as_times, side_of_event
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError, nearest
-from hybridsim.solution.model_trajectory import relative_velocity
+from hybridsim.solution.run_trajectory import relative_velocity
 
 if TYPE_CHECKING:
     from hybridsim.solution.run_trajectory import RunTrajectory

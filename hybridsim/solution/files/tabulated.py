@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from hybridsim.arguments import whole_number
+from hybridsim.engine.record.segments import Segment
 from hybridsim.model.checks.units import time_unit, units_of
 from hybridsim.presentation.tables import Table
+from hybridsim.solution.run import Run
 
-if TYPE_CHECKING:
-    from hybridsim.solution.model_trajectory import ModelTrajectory
-
+Part = tuple[Segment, np.ndarray, np.ndarray]  # segment, indices of its times, local times
 MOST_POINTS = 1 << 27  # rows per column: one gigabyte
 
 
@@ -21,25 +21,33 @@ def equal_steps(t0: float, t1: float, points: int) -> np.ndarray:
     return np.linspace(t0, t1, whole_number(points, "points", 2, MOST_POINTS))
 
 
-def tabulated(trajectory: ModelTrajectory, times: np.ndarray | None) -> Table:
-    """Return the table of a run of a `Model`, at its own steps or at other times; see `Solution.table`."""
-    model = trajectory.model
-    if times is None:
-        t, ends = trajectory.own_times, np.cumsum([len(g.s) for g in trajectory.segments], dtype=int)
-        x = trajectory.own_states.T
-        parts = [
-            (g, np.arange(end - len(g.s), end), g.s) for g, end in zip(trajectory.segments, ends, strict=True)
-        ]
-    else:
-        t = times
-        x, parts = trajectory.by_segment(t, "+") if len(t) else (np.zeros((0, len(trajectory.names))), [])
+def at_steps(segments: Sequence[Segment]) -> list[Part]:
+    """Return the segments with the indices and the local times of their steps, for `tabulated`."""
+    ends = np.cumsum([len(g.s) for g in segments], dtype=int)
+    return [(g, np.arange(end - len(g.s), end), g.s) for g, end in zip(segments, ends, strict=True)]
+
+
+def tabulated(
+    run: Run,
+    status: str,
+    t: np.ndarray,
+    x: np.ndarray,
+    parts: Sequence[Part],
+    values_in: Callable[..., Sequence[np.ndarray]],
+) -> Table:
+    """Return the table of a run of a `Model` at times t (k,) with states x (k, n); see `Solution.table`.
+
+    parts : segments with the indices of their times, and the local times.
+    values_in : a function that returns the values of named quantities at points of a segment.
+    """
+    model, system = run.model, run.system
     names = [d.name for d in model.discrete]
-    names += [q for q in trajectory.system.quantities if " in " not in q]
-    columns = {name: np.empty(len(t)) for name in (*trajectory.names, *names)}
-    declared = trajectory.system.declared
+    names += [q for q in system.quantities if " in " not in q]
+    columns = {name: np.empty(len(t)) for name in (*system.names, *names)}
+    declared = system.declared
     numbers = np.empty((len(declared), len(t)), dtype=np.int64)
     for segment, chosen, s in parts:
-        found = trajectory.values_in(names, segment, s, x[chosen])
+        found = values_in(names, segment, s, x[chosen])
         for name, values in zip(columns, (*x[chosen].T, *found), strict=True):
             columns[name][chosen] = values
         numbers[:, chosen] = segment.z[: len(declared), None]
@@ -51,7 +59,7 @@ def tabulated(trajectory: ModelTrajectory, times: np.ndarray | None) -> Table:
         {
             "model": model.name,
             "title": model.title,
-            "integrator": trajectory.integrator,
-            "status": trajectory.status,
+            "integrator": run.method.name,
+            "status": status,
         },
     )
