@@ -90,18 +90,9 @@ def _together(four: tuple[float, float, float, float]) -> float:
 
 @inlined
 def look_ahead(
-    code: int,
-    rows: Any,
-    flow_registers: Any,
-    order: int,
-    s: float,
-    d: float,
-    guard_registers: Any,
-    series: Any,
-    U: Any,
-    W: Any,
-    ahead: Any,
-) -> None:
+    code: int, rows: Any, flow_registers: Any, order: int, s: float, d: float, guard_registers: Any, series: Any,
+    U: Any, W: Any, ahead: Any,
+) -> None:  # fmt: skip
     """Fill the array `ahead` for a distance from the start of the Taylor series of states and guards.
 
     code: address of a function that does the same; 0 for none. W: the registers of the tape with its
@@ -109,7 +100,17 @@ def look_ahead(
     """
     if code != 0:
         call_series(code, s, d, series, U, W, ahead)
-        return
+    else:
+        tape = (rows, flow_registers, guard_registers)
+        call_noinline(_interpreted_ahead, (tape, order, s, d, series, U, W, ahead))
+
+
+@kernel
+def _interpreted_ahead(
+    tape: Any, order: int, s: float, d: float, series: Any, U: Any, W: Any, ahead: Any
+) -> None:
+    """Fill the array of `look_ahead` with the interpreter of tapes."""
+    rows, flow_registers, guard_registers = tape
     n, count = series.shape[0], guard_registers.shape[0]
     tabulate(d, order, ahead)
     x, rates, values, sums = parts_of(ahead, order, n, count)

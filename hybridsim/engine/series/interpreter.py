@@ -362,7 +362,12 @@ def measure(code: int, U: Any, monitored: Any, order: int, h: float, powers: Any
     """
     if code != 0:
         call_series(code, h, 0.0, U, U, U, powers)
-        return
+    else:
+        call_noinline(_interpreted_sizes, (U, monitored, order, h, powers, totals))
+
+
+@kernel
+def _interpreted_sizes(U: Any, monitored: Any, order: int, h: float, powers: Any, totals: Any) -> None:
     tabulate(h, order, powers)
     for j in range(monitored.shape[0]):
         totals[j] = sum_sizes(U, monitored[j], order, powers)
@@ -412,19 +417,9 @@ def shorter_reach(U: Any, r: int, order: int, rtol: float, h: float, is_before: 
 
 @kernel
 def reach(
-    code: int,
-    V: Any,
-    states: Any,
-    U: Any,
-    monitored: Any,
-    order: int,
-    rtol: float,
-    atol: Any,
-    slack: float,
-    longest: float,
-    powers: Any,
-    totals: Any,
-) -> float:
+    code: int, V: Any, states: Any, U: Any, monitored: Any, order: int, rtol: float, atol: Any, slack: float,
+    longest: float, powers: Any, totals: Any,
+) -> float:  # fmt: skip
     """Return the step, at most `longest`, over which the Taylor series meet the tolerance.
 
     On return powers (order + 1,) are h**k and totals are those of `sum_sizes` for the functions; code: see

@@ -10,7 +10,7 @@ from hybridsim.engine.events.compiled.at_end import is_clear, may_vanish
 from hybridsim.engine.events.compiled.known_time import SEGMENTS, STEPS
 from hybridsim.engine.events.compiled.scratch import called_by
 from hybridsim.engine.native.constants import IN_A_ROW, STANDSTILL
-from hybridsim.engine.native.kernels import call, call_noinline, call_series, inlined
+from hybridsim.engine.native.kernels import call, call_noinline, call_series, inlined, kernel
 from hybridsim.engine.native.loop_hints import fill, put
 from hybridsim.engine.native.time_grid import on_the_grid
 from hybridsim.engine.roots.defect_check import (
@@ -46,20 +46,9 @@ _TRIALS = 30
 
 @inlined
 def series_at(
-    code: int,
-    is_known: bool,
-    rows: Any,
-    high: Any,
-    flow_registers: Any,
-    order: int,
-    s: float,
-    x: Any,
-    guard_registers: Any,
-    fading: Any,
-    V: Any,
-    U: Any,
-    out: Any,
-) -> None:
+    code: int, is_known: bool, rows: Any, high: Any, flow_registers: Any, order: int, s: float, x: Any,
+    guard_registers: Any, fading: Any, V: Any, U: Any, out: Any,
+) -> None:  # fmt: skip
     """Write the Taylor coefficients of states, guards and vanishing functions at (s, x).
 
     code: address of a compiled function that does the same; 0 for none. is_known: `values_at` was called last at this
@@ -67,8 +56,18 @@ def series_at(
     """
     if code != 0:
         call_series(code, s, 1.0 if is_known else 0.0, x, U, V, out)
-        return
-    call_noinline(expand, (rows, high, flow_registers, order, s, x, V))
+    else:
+        tape = (rows, high, flow_registers)
+        call_noinline(_interpreted_series, (tape, order, s, x, guard_registers, fading, V, U, out))
+
+
+@kernel
+def _interpreted_series(
+    tape: Any, order: int, s: float, x: Any, guard_registers: Any, fading: Any, V: Any, U: Any, out: Any
+) -> None:
+    """Write the Taylor coefficients of `series_at` with the interpreter of tapes."""
+    rows, high, flow_registers = tape
+    expand(rows, high, flow_registers, order, s, x, V)
     states = flow_registers[1]
     for i in range(states.shape[0]):
         for k in range(order + 1):
