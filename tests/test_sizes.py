@@ -37,7 +37,7 @@ FILES = {
     "engine/run/mode_loop.py": 630,
     "engine/run/segment_run.py": 496,
     "engine/series/bounded.py": 401,
-    "engine/series/interpreter.py": 485,
+    "engine/series/interpreter.py": 480,
     "engine/series/tape.py": 306,
     "engine/system/system.py": 500,
     "integrators/fixed_step/moreau_kernels.py": 413,
