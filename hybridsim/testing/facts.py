@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +14,8 @@ Events = tuple[tuple[float, str], ...]
 States = tuple[tuple[float, tuple[float | None, ...]], ...]
 
 
-def recomputed(name: str, rename: Mapping[str, str] | None = None) -> tuple[Events, States]:
-    """Return the events and states of a case in truths.json as a `Truth`; components can be renamed."""
-    truth, other = TRUTHS[name], rename or {}
-    events = tuple((float(t), f"{other.get(c, c)}:{mode}") for t, c, mode in truth["events"])
+def recomputed(name: str) -> tuple[Events, States]:
+    """Return the events and states of a case in truths.json, for a `Truth`."""
+    truth = TRUTHS[name]
+    events = tuple((float(t), f"{component}:{mode}") for t, component, mode in truth["events"])
     return events, tuple((float(row[0]), tuple(row[1:])) for row in truth["states"])

@@ -44,9 +44,7 @@ class Orbit:
     attracts: bool = True
 
 
-def shoot(
-    motion: Motion, start: Orbit, scale: np.ndarray, section: int | None, tol: float, steps: int = _STEPS
-) -> Orbit:
+def shoot(motion: Motion, start: Orbit, scale: np.ndarray, section: int | None, tol: float) -> Orbit:
     """Find a periodic orbit near a given start by Newton's method.
 
     Parameters
@@ -56,7 +54,7 @@ def shoot(
     """
     best = replace(start, residual=np.inf, converged=False)
     orbit = start
-    for count in range(steps + 1):
+    for count in range(_STEPS + 1):
         try:
             solution = motion.run(orbit.start, orbit.period)
             end = point_at_end(solution)

@@ -83,10 +83,10 @@ def _free(r: float, zeta: float) -> tuple[tuple[float, float], float]:
     return (float(a), float(b)), float(b * kappa - a * zeta)
 
 
-def largest_friction(r: float, zeta: float, tol: float = 1e-12) -> float:
+def largest_friction(r: float, zeta: float) -> float:
     """Return the friction ratio f = mu N/F0 up to which the motion does not stop, by bisection."""
     low, high = 0.0, 1.0
-    while high - low > tol:
+    while high - low > 1e-12:
         middle = 0.5 * (low + high)
         if no_stops(r, zeta, middle).holds:
             low = middle
