@@ -77,6 +77,7 @@ def _states_at(states: Any, participants: Any, first: int, component: int, side:
 
 
 SCHEDULED = "scheduled"  # kind of the event of a schedule
+_NO_KINDS = np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64)  # of known times, as arrays
 _take_part, _times_of_one = Precompiled(_taking_part), Precompiled(_times_at)
 
 
@@ -106,7 +107,9 @@ class EventBlock(Sequence[Occurrence]):
         self._before, self._after, self._states = before, after, states
         self._first = 0
         participants = np.empty((2, len(fired)), dtype=np.int64)
-        kinds = np.cumsum([0, *map(len, due)]), np.array([k for one in due for k in one], dtype=np.int64)
+        kinds = _NO_KINDS
+        if due:
+            kinds = np.cumsum([0, *map(len, due)]), np.array([k for one in due for k in one], dtype=np.int64)
         arrays = fired, before, after, system.owner, system.has_surface, *kinds
         self._count, schedules, self._is_plain = _take_part(*arrays, participants)
         if self._count != len(fired):
@@ -189,8 +192,11 @@ class EventBlock(Sequence[Occurrence]):
     def __getitem__(self, i: Any, /) -> Any:
         if isinstance(i, slice):
             return list(self._made(i))
-        place = range(len(self))[i]
-        return next(self._made(slice(place, place + 1)))
+        e, c = self._participants[:, range(len(self))[i]].tolist()
+        modes = (0, 0)  # of no meaning for a schedule
+        if c < self._before.shape[1]:
+            modes = int(self._before[e, c]), int(self._after[e, c])
+        return self._occurrence(c, int(self._fired[e]), *modes, self._instants[e].tolist(), *self._states[e])
 
     def __iter__(self) -> Iterator[Occurrence]:
         return self._made(slice(None))
