@@ -26,6 +26,9 @@ from hybridsim.errors import UsageError
 
 _NEIGHBOURHOOD = 0.125  # fraction of a step by which an event time may be corrected
 _CORRECTIONS = 5  # Newton iterations for an event time, starting at the accuracy of the dense output
+# Fraction of a step to retry if the step contradicts the flow at its start. A first tenth is a step of its own, and
+# finds the same events there.
+_SHORTER = 0.1
 _DIRECTIONS = {"up": 1, "down": -1, "both": 0}
 
 
@@ -53,11 +56,6 @@ class Arrival:
     def is_bare(self) -> bool:
         """Return whether the segment ends without an event."""
         return not (self.fired or self.stopping or self.entered)
-
-
-# Fraction of a step to retry if the step contradicts the flow at its start. A first tenth is a step of its own, and
-# finds the same events there.
-_SHORTER = 0.1
 
 
 class Still:
@@ -100,17 +98,14 @@ class SegmentRun:
         self.monitors = system.model.monitors
         self.knots, self.states = [0.0], [x]
         self.interpolants: list[Dense] = []
-        self.scale = np.abs(
-            x
-        )  # largest magnitude of each state on the segment, to which rounding is relative
+        # largest magnitude of each state on the segment, to which rounding is relative
+        self.scale = np.abs(x)
         self.passed_monitors: list[PassedMonitor] = []
         self.grazings: list[tuple[int, float, float]] = []  # guard, local time, distance
         self.undefined: set[int] = set()  # monitors that were not a number somewhere
-        self.last_step: float | None = None
-        self.short, self.since = (
-            0,
-            0.0,
-        )  # consecutive steps that are too short, and the local time at which they began
+        self.last_step: float | None = None  # the last length that was not limited by the end of the segment
+        # consecutive steps that are too short, and the local time at which they began
+        self.short, self.since = 0, 0.0
         self.entries = () if forward else entries(system, z)
 
     def run(self, bound: float, first_step: float | None) -> Arrival:
@@ -133,7 +128,7 @@ class SegmentRun:
                 raise StepFailure(
                     f"the state is not finite at the end of a step of length {step.s1 - step.s0:.3g}"
                 )
-            self.last_step = abs(step.s1 - step.s0)
+            self._note_length(step, bound, first_step)
             self._refuse_standstill(step)
             whole, known = step.s1, self.scale
             self.scale = np.maximum(known, np.abs(step.x1))
@@ -143,9 +138,8 @@ class SegmentRun:
                 arrival = self._take_roots(step)
             if self.entries:
                 step, arrival = self._look_for_entries(step, arrival)
-            if (
-                step.s1 != whole
-            ):  # only a part is used; the states at the end of the whole step may be far larger
+            # only a part is used; the states at the end of the whole step may be far larger
+            if step.s1 != whole:
                 parts = np.array([step.s0, 0.5 * (step.s0 + step.s1), step.s1])
                 self.scale = np.maximum(known, np.abs(step.dense(parts)).max(axis=0))
             self.knots.append(step.s1)
@@ -157,6 +151,11 @@ class SegmentRun:
                 return arrival
             if step.s1 == bound:
                 return Arrival(step.s1, self._projected(step))
+
+    def _note_length(self, step: Step, bound: float, first_step: float | None) -> None:
+        """Store the length of a step; a step to the bound, which may be shorter, only if it is longer than others."""
+        length, known = abs(step.s1 - step.s0), first_step if self.last_step is None else self.last_step
+        self.last_step = length if step.s1 != bound else known and max(known, length)
 
     def cut(self) -> Arrival:
         """Return the end of the last complete step as the end of an unfinished segment."""
