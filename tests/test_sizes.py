@@ -35,7 +35,7 @@ FILES = {
     "engine/native/kernels.py": 510,
     "engine/roots/roots.py": 355,
     "engine/run/mode_loop.py": 630,
-    "engine/run/segment_run.py": 496,
+    "engine/run/segment_run.py": 495,
     "engine/series/bounded.py": 401,
     "engine/series/interpreter.py": 480,
     "engine/series/tape.py": 306,
