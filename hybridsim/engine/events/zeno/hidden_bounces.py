@@ -67,12 +67,12 @@ def bounces_of(outcome: Outcome, now: Instant, x_minus: np.ndarray) -> dict[int,
 
 
 def last_bounces(system: System, happened: Sequence[Occurrence]) -> dict[int, Bounce]:
-    """Return the last recorded event of a run as bounces."""
-    if not happened:
-        return {}
-    last = happened[-1]
-    c = next(c for c, automaton in enumerate(system.automata) if automaton.name == last.component)
-    return {c: _recorded(system.automata[c], last)}
+    """Return the last recorded event of a run as bounces; none if a schedule or a clock was due last."""
+    last = next((o for o in reversed(happened) if o.kind != "monitor"), None)
+    components = [
+        c for c, automaton in enumerate(system.automata) if last and automaton.name == last.component
+    ]
+    return {c: _recorded(system.automata[c], last) for c in components if last}
 
 
 def _recorded(automaton: Automaton, o: Occurrence) -> Bounce:
