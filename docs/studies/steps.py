@@ -4,7 +4,7 @@
 
 Each sequence mixes start, advance, set, save, restore, copy and pickle, on a pulled block, a linear oscillator and a
 pendulum, each with dry friction and a held force. The straight run is that of the same model with a discrete force
-that schedules set.
+that schedules set, and its compiled calls end at these times: tables of `exact` are made for the longest call.
 """
 
 from __future__ import annotations

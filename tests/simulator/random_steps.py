@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import dataclass
+from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 
 import hybridsim as hs
+from hybridsim.engine.run import mode_loop
 
 KNOTS = 10
 END = 2.0
@@ -50,7 +53,11 @@ def models(kind: str) -> tuple[hs.Model, hs.Model]:
 
 @dataclass
 class Outcome:
-    """How a sequence compares: whether all bits are equal, and the largest difference of a state."""
+    """How a sequence compares with a straight run.
+
+    is_equal: whether all bits are those of the run whose compiled calls end at the knots. difference: of a state from
+    the run whose calls pass them.
+    """
 
     is_equal: bool
     difference: float
@@ -98,13 +105,17 @@ def compare(kind: str, integrator: str, seed: int) -> Outcome:
     knots = {f"t{k}": t for k, (t, _) in enumerate(path)} | {
         f"F{k}": value for k, (_, value) in enumerate(path)
     }
-    straight = hs.simulate(scheduled, (0, sim.t), params=numbers | knots, integrator=integrator)
-    assert straight.status == "finished"
-    found, wanted = np.array(list(sim.state.values())), straight.y[:, -1]
+    settings: dict[str, Any] = {"params": numbers | knots, "integrator": integrator}
+    whole = hs.simulate(scheduled, (0, sim.t), **settings)
+    # tables of `exact` are made for the longest call of a run, so a call that passes knots has other last digits
+    with patch.object(mode_loop, "has_known_times", lambda system: False):
+        straight = hs.simulate(scheduled, (0, sim.t), **settings)
+    assert straight.status == whole.status == "finished"
+    found = np.array(list(sim.state.values()))
     return Outcome(
-        found.tobytes() == wanted.tobytes(),
-        float(np.abs(found - wanted).max()),
-        sim.modes == {"f": straight.modes["f"][-1].mode},
+        found.tobytes() == straight.y[:, -1].tobytes(),
+        float(np.abs(found - whole.y[:, -1]).max()),
+        sim.modes == {"f": straight.modes["f"][-1].mode} == {"f": whole.modes["f"][-1].mode},
         calls,
     )
 
