@@ -247,13 +247,14 @@ def _last(blocks: Sequence[Any], count: int) -> list[Occurrence]:
 
 
 def _sampled(block: Any) -> list[Sample]:
-    """Return complete steps, not shortened by events, from segments spread evenly over a block."""
+    """Return steps from segments spread evenly over a block: no last ones, and first ones of short segments only."""
     chosen = _evenly(len(block), _LOOKS)
     share = -(-_LOOKS // len(chosen))
     found: list[Sample] = []
     for i in chosen:
         knots, states, p, z = block.steps_of(i)
-        for k in _evenly(len(knots) - 2, share):  # all steps except the last
+        among = _evenly(len(knots) - 2, share + 2)  # an event shortens the last step, and a restart the first
+        for k in among[1:-1] if len(among) == share + 2 else among[:share]:
             s, end = float(knots[k]), float(knots[k + 1])
             found.append((i, s, end - s, np.ascontiguousarray(states[k]), p, z))
     return found[:_LOOKS]
