@@ -47,15 +47,7 @@ def animate(
 ) -> Path:
     """Write the moving mechanism of a run, next to its curves and modes, to a file.
 
-    Parameters
-    ----------
-    path : ends in .gif, .html (a page with a player) or .mp4 (needs the program ffmpeg).
-    quantities : names of the drawn states and outputs; by default the first two states, and [] for none.
-    t_span : part of the run; by default all, or the last few of very many periods.
-    speed : time of the model per second of the animation; by default a round number for about 8 s.
-    fps : frames per second, at most 50; there are at most 1000 frames.
-    dark : whether the background is dark.
-    progress : a function that is called with the finished part, from 0 to 1.
+    The arguments are those of `Solution.animate`.
     """
     refuse_arrays(solution)
     path = Path(path_text(path))

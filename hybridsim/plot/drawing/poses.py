@@ -70,7 +70,7 @@ def poses_at(solution: Solution, times: NDArray[np.float64]) -> list[Poses]:
     found = []
     for k in range(len(times)):
         values = {name: float(value if name in constants else value[k]) for name, value in series.items()}
-        found.append({shape.name: _pose(shape, lambda expr: at(expr, values)) for shape in shapes})  # noqa: B023
+        found.append({shape.name: _pose(shape, lambda expr: at(expr, values)) for shape in shapes})  # noqa: B023  # it is called within the same pass
     return found
 
 
