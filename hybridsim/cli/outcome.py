@@ -102,7 +102,7 @@ def check_arguments(args: argparse.Namespace) -> None:
 def check_drawing(model: Model, args: argparse.Namespace) -> None:
     """Reject an animation that cannot be made before the run starts."""
     if args.animate:
-        from hybridsim.plot.animation import check_animation
+        from hybridsim.plot.drawing.animation import check_animation
 
         check_animation(model, args.animate)
 

@@ -1,11 +1,11 @@
 """This package draws solutions and results; functions return their axes and change no global settings."""
 
 from hybridsim.plot.advice import advice
-from hybridsim.plot.animation import animate
 from hybridsim.plot.branch import branch
+from hybridsim.plot.drawing.animation import animate
+from hybridsim.plot.drawing.mechanism import mechanism
 from hybridsim.plot.friction_law import friction_law
 from hybridsim.plot.friction_loop import friction_loop
-from hybridsim.plot.mechanism import mechanism
 from hybridsim.plot.phase_portrait import phase_portrait
 from hybridsim.plot.regularisation import regularisation
 from hybridsim.plot.style import save

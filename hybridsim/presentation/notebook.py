@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from html import escape
-from typing import Any, Protocol
+from typing import Any
 
 from hybridsim.model.parts.component import Component
 from hybridsim.presentation.colours import INK, mode_colours
+from hybridsim.presentation.mode_strip import Interval
 
 # Limits of the size of the HTML: rectangles in all strips, strips, first and last rows of the table, warnings.
 _RECTANGLES, _MAX_BARS, _FIRST, _LAST, _WARNINGS = 1000, 20, 20, 5, 10
@@ -16,17 +17,6 @@ _NARROWEST = 1.5  # width of a rectangle, so that a short mode is visible
 _OVERLAP = 0.3  # added width of a rectangle, so that no gap is visible between neighbours
 _GOOD, _BAD = "#009E73", "#D55E00"  # readable on black and on white
 _CELL = "padding:0 .8em 0 0;text-align:left;border:none"
-
-
-class Interval(Protocol):
-    """A time interval that a component spends in one mode."""
-
-    @property
-    def mode(self) -> str: ...
-    @property
-    def t0(self) -> float: ...
-    @property
-    def t1(self) -> float: ...
 
 
 def run_html(

@@ -19,7 +19,8 @@ from matplotlib.patches import PathPatch
 from PIL import Image
 
 import hybridsim as hs
-from hybridsim.plot import animate, animation, mechanism
+from hybridsim.plot import animate, mechanism
+from hybridsim.plot.drawing import animation
 from hybridsim.plot.drawing.canvas import Canvas
 from hybridsim.plot.drawing.clip import Clip
 from hybridsim.plot.drawing.layout import ends_of

@@ -1,1 +1,1 @@
-"""This package turns the drawing of a model into outlines and lines at given times."""
+"""This package draws the mechanism of a model: `mechanism` at one time, and `animate` over a run."""

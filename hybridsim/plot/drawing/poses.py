@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,7 +71,7 @@ def poses_at(solution: Solution, times: NDArray[np.float64]) -> list[Poses]:
     found = []
     for k in range(len(times)):
         values = {name: float(value if name in constants else value[k]) for name, value in series.items()}
-        found.append({shape.name: _pose(shape, lambda expr: at(expr, values)) for shape in shapes})  # noqa: B023  # it is called within the same pass
+        found.append({shape.name: _pose(shape, partial(at, values=values)) for shape in shapes})
     return found
 
 
