@@ -167,7 +167,7 @@ def land(
     d: float,
     h: float,
     state: Any,
-    is_holding: bool,
+    is_projected: bool,
     scale: Any,
     scratch: Any,
     work: Any,
@@ -176,7 +176,8 @@ def land(
 
     place: index of the function. The step starts from work.y; its end is in work.x_after, the series there
     are in scratch.right and scratch.guards_right. code: see `series_of`. Newton's method corrects the time until it
-    is accurate to rounding; a correction within the range of the series at the end needs no new step.
+    is accurate to rounding; a correction within the range of the series at the end needs no new step. As in other
+    steps, is_projected tells whether to project the end. Held states that flow and guards do not read keep their values.
     """
     W, right, y, y1, last = scratch.W, scratch.right, work.y, work.x_after, scratch.right.shape[1] - 1
     p, z = state.p, state.z
@@ -193,7 +194,7 @@ def land(
     for _ in range(_CORRECTIONS):
         if not error <= 1.0:
             return REJECTED, d
-        if is_holding:
+        if is_projected:
             call(functions.project, s + d, y1, p, z, work.slopes)
             put(work.slopes, y1)
         if not series_of(
@@ -351,7 +352,7 @@ def runge_kutta_segment(
                 place += 1
             code, at = land(
                 functions, tableau, tolerances, tapes, k, guard_rows, inputs, ends_code, guard_registers, place,
-                s, at, d, state, is_holding, scale, own, work,
+                s, at, d, state, is_projected, scale, own, work,
             )  # fmt: skip
             if code == LOST:
                 return not_followed(STOPPED)

@@ -222,3 +222,23 @@ def test_a_segment_of_more_steps_than_there_is_room_for(
         len(cramped._of_model.record.segments.blocks)
         >= whole.stats["steps"] // compiled_loop.MIN_STEPS_IN_PART
     )
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_landings_on_events_are_accepted_while_contacts_between_moving_bodies_hold(method: str) -> None:
+    """The velocity of a body that sticks to a moving one is no state of its own; its stored value is not compared."""
+    drifts = ("v1", "(v2 - v1)", "(v3 - v2)")
+    force = [f"40*({drift.replace('v', 'x')}) + f{i}" for i, drift in enumerate(drifts, 1)] + ["0"]
+    rates = [f"{force[i + 1]} - ({force[i]}) + 8*sin(2*t)" for i in range(3)]
+    tower = hs.Model(
+        "tower",
+        states=[hs.State(f"x{i}", 0, f"v{i}") for i in (1, 2, 3)]
+        + [hs.State(f"v{i}", 0, rate) for i, rate in enumerate(rates, 1)],
+        contacts=[
+            hs.Contact(f"f{i}", drift, "1", "coulomb", {"mu": mu})
+            for i, (drift, mu) in enumerate(zip(drifts, (3.0, 9.0, 6.0), strict=True), 1)
+        ],
+    )
+    sol = hs.simulate(tower, (0, 20), integrator=method, rtol=1e-6)
+    assert sol.status == "finished" and len(sol.events) > 20
+    assert sol.stats["rejected"] < sol.stats["steps"]
