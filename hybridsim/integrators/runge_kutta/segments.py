@@ -174,10 +174,9 @@ def land(
 ) -> tuple[int, float]:
     """Repeat a step up to the zero of a guard that was located on the dense output.
 
-    place: index of the function. The step starts from work.y; its end is in work.x_after, the series there
-    are in scratch.right and scratch.guards_right. code: see `series_of`. Newton's method corrects the time until it
-    is accurate to rounding; a correction within the range of the series at the end needs no new step. is_projected
-    tells, as in other steps, whether to project the end: held states that nothing reads keep their values.
+    place: index of the function. The step starts from work.y; its end is in work.x_after, the series there in
+    scratch.right and scratch.guards_right. code: see `series_of`. Newton's method corrects the time to the accuracy of
+    rounding; it repeats the step only beyond the range of the series. is_projected: whether to project the end.
     """
     W, right, y, y1, last = scratch.W, scratch.right, work.y, work.x_after, scratch.right.shape[1] - 1
     p, z = state.p, state.z
