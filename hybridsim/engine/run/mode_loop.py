@@ -327,7 +327,7 @@ class ModeLoop:
             return True, True
         x, error = self.outcome.x, self.outcome.x_error
         if not appointment.is_renewal:
-            self.timetable.mark_done(target)
+            self.timetable.mark_done(appointment)
             steps = self.record.counters.steps - steps
             errors = errors_when_due(self.system, target, self.outcome, steps, self.method.rounding, x_before)
             error = np.maximum(error, errors)
@@ -427,7 +427,7 @@ class ModeLoop:
             x_minus, error = outcome.x, outcome.x_error
         if appointment:
             if not appointment.is_renewal:
-                self.timetable.mark_done(instant)
+                self.timetable.mark_done(appointment)
             # located events come first, because they belong to the signals before the instant
             outcome = self._resolve_appointment(instant, self.outcome, x_minus, schedules, error, s_error)
             outcome = self._apply_crossed(outcome, 0.0, monitors)

@@ -18,11 +18,13 @@ class Appointment:
     """A scheduled time that a step must reach exactly, and the schedules that are due then.
 
     A schedule that lists this time several times occurs as often. At a renewal only the local time is restarted.
+    first: the nearest of the times that are merged here, if it is another one than the instant.
     """
 
     instant: Instant
     schedules: tuple[int, ...]
     is_renewal: bool = False
+    first: Instant | None = None
 
 
 class Timetable:
@@ -45,9 +47,9 @@ class Timetable:
             count = 1 if schedule.start is not None and schedule.period is None else schedule.count
             self._schedules.append((times, start, period, count))
 
-    def mark_done(self, instant: Instant) -> None:
+    def mark_done(self, done: Instant | Appointment) -> None:
         """Mark an instant as done, so that times within rounding of it are not due again."""
-        self.settled = instant
+        self.settled = done if isinstance(done, Instant) else done.first or done.instant
 
     def due_at_start(self, start: Instant) -> tuple[int, ...]:
         """Return the schedules that are due at the start of the run, such as a clock with zero offset."""
@@ -86,7 +88,9 @@ class Timetable:
         elif (self._end.minus(nearest) < 0.0) == forward:
             return self.step_end
         due = sorted(k for k in together if k >= 0)
-        return Appointment(latest, tuple(k for k in due for _ in range(self._count(k, nearest))))
+        return Appointment(
+            latest, tuple(k for k in due for _ in range(self._count(k, nearest))), first=nearest
+        )
 
     def ahead(self, k: int, after: Instant, most: int) -> np.ndarray:
         """Return the next times (m, 2) of a schedule after an instant, at most so many, with repetitions."""
@@ -108,12 +112,14 @@ class Timetable:
         return np.asarray(2.0 * np.spacing(np.maximum(np.abs(near), largest)))
 
     def _count(self, k: int, instant: Instant) -> int:
-        """Return how many times of a due schedule are equal to an instant within rounding; 1 for a clock."""
+        """Return how many open times of a due schedule are equal to an instant within rounding; 1 for a clock."""
         times, slack = self._schedules[k][0], self._slack(instant)
         if not times:
             return 1
         first, last = bisect_left(times, instant.plus(-slack)), bisect_right(times, instant.plus(slack))
-        return sum(abs(time.minus(instant)) <= slack for time in times[first:last])
+        return sum(
+            abs(time.minus(instant)) <= slack and not self._is_settled(time) for time in times[first:last]
+        )
 
     def _slack(self, near: Instant) -> float:
         """Return the rounding error of scheduled times near an instant."""

@@ -210,7 +210,7 @@ class FixedStepRun:
         if why == BOUND:
             self.origin = instant
             schedules = appointment.schedules if appointment else ()
-            self.timetable.mark_done(instant)
+            self.timetable.mark_done(appointment or instant)
             self.turned = bool(system.signals)
             is_zero = bool(self.declared) and bool(
                 (self._guards(s, x, p)[self._declared_guards()] == 0.0).any()

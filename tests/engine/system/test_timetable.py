@@ -152,6 +152,49 @@ def test_neighbours_that_are_not_rounding_stay_apart() -> None:
     assert [k for _, k in walk(table, Instant(0.0))] == [(0,), (1,)]
 
 
+@given(
+    st.lists(st.lists(st.integers(0, 12), min_size=1, max_size=6), min_size=1, max_size=3),
+    st.lists(st.integers(0, 12), max_size=4, unique=True),
+    st.sampled_from([1.0, 1e6]),
+)
+def test_each_time_of_a_close_row_occurs_once(
+    schedules: list[list[int]], knots: list[int], start: float
+) -> None:
+    """Times that lie a few units in the last place apart are merged in some way, but none is lost or doubled."""
+    ulp = math.ulp(start)
+    listed = [Schedule(f"s{k}", times=[start + n * ulp for n in row]) for k, row in enumerate(schedules)]
+    times = [start - 1.0, *(start + n * ulp for n in sorted(knots)), start + 1.0]
+    knotted = Input("u", "table", times=times, values=list(range(len(times))))
+    table = timetable(*listed, inputs=(knotted,))
+    instant, counts = Instant(start - 0.5), [0] * len(schedules)
+    while (appointment := table.next(instant, True)) is not None:
+        instant = appointment.instant
+        table.mark_done(appointment)
+        for k in appointment.schedules:
+            counts[k] += 1
+    assert counts == [len(row) for row in schedules]
+
+
+@pytest.mark.parametrize("integrator", ["exact", "dop853", "rodas5p", "rk4-dichotomy"])
+@pytest.mark.parametrize("start", [0.0, 1e6])
+@pytest.mark.parametrize("others", [(), (1, 3)])
+def test_a_run_counts_times_that_are_two_roundings_apart(
+    others: tuple[int, ...], start: float, integrator: str
+) -> None:
+    ulp = math.ulp(start + 1.0)
+    first = Schedule("s", times=[start + 1.0 + n * ulp for n in (0, 2, 4)], reset={"n": "+= 1"})
+    second = [Schedule("o", times=[start + 1.0 + n * ulp for n in others], reset={"m": "+= 1"})]
+    model = Model(
+        "row",
+        states=(State("x", 0, "1"),),
+        discrete=(Discrete("n", 0), Discrete("m", 0)),
+        schedules=(first, *(second if others else ())),
+    )
+    options = {"step": 0.25} if integrator == "rk4-dichotomy" else {}
+    sol = hs.simulate(model, (start, start + 2.0), integrator=integrator, **options)
+    assert sol.output("n", start + 2.0) == 3 and sol.output("m", start + 2.0) == len(others)
+
+
 def test_the_knot_of_an_input_joins_a_tick() -> None:
     square = Input("u", "wave", shape="square", period=0.3)
     table = timetable(Schedule("a", period=0.1), inputs=(square,))
