@@ -49,6 +49,7 @@ from hybridsim.engine.run.kernel_run import (
     skipped_rows,
 )
 from hybridsim.engine.run.method_kernels import NOT_LINEAR, MethodKernels
+from hybridsim.engine.run.notices import STEPS_PER_LOOK
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.known_times import TimesAhead
@@ -266,9 +267,9 @@ class CompiledLoop:
     def forget_segments(self, run: KernelRun) -> bool:
         """Release the memory of all segments except the last end; return False if the memory is needed.
 
-        `advance` must not be called afterwards.
+        Fewer steps than one look at stiffness takes are never examined.
         """
-        if self.kernels.is_looked_at:
+        if self.kernels.is_looked_at and run.steps >= STEPS_PER_LOOK:
             return False
         run.forget_segments()
         self.memory = None
@@ -292,7 +293,7 @@ class CompiledLoop:
     def _commit(self, run: KernelRun, record: Trajectory) -> None:
         """Append the segments and events of one call to the trajectory."""
         self.used = (run.first_step + run.steps, run.first + run.count + 1)
-        if record.segments.is_end_alone and not self.kernels.is_looked_at:
+        if run.memory is None or (record.segments.is_end_alone and not self.kernels.is_looked_at):
             record.segments.set_end(run.last_end)
         else:
             record.segments.add(self.segments_of(run))
