@@ -50,21 +50,21 @@ class ArrayLayout:
     def __init__(self, kinds: Sequence[Any], fields: Sequence[tuple[Any, tuple[int, ...], int]]) -> None:
         self._kinds = [(kind, len(kind._fields)) for kind in kinds]
         self._kind: Any = namedtuple("Rows", [name for kind in kinds for name in kind._fields])  # type: ignore[misc]  # names known at run time
-        self._specs: list[tuple[tuple[int, ...], np.dtype[Any], int, int]] = []
+        self._specs: dict[str, tuple[tuple[int, ...], np.dtype[Any], int, int]] = {}
         self._sizes = [0] * (1 + max(block for *_, block in fields))
         # the table without the addresses of the blocks
         self._entries = np.zeros((len(fields), SLOTS_PER_ARRAY), dtype=np.int64)
         self._steps = np.zeros_like(self._entries)  # change of the table per skipped row
         self._owners = np.array([block for *_, block in fields], dtype=np.int64)
-        for k, (name, shape, block) in enumerate(fields):
-            dtype, offset = np.dtype(name), self._sizes[block]
+        for k, (name, (kind, shape, block)) in enumerate(zip(self._kind._fields, fields, strict=True)):
+            dtype, offset = np.dtype(kind), self._sizes[block]
             row = dtype.itemsize * math.prod(shape[1:])
-            self._specs.append((shape, dtype, block, offset))
+            self._specs[name] = shape, dtype, block, offset
             self._entries[k, : 1 + len(shape)] = offset, *shape
             self._steps[k, :2] = row, -1
             self._sizes[block] += -(-row * shape[0] // ALIGNED) * ALIGNED
         self._pools = [BufferPool(size) if _LARGE <= size <= LARGEST else None for size in self._sizes]
-        form = [(dtype.char, len(shape)) for shape, dtype, *_ in self._specs]
+        form = [(dtype.char, len(shape)) for shape, dtype, *_ in self._specs.values()]
         self._types: list[
             tuple[Any, int]
         ] = []  # the type of each pack, and the bytes of its part of the table
@@ -112,19 +112,14 @@ class ArrayLayout:
         return self._kind(
             *[
                 None if blocks[k] is None else np.ndarray(shape, dtype, blocks[k], offset)
-                for shape, dtype, k, offset in self._specs
+                for shape, dtype, k, offset in self._specs.values()
             ]
         )
 
-    def item(self, blocks: tuple[np.ndarray, ...], name: str, i: int) -> Any:
-        """Return number `i` of a vector with the given name."""
-        _, dtype, k, offset = self._specs[self._kind._fields.index(name)]
-        return np.ndarray((), dtype, blocks[k], offset + i * dtype.itemsize).item()
-
-    def row(self, blocks: tuple[np.ndarray, ...], name: str, i: int) -> np.ndarray:
-        """Return a copy of row `i` of the array with the given name."""
-        shape, dtype, k, offset = self._specs[self._kind._fields.index(name)]
-        return np.ndarray(shape, dtype, blocks[k], offset)[i].copy()
+    def array(self, blocks: tuple[np.ndarray | None, ...], name: str) -> np.ndarray:
+        """Return the array with the given name, whose block must not be missing."""
+        shape, dtype, k, offset = self._specs[name]
+        return np.ndarray(shape, dtype, blocks[k], offset)
 
 
 class BufferPool:

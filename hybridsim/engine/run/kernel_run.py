@@ -118,15 +118,15 @@ class KernelRun:
     def __post_init__(self) -> None:
         assert self.memory is not None
         self._event_memory, last = self.memory[1], self.first + self.count - 1
-        self.events = 0  # number of segments that an event ended: all, or all except the last
-        if self.count:
-            self.events = self.count - (self.array_layout.item(self.memory, "fires", last) == NO_GUARD)
+        self._fires = self._array("fires")
+        self.events = self.count  # number of segments that an event ended: all, or all except the last
+        if self.count and self._fires[last] == NO_GUARD:
+            self.events -= 1
         self._event_block: EventBlock | None = None
 
-    @cached_property
-    def _happened(self) -> Any:
-        """Return the arrays of the record that are kept with the events."""
-        return self.array_layout.rows((None, self._event_memory))
+    def _array(self, name: str) -> np.ndarray:
+        """Return an array of the record that is kept with the events."""
+        return self.array_layout.array((None, self._event_memory), name)
 
     @cached_property
     def rows(self) -> Any:
@@ -147,7 +147,7 @@ class KernelRun:
     @property
     def instants(self) -> np.ndarray:
         """Return the instants (E, 2) at which guards fired."""
-        found: np.ndarray = self._happened.clocks[self.first + 1 : self.first + 1 + self.events]
+        found = self._array("clocks")[self.first + 1 : self.first + 1 + self.events]
         return found[self._have_fired] if self.passed else found
 
     @property
@@ -158,7 +158,7 @@ class KernelRun:
     @property
     def adopted(self) -> Instant | None:
         """Return the last instant at which a guard fired or a known time was passed."""
-        return Instant(*self._happened.clocks[self.first + self.events].tolist()) if self.events else None
+        return Instant(*self._array("clocks")[self.first + self.events].tolist()) if self.events else None
 
     @property
     def known_passed(self) -> KnownTimesPassed | None:
@@ -176,27 +176,27 @@ class KernelRun:
     @property
     def fires(self) -> np.ndarray:
         """Return the indices (E,) of the guards that fired."""
-        found: np.ndarray = self._happened.fires[self._ended]
+        found = self._fires[self._ended]
         return found[self._have_fired] if self.passed else found
 
     @property
     def _have_fired(self) -> np.ndarray:
         """Return whether a guard ended each segment; otherwise a known time did."""
-        return np.asarray(self._happened.fires[self._ended] >= 0)
+        return np.asarray(self._fires[self._ended] >= 0)
 
     @property
     def event_block(self) -> EventBlock | None:
         """Return the events as one block, or None if there are none."""
         if self._event_block is None and self.events:
-            rows, ended = self._happened, self._ended
+            modes, ended = self._array("modes"), self._ended
             after = slice(ended.start + 1, ended.stop + 1)
             self._event_block = EventBlock(
                 self.system,
-                rows.clocks[after],
-                rows.fires[ended],
-                rows.modes[ended],
-                rows.modes[after],
-                rows.jumps[ended, -2:],  # the states at its end, after the state at its start
+                self._array("clocks")[after],
+                self._fires[ended],
+                modes[ended],
+                modes[after],
+                self._array("jumps")[ended, -2:],  # the states at its end, after the state at its start
                 self.known.due if self.known is not None and self.passed else (),
             )
         return self._event_block
@@ -216,14 +216,16 @@ class KernelRun:
     @property
     def last_end(self) -> Segment:
         """Return the time and the state at the end of the last segment."""
-        rows, last = self._happened, self.first + self.count - 1
+        last = self.first + self.count - 1
         vector = self.rows.vectors[last] if self.vector is None else self.vector
-        return end_point(Instant(*self.clock), rows.modes[last], vector, rows.jumps[last, -2])
+        return end_point(
+            Instant(*self.clock), self._array("modes")[last], vector, self._array("jumps")[last, -2]
+        )
 
     def forget_segments(self) -> None:
         """Release the memory of the segments, except for the end of the last segment."""
         assert self.memory is not None
-        self.vector = self.array_layout.row(self.memory, "vectors", self.first + self.count - 1)
+        self.vector = self.array_layout.array(self.memory, "vectors")[self.first + self.count - 1].copy()
         vars(self).pop("rows", None)
         self.array_layout.take_back(self.memory[0])
         self.memory = None
