@@ -49,15 +49,16 @@ class ArrayLayout:
 
     def __init__(self, kinds: Sequence[Any], fields: Sequence[tuple[Any, tuple[int, ...], int]]) -> None:
         self._kinds = [(kind, len(kind._fields)) for kind in kinds]
-        self._kind: Any = namedtuple("Rows", [name for kind in kinds for name in kind._fields])  # type: ignore[misc]  # names known at run time
+        names = [name for kind in kinds for name in kind._fields]
+        self._kind: Any = namedtuple("Rows", names)  # type: ignore[misc]  # names known at run time
         self._specs: dict[str, tuple[tuple[int, ...], np.dtype[Any], int, int]] = {}
         self._sizes = [0] * (1 + max(block for *_, block in fields))
         # the table without the addresses of the blocks
         self._entries = np.zeros((len(fields), SLOTS_PER_ARRAY), dtype=np.int64)
         self._steps = np.zeros_like(self._entries)  # change of the table per skipped row
         self._owners = np.array([block for *_, block in fields], dtype=np.int64)
-        for k, (name, (kind, shape, block)) in enumerate(zip(self._kind._fields, fields, strict=True)):
-            dtype, offset = np.dtype(kind), self._sizes[block]
+        for k, (name, (scalar, shape, block)) in enumerate(zip(names, fields, strict=True)):
+            dtype, offset = np.dtype(scalar), self._sizes[block]
             row = dtype.itemsize * math.prod(shape[1:])
             self._specs[name] = shape, dtype, block, offset
             self._entries[k, : 1 + len(shape)] = offset, *shape
