@@ -12,8 +12,8 @@ import pytest
 
 import hybridsim as hs
 from hybridsim.engine.run.compiled_loop import CompiledLoop
+from hybridsim.engine.run.method_kernels import STEPS_PER_LOOK
 from hybridsim.engine.run.mode_loop import ModeLoop
-from hybridsim.engine.run.notices import STEPS_PER_LOOK
 from hybridsim.engine.run.segment_run import SegmentRun
 from hybridsim.engine.run.single_call import LazyTrajectory
 from hybridsim.engine.system.failures import StepFailure

@@ -48,8 +48,7 @@ from hybridsim.engine.run.kernel_run import (
     record_layout,
     skipped_rows,
 )
-from hybridsim.engine.run.method_kernels import NOT_LINEAR, MethodKernels
-from hybridsim.engine.run.notices import STEPS_PER_LOOK
+from hybridsim.engine.run.method_kernels import NOT_LINEAR, STEPS_PER_LOOK, MethodKernels
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.known_times import TimesAhead

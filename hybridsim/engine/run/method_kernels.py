@@ -19,6 +19,7 @@ from hybridsim.engine.system.programs.mode_tables import Tapes
 from hybridsim.engine.system.system import System
 
 NOT_LINEAR = no_tables()  # for kernels without tables of linear modes
+STEPS_PER_LOOK = 500  # a method with `is_looked_at` is examined for stiffness after so many steps
 
 
 class MethodKernels(ABC):

@@ -18,6 +18,7 @@ from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.record.trajectory import Task, Trajectory
 from hybridsim.engine.run.headway import Headway
+from hybridsim.engine.run.method_kernels import STEPS_PER_LOOK
 from hybridsim.engine.run.segment_run import SegmentRun
 from hybridsim.engine.run.stepping import Flow, Method
 from hybridsim.engine.series.bounded import UNIT
@@ -28,7 +29,7 @@ from hybridsim.engine.system.system import System
 _EVENTS, _SHARE = 200, 1e-3
 _FASTER = 0.5  # intervals that shrink by more over these events are an accumulation instead
 # Stiffness: number of examined steps, how many must be near the stability limit, and the fraction that counts as near.
-STEPS_PER_LOOK, _LOOKS, _MIN_NEAR_LIMIT, _NEAR = 500, 8, 6, 0.6
+_LOOKS, _MIN_NEAR_LIMIT, _NEAR = 8, 6, 0.6
 _DECAYING = 0.25  # least ratio of the decay rate to the magnitude of an eigenvalue
 _ITERATIONS, _ALIGNED = 12, 0.9  # of the power method, and the required alignment of its vector with a decay
 

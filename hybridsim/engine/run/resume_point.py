@@ -20,8 +20,7 @@ from hybridsim.engine.record.checkpoint import Checkpoint
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.trajectory import Task
 from hybridsim.engine.run.compiled_loop import CompiledLoop
-from hybridsim.engine.run.method_kernels import MethodKernels
-from hybridsim.engine.run.notices import STEPS_PER_LOOK
+from hybridsim.engine.run.method_kernels import STEPS_PER_LOOK, MethodKernels
 from hybridsim.engine.run.setup import RunSetup
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.instant import Instant
