@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from hybridsim.engine.run.report import Report
     from hybridsim.expr import Expression
     from hybridsim.model import Mode, Model
-    from hybridsim.model.checks.doubtful import Caution
+    from hybridsim.model.checks.caution import Caution
     from hybridsim.model.smoothing.nonsmooth import Primitive
 
 

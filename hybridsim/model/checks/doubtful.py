@@ -6,9 +6,10 @@ import ast
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
-from hybridsim.errors import HybridsimError, Place
+from hybridsim.errors import Place
 from hybridsim.expr import Expression
 from hybridsim.expr.grammar import NAME, TIME
+from hybridsim.model.checks.caution import Caution
 from hybridsim.model.checks.pulses import pulse_in
 from hybridsim.model.laws.force_signs import wrong_reactions, wrong_signs
 from hybridsim.model.laws.velocity_powers import velocity_powers
@@ -18,37 +19,21 @@ from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.explicit_corners import smoothing_of
 from hybridsim.model.smoothing.nonsmooth import JUMPS, UNCHANGED, uses_primitives
 from hybridsim.model.smoothing.one_sided import names_of, never_negative, number_of
-
-
-@dataclass(frozen=True)
-class Caution:
-    """A warning about a valid model, with its message, place and remedy."""
-
-    message: str
-    place: Place | None
-    remedy: str
-
-    def __str__(self) -> str:
-        return str(HybridsimError(self.message, place=self.place, remedy=self.remedy))
-
-    @property
-    def sentence(self) -> str:
-        """The warning in one line, with file and line number but without the source text."""
-        where = self.place.prefix if self.place else ""
-        return f"{where}{self.message}: {self.remedy.rstrip('.')}"
+from hybridsim.model.units.faults import unit_faults
 
 
 def warnings_of(model: Model) -> tuple[Caution, ...]:
     """Return the warnings about a valid model; warnings about guards come first.
 
     Warnings concern guards and monitors that are of one sign, constant in their mode, or without units if all other
-    states have units; pulses in t; jumps that are not treated as switching surfaces; fractional powers of a contact's
+    states have units; units that disagree; pulses in t; jumps that are not treated as switching surfaces; fractional powers of a contact's
     velocity; and loads, friction forces or reactions of the wrong sign. They are based on the form of the expressions
     and their values at the start. Guards of contacts and surfaces, which the program creates, are not checked.
     """
     return (
         *_of_signs(model),
         *_of_units(model),
+        *unit_faults(model),
         *_of_pulses(model),
         *jumps_of(model),
         *_of_powers(model),

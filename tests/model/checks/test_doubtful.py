@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 import hybridsim as hs
-from hybridsim.model.checks.doubtful import Caution, warnings_of
+from hybridsim.model.checks.caution import Caution
+from hybridsim.model.checks.doubtful import warnings_of
 from hybridsim.testing.measuring import SCENES as FOLDER
 
 SCENES = sorted(FOLDER.glob("*.toml"))

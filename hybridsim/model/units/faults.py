@@ -1,0 +1,68 @@
+"""This module finds the expressions of a model whose units disagree, and words the messages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from hybridsim.expr.write import write
+from hybridsim.model.checks.caution import Caution
+from hybridsim.model.parts.model import Model
+from hybridsim.model.units.infer import Disagreement
+from hybridsim.model.units.parse import write_unit
+from hybridsim.model.units.quantities import Quantities, quantities_of
+from hybridsim.model.units.statements import Statement, statements_of
+from hybridsim.model.units.unit import Unit
+
+
+@dataclass(frozen=True)
+class UnitOfExpression:
+    """The unit of one expression, with the reasons if it is unknown, and the disagreements in it."""
+
+    statement: Statement
+    unit: Unit | None
+    unknown: tuple[str, ...]
+    cautions: tuple[Caution, ...]
+
+
+def unit_faults(model: Model) -> Iterator[Caution]:
+    """Yield a warning for each expression of a model in which two known units disagree."""
+    known = quantities_of(model)
+    if known is not None:
+        for expression in units_of_expressions(model, known):
+            yield from expression.cautions
+
+
+def units_of_expressions(model: Model, known: Quantities) -> Iterator[UnitOfExpression]:
+    """Yield the unit of each expression of a model; a warning that repeats is given once."""
+    told: set[tuple[object, str]] = set()
+    for statement in statements_of(model, known):
+        inference = known.inference()
+        unit = inference.unit(statement.expr.tree)
+        found = list(inference.disagreements)
+        if unit is not None and statement.needed is not None and unit.differs(statement.needed):
+            found.append(Disagreement(statement.expr.tree, unit, statement.needed, statement.because))
+        cautions = [_caution(statement, one, known) for one in found]
+        keys = [(caution.place and caution.place.line, caution.message.partition(": ")[2]) for caution in cautions]
+        new = tuple(caution for key, caution in zip(keys, cautions, strict=True) if key not in told)
+        told.update(keys)
+        yield UnitOfExpression(statement, unit, tuple(inference.unknown), new)
+
+
+def _caution(statement: Statement, found: Disagreement, known: Quantities) -> Caution:
+    texts = known.texts.values()
+    message = (
+        f"{statement.what}: '{write(found.term)}' {_is_in(found.unit, texts)}, "
+        f"but {found.because} {_is_in(found.needed, texts)}"
+    )
+    node = found.term if statement.has_columns else None
+    remedy = "correct the expression or a unit; a constant with a unit is declared in [parameters]"
+    if found.unit.differs(found.needed) == "scale":
+        factor = write_unit(found.needed / found.unit)
+        remedy = f"units are not converted: multiply by a parameter with the unit {factor}, or use one unit"
+    return Caution(message, statement.expr.error(message, node=node).place, remedy)
+
+
+def _is_in(unit: Unit, texts: Iterable[str]) -> str:
+    text = write_unit(unit, texts)
+    return "is a pure number" if text == "1" else f"is in {text}"

@@ -1,0 +1,149 @@
+"""This module lists the expressions of a model, each with the unit that its place needs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+from hybridsim.expr import Expression
+from hybridsim.expr.grammar import TIME
+from hybridsim.model.laws.law_with_states import ContactState
+from hybridsim.model.parts.component import Component
+from hybridsim.model.parts.contact import Contact
+from hybridsim.model.parts.inputs import Input
+from hybridsim.model.parts.model import Model
+from hybridsim.model.units.parse import read_unit
+from hybridsim.model.units.quantities import Quantities
+from hybridsim.model.units.unit import ONE, TURN, Unit
+
+_TURN = Unit(((TURN, Fraction(1)),))
+
+
+@dataclass(frozen=True)
+class Statement:
+    """An expression, its name for messages, and the unit that its place needs, if there is one."""
+
+    what: str
+    expr: Expression
+    needed: Unit | None = None
+    because: str = ""
+    has_columns: bool = True  # False for an expression of a friction law, in which arguments are inserted
+
+
+def statements_of(model: Model, known: Quantities) -> Iterator[Statement]:
+    """Yield the expressions of a model, in the order of the declarations in a file."""
+    time = known.time
+    if model.duration is not None:
+        yield Statement("duration", model.duration, time, TIME)
+    for part in model.parameters:
+        yield _value(known, f"parameter {part.name}", part.value, part.name)
+    for state in model.states:
+        own = not isinstance(state, ContactState)
+        what, name = f"state {state.name}", state.name
+        yield Statement(f"{what}, start", state.start, known.units.get(name), name, own)
+        yield Statement(f"{what}, der", state.der, known.rate(name), f"the rate of {name}", own)
+    for discrete in model.discrete:
+        yield _value(known, f"discrete state {discrete.name}, start", discrete.start, discrete.name)
+    for name, expr in model.definitions:
+        yield Statement(f"definition {name}", expr)
+    for signal in model.inputs:
+        yield from _of_input(known, signal)
+    for contact in model.contacts:
+        yield from _of_contact(known, contact, model)
+    for surface in model.surfaces:
+        yield Statement(f"surface {surface.name}", surface.expr)
+        for side, values in (("above", surface.above), ("below", surface.below)):
+            for name, expr in values.items():
+                yield _value(known, f"surface {surface.name}, {name} {side}", expr, name)
+    for impact in model.impacts:
+        yield Statement(f"impact {impact.name}, gap", impact.gap)
+        yield Statement(f"impact {impact.name}, restitution", impact.restitution, ONE, "a ratio of speeds")
+    for component in model.components:
+        yield from _of_component(known, component)
+    for monitor in model.monitors:
+        yield Statement(f"monitor {monitor.name}", monitor.expr)
+        yield from _resets(known, f"monitor {monitor.name}", monitor.reset)
+    for schedule in model.schedules:
+        what = f"schedule {schedule.name}"
+        for field, time_expr in (("start", schedule.start), ("period", schedule.period)):
+            if time_expr is not None:
+                yield Statement(f"{what}, {field}", time_expr, time, TIME)
+        yield from (Statement(f"{what}, times", expr, time, TIME) for expr in schedule.times)
+        yield from _resets(known, what, schedule.reset)
+    for output in model.outputs:
+        unit, label = read_unit(output.unit), f"the unit of output {output.name}"
+        yield Statement(f"output {output.name}", output.expr, unit, label)
+        for key, expr in output.modes.items():
+            yield Statement(f"output {output.name} in {key}", expr, unit, label)
+
+
+def _value(known: Quantities, what: str, expr: Expression, name: str) -> Statement:
+    return Statement(what, expr, known.units.get(name), name)
+
+
+def _resets(known: Quantities, what: str, resets: Mapping[str, Expression]) -> Iterator[Statement]:
+    for name, expr in resets.items():
+        yield _value(known, f"{what}, reset of {name}", expr, name)
+
+
+def _of_input(known: Quantities, signal: Input) -> Iterator[Statement]:
+    time = known.time
+    frequency = None if time is None else _TURN / time
+    needed: dict[str, tuple[Unit | None, str]] = {
+        "period": (time, TIME), "duration": (time, TIME), "duty": (ONE, "a share"),
+        "f0": (frequency, "a frequency"), "f1": (frequency, "a frequency"),
+        "phase": (time, TIME) if signal.kind == "wave" else (ONE, "an angle"),
+    }  # fmt: skip
+    for field, expr in signal.expressions.items():
+        unit, because = needed.get(field, (known.units.get(signal.name), signal.name))
+        yield Statement(f"input {signal.name}, {field}", expr, unit, because)
+
+
+def _of_contact(known: Quantities, contact: Contact, model: Model) -> Iterator[Statement]:
+    what = f"contact {contact.name}"
+    yield Statement(f"{what}, velocity", contact.velocity)
+    yield Statement(f"{what}, normal", contact.normal)
+    what += f", law {contact.law.name}"
+    for name, expr in contact.arguments.items():
+        yield Statement(f"{what}, {name}", expr)
+    for part, name, expr in _of_law(contact, model):
+        yield Statement(f"{what}, {part}", _at(expr, contact), known.units.get(name), name, has_columns=False)
+
+
+def _of_law(contact: Contact, model: Model) -> Iterator[tuple[str, str, Expression]]:
+    """Yield the expressions of the forces of a law, each with its name in the law and the force."""
+    if contact.law.is_set_valued:
+        for suffix, backward in (("", False), (" backward", True)):
+            yield f"slip{suffix}", contact.name, contact.slip_force(contact.velocity, backward=backward)
+            yield f"stick{suffix}", contact.name, contact.limit_force(backward)
+        return
+    for component in model.components_of(contact):
+        for mode in component.modes:
+            yield from ((f"{name} in {mode.name}", name, expr) for name, expr in mode.set.items())
+
+
+def _at(expr: Expression, contact: Contact) -> Expression:
+    """Return an expression of a friction law with the place of its arguments."""
+    places = (argument.place for argument in contact.arguments.values())
+    return Expression(expr.text, expr.names, next(places, None) or contact.place, expr.tree)
+
+
+def _of_component(known: Quantities, component: Component) -> Iterator[Statement]:
+    head = f"component {component.name}"
+    if component.surface is not None:
+        yield Statement(f"{head}, surface", component.surface.function)
+    if component.limit is not None:
+        yield from _resets(known, f"{head}, limit", component.limit.reset)
+    for mode in component.modes:
+        where = f"{head}, mode {mode.name}"
+        for name, expr in mode.der.items():
+            yield Statement(f"{where}, der of {name}", expr, known.rate(name), f"the rate of {name}")
+        for name, expr in mode.set.items():
+            yield _value(known, f"{where}, set {name}", expr, name)
+        for guard in mode.guards:
+            yield Statement(f"{where}, guard {guard.name}", guard.expr)
+            for choice in guard.then:
+                if choice.when is not None:
+                    yield Statement(f"{where}, guard {guard.name}, when", choice.when)
+                yield from _resets(known, f"{where}, guard {guard.name}", choice.reset)
