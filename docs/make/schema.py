@@ -43,7 +43,7 @@ TEXT, NUMBER, FLAG = {"type": "string"}, {"type": "number"}, {"type": "boolean"}
 EXPRESSION = {"type": ["number", "string"]}
 EXPRESSIONS = {"type": "object", "additionalProperties": EXPRESSION}
 NUMBERS = {"type": "array", "items": NUMBER}
-UNIT = said("the unit, for labels", TEXT)
+UNIT = said("the unit, for labels and for the check of units", TEXT)
 START = said("the initial value", EXPRESSION)
 NOMINAL = said("the usual size; the absolute tolerance follows it", NUMBER)
 
@@ -174,17 +174,17 @@ CLOCK = table(
 )
 WAVE = {
     "kind": {"const": "wave"}, "shape": {"enum": ["square", "triangle", "sawtooth", "sine"]}, "period": EXPRESSION,
-    "amplitude": EXPRESSION, "phase": EXPRESSION, "offset": EXPRESSION, "duty": EXPRESSION,
+    "amplitude": EXPRESSION, "phase": EXPRESSION, "offset": EXPRESSION, "duty": EXPRESSION, "unit": UNIT,
 }  # fmt: skip
 CHIRP = {
     "kind": {"const": "chirp"}, "f0": EXPRESSION, "f1": EXPRESSION, "duration": EXPRESSION, "amplitude": EXPRESSION,
-    "phase": EXPRESSION,
+    "phase": EXPRESSION, "unit": UNIT,
 }  # fmt: skip
 CONNECTED = {"kind": {"const": "connected"}, "unit": UNIT}
 HELD = {"kind": {"const": "held"}, "value": said("until it is set from outside", EXPRESSION), "unit": UNIT}
 POINTS_IN_TIME = {
     "kind": {"const": "table"}, "times": NUMBERS, "values": NUMBERS, "file": said("a CSV beside the model", TEXT),
-    "columns": {"type": "array"}, "interpolation": {"enum": ["linear", "cubic", "previous"]},
+    "columns": {"type": "array"}, "interpolation": {"enum": ["linear", "cubic", "previous"]}, "unit": UNIT,
 }  # fmt: skip
 INPUT = {"oneOf": [table(keys, ("kind",)) for keys in (WAVE, CHIRP, POINTS_IN_TIME, HELD, CONNECTED)]}
 OUTPUT = table(

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from hybridsim.expr import assignment
+from hybridsim.model.checks.units import label_of
 from hybridsim.model.parts.inputs import HeldInput
 from hybridsim.model.parts.switching import ATTRACTION
 from hybridsim.model.smoothing.nonsmooth import COMPONENT, MODE, POWER, SURFACE, TIMED, UNCHANGED
@@ -82,21 +83,21 @@ def _parameters(model: Model) -> Iterator[str]:
     numbers = model.parameter_values()
     for parameter in model.parameters:
         formula = f"{_flat(parameter.value)} = " if parameter.value.names else ""
-        yield f"{parameter.name} = {formula}{numbers[parameter.name]:.12g} {parameter.unit}".rstrip()
+        yield f"{parameter.name} = {formula}{numbers[parameter.name]:.12g} {label_of(parameter.unit)}".rstrip()
 
 
 def _states(model: Model) -> Iterator[str]:
     starts = model.start_values()
     for state in model.states:
-        start = f"{starts[state.name]:.12g} {state.unit}".rstrip()
+        start = f"{starts[state.name]:.12g} {label_of(state.unit)}".rstrip()
         yield f"{state.name}' = {_flat(state.der)}   from {start}"
 
 
 def _discrete(model: Model) -> Iterator[str]:
     starts = model.discrete_values()
     for part in model.discrete:
-        held = isinstance(part, HeldInput)
-        yield f"{part.name}   {'held input, ' if held else ''}from {starts[part.name]:.12g} {part.unit}".rstrip()
+        held, start = isinstance(part, HeldInput), f"{starts[part.name]:.12g} {label_of(part.unit)}".rstrip()
+        yield f"{part.name}   {'held input, ' if held else ''}from {start}"
 
 
 def _input(declared: Input) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import values
 from hybridsim.cli.automaton import lines_of
-from hybridsim.cli.output import complain, print_json, say
+from hybridsim.cli.output import complain, print_json, print_table, say
 from hybridsim.cli.session import Session
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ def add_to(commands: Any) -> None:
         "check",
         help="check a model and print its automaton",
         description="Read a model, report every error, warn about suspicious parts (guards that never fire, pulses "
-        "that a step may miss, missing units), and print the hybrid automaton of the model.",
+        "that a step may miss, units that are missing or disagree), and print the hybrid automaton of the model.",
     )
     values.add_model_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
@@ -34,6 +34,11 @@ def add_to(commands: Any) -> None:
         "--flat",
         action="store_true",
         help="print the model as one TOML file, in which the parts ([use.NAME]) are written out",
+    )
+    parser.add_argument(
+        "--units",
+        action="store_true",
+        help="print the unit of each quantity and expression: declared, inferred, unknown or in disagreement",
     )
     parser.set_defaults(execute=execute)
 
@@ -46,6 +51,8 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     from hybridsim.model.smoothing.explicit_corners import smoothing_of
 
     model = values.changed_model(args)
+    if args.units:
+        return _print_units(model, args.json)
     # a part alone has no engine: its equations are complete only inside another model
     report = None if any(signal.kind == "connected" for signal in model.inputs) else describe(model)
     cautions = warnings_of(model)
@@ -59,6 +66,25 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         say("\n".join(lines_of(model, report, primitives, facts)))
     for caution in cautions:
         complain(f"warning: {caution}")
+    return 0
+
+
+def _print_units(model: Model, as_json: bool) -> int:
+    """Print the units of a model, and warn where they disagree."""
+    from hybridsim.model.units.faults import unit_faults
+    from hybridsim.model.units.report import HEADER, unit_rows
+
+    rows, faults = [*unit_rows(model)], [*unit_faults(model)]
+    if as_json:
+        keys = ("what", "unit", "known")
+        units = [dict(zip(keys, row, strict=True)) for row in rows]
+        print_json({"name": model.name, "units": units, "warnings": [*map(_caution_record, faults)]})
+    elif rows:
+        print_table(HEADER, rows)
+    else:
+        say(f"the model {model.name} declares no units")
+    for fault in faults:
+        complain(f"warning: {fault}")
     return 0
 
 

@@ -245,7 +245,9 @@ def _summary(solution: Solution) -> list[str]:
         shares = ", ".join(f"{mode} {100 * share:.3g} %" for mode, share in modes.items())
         lines.append(f"  {f'modes ({component})':<12} {shares} of the time")
     if solution.t.size:
-        units = {state.name: state.unit for state in model.states}
+        from hybridsim.model.checks.units import label_of
+
+        units = {state.name: label_of(state.unit) for state in model.states}
         final = ", ".join(
             f"{name} = {value:.9g} {units.get(name, '')}".rstrip() for name, value in _final(solution)
         )

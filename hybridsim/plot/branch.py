@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from hybridsim.analysis import Branch
-from hybridsim.model.checks.units import units_of
+from hybridsim.model.checks.units import label_of, units_of
 from hybridsim.plot import style
 from hybridsim.plot.scale import label_axis
 
@@ -41,7 +41,7 @@ def branch(result: Branch, name: str | None = None, *, axes: Axes | None = None)
                 [s.parameter for s in chosen], heights, marker, color=style.INK, markersize=6,
                 markerfacecolor="white", label=_TITLES.get(kind, kind),
             )  # fmt: skip
-    unit = next(p.unit for p in model.parameters if p.name == result.name)
+    unit = next(label_of(p.unit) for p in model.parameters if p.name == result.name)
     label_axis(axes.xaxis, result.name, unit, across.min(), across.max())
     label_axis(axes.yaxis, f"amplitude of {name}", units_of(model).get(name, ""), up.min(), up.max())
     style.dress(axes)

@@ -15,6 +15,7 @@ from hybridsim.arguments import cannot_be, is_row, number
 from hybridsim.errors import ExpressionError, UsageError
 from hybridsim.expr import Expression, parse, require_names, resolve
 from hybridsim.model import Model
+from hybridsim.model.checks.units import label_of
 
 MODES = ("grid", "list")
 POINT = "point"  # the dimension of a list
@@ -95,8 +96,9 @@ def points_of(model: Model, values: Any, mode: Any) -> Points:
         raise cannot_be(
             "values", values, "use a dict of parameter names and values, such as {'F0': [20, 30, 40]}"
         )
-    units = {p.name: p.unit for p in model.parameters}
-    starts = {s.name: s.unit for s in model.states} | {d.name: d.unit for d in model.discrete}
+    units = {p.name: label_of(p.unit) for p in model.parameters}
+    starts = {s.name: label_of(s.unit) for s in model.states}
+    starts |= {d.name: label_of(d.unit) for d in model.discrete}
     for name in values:
         if name not in units and name not in starts:
             raise UsageError(

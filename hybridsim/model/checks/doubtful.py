@@ -26,9 +26,10 @@ def warnings_of(model: Model) -> tuple[Caution, ...]:
     """Return the warnings about a valid model; warnings about guards come first.
 
     Warnings concern guards and monitors that are of one sign, constant in their mode, or without units if all other
-    states have units; units that disagree; pulses in t; jumps that are not treated as switching surfaces; fractional powers of a contact's
-    velocity; and loads, friction forces or reactions of the wrong sign. They are based on the form of the expressions
-    and their values at the start. Guards of contacts and surfaces, which the program creates, are not checked.
+    states have units; units that disagree; pulses in t; jumps that are not treated as switching surfaces; fractional
+    powers of a contact's velocity; and loads, friction forces or reactions of the wrong sign. They are based on the
+    form of the expressions and their values at the start. Guards of contacts and surfaces, which the program creates,
+    are not checked.
     """
     return (
         *_of_signs(model),

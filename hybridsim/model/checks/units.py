@@ -14,13 +14,21 @@ _COUNT = 4  # multiples of 1/4 up to this count as dimensionless factors
 
 
 def units_of(model: Model) -> dict[str, str]:
-    """Return the units of states, outputs, contact forces, discrete states and inputs, in this order."""
+    """Return the labels of states, outputs, contact forces, discrete states and inputs, in this order."""
     units = {state.name: state.unit for state in model.states} | {o.name: o.unit for o in model.outputs}
     rest = dict.fromkeys((contact.name for contact in model.contacts), "")
     if missing := [contact for contact in model.contacts if contact.name not in units]:
         rest |= _of_forces(model, missing)
-    rest |= {d.name: d.unit for d in model.discrete} | {declared.name: "" for declared in model.inputs}
-    return units | {name: unit for name, unit in rest.items() if name not in units}
+    rest |= {d.name: d.unit for d in model.discrete} | {
+        signal.name: signal.unit or "" for signal in model.inputs
+    }
+    units |= {name: unit for name, unit in rest.items() if name not in units}
+    return {name: label_of(unit) for name, unit in units.items()}
+
+
+def label_of(unit: str) -> str:
+    """Return a unit as a label; pure numbers have none."""
+    return "" if unit == "1" else unit
 
 
 def unit_of(model: Model, expression: Expression) -> str:

@@ -30,8 +30,8 @@ KINDS = (
 )  # fmt: skip
 
 
-def flattened(model: Model) -> dict[str, tuple[Any, ...]]:
-    """Return the declarations of a model and of all its parts, by the names of the fields of a model.
+def flattened(model: Model) -> dict[str, Any]:
+    """Return the declarations of a model and of all its parts, by the names of the attributes of a model.
 
     Raises
     ------
@@ -44,7 +44,8 @@ def flattened(model: Model) -> dict[str, tuple[Any, ...]]:
         errors = flat.errors
         if not errors:
             flat.parts["discrete"].sort(key=lambda part: isinstance(part, HeldInput))  # as in a file
-            return {kind: tuple(parts) for kind, parts in flat.parts.items()}
+            found: dict[str, Any] = {kind: tuple(parts) for kind, parts in flat.parts.items()}
+            return found | {"connected_units": flat.connected_units}
     raise ModelError.collect(errors, f"model {model.name}")
 
 
@@ -128,6 +129,7 @@ class _Flat:
     def __init__(self, model: Model) -> None:
         self.errors: list[ModelError] = []
         self._wrong: set[int] = set()
+        self.connected_units: dict[str, str] = {}
         self.parts: dict[str, list[Any]] = {kind: list(getattr(model, kind)) for kind in KINDS}
         self.parts["definitions"] = list(model.definitions)
         self._repeats = {use.name: use.repeat for use in model.use if use.repeat}
@@ -161,6 +163,10 @@ class _Flat:
                 elif kind == "contacts":
                     made = replace(made, start={**made.start, **_of_law(declared, part, start)})
                 self.parts[kind].append(made)
+        units = {signal.name: signal.unit for signal in part.inputs if signal.name in connect and signal.unit}
+        self.connected_units |= {
+            copies.prefix + name: unit for name, unit in (part.connected_units | units).items()
+        }
         definitions = self.parts["definitions"]
         definitions += [(copies.prefix + name, expr) for name, expr in connect.items()]
         definitions += [(copies.prefix + name, copies.expr(expr)) for name, expr in part.definitions]

@@ -27,9 +27,9 @@ REQUIRED = {
     "connected": (),
 }
 OPTIONAL = {
-    "table": ("interpolation",),
-    "wave": ("amplitude", "phase", "offset", "duty"),
-    "chirp": ("amplitude", "phase"),
+    "table": ("interpolation", "unit"),
+    "wave": ("amplitude", "phase", "offset", "duty", "unit"),
+    "chirp": ("amplitude", "phase", "unit"),
     "held": ("value", "unit"),
     "connected": ("unit",),
 }
@@ -77,7 +77,7 @@ class Input(Declared):
     amplitude, period, phase, offset, duty, f0, f1, duration, value : str or float, optional
         Expressions of parameters.
     unit : str, optional
-        Unit of a held or a connected input.
+        Unit of the values.
     file : str or path, optional
         Path of a CSV file with the times and values of a table, instead of ``times`` and ``values``. It is read at
         once; the input contains the numbers.

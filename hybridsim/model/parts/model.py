@@ -45,7 +45,7 @@ _PARTS: dict[str, type[Declared]] = {
 
 # methods that other parts of the package call; completion does not offer them
 _INTERNAL = {
-    "affected_by", "changed_numbers", "components_of", "error", "is_known_to_be_sound", "once",
+    "affected_by", "changed_numbers", "components_of", "connected_units", "error", "is_known_to_be_sound", "once",
     "once_per_expressions", "place", "remedy_for_parameter", "structure", "with_values_of",
 }  # fmt: skip
 
@@ -130,8 +130,8 @@ class Model(Declared):
     drawing: tuple[Shape, ...] = ()
     use: tuple[Use, ...] = ()
 
-    # files of its parts, if it was read from a file
-    _part_files: ClassVar[tuple[str, ...]] = ()
+    _part_files: ClassVar[tuple[str, ...]] = ()  # files of its parts, if it was read from a file
+    connected_units: ClassVar[dict[str, str]] = {}  # units of the inputs of its parts that are connected
     # of a checked model: its values; of its copies also the parameters that have other numbers than it
     _sound: ClassVar[tuple[dict[str, float], frozenset[str]]]
 

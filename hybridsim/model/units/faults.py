@@ -34,19 +34,26 @@ def unit_faults(model: Model) -> Iterator[Caution]:
 
 
 def units_of_expressions(model: Model, known: Quantities) -> Iterator[UnitOfExpression]:
-    """Yield the unit of each expression of a model; a warning that repeats is given once."""
-    told: set[tuple[object, str]] = set()
+    """Yield the unit of each expression of a model.
+
+    A warning is given once for each line. In the expressions of a friction law it is left out if an argument of the
+    law or another expression of the law has it.
+    """
+    told: set[tuple[int | None, str]] = set()
     for statement in statements_of(model, known):
         inference = known.inference()
         unit = inference.unit(statement.expr.tree)
         found = list(inference.disagreements)
         if unit is not None and statement.needed is not None and unit.differs(statement.needed):
             found.append(Disagreement(statement.expr.tree, unit, statement.needed, statement.because))
-        cautions = [_caution(statement, one, known) for one in found]
-        keys = [(caution.place and caution.place.line, caution.message.partition(": ")[2]) for caution in cautions]
-        new = tuple(caution for key, caution in zip(keys, cautions, strict=True) if key not in told)
-        told.update(keys)
-        yield UnitOfExpression(statement, unit, tuple(inference.unknown), new)
+        cautions = []
+        for caution in (_caution(statement, one, known) for one in found):
+            text = caution.message.partition(": ")[2]
+            line = caution.place.line if caution.place and not statement.is_of_law else None
+            if (line, text) not in told:
+                cautions.append(caution)
+            told |= {(line, text), (None, text)}
+        yield UnitOfExpression(statement, unit, tuple(inference.unknown), tuple(cautions))
 
 
 def _caution(statement: Statement, found: Disagreement, known: Quantities) -> Caution:
@@ -55,7 +62,7 @@ def _caution(statement: Statement, found: Disagreement, known: Quantities) -> Ca
         f"{statement.what}: '{write(found.term)}' {_is_in(found.unit, texts)}, "
         f"but {found.because} {_is_in(found.needed, texts)}"
     )
-    node = found.term if statement.has_columns else None
+    node = None if statement.is_of_law else found.term
     remedy = "correct the expression or a unit; a constant with a unit is declared in [parameters]"
     if found.unit.differs(found.needed) == "scale":
         factor = write_unit(found.needed / found.unit)

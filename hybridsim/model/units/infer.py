@@ -12,7 +12,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from hybridsim.expr.evaluate import NoValue, value_of
+from hybridsim.expr.walk import NoValue, value_of
 from hybridsim.expr.write import write
 from hybridsim.model.smoothing.one_sided import names_of
 from hybridsim.model.units.unit import ONE, Unit
@@ -23,9 +23,7 @@ Units = Mapping[str, Unit]
 _COUNT = 4
 # Exponents such as 0.7 are fractions with at most this denominator.
 _DENOMINATOR = 100
-_OF_NUMBERS = frozenset(
-    {"sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log"}
-)
+_OF_NUMBERS = frozenset({"sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log"})
 _OF_ALIKE = frozenset({"min", "max"})
 
 
@@ -55,15 +53,15 @@ class Inference:
         self.unknown: list[str] = []
 
     def unit(self, node: ast.expr) -> Unit | None:
-        """Return the unit of an expression, or None if it is unknown or the expression is only a number."""
+        """Return the unit of an expression, or None if it is unknown or the expression is only a number.
+
+        The unit of a condition is that of its sides, or of those of its first part.
+        """
         if is_number(node):
             return None
         match node:
             case ast.Name(id=name):
                 return self._named(name)
-            case ast.UnaryOp(op=ast.Not(), operand=operand):
-                self.unit(operand)
-                return None
             case ast.UnaryOp(operand=operand):
                 return self.unit(operand)
             case ast.BinOp(op=ast.Add() | ast.Sub()):
@@ -73,12 +71,10 @@ class Inference:
             case ast.BinOp(left=base, op=ast.Pow(), right=exponent):
                 return self._power(base, exponent)
             case ast.Compare(left=left, comparators=others):
-                self._alike([left, *others])
-                return None
+                return self._alike([left, *others])
             case ast.BoolOp(values=values):
-                for value in values:
-                    self.unit(value)
-                return None
+                units = [self.unit(value) for value in values]
+                return units[0]
             case ast.IfExp(test=test, body=body, orelse=orelse):
                 self.unit(test)
                 return self._alike([body, orelse])
@@ -120,10 +116,12 @@ class Inference:
         return product.without_angles() if turns else product  # 2*pi*f is in rad/s
 
     def _has_parameter(self, node: ast.expr) -> bool:
-        """Return whether a factor is a parameter whose unit is known and not a pure number, or its power."""
+        """Return whether a product contains a parameter, or its power, whose unit is known and not 1."""
         match node:
             case ast.Name(id=name):
-                return name in self.parameters and name in self.units and bool(self.units[name].differs(ONE))
+                return name in self.parameters and self.units.get(name, ONE) != ONE
+            case ast.UnaryOp(operand=operand):
+                return self._has_parameter(operand)
             case ast.BinOp(left=base, op=ast.Pow()) | ast.Call(func=ast.Name(id="sqrt" | "abs"), args=[base]):
                 return self._has_parameter(base)
             case ast.BinOp(left=left, op=ast.Mult() | ast.Div(), right=right):

@@ -1,4 +1,4 @@
-"""This module collects the units of all names of a model: declared ones first, then those that follow from expressions."""
+"""This module collects the units of the names of a model: those declared, and those inferred from expressions."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ from dataclasses import dataclass, field
 from hybridsim.expr import Expression
 from hybridsim.expr.grammar import TIME
 from hybridsim.model.laws.law_with_states import ContactState
+from hybridsim.model.parts.inputs import Input
 from hybridsim.model.parts.model import Model
-from hybridsim.model.units.infer import Inference, factors_of, is_number, terms_of
+from hybridsim.model.parts.quantities import Discrete, Parameter, State
+from hybridsim.model.smoothing.one_sided import names_of
+from hybridsim.model.units.infer import Inference, factors_of, terms_of
 from hybridsim.model.units.parse import read_unit
 from hybridsim.model.units.unit import ONE, Unit
 
@@ -80,8 +83,9 @@ def quantities_of(model: Model) -> Quantities | None:
 def declared_texts(model: Model) -> dict[str, str]:
     """Return the units that a model declares; those of the states of friction laws follow from their equations."""
     states = (state for state in model.states if not isinstance(state, ContactState))
+    parts: tuple[Parameter | State | Discrete | Input, ...]
     parts = (*model.parameters, *states, *model.discrete, *model.inputs)
-    return {part.name: part.unit for part in parts if part.unit}
+    return {part.name: part.unit for part in parts if part.unit} | model.connected_units
 
 
 def _time_of(texts: Iterable[str]) -> Unit | None:
@@ -124,7 +128,9 @@ def _resets(model: Model) -> Iterator[Mapping[str, Expression]]:
     yield from (monitor.reset for monitor in model.monitors)
     yield from (schedule.reset for schedule in model.schedules)
     for component in model.components:
-        yield from (choice.reset for mode in component.modes for guard in mode.guards for choice in guard.then)
+        yield from (
+            choice.reset for mode in component.modes for guard in mode.guards for choice in guard.then
+        )
 
 
 def _forces(model: Model) -> list[str]:
@@ -173,17 +179,18 @@ def _solved(found: Quantities, node: ast.expr, needed: Unit, name: str) -> Unit 
         case ast.UnaryOp(operand=operand):
             return _solved(found, operand, needed, name)
         case ast.BinOp(op=ast.Add() | ast.Sub()):
-            solved = (_solved(found, term, needed, name) for term in terms_of(node))
+            common = found.inference().unit(node) or needed
+            solved = (_solved(found, term, common, name) for term in terms_of(node))
             return next((unit for unit in solved if unit is not None), None)
         case ast.BinOp(op=ast.Mult() | ast.Div()):
-            unknown, rest = None, needed
+            inside: list[ast.expr] = []
             for factor, sign in factors_of(node):
                 unit = found.inference().unit(factor)
-                if unit is not None:
-                    rest = rest / unit if sign > 0 else rest * unit
-                elif unknown is None and sign > 0 and not is_number(factor):
-                    unknown = factor
-                else:
+                if name in names_of(factor) and sign > 0:
+                    inside.append(factor)
+                elif unit is None:
                     return None
-            return None if unknown is None else _solved(found, unknown, rest, name)
+                else:
+                    needed = needed / unit if sign > 0 else needed * unit
+            return _solved(found, inside[0], needed, name) if len(inside) == 1 else None
     return None

@@ -28,7 +28,7 @@ class Statement:
     expr: Expression
     needed: Unit | None = None
     because: str = ""
-    has_columns: bool = True  # False for an expression of a friction law, in which arguments are inserted
+    is_of_law: bool = False  # whether it is an expression of a friction law, in which arguments are inserted
 
 
 def statements_of(model: Model, known: Quantities) -> Iterator[Statement]:
@@ -39,14 +39,13 @@ def statements_of(model: Model, known: Quantities) -> Iterator[Statement]:
     for part in model.parameters:
         yield _value(known, f"parameter {part.name}", part.value, part.name)
     for state in model.states:
-        own = not isinstance(state, ContactState)
-        what, name = f"state {state.name}", state.name
-        yield Statement(f"{what}, start", state.start, known.units.get(name), name, own)
-        yield Statement(f"{what}, der", state.der, known.rate(name), f"the rate of {name}", own)
+        if not isinstance(state, ContactState):
+            yield _value(known, f"state {state.name}, start", state.start, state.name)
+            yield _rate(known, f"state {state.name}, der", state.der, state.name)
     for discrete in model.discrete:
         yield _value(known, f"discrete state {discrete.name}, start", discrete.start, discrete.name)
     for name, expr in model.definitions:
-        yield Statement(f"definition {name}", expr)
+        yield _value(known, f"definition {name}", expr, name)
     for signal in model.inputs:
         yield from _of_input(known, signal)
     for contact in model.contacts:
@@ -82,6 +81,10 @@ def _value(known: Quantities, what: str, expr: Expression, name: str) -> Stateme
     return Statement(what, expr, known.units.get(name), name)
 
 
+def _rate(known: Quantities, what: str, expr: Expression, name: str) -> Statement:
+    return Statement(what, expr, known.rate(name), f"the rate of {name}")
+
+
 def _resets(known: Quantities, what: str, resets: Mapping[str, Expression]) -> Iterator[Statement]:
     for name, expr in resets.items():
         yield _value(known, f"{what}, reset of {name}", expr, name)
@@ -107,26 +110,38 @@ def _of_contact(known: Quantities, contact: Contact, model: Model) -> Iterator[S
     what += f", law {contact.law.name}"
     for name, expr in contact.arguments.items():
         yield Statement(f"{what}, {name}", expr)
-    for part, name, expr in _of_law(contact, model):
-        yield Statement(f"{what}, {part}", _at(expr, contact), known.units.get(name), name, has_columns=False)
+    places = (argument.place for argument in contact.arguments.values())
+    place = next(places, None) or contact.place
+    for part, expr, needed, because in _of_law(known, contact, model):
+        there = Expression(expr.text, expr.names, place, expr.tree)
+        yield Statement(f"{what}, {part}", there, needed, because, is_of_law=True)
 
 
-def _of_law(contact: Contact, model: Model) -> Iterator[tuple[str, str, Expression]]:
-    """Yield the expressions of the forces of a law, each with its name in the law and the force."""
-    if contact.law.is_set_valued:
-        for suffix, backward in (("", False), (" backward", True)):
-            yield f"slip{suffix}", contact.name, contact.slip_force(contact.velocity, backward=backward)
-            yield f"stick{suffix}", contact.name, contact.limit_force(backward)
+def _of_law(
+    known: Quantities, contact: Contact, model: Model
+) -> Iterator[tuple[str, Expression, Unit | None, str]]:
+    """Yield the names and expressions of the forces and states of a law, each with the unit that it needs."""
+    law, name, force = contact.law, contact.name, known.units.get(contact.name)
+    if law.is_set_valued:
+        for backward in (False, True) if law.slip_backward or law.stick_backward else (False,):
+            suffix = " backward" if backward else ""
+            yield f"slip{suffix}", contact.slip_force(contact.velocity, backward=backward), force, name
+            yield f"stick{suffix}", contact.limit_force(backward), force, name
         return
     for component in model.components_of(contact):
         for mode in component.modes:
-            yield from ((f"{name} in {mode.name}", name, expr) for name, expr in mode.set.items())
-
-
-def _at(expr: Expression, contact: Contact) -> Expression:
-    """Return an expression of a friction law with the place of its arguments."""
-    places = (argument.place for argument in contact.arguments.values())
-    return Expression(expr.text, expr.names, next(places, None) or contact.place, expr.tree)
+            for name, expr in mode.set.items():
+                yield f"{name} in {mode.name}", expr, known.units.get(name), name
+            for name, expr in mode.der.items():
+                yield f"rate of {name} in {mode.name}", expr, known.rate(name), f"the rate of {name}"
+            for guard in mode.guards:
+                yield f"guard {guard.name} of {mode.name}", guard.expr, None, ""
+                for name, expr in (pair for choice in guard.then for pair in choice.reset.items()):
+                    yield f"reset of {name} in {mode.name}", expr, known.units.get(name), name
+    own = tuple(contact.variable(state.name) for state in law.states)
+    for state in model.states:
+        if isinstance(state, ContactState) and state.name.startswith(own):
+            yield f"rate of {state.name}", state.der, known.rate(state.name), f"the rate of {state.name}"
 
 
 def _of_component(known: Quantities, component: Component) -> Iterator[Statement]:
@@ -138,7 +153,7 @@ def _of_component(known: Quantities, component: Component) -> Iterator[Statement
     for mode in component.modes:
         where = f"{head}, mode {mode.name}"
         for name, expr in mode.der.items():
-            yield Statement(f"{where}, der of {name}", expr, known.rate(name), f"the rate of {name}")
+            yield _rate(known, f"{where}, der of {name}", expr, name)
         for name, expr in mode.set.items():
             yield _value(known, f"{where}, set {name}", expr, name)
         for guard in mode.guards:

@@ -38,7 +38,9 @@ class Unit:
 
     def power(self, exponent: Fraction) -> Unit:
         """Return a power of the unit."""
-        return Unit(_sum((name, power * exponent) for name, power in self.powers), self.scale ** float(exponent))
+        return Unit(
+            _sum((name, power * exponent) for name, power in self.powers), self.scale ** float(exponent)
+        )
 
     def without_angles(self) -> Unit:
         """Return the unit without radians and turns."""

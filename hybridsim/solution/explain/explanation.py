@@ -15,7 +15,7 @@ from hybridsim.engine.events.zeno.limits import LIMIT
 from hybridsim.engine.system.system import CORNER
 from hybridsim.errors import UsageError
 from hybridsim.expr import assignment
-from hybridsim.model.checks.units import units_of
+from hybridsim.model.checks.units import label_of, units_of
 from hybridsim.presentation.readable import Readable
 from hybridsim.solution.event import Event
 from hybridsim.solution.explain.candidate import candidate, views
@@ -288,7 +288,7 @@ def _choices(solution: Solution, event: Event, at: Situation) -> tuple[str, ...]
         return ()
     model = solution.model
     known = dict(zip(solution.names, event.x_minus.tolist(), strict=True)) | model.parameter_values()
-    units = units_of(model) | {q.name: q.unit for q in model.parameters}
+    units = units_of(model) | {q.name: label_of(q.unit) for q in model.parameters}
     lines = []
     for k, choice in enumerate(then):
         condition = "in all other cases"
