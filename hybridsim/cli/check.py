@@ -71,8 +71,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
 def _print_units(model: Model, as_json: bool) -> int:
     """Print the units of a model, and warn where they disagree."""
-    from hybridsim.model.units.faults import unit_faults
-    from hybridsim.model.units.report import HEADER, unit_rows
+    from hybridsim.model.units.faults import HEADER, unit_faults, unit_rows
 
     rows, faults = [*unit_rows(model)], [*unit_faults(model)]
     if as_json:

@@ -1,18 +1,23 @@
-"""This module finds the expressions of a model whose units disagree, and words the messages."""
+"""This module finds the expressions whose units disagree, words the messages, and lists what is known."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
+from hybridsim.expr.grammar import TIME
 from hybridsim.expr.write import write
 from hybridsim.model.checks.caution import Caution
 from hybridsim.model.parts.model import Model
 from hybridsim.model.units.infer import Disagreement
 from hybridsim.model.units.parse import write_unit
-from hybridsim.model.units.quantities import Quantities, quantities_of
+from hybridsim.model.units.quantities import Quantities
 from hybridsim.model.units.statements import Statement, statements_of
 from hybridsim.model.units.unit import Unit
+from hybridsim.model.units.votes import quantities_of
+
+HEADER = ("what", "unit", "how it is known")
+DECLARED, INFERRED, UNKNOWN, AGREES, DISAGREES = "declared", "inferred", "unknown", "agrees", "disagrees"
 
 
 @dataclass(frozen=True)
@@ -73,3 +78,37 @@ def _caution(statement: Statement, found: Disagreement, known: Quantities) -> Ca
 def _is_in(unit: Unit, texts: Iterable[str]) -> str:
     text = write_unit(unit, texts)
     return "is a pure number" if text == "1" else f"is in {text}"
+
+
+def unit_rows(model: Model) -> Iterator[tuple[str, str, str]]:
+    """Yield what has a unit, the unit, and how it is known: first the quantities, then the expressions.
+
+    Expressions that are only numbers are left out.
+    """
+    known = quantities_of(model)
+    if known is None:
+        return
+    yield from _quantities(model, known)
+    for expression in units_of_expressions(model, known):
+        what, expr = expression.statement.what, expression.statement.expr
+        if expr.is_constant:
+            continue
+        if expression.unit is None and not expression.cautions:
+            yield what, "", f"{UNKNOWN}: {'; '.join(dict.fromkeys(expression.unknown))}"
+        else:
+            unit = "" if expression.unit is None else write_unit(expression.unit, known.texts.values())
+            yield what, unit, DISAGREES if expression.cautions else AGREES
+
+
+def _quantities(model: Model, known: Quantities) -> Iterator[tuple[str, str, str]]:
+    names = [
+        part.name for kind in (model.parameters, model.states, model.discrete, model.inputs) for part in kind
+    ]
+    for name in dict.fromkeys((TIME, *names, *dict(model.definitions), *model.variables())):
+        text = known.texts.get(name, "")
+        if name not in known.units:
+            yield name, text, f"{UNKNOWN}: this text is not a known unit" if text else UNKNOWN
+        elif text and name not in known.inferred:
+            yield name, text, DECLARED
+        else:
+            yield name, write_unit(known.units[name], known.texts.values()), INFERRED

@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 import hybridsim as hs
-from hybridsim.model.units.faults import unit_faults
-from hybridsim.model.units.report import UNKNOWN, unit_rows
+from hybridsim.model.units.faults import UNKNOWN, unit_faults, unit_rows
 
 ROOT = Path(__file__).parents[3]
 FILES = sorted([*(ROOT / "models").glob("*.toml"), *(ROOT / "docs" / "examples" / "parts").glob("*.toml")])
