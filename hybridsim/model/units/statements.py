@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -18,6 +18,8 @@ from hybridsim.model.units.quantities import Quantities
 from hybridsim.model.units.unit import ONE, TURN, Unit
 
 _TURN = Unit(((TURN, Fraction(1)),))
+_METRE, _SECOND = Unit((("m", Fraction(1)),)), Unit((("s", Fraction(1)),))
+_LENGTHS, _SPEEDS = (_METRE, ONE), (_METRE / _SECOND, ONE / _SECOND)  # the second ones are those of angles
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,9 @@ def statements_of(model: Model, known: Quantities) -> Iterator[Statement]:
             for name, expr in values.items():
                 yield _value(known, f"surface {surface.name}, {name} {side}", expr, name)
     for impact in model.impacts:
-        yield Statement(f"impact {impact.name}, gap", impact.gap)
+        yield Statement(
+            f"impact {impact.name}, gap", impact.gap, _unless(known, impact.gap, _LENGTHS), "a gap"
+        )
         yield Statement(f"impact {impact.name}, restitution", impact.restitution, ONE, "a ratio of speeds")
     for component in model.components:
         yield from _of_component(known, component)
@@ -85,6 +89,13 @@ def _rate(known: Quantities, what: str, expr: Expression, name: str) -> Statemen
     return Statement(what, expr, known.rate(name), f"the rate of {name}")
 
 
+def _unless(known: Quantities, expr: Expression, kinds: Sequence[Unit]) -> Unit | None:
+    """Return the first of some units, unless the unit of an expression is unknown or has the dimension of one of them."""
+    unit = known.inference().unit(expr.tree)
+    is_one = unit is None or any(unit.dimension == kind.dimension for kind in kinds)
+    return None if is_one else kinds[0]
+
+
 def _resets(known: Quantities, what: str, resets: Mapping[str, Expression]) -> Iterator[Statement]:
     for name, expr in resets.items():
         yield _value(known, f"{what}, reset of {name}", expr, name)
@@ -105,15 +116,21 @@ def _of_input(known: Quantities, signal: Input) -> Iterator[Statement]:
 
 def _of_contact(known: Quantities, contact: Contact, model: Model) -> Iterator[Statement]:
     what = f"contact {contact.name}"
-    yield Statement(f"{what}, velocity", contact.velocity)
+    speed = _unless(known, contact.velocity, _SPEEDS)
+    yield Statement(f"{what}, velocity", contact.velocity, speed, "a relative velocity")
     yield Statement(f"{what}, normal", contact.normal)
     what += f", law {contact.law.name}"
     for name, expr in contact.arguments.items():
         yield Statement(f"{what}, {name}", expr)
     places = (argument.place for argument in contact.arguments.values())
     place = next(places, None) or contact.place
+    load = known.inference().unit(contact.normal.tree)
     for part, expr, needed, because in _of_law(known, contact, model):
-        there = Expression(expr.text, expr.names, place, expr.tree)
+        unit = known.inference().unit(expr.tree)
+        is_load = (
+            load is not None and unit is not None and not unit.differs(load)
+        )  # coefficients times the load
+        there = Expression(expr.text, expr.names, contact.normal.place if is_load else place, expr.tree)
         yield Statement(f"{what}, {part}", there, needed, because, is_of_law=True)
 
 

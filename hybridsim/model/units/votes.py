@@ -49,8 +49,7 @@ class _Witnesses:
         self.known = known
         self.rates = {state.name: state.der for state in model.states if isinstance(state, ContactState)}
         self.setting = _setting(model)
-        labels = ((output.expr.text, read_unit(output.unit)) for output in model.outputs)
-        self.shown = [(name, unit) for name, unit in labels if unit is not None]
+        self.shown = {output.expr.text: read_unit(output.unit) for output in model.outputs if output.unit}
         signals = (*(part.name for part in model.discrete), *(signal.name for signal in model.inputs))
         numbers = {name for name, expr in model.definitions if expr.is_constant}
         # a number may stand for several quantities; each of these is one
@@ -82,7 +81,8 @@ class _Witnesses:
             needed = known.rate(user) if is_rate else known.units.get(user)
             if needed is not None and (unit := _solved(known, expr.tree, needed, name)) is not None:
                 yield unit
-        yield from (unit for shown, unit in self.shown if shown == name)
+        if (shown := self.shown.get(name)) is not None:
+            yield shown
 
 
 def _setting(model: Model) -> dict[str, list[Expression]]:

@@ -166,6 +166,19 @@ PLACES = {
         '[surfaces.u]\nexpr = "x"\nabove = { a = "F" }\nbelow = { a = "x" }\n',
         "surface u, a below: 'x' is in m, but a is in N", 2,
     ),
+    "dimension of a velocity": (
+        '[contacts.f]\nvelocity = "x"\nnormal = "F"\nlaw = { name = "coulomb", mu = "ratio" }\n',
+        "contact f, velocity: 'x' is in m, but a relative velocity is in m/s", 0,
+    ),
+    "dimension of a gap": (
+        '[impacts.q]\ngap = "v"\nrestitution = 0.5\n', "impact q, gap: 'v' is in m/s, but a gap is in m", 0,
+    ),
+    "load that is no force": (
+        '[states.y]\nstart = 0\nunit = "m/s"\nder = "(F - f)/m"\n'
+        '[contacts.f]\nvelocity = "v"\nnormal = "k"\nlaw = { name = "coulomb", mu = "ratio" }\n'
+        '[outputs]\nf = { expr = "f", unit = "N" }\n',
+        "contact f, law coulomb, slip: 'ratio*k' is in N/m, but f is in N", 5,
+    ),
     "gap": ('[impacts.q]\ngap = "x - gap"\nrestitution = 0.5\n', "impact q, gap: 'gap' is in mm, but 'x' is in m", 0),
     "restitution": (
         '[impacts.q]\ngap = "x"\nrestitution = "L"\n',
