@@ -90,7 +90,7 @@ def _rate(known: Quantities, what: str, expr: Expression, name: str) -> Statemen
 
 
 def _unless(known: Quantities, expr: Expression, kinds: Sequence[Unit]) -> Unit | None:
-    """Return the first of some units, unless the unit of an expression is unknown or has the dimension of one of them."""
+    """Return the first of some units if an expression is known to have the dimension of none of them."""
     unit = known.inference().unit(expr.tree)
     is_one = unit is None or any(unit.dimension == kind.dimension for kind in kinds)
     return None if is_one else kinds[0]
@@ -126,12 +126,17 @@ def _of_contact(known: Quantities, contact: Contact, model: Model) -> Iterator[S
     place = next(places, None) or contact.place
     load = known.inference().unit(contact.normal.tree)
     for part, expr, needed, because in _of_law(known, contact, model):
-        unit = known.inference().unit(expr.tree)
-        is_load = (
-            load is not None and unit is not None and not unit.differs(load)
-        )  # coefficients times the load
-        there = Expression(expr.text, expr.names, contact.normal.place if is_load else place, expr.tree)
+        at = contact.normal.place if _is_of_load(known, expr, load, needed) else place
+        there = Expression(expr.text, expr.names, at, expr.tree)
         yield Statement(f"{what}, {part}", there, needed, because, is_of_law=True)
+
+
+def _is_of_load(known: Quantities, expr: Expression, load: Unit | None, needed: Unit | None) -> bool:
+    """Return whether a force is a pure number times a load that is not in the unit of the force."""
+    if load is None or needed is None or not load.differs(needed):
+        return False
+    unit = known.inference().unit(expr.tree)
+    return unit is not None and not unit.differs(load)
 
 
 def _of_law(
