@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from hybridsim.expr.grammar import TIME
@@ -62,22 +62,22 @@ def units_of_expressions(model: Model, known: Quantities) -> Iterator[UnitOfExpr
 
 
 def _caution(statement: Statement, found: Disagreement, known: Quantities) -> Caution:
-    texts = known.texts.values()
-    message = (
-        f"{statement.what}: '{write(found.term)}' {_is_in(found.unit, texts)}, "
-        f"but {found.because} {_is_in(found.needed, texts)}"
-    )
+    own, needed = (write_unit(unit, known.labels) for unit in (found.unit, found.needed))
+    message = f"{statement.what}: '{write(found.term)}' {_is_in(own)}, but {found.because} {_is_in(needed)}"
     node = None if statement.is_of_law else found.term
     remedy = "correct the expression or a unit; a constant with a unit is declared in [parameters]"
-    if found.unit.differs(found.needed) == "scale":
-        factor = write_unit(found.needed / found.unit)
-        remedy = f"units are not converted: multiply by a parameter with the unit {factor}, or use one unit"
+    if found.unit.differs(found.needed) != "dimension":
+        ratio = "/".join(f"({text})" if "/" in text or " " in text else text for text in (needed, own))
+        factor = found.unit.factor(found.needed)
+        remedy = (
+            "units are not converted: use one unit, or multiply by a parameter that converts, "
+            f'{{ value = {factor:.9g}, unit = "{ratio}" }}'
+        )
     return Caution(message, statement.expr.error(message, node=node).place, remedy)
 
 
-def _is_in(unit: Unit, texts: Iterable[str]) -> str:
-    text = write_unit(unit, texts)
-    return "is a pure number" if text == "1" else f"is in {text}"
+def _is_in(unit: str) -> str:
+    return "is a pure number" if unit == "1" else f"is in {unit}"
 
 
 def unit_rows(model: Model) -> Iterator[tuple[str, str, str]]:
@@ -96,7 +96,7 @@ def unit_rows(model: Model) -> Iterator[tuple[str, str, str]]:
         if expression.unit is None and not expression.cautions:
             yield what, "", f"{UNKNOWN}: {'; '.join(dict.fromkeys(expression.unknown))}"
         else:
-            unit = "" if expression.unit is None else write_unit(expression.unit, known.texts.values())
+            unit = "" if expression.unit is None else write_unit(expression.unit, known.labels)
             yield what, unit, DISAGREES if expression.cautions else AGREES
 
 
@@ -111,4 +111,4 @@ def _quantities(model: Model, known: Quantities) -> Iterator[tuple[str, str, str
         elif text and name not in known.inferred:
             yield name, text, DECLARED
         else:
-            yield name, write_unit(known.units[name], known.texts.values()), INFERRED
+            yield name, write_unit(known.units[name], known.labels), INFERRED

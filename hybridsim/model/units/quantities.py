@@ -25,12 +25,14 @@ class Quantities:
     Parameters
     ----------
     texts : the declared units as they are written, by name, without empty ones.
+    labels : all units that the model writes, those of outputs included; messages use them.
     units : the known units by name.
     inferred : the names whose units are not declared but follow from expressions.
     parameters : the names of the parameters.
     """
 
     texts: dict[str, str]
+    labels: tuple[str, ...]
     units: dict[str, Unit]
     parameters: frozenset[str]
     inferred: set[str] = field(default_factory=set)
@@ -60,7 +62,8 @@ def declared_quantities(model: Model) -> Quantities | None:
     if time is not None:
         implied[TIME] = time
     parameters = frozenset(parameter.name for parameter in model.parameters)
-    return Quantities(texts, units | implied, parameters, {*implied})
+    labels = (*texts.values(), *(output.unit for output in model.outputs if output.unit))
+    return Quantities(texts, tuple(dict.fromkeys(labels)), units | implied, parameters, {*implied})
 
 
 def declared_texts(model: Model) -> dict[str, str]:

@@ -75,7 +75,7 @@ def statements_of(model: Model, known: Quantities) -> Iterator[Statement]:
         yield from (Statement(f"{what}, times", expr, time, TIME) for expr in schedule.times)
         yield from _resets(known, what, schedule.reset)
     for output in model.outputs:
-        unit, label = read_unit(output.unit), f"the unit of output {output.name}"
+        unit, label = read_unit(output.unit), f"output {output.name}"
         yield Statement(f"output {output.name}", output.expr, unit, label)
         for key, expr in output.modes.items():
             yield Statement(f"output {output.name} in {key}", expr, unit, label)

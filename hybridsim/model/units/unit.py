@@ -67,6 +67,11 @@ class Unit:
         mixed = (TURN in own and RADIAN in others) or (RADIAN in own and TURN in others)
         return "" if not mixed and math.isclose(self.scale, other.scale, rel_tol=_TOLERANCE) else "scale"
 
+    def factor(self, other: Unit) -> float:
+        """Return the factor that converts a value in this unit to another unit of the same dimension."""
+        turns = dict((self / other).powers).get(TURN, Fraction(0))
+        return self.scale / other.scale * math.tau ** float(turns)
+
 
 ONE = Unit()
 

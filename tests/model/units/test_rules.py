@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+from pathlib import Path
+
 import pytest
 
 import hybridsim as hs
-from hybridsim.model.units.faults import unit_faults
+from hybridsim.model.units.faults import unit_faults, unit_rows
 
 HEAD = """[parameters]
 m = { value = 1, unit = "kg" }
@@ -99,12 +102,12 @@ def test_no_fault(expr: str, unit: str) -> None:
         ("sin(f0*t)", "", "'f0*t' is in turn, but the argument of sin is a pure number"),
         ("log(x/gap)", "", "'x/gap' is in 1000, but the argument of log is a pure number"),
         ("L**(x/L)*ratio**x", "", "'x' is in m, but an exponent is a pure number"),
-        ("k*x", "kN", "'k*x' is in N, but the unit of output y is in kN"),
-        ("k*x", "N/m", "'k*x' is in N, but the unit of output y is in N/m"),
-        ("f0", "rad/s", "'f0' is in Hz, but the unit of output y is in rad/s"),
-        ("sqrt(k*m)", "N", "'sqrt(k*m)' is in N s/m, but the unit of output y is in N"),
-        ("abs(x)**1.5", "m", "'abs(x)**1.5' is in m^(3/2), but the unit of output y is in m"),
-        ("F*ratio/L", "N", "'F*ratio/L' is in N/m, but the unit of output y is in N"),
+        ("k*x", "kN", "'k*x' is in N, but output y is in kN"),
+        ("k*x", "N/m", "'k*x' is in N, but output y is in N/m"),
+        ("f0", "rad/s", "'f0' is in Hz, but output y is in rad/s"),
+        ("sqrt(k*m)", "N", "'sqrt(k*m)' is in N s/m, but output y is in N"),
+        ("abs(x)**1.5", "m", "'abs(x)**1.5' is in m^(3/2), but output y is in m"),
+        ("F*ratio/L", "N", "'F*ratio/L' is in N/m, but output y is in N"),
     ],
 )
 def test_a_fault_names_line_expression_term_and_both_units(expr: str, unit: str, message: str) -> None:
@@ -212,7 +215,7 @@ PLACES = {
     "times": ('[schedules]\nbump = { times = [1, "L"] }\n', "schedule bump, times: 'L' is in m, but t is in s", 0),
     "output in a mode": (
         '[components.a.modes.b]\n[outputs.y]\nexpr = "x"\nunit = "m"\nmodes = { "a.b" = "v" }\n',
-        "output y in a.b: 'v' is in m/s, but the unit of output y is in m", 4 - 1,
+        "output y in a.b: 'v' is in m/s, but output y is in m", 4 - 1,
     ),
 }  # fmt: skip
 
@@ -222,3 +225,70 @@ def test_every_kind_of_expression_is_checked(place: str) -> None:
     text, message, line = PLACES[place]
     (found,) = faults(text)
     assert message in found and found.startswith(f"m.toml:{FIRST + line}: ")
+
+
+@pytest.mark.parametrize(
+    ("expr", "unit", "factor", "of_factor"),
+    [
+        ("gap", "m", 1e-3, "m/mm"),
+        ("n", "rad/s", 2 * math.pi / 60, "(rad/s)/rpm"),
+        ("f0", "rad/s", 2 * math.pi, "(rad/s)/Hz"),
+        ("omega", "Hz", 1 / (2 * math.pi), "Hz/(rad/s)"),
+        ("alpha", "rad", math.pi / 180, "rad/deg"),
+        ("k*x", "kN", 1e-3, "kN/N"),
+    ],
+)
+def test_the_remedy_of_a_scale_is_a_factor_that_mends_it(
+    expr: str, unit: str, factor: float, of_factor: str
+) -> None:
+    (found,) = of_expression(expr, unit)
+    assert found.endswith(f'a parameter that converts, {{ value = {factor:.9g}, unit = "{of_factor}" }}')
+    added = f'[parameters.q]\nvalue = {factor!r}\nunit = "{of_factor}"\n'
+    assert faults(f'{added}[outputs]\ny = {{ expr = "q*{expr}", unit = "{unit}" }}\n') == []
+
+
+def test_a_caret_points_at_the_term() -> None:
+    (caution,) = unit_faults(hs.Model.from_toml(f'{HEAD}[outputs]\ny = "k*x + c*v - L"\n'))
+    lines = str(caution).splitlines()
+    assert lines[2].index("^") == lines[1].index("L")
+
+
+def test_the_unit_of_a_connected_input_is_checked_in_the_whole_model(tmp_path: Path) -> None:
+    (tmp_path / "part.toml").write_text(
+        '[inputs]\nu = { kind = "connected", unit = "m" }\n[states]\ny = { start = 0, unit = "m s", der = "u" }\n'
+    )
+    (tmp_path / "inner.toml").write_text(
+        '[inputs]\nw = { kind = "connected", unit = "m" }\n[use]\np = { model = "part.toml", connect = { u = "w" } }\n'
+    )
+    path = tmp_path / "whole.toml"
+    path.write_text(HEAD + '[use]\na = { model = "part.toml", connect = { u = "v" } }\n')
+    (caution,) = unit_faults(hs.load(path))
+    assert "definition a.u: 'v' is in m/s, but a.u is in m" in caution.message
+    assert caution.place is not None and caution.place.line == FIRST
+    path.write_text(HEAD + '[use]\na = { model = "inner.toml", connect = { w = "x" } }\n')
+    assert not [*unit_faults(hs.load(path).with_(m=2))]
+    path.write_text(HEAD + '[use]\na = { model = "inner.toml", connect = { w = "gap" } }\n')
+    assert ["a.w is in m" in one.message for one in unit_faults(hs.load(path))] == [True]
+
+
+def test_names_without_units_inherit_what_most_expressions_tell() -> None:
+    model = hs.Model.from_toml(
+        HEAD
+        + '[discrete]\nheld = "F"\n[definitions]\nS = "k*x + c*v"\n'
+        + '[inputs.a]\nkind = "table"\ntimes = [0, 1]\nvalues = [0, 1]\n'
+        + '[states.y]\nstart = 0\nunit = "m/s"\nder = "a - f/m"\n'
+        + '[contacts.f]\nvelocity = "v"\nnormal = "free"\nlaw = { name = "dahl", mu = 0.3, sigma = "k" }\n'
+    )
+    rows = {what: (unit, known) for what, unit, known in unit_rows(model)}
+    assert rows["held"] == rows["S"] == rows["f"] == ("N", "inferred")
+    assert rows["a"] == ("m/s^2", "inferred")
+    assert rows["f_z"] == ("m", "inferred")
+    assert rows["free"] == ("", "unknown")
+    assert rows["t"] == ("s", "inferred")
+    assert rows["contact f, normal"] == ("", "unknown: free has no known unit")
+
+
+def test_a_unit_in_python_is_checked_without_a_line() -> None:
+    fall = [hs.State("h", 10, der="w", unit="m"), hs.State("w", 0, der="h", unit="m/s")]
+    (caution,) = unit_faults(hs.Model("fall", states=fall))
+    assert caution.sentence.startswith("state w, der: 'h' is in m, but the rate of w is in m/s^2: ")
