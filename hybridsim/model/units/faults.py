@@ -44,31 +44,31 @@ def units_of_expressions(model: Model, known: Quantities) -> Iterator[UnitOfExpr
     A warning is given once for each line. In the expressions of a friction law it is left out if an argument of the
     law or another expression of the law has it.
     """
-    told: set[tuple[int | None, str]] = set()
+    reported: set[tuple[int | None, str]] = set()
     for statement in statements_of(model, known):
-        inference = known.inference()
+        inference = known.inference(statement.counts)
         unit = inference.unit(statement.expr.tree)
         found = list(inference.disagreements)
-        if unit is not None and statement.needed is not None and unit.differs(statement.needed):
-            found.append(Disagreement(statement.expr.tree, unit, statement.needed, statement.because))
+        if unit is not None and statement.required is not None and unit.differs(statement.required):
+            found.append(Disagreement(statement.expr.tree, unit, statement.required, statement.because))
         cautions = []
         for caution in (_caution(statement, one, known) for one in found):
             text = caution.message.partition(": ")[2]
             line = caution.place.line if caution.place and not statement.is_of_law else None
-            if (line, text) not in told:
+            if (line, text) not in reported:
                 cautions.append(caution)
-            told |= {(line, text), (None, text)}
+            reported |= {(line, text), (None, text)}
         yield UnitOfExpression(statement, unit, tuple(inference.unknown), tuple(cautions))
 
 
 def _caution(statement: Statement, found: Disagreement, known: Quantities) -> Caution:
-    own, needed = (write_unit(unit, known.labels) for unit in (found.unit, found.needed))
-    message = f"{statement.what}: '{write(found.term)}' {_is_in(own)}, but {found.because} {_is_in(needed)}"
+    own, required = (write_unit(unit, known.labels) for unit in (found.unit, found.required))
+    message = f"{statement.what}: '{write(found.term)}' {_is_in(own)}, but {found.because} {_is_in(required)}"
     node = None if statement.is_of_law else found.term
     remedy = "correct the expression or a unit; a constant with a unit is declared in [parameters]"
-    if found.unit.differs(found.needed) != "dimension":
-        ratio = "/".join(f"({text})" if "/" in text or " " in text else text for text in (needed, own))
-        factor = found.unit.factor(found.needed)
+    if found.unit.differs(found.required) != "dimension":
+        ratio = "/".join(f"({text})" if "/" in text or " " in text else text for text in (required, own))
+        factor = found.unit.factor(found.required)
         remedy = (
             "units are not converted: use one unit, or multiply by a parameter that converts, "
             f'{{ value = {factor:.9g}, unit = "{ratio}" }}'

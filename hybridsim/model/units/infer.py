@@ -33,7 +33,7 @@ class Disagreement:
 
     term: ast.expr
     unit: Unit
-    needed: Unit
+    required: Unit
     because: str  # the other term as it is written, or the place that needs a unit
 
 
@@ -44,11 +44,13 @@ class Inference:
     ----------
     units : the known units by name.
     parameters : names of the parameters, which numbers multiply as pure numbers.
+    counts : whether numbers in products are pure numbers, as in a duration of 20 periods.
     """
 
-    def __init__(self, units: Units, parameters: Collection[str]) -> None:
+    def __init__(self, units: Units, parameters: Collection[str], counts: bool = False) -> None:
         self.units = units
         self.parameters = parameters
+        self.counts = counts
         self.disagreements: list[Disagreement] = []
         self.unknown: list[str] = []
 
@@ -109,7 +111,7 @@ class Inference:
         numbers = [factor for factor, _ in factors if is_number(factor)]
         if all(_is_one(number) for number in numbers):
             return product
-        if not (self._has_parameter(node) and all(map(_is_pure, numbers))):
+        if not (self.counts or (self._has_parameter(node) and all(map(_is_pure, numbers)))):
             self.unknown.append(f"a number in '{write(node)}' may have a unit")
             return None
         turns = any(isinstance(part, ast.Name) for number in numbers for part in ast.walk(number))
@@ -133,7 +135,7 @@ class Inference:
         if is_number(exponent):
             value = _value(exponent)
             return None if unit is None or value is None else unit.power(value)
-        self._number_needed(exponent)
+        self._require_number(exponent)
         if unit is None or not unit.is_number:
             self.unknown.append(f"the exponent '{write(exponent)}' is not a number")
             return None
@@ -141,7 +143,7 @@ class Inference:
 
     def _call(self, function: str, args: Sequence[ast.expr]) -> Unit | None:
         if function in _OF_NUMBERS:
-            self._number_needed(args[0], function)
+            self._require_number(args[0], function)
             return ONE
         if function in _OF_ALIKE:
             return self._alike(args)
@@ -155,7 +157,7 @@ class Inference:
             return None if unit is None else unit.power(Fraction(1, 2))
         return unit  # abs
 
-    def _number_needed(self, node: ast.expr, function: str = "") -> None:
+    def _require_number(self, node: ast.expr, function: str = "") -> None:
         """Report an argument or exponent that is known not to be a pure number."""
         unit = self.unit(node)
         if unit is not None and not unit.is_number:

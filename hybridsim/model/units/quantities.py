@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Iterable
 from dataclasses import dataclass, field
+from fractions import Fraction
 
 from hybridsim.expr.grammar import TIME
 from hybridsim.model.laws.law_with_states import ContactState
@@ -15,6 +14,7 @@ from hybridsim.model.units.infer import Inference
 from hybridsim.model.units.parse import read_unit
 from hybridsim.model.units.unit import ONE, Unit
 
+_SECOND = Unit((("s", Fraction(1)),))
 _TIMES = ("s", "ms", "us", "µs", "min", "h", "d")
 
 
@@ -42,9 +42,9 @@ class Quantities:
         """The unit of t."""
         return self.units.get(TIME)
 
-    def inference(self) -> Inference:
+    def inference(self, counts: bool = False) -> Inference:
         """Return an empty inference that knows these units."""
-        return Inference(self.units, self.parameters)
+        return Inference(self.units, self.parameters, counts)
 
     def rate(self, name: str) -> Unit | None:
         """Return the unit of the time derivative of a quantity."""
@@ -52,18 +52,20 @@ class Quantities:
 
 
 def declared_quantities(model: Model) -> Quantities | None:
-    """Return the units that a model declares, or None if it declares none."""
+    """Return the units that a model declares, and that of t, or None if it declares none."""
     texts = declared_texts(model)
     if not texts:
         return None
     units = {name: unit for name, text in texts.items() if (unit := read_unit(text)) is not None}
     implied = dict.fromkeys((surface.name for surface in model.surfaces), ONE)
-    time = _time_of([*texts.values()])
-    if time is not None:
-        implied[TIME] = time
-    parameters = frozenset(parameter.name for parameter in model.parameters)
     labels = (*texts.values(), *(output.unit for output in model.outputs if output.unit))
-    return Quantities(texts, tuple(dict.fromkeys(labels)), units | implied, parameters, {*implied})
+    parameters = frozenset(parameter.name for parameter in model.parameters)
+    known = Quantities(texts, tuple(dict.fromkeys(labels)), units | implied, parameters, {*implied})
+    time = _time_of(model, known)
+    if time is not None:
+        known.units[TIME] = time
+        known.inferred.add(TIME)
+    return known
 
 
 def declared_texts(model: Model) -> dict[str, str]:
@@ -74,18 +76,23 @@ def declared_texts(model: Model) -> dict[str, str]:
     return {part.name: part.unit for part in parts if part.unit} | model.connected_units
 
 
-def _time_of(texts: Iterable[str]) -> Unit | None:
-    """Return the unit of t: the unit of time that most declarations contain, or s if they imply it."""
-    used: Counter[str] = Counter()
-    for text in texts:
-        symbols = [symbol for symbol in _TIMES if _contains(text, symbol)]
-        used.update(symbols)
-        unit = read_unit(text)
-        if not symbols and unit is not None and "s" in dict(unit.powers):
-            used["s"] += 0  # as in N, if no other unit of time is found
-    if not used:
+def _time_of(model: Model, known: Quantities) -> Unit | None:
+    """Return the unit of t that most rates of states and most declarations tell; s if they tell several equally."""
+    votes = []
+    for state in model.states:
+        rate = known.inference().unit(state.der.tree)
+        if rate is not None and state.name in known.units:
+            votes.append((known.units[state.name] / rate).without_angles())
+    for text in known.texts.values():
+        votes += [unit for symbol in _TIMES if _contains(text, symbol) and (unit := read_unit(symbol))]
+    votes = [unit for unit in votes if unit.dimension == _SECOND.dimension]
+    if any("s" in dict(unit.powers) for unit in known.units.values()):
+        votes.append(_SECOND)  # as in N
+    if not votes:
         return None
-    return read_unit(max(used, key=lambda symbol: (used[symbol], symbol == "s")))
+    return max(
+        votes, key=lambda unit: (sum(not unit.differs(one) for one in votes), not unit.differs(_SECOND))
+    )
 
 
 def _contains(text: str, symbol: str) -> bool:

@@ -28,16 +28,17 @@ class Statement:
 
     what: str
     expr: Expression
-    needed: Unit | None = None
+    required: Unit | None = None
     because: str = ""
     is_of_law: bool = False  # whether it is an expression of a friction law, in which arguments are inserted
+    counts: bool = False  # whether numbers in products are pure numbers, as in a duration of 20 periods
 
 
 def statements_of(model: Model, known: Quantities) -> Iterator[Statement]:
     """Yield the expressions of a model, in the order of the declarations in a file."""
     time = known.time
     if model.duration is not None:
-        yield Statement("duration", model.duration, time, TIME)
+        yield Statement("duration", model.duration, time, TIME, counts=True)
     for part in model.parameters:
         yield _value(known, f"parameter {part.name}", part.value, part.name)
     for state in model.states:
@@ -71,8 +72,8 @@ def statements_of(model: Model, known: Quantities) -> Iterator[Statement]:
         what = f"schedule {schedule.name}"
         for field, time_expr in (("start", schedule.start), ("period", schedule.period)):
             if time_expr is not None:
-                yield Statement(f"{what}, {field}", time_expr, time, TIME)
-        yield from (Statement(f"{what}, times", expr, time, TIME) for expr in schedule.times)
+                yield Statement(f"{what}, {field}", time_expr, time, TIME, counts=True)
+        yield from (Statement(f"{what}, times", expr, time, TIME, counts=True) for expr in schedule.times)
         yield from _resets(known, what, schedule.reset)
     for output in model.outputs:
         unit, label = read_unit(output.unit), f"output {output.name}"
@@ -104,13 +105,13 @@ def _resets(known: Quantities, what: str, resets: Mapping[str, Expression]) -> I
 def _of_input(known: Quantities, signal: Input) -> Iterator[Statement]:
     time = known.time
     frequency = None if time is None else _TURN / time
-    needed: dict[str, tuple[Unit | None, str]] = {
+    required: dict[str, tuple[Unit | None, str]] = {
         "period": (time, TIME), "duration": (time, TIME), "duty": (ONE, "a share"),
         "f0": (frequency, "a frequency"), "f1": (frequency, "a frequency"),
         "phase": (time, TIME) if signal.kind == "wave" else (ONE, "an angle"),
     }  # fmt: skip
     for field, expr in signal.expressions.items():
-        unit, because = needed.get(field, (known.units.get(signal.name), signal.name))
+        unit, because = required.get(field, (known.units.get(signal.name), signal.name))
         yield Statement(f"input {signal.name}, {field}", expr, unit, because)
 
 
@@ -122,18 +123,18 @@ def _of_contact(known: Quantities, contact: Contact, model: Model) -> Iterator[S
     what += f", law {contact.law.name}"
     for name, expr in contact.arguments.items():
         yield Statement(f"{what}, {name}", expr)
-    places = (argument.place for argument in contact.arguments.values())
-    place = next(places, None) or contact.place
+    positions = (argument.place for argument in contact.arguments.values())
+    place = next(positions, None) or contact.place
     load = known.inference().unit(contact.normal.tree)
-    for part, expr, needed, because in _of_law(known, contact, model):
-        at = contact.normal.place if _is_of_load(known, expr, load, needed) else place
+    for part, expr, required, because in _of_law(known, contact, model):
+        at = contact.normal.place if _is_of_load(known, expr, load, required) else place
         there = Expression(expr.text, expr.names, at, expr.tree)
-        yield Statement(f"{what}, {part}", there, needed, because, is_of_law=True)
+        yield Statement(f"{what}, {part}", there, required, because, is_of_law=True)
 
 
-def _is_of_load(known: Quantities, expr: Expression, load: Unit | None, needed: Unit | None) -> bool:
+def _is_of_load(known: Quantities, expr: Expression, load: Unit | None, required: Unit | None) -> bool:
     """Return whether a force is a pure number times a load that is not in the unit of the force."""
-    if load is None or needed is None or not load.differs(needed):
+    if load is None or required is None or not load.differs(required):
         return False
     unit = known.inference().unit(expr.tree)
     return unit is not None and not unit.differs(load)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 
 from hybridsim.expr import Expression
 from hybridsim.model.laws.law_with_states import ContactState
@@ -42,6 +43,32 @@ def quantities_of(model: Model) -> Quantities | None:
     return known
 
 
+@dataclass(frozen=True)
+class _Use:
+    """An expression, and what its unit follows from: a state of which it is the rate, a name, or a label."""
+
+    expr: Expression
+    rate_of: str = ""
+    value_of: str = ""
+    label: str = ""
+
+    def required(self, known: Quantities) -> Unit | None:
+        """Return the unit that the expression needs, or None if it is unknown."""
+        if self.rate_of:
+            return known.rate(self.rate_of)
+        return known.units.get(self.value_of) if self.value_of else read_unit(self.label)
+
+
+def _uses(model: Model) -> Iterator[_Use]:
+    """Yield the expressions that tell the unit of a name in them."""
+    yield from (_Use(state.der, rate_of=state.name) for state in model.states)
+    yield from (_Use(expr, value_of=name) for name, expr in model.definitions)
+    yield from (_Use(output.expr, label=output.unit) for output in model.outputs)
+    for contact in model.contacts:
+        yield from (_Use(contact.velocity), _Use(contact.normal))
+    yield from (_Use(impact.gap) for impact in model.impacts)
+
+
 class _Witnesses:
     """The expressions that tell the units of names: those that set a name, and those that use it."""
 
@@ -49,15 +76,13 @@ class _Witnesses:
         self.known = known
         self.rates = {state.name: state.der for state in model.states if isinstance(state, ContactState)}
         self.setting = _setting(model)
-        self.shown = {output.expr.text: read_unit(output.unit) for output in model.outputs if output.unit}
         signals = (*(part.name for part in model.discrete), *(signal.name for signal in model.inputs))
         numbers = {name for name, expr in model.definitions if expr.is_constant}
         # a number may stand for several quantities; each of these is one
         single = {*signals, *model.variables(), *dict(model.definitions)} - numbers
-        self.uses: dict[str, list[tuple[str, bool, Expression]]] = {name: [] for name in single}
-        uses = [(state.name, True, state.der) for state in model.states]
-        for use in (*uses, *((name, False, expr) for name, expr in model.definitions)):
-            for name in use[2].names & single:
+        self.uses: dict[str, list[_Use]] = {name: [] for name in single}
+        for use in _uses(model):
+            for name in use.expr.names & single:
                 self.uses[name].append(use)
         self.names = [*dict.fromkeys((*self.setting, *self.rates, *model.variables()))]
 
@@ -70,19 +95,15 @@ class _Witnesses:
 
     def _votes(self, name: str) -> Iterator[Unit]:
         known = self.known
+        for use in self.uses.get(name, ()):
+            yield from _solved(known, use.expr.tree, use.required(known), name)
         for expr in self.setting.get(name, ()):
-            if (unit := known.inference().unit(expr.tree)) is not None:
-                yield unit
+            units = (known.inference().unit(term) for term in terms_of(expr.tree))
+            yield from (unit for unit in units if unit is not None)
         if name in self.rates and known.time is not None:
             rate = known.inference().unit(self.rates[name].tree)
             if rate is not None:
                 yield rate * known.time
-        for user, is_rate, expr in self.uses.get(name, ()):
-            needed = known.rate(user) if is_rate else known.units.get(user)
-            if needed is not None and (unit := _solved(known, expr.tree, needed, name)) is not None:
-                yield unit
-        if (shown := self.shown.get(name)) is not None:
-            yield shown
 
 
 def _setting(model: Model) -> dict[str, list[Expression]]:
@@ -116,26 +137,29 @@ def _resets(model: Model) -> Iterator[Mapping[str, Expression]]:
         yield from (choice.reset for guard in guards for choice in guard.then)
 
 
-def _solved(known: Quantities, node: ast.expr, needed: Unit, name: str) -> Unit | None:
-    """Return the unit that a name must have for an expression to have a unit; None if it does not follow."""
+def _solved(known: Quantities, node: ast.expr, required: Unit | None, name: str) -> Iterator[Unit]:
+    """Yield units that a name must have: for an expression to have a unit, and to fit the other terms of a sum."""
     match node:
         case ast.Name(id=own):
-            return needed if own == name else None
+            if own == name and required is not None:
+                yield required
         case ast.UnaryOp(operand=operand):
-            return _solved(known, operand, needed, name)
+            yield from _solved(known, operand, required, name)
         case ast.BinOp(op=ast.Add() | ast.Sub()):
-            common = known.inference().unit(node) or needed
-            solved = (_solved(known, term, common, name) for term in terms_of(node))
-            return next((unit for unit in solved if unit is not None), None)
-        case ast.BinOp(op=ast.Mult() | ast.Div()):
+            common = known.inference().unit(node)
+            for term in terms_of(node):
+                for unit in (common, required):
+                    if unit is not None and name in names_of(term):
+                        yield from _solved(known, term, unit, name)
+        case ast.BinOp(op=ast.Mult() | ast.Div()) if required is not None:
             inside: list[ast.expr] = []
             for factor, sign in factors_of(node):
                 unit = known.inference().unit(factor)
                 if name in names_of(factor) and sign > 0:
                     inside.append(factor)
                 elif unit is None:
-                    return None
+                    return
                 else:
-                    needed = needed / unit if sign > 0 else needed * unit
-            return _solved(known, inside[0], needed, name) if len(inside) == 1 else None
-    return None
+                    required = required / unit if sign > 0 else required * unit
+            if len(inside) == 1:
+                yield from _solved(known, inside[0], required, name)

@@ -1,0 +1,126 @@
+"""Put faults of units into the packaged models at random, and count how many the check of units finds.
+
+    python docs/studies/units.py
+
+The faults are those of tests/model/units/mutations.py. The command writes docs/studies/units.md in about a minute.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+
+import hybridsim as hs
+from hybridsim.model.units.faults import UNKNOWN, unit_faults, unit_rows
+
+ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "tests"))
+
+from model.units.mutations import MODELS, NAMES, Fault, faults  # noqa: E402  # after the path
+
+PAGE = ROOT / "docs" / "studies" / "units.md"
+FIRST, MANY = 100, 1000  # faults of the first seed that are listed, and faults of each seed
+SEEDS = (1, 2, 3)
+ENDS = ("found on the right line", "found on another line", "not found")
+KINDS = {"unit": "another unit in a declaration", "factor": "a factor left out", "name": "a name exchanged"}
+
+
+def end_of(fault: Fault, model: hs.Model) -> str:
+    """What the check of units makes of a fault."""
+    lines = {caution.place.line for caution in unit_faults(model) if caution.place}
+    return ENDS[2] if not lines else ENDS[0] if lines & fault.lines else ENDS[1]
+
+
+def cases(seed: int, count: int) -> Iterator[tuple[Fault, str]]:
+    """So many faults of a seed with their ends; a model that other checks refuse does not count."""
+    found = 0
+    for fault in faults(seed):
+        if found == count:
+            return
+        try:
+            model = hs.Model.from_toml(fault.text, str(MODELS / f"{fault.model}.toml"))
+        except hs.ModelError:
+            continue
+        found += 1
+        yield fault, end_of(fault, model)
+
+
+def table(done: list[tuple[Fault, str]]) -> str:
+    """The number of faults of each kind by their ends."""
+    counts = Counter((fault.kind, end) for fault, end in done)
+    out = f"| fault | {' | '.join(ENDS)} |\n| --- | --- | --- | --- |\n"
+    for kind, what in KINDS.items():
+        out += f"| {what} | {' | '.join(str(counts[kind, end]) for end in ENDS)} |\n"
+    total = [sum(end == one for _, one in done) for end in ENDS]
+    return out + f"| all | {' | '.join(map(str, total))} |\n"
+
+
+def page() -> str:
+    """The results as Markdown."""
+    models = [hs.load(MODELS / f"{name}.toml") for name in NAMES]
+    alarms = sum(len([*unit_faults(model)]) for model in models)
+    rows = [row for model in models for row in unit_rows(model)]
+    unknown = sum(known.startswith(UNKNOWN) for *_, known in rows)
+    first = [*islice(cases(SEEDS[0], FIRST), FIRST)]
+    many = [case for seed in SEEDS for case in cases(seed, MANY)]
+    share = 100 * sum(end == ENDS[0] for _, end in many) / len(many)
+    lost = Counter((f"`{fault.model}`, `{fault.what}`", end) for fault, end in many if end != ENDS[0])
+    out = (
+        HEAD
+        + f"\n## Results\n\nOn the {len(models)} models as they are the check gives {alarms} warnings. Of the "
+    )
+    out += f"{len(rows)} quantities and expressions in them {unknown} have an unknown unit.\n\n"
+    out += f"The first {FIRST} faults of seed {SEEDS[0]}:\n\n{table(first)}\n"
+    seeds = ", ".join(map(str, SEEDS))
+    out += f"{MANY} faults of each of the seeds {seeds} ({share:.1f} % on the right line):\n\n{table(many)}\n"
+    out += "Those that were not found on the right line, the most frequent first:\n\n"
+    out += "| fault | end | times |\n| --- | --- | --- |\n"
+    for (what, end), times in sorted(lost.items(), key=lambda item: (-item[1], item[0]))[:20]:
+        out += f"| {what} | {end} | {times} |\n"
+    return out + "\n" + REASONS
+
+
+HEAD = """# Faults of units
+
+`python docs/studies/units.py` puts faults of units into the packaged models that declare units, one fault at a time. It
+counts how many `hybridsim check` finds ([Check the units of a model](../how-to/check-units.md)), and on which line.
+
+The faults are drawn at random, the three kinds in turn:
+
+- *Another unit*: a declaration gets a unit of another dimension, or of the same dimension in another size.
+- *A factor left out*: `a*b` becomes `a` or `b`, and `a/b` becomes `a`.
+- *A name exchanged*: a name in an expression becomes another name of the model.
+
+A fault counts only if it alters a unit. The factor that is left out is not a pure number, and the two names have
+different units. The script has its own table of the units of all names, which shares no code with the check. These
+changes do not count:
+
+- A guard, a monitor or a surface that is one product may have any unit.
+- A number that is left alone has the unit that its place needs.
+- A model that other checks refuse is drawn again.
+
+The right line is that of the changed expression. For a changed declaration it is that line or the line of an expression
+that reads the name. In the law of a contact it is the line of its load or of its arguments.
+"""
+REASONS = """These are the reasons:
+
+- The unit of an impact force is not declared. In `-g + p/m` without `m` the force becomes an acceleration, and all
+  units still agree, unless a contact force shows the unit of `p`. The same holds for the unit of t in `thermostat`.
+- A number in a product may be a constant with a unit: `0.6*sqrt(k/m)`, `0.1*A*omega`, `w**2/2`.
+- Where two expressions imply different units of a force, the warning may be on the line of the other one.
+"""
+
+
+def main() -> None:
+    """Run the study and write the page."""
+    os.chdir(ROOT)
+    PAGE.write_text(page(), encoding="utf-8")
+    print(PAGE.read_text(encoding="utf-8"))
+
+
+if __name__ == "__main__":
+    main()
