@@ -50,7 +50,7 @@ class LastPeriods(NamedTuple):
 
 
 def can_run_together(system: System) -> bool:
-    """Return whether runs of a model can be computed together: only contacts, always linear modes.
+    """Return whether runs of a model can be computed together: it has only contacts and linear modes.
 
     Held values must be constants, because states that follow others are not supported here.
     """

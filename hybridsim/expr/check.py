@@ -215,7 +215,7 @@ class _Checker:
 
 
 def check_size(tree: ast.expr, expr: str, place: Place, max_depth: int, max_nodes: int) -> None:
-    """Reject a tree that is too deep or too large; ``expr`` is the text in the message."""
+    """Reject a tree that is too deep or too large; ``expr`` is the text that the message shows."""
     level: list[ast.AST] = [tree]
     depth = nodes = 0
     while level:

@@ -11,7 +11,7 @@ from hybridsim.expr.walk import NoValue, value_of
 
 
 class CyclicDependency(ExpressionError):
-    """Raised for expressions that depend on each other in a circle, whose names it lists."""
+    """Raised for expressions that depend on each other in a circle; ``circle`` lists their names."""
 
     def __init__(
         self, message: str, circle: Sequence[str], *, place: Place | None = None, remedy: str | None = None

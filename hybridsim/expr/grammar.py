@@ -20,7 +20,7 @@ class Function:
 
     @property
     def arity(self) -> str:
-        """The number of arguments in words."""
+        """The allowed number of arguments, as text."""
         if self.most > self.least:
             return f"{self.least} to {self.most} arguments"
         return f"{self.least} argument" + ("s" if self.least > 1 else "")

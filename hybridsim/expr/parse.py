@@ -135,7 +135,7 @@ def one_line(text: str) -> str:
 def checked_tree(
     text: str, where: Place, prepare: Callable[[ast.expr], ast.expr]
 ) -> tuple[ast.expr, frozenset[str]]:
-    """Return the tree of a text after a preparation and the check against the whitelist, and its names."""
+    """Parse a text, apply ``prepare`` to its tree, and check the tree; return the tree and its names."""
     try:
         tree = prepare(python_tree(text, "eval").body)
         check_size(tree, text, where, MAX_DEPTH, MAX_LENGTH)
@@ -215,7 +215,7 @@ def of_tree(tree: ast.expr, place: Place | None = None) -> Expression:
 
 
 def check_text(text: str, where: Place, also: str = "") -> None:
-    """Reject a text that is empty, too long, or contains invalid characters, except those in ``also``."""
+    """Reject a text that is empty or too long, or has invalid characters; ``also`` lists further valid ones."""
     if not text:
         raise ExpressionError(
             "the expression is empty", place=where, remedy="write a number or an expression"

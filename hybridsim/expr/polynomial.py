@@ -78,7 +78,7 @@ def scaled(p: Polynomial, factor: Fraction) -> Polynomial:
 
 
 def is_multiple(p: Polynomial, of: Polynomial) -> bool:
-    """Return whether the polynomial `p` is a multiple of `of`, if names in denominators are cleared."""
+    """Return whether the polynomial `p` is a multiple of `of`, after both are cleared of denominators."""
     rest, divisor = _cleared(p), _cleared(of)
     if not divisor:
         return False

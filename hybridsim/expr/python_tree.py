@@ -1,4 +1,4 @@
-"""Python's parser, used by one thread at a time and without warnings, and names with dots in its trees."""
+"""This module calls Python's parser, without warnings and in one thread at a time, and joins names with dots."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ def with_dotted_names(tree: ast.expr) -> ast.expr:
 
 
 class _Joined(ast.NodeTransformer):
-    """Replaces a chain of attributes of a name by one name; any other attribute is left for the whitelist."""
+    """Replaces each chain of names and dots by one name; other attributes remain, and the whitelist rejects them."""
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
-        """Return the single name, or the node itself if something other than a name stands before its dot."""
+        """Return the joined name, or the node itself if its dot does not follow a name."""
         value = self.visit(node.value)
         if not isinstance(value, ast.Name):
             node.value = value

@@ -67,7 +67,7 @@ def terms_of(e: Any) -> int:
 
 
 def _named(e: Any, names: dict[Any, Any]) -> Any:
-    """Return an expression with names in place of arguments and of parts that are not polynomials."""
+    """Replace function arguments and parts that are not polynomials by names, and return the expression."""
     if e.is_Symbol or e.is_number:
         return e
     if e.is_Pow and not e.exp.is_Integer:

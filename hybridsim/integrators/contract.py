@@ -178,7 +178,7 @@ class Integrator(metaclass=_IntegratorType):
         raise NotImplementedError(f"{self.name} has no start(), because the method run() takes all steps")
 
     def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> CompiledLoop | None:
-        """Return the compiled loop of this method for one run, or None if the model rules it out."""
+        """Return the compiled loop of this method for one run, or None if the model does not allow one."""
         return None
 
     def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:

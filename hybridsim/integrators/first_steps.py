@@ -1,4 +1,4 @@
-"""Take the first steps of a multistep method by a method of high order if its errors would hide a guard."""
+"""Take the first steps with a method of high order if the errors of a multistep method would hide a guard."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def with_first_steps(
     make: Callable[[float, np.ndarray], Stepper],
     keeps_low: bool = True,
 ) -> Stepper:
-    """Start a multistep method; if its errors would hide a guard, the first steps are of high order.
+    """Start a multistep method, with first steps of high order if its errors would hide a guard.
 
     A guard is hidden if it grows late, or if it is low: if states jump when it is zero, and it is thrown up and falls
     back while the states change by less than atol/rtol, as in the last of infinitely many bounces. All of this time
@@ -59,7 +59,7 @@ def with_first_steps(
 
 
 def _jumps(system: System) -> np.ndarray:
-    """Return for each guard whether states jump when it is zero, by an impact or a reset."""
+    """Return, for each guard, whether an impact or a reset makes states jump at its zero."""
     resets = [key[1] for key in system.resets if key[0] == "choice"]
     return system.is_unilateral[system.owner] | np.isin(system.owner, resets)
 

@@ -118,7 +118,7 @@ class OneStepStepper(ABC):
         return Step(start.s, s, start.x, end.x, self.dense(start, end, trial))
 
     def restep(self, step: Step, s: float) -> Step:
-        """Return one step from the start to exactly the local time `s`, or a shorter one if it is inaccurate.
+        """Repeat a step to exactly the local time `s`, or return a shorter step if the result is inaccurate.
 
         A law may be steep at an event and flat on both sides, which the stages of the longer step missed. If
         the change of the state is below the tolerance, equal parts are used, because a law with a jump cannot

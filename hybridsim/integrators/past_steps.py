@@ -24,7 +24,7 @@ _CONVERGES = 0.1
 
 @kernel
 def converges(series: Any, h: float, x1: Any) -> bool:
-    """Return whether Taylor coefficients at one end of a step give the states at the other end."""
+    """Return whether the Taylor series at one end of a step yield the states at the other end."""
     for i in range(series.shape[0]):
         power, largest, total = 1.0, 0.0, 0.0
         for k in range(series.shape[1]):
@@ -39,7 +39,7 @@ def converges(series: Any, h: float, x1: Any) -> bool:
 
 
 def through(s: np.ndarray, x: np.ndarray) -> Dense:
-    """Return a polynomial for the last step through a suitable number of earlier points.
+    """Return the dense output of the last step: a polynomial through a suitable number of earlier points.
 
     Of the polynomials through the last 2, 3, ... points it is the one for which the next point changes the
     middle of the step least.

@@ -56,7 +56,7 @@ class PolynomialRows(NamedTuple):
 
 
 class PolynomialArrays(NamedTuple):
-    """Arrays of a segment kernel, for n states, G guards, R registers, and guards expanded up to an order."""
+    """Arrays of a segment kernel, for n states, G guards, R registers, and guard series up to `order`."""
 
     method: Any  # arrays of the method
     parts: Any  # `hybridsim.engine.system.programs.guard_parts.Parts` of the tapes
@@ -165,7 +165,7 @@ class PolynomialKernels(MethodKernels):
 
 @inlined
 def project(model: Any, work: Any, state: Any, s: float, x: Any) -> None:
-    """Put states at the end of a step back on the surfaces that a projection keeps."""
+    """Project the states at the end of a step onto the held surfaces, if a mode requires a projection."""
     if any_projecting(model.automata, state.z):
         call_function(called_by(work).project, s, x, state.p, state.z, work.slopes)
         put(work.slopes, x)
@@ -173,7 +173,7 @@ def project(model: Any, work: Any, state: Any, s: float, x: Any) -> None:
 
 @inlined
 def put_sides(state: Any, own: Any) -> None:
-    """Take the sides of the guards from the start of the segment, before the first step is repeated."""
+    """Set the sides of the guards to those at the start of the segment."""
     put(state.sides, own.sides)
     put(state.orders, own.orders)
     put(state.floors, own.floors)
@@ -181,7 +181,7 @@ def put_sides(state: Any, own: Any) -> None:
 
 @inlined
 def begin_segment(start: Any, model: Any, call: Any, state: Any, work: Any, own: Any) -> bool:
-    """Begin a segment, with its states in ``work.y``. Return False if it is not to be followed."""
+    """Begin a segment with its states in ``work.y``; return False if the last segment was rejected."""
     tapes, inputs, k = model.tapes, model.inputs, start.mode_row
     load_constants(inputs, tapes, k, state.p, own.V)
     load_constants(inputs, tapes, k, state.p, own.W)
@@ -198,7 +198,7 @@ def begin_segment(start: Any, model: Any, call: Any, state: Any, work: Any, own:
 
 @inlined
 def next_step(call: Any, own: Any, rows: Any, s: float) -> int:
-    """Return CONTINUES, FOLLOWED if the segment is to be divided at s, or another outcome of the segment."""
+    """Return CONTINUES, or the outcome of the segment if it has to end at s before the next step."""
     taken = own.counts[TAKEN]
     if s > call.longest[0]:
         return STOPPED
@@ -271,7 +271,7 @@ def record_step(call: Any, work: Any, own: Any, rows: Any, s: float, d: float, e
 def end_segment(
     start: Any, model: Any, call: Any, state: Any, work: Any, own: Any, s: float, length: float, number: int
 ) -> SegmentEnd:
-    """Return the end of a segment at s, with the states in ``work.y``, after a last step of this length.
+    """Return the end of a segment at s, with the states in ``work.y``; `length` is that of the last step.
 
     number: of the active guard that is zero there, -1 for none. ``own.guards`` belong to this end if there is one.
     """

@@ -89,7 +89,7 @@ def integrator_class(name: str) -> type[Integrator]:
 
 @contextmanager
 def registered(method: str | type[Integrator]) -> Iterator[str]:
-    """Make an integrator class available by its name within a block, even if it is not registered."""
+    """Make an integrator class available by its name within a `with` block, even if it is not registered."""
     if isinstance(method, str):
         yield integrator_class(method).name
         return
@@ -142,7 +142,7 @@ _ELSEWHERE = {
 
 
 def keyword_elsewhere(keyword: str) -> str | None:
-    """Return the remedy for a keyword of another tool that has a different name in `simulate`."""
+    """Return the remedy for a keyword of another tool; it names the equivalent argument of `simulate`."""
     return _ELSEWHERE.get(keyword)
 
 

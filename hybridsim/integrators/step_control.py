@@ -18,7 +18,7 @@ LAST_STEP_FACTOR = 1.0 + 2.0**-30
 
 @kernel
 def forget(memory: Any) -> None:
-    """Reset the step control, whose memory is the last accepted step, its error, and a rejection flag."""
+    """Reset the memory of the step control: the last accepted step, its error, and a rejection flag."""
     memory[0], memory[1], memory[2] = 0.0, 0.0, 0.0
 
 

@@ -102,10 +102,10 @@ class Scratch(NamedTuple):
 
 
 class Record(NamedTuple):
-    """The record of a run: segments (node, row; start as high, low, local), their series, and events."""
+    """The record of a run: segments with their Taylor series, and events."""
 
-    segment: np.ndarray
-    start: np.ndarray
+    segment: np.ndarray  # node, row
+    start: np.ndarray  # high, low, local
     series: np.ndarray
     event: np.ndarray
     when: np.ndarray

@@ -110,7 +110,7 @@ class ArraysTrajectory(ABC):
         return self._column(name, self.own_times)
 
     def _column(self, name: str, times: np.ndarray) -> np.ndarray:
-        """Return a quantity at times; of two equal times, the first one is just before an event."""
+        """Return a quantity at times; if a time occurs twice, the first value is that before the event."""
         self.require_states()
         before = self._are_before(times)
         values = self.values(name, times, "+")

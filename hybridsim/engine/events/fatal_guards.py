@@ -13,7 +13,7 @@ from hybridsim.engine.system.system import System
 def message_of_leaving(
     system: System, z: np.ndarray, leaving: Iterable[int], sides: np.ndarray
 ) -> str | None:
-    """Return the message of the first fatal guard through which one of some components leaves its mode."""
+    """Return the message of the first fatal guard that is negative in the present modes of some components."""
     for c in leaving:
         automaton, mode = system.automata[c], int(z[c])
         for guard, message in zip(automaton.guards[mode], automaton.fatal[mode]):

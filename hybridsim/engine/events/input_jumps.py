@@ -18,7 +18,7 @@ _JOINED = 3.0  # ulps within which times count as equal, as in `hybridsim.engine
 
 
 def surfaces_jump(system: System, instant: Instant, at: Situation, forward: bool) -> bool:
-    """Return whether surfaces or rates of closed gaps jump when the inputs change their pieces.
+    """Return whether surfaces, or rates of closed gaps, jump at an instant at which inputs begin new pieces.
 
     Times that are equal within rounding count as one, at the last of them. The pieces before are those before all of
     them.

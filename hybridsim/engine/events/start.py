@@ -44,7 +44,7 @@ def settled_start(system: System, task: Task, origin: Instant, due: tuple[int, .
 
 
 def start_by_kernel(system: System, task: Task, origin: Instant) -> HybridState | None:
-    """Return the state just after the start by compiled code, or None if only `settled_start` can tell."""
+    """Return the state just after the start, computed by compiled code, or None if `settled_start` is needed."""
     if not task.forward or (task.z0 >= 0).any():
         return None
     p = system.vector(origin, task.discrete)

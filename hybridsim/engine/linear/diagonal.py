@@ -1,4 +1,4 @@
-"""This module decides in compiled code whether eigenvectors are a good basis, and writes the modes in that basis."""
+"""This module tests in compiled code whether eigenvectors are a good basis, and writes the modes in that basis."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _SWEEPS = 8  # most sweeps of balancing
 
 @kernel
 def balance(A: Any, horizon: float, sizes: Any, scales: Any, balanced: Any) -> None:
-    """Write powers of two to `scales` that make the rows and columns of D^-1 A D about equally large, and the product.
+    """Write powers of two D to `scales` that balance rows and columns of D^-1 A D, and write D^-1 A D to `balanced`.
 
     The method is that of E. E. Osborne, J. ACM 7 (1960) 338. sizes (k, m, m) is scratch.
 
@@ -70,7 +70,7 @@ def balance(A: Any, horizon: float, sizes: Any, scales: Any, balanced: Any) -> N
 
 @kernel
 def real_columns(values: Any, vectors: Any, out: Any) -> None:
-    """Write the real part of each eigenvector, but the imaginary part of the second of two conjugates.
+    """Write the real part of each eigenvector; for the second of two conjugates, write the imaginary part.
 
     Both represent the pair. A complex inverse would make the two conjugates of each other only to within the
     condition of the basis.
@@ -93,7 +93,7 @@ def check_eigenvectors(
     chosen: Any,
     right: Any,
 ) -> bool:
-    """Write how many coordinates each matrix has, and whether its eigenvectors are a good basis, and are right at all.
+    """Write the number of coordinates of each matrix, and whether its eigenvectors are accurate and a good basis.
 
     inverses: those of `real_columns`. Return whether all are good.
     """
@@ -129,7 +129,7 @@ def check_eigenvectors(
 def write_diagonal(
     values: Any, vectors: Any, inverses: Any, scales: Any, chosen: Any, exponent: int, out: Any
 ) -> None:
-    """Write one block for each eigenvalue of the chosen matrices to `out`, `hybridsim.engine.linear.modal.Modals`."""
+    """Write one block for each eigenvalue of the chosen matrices to `out` (`hybridsim.engine.linear.modal.Modals`)."""
     for k in range(values.shape[0]):
         if not chosen[k]:
             continue

@@ -60,7 +60,7 @@ def measure_point(lin: Any, work: Any) -> None:
 
 @inlined
 def rough_coefficient(lin: Any, k: int, g: int, order: int, work: Any) -> tuple[float, float]:
-    """Return a Taylor coefficient of a guard with a wide error bound that is fast to compute."""
+    """Return a Taylor coefficient of a guard, and a wide error bound that is fast to compute."""
     return dot(lin.series, (k, g, order), (work.x_after, work.w)), lin.largest[k, g, order] * work.size[0]
 
 

@@ -17,7 +17,7 @@ _ROUNDINGS = 8.0  # roundings of a coefficient read from the tape, for a chain o
 
 @kernel
 def guard_series(A: Any, rows: Any, n: int, series: Any, roundings: Any, largest: Any) -> None:
-    """Compute the Taylor coefficients of guards along y' = A y, the rounding error of each entry, and the largest.
+    """Compute the Taylor coefficients of guards along y' = A y, the error bound of each entry, and the largest bound.
 
     rows (K, G, m) are functions of y. A (K, m, m). series, roundings (K, G, ORDER + 1, .) are zero; the entries behind
     the states begin at a multiple of four. largest (K, G, ORDER + 1).
@@ -61,7 +61,7 @@ def modal_guards(
     turning: Any,
     waves: Any,
 ) -> None:
-    """Compute the Taylor series of guards in modal coordinates, with bounds and undamped oscillations.
+    """Compute the Taylor series of guards in modal coordinates, their bounds, and their undamped oscillations.
 
     flows: `hybridsim.engine.linear.modal.Modals` with |B**BOUND_TERMS|; gamma (J,) is scratch space. The
     other arrays are described in `hybridsim.engine.linear.tables` and are zero.

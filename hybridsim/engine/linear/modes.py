@@ -58,7 +58,7 @@ def _named(reader: LinearReader, register: int, title: str) -> Form:
 
 
 class NoMode:
-    """Replaces a combination of modes that has no motion because its rates are NaN."""
+    """The placeholder for a combination of modes that has no motion because its rates are NaN."""
 
     def __init__(self, system: System) -> None:
         self.rates: list[Form] = [{(): math.nan} for _ in system.names]
@@ -89,7 +89,7 @@ def modes_of(
 
 
 def single_changes(system: System) -> np.ndarray:
-    """Return the first mode of each component, and all combinations that differ in one component."""
+    """Return the combination of all first modes, and all combinations that differ from it in one component."""
     first = np.zeros(len(system.automata), dtype=np.int64)
     vectors = [first]
     for c, automaton in enumerate(system.automata):

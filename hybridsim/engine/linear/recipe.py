@@ -135,7 +135,7 @@ class Recipe:
         self._left, self._right, self._found = compared[:, 0], compared[:, 1], compared[:, 2] != 0
 
     def values(self, inputs: Any) -> np.ndarray | None:
-        """Return all registers for the given inputs, or None if a comparison gives another result."""
+        """Return all registers for the given inputs, or None if a comparison differs from the recorded one."""
         V = self._start.copy()
         V[: self._inputs, 0] = inputs
         advance(self._rows, V, 0)
@@ -144,7 +144,7 @@ class Recipe:
         return registers if same.all() else None
 
     def values_at(self, inputs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return all registers for many inputs, and for which inputs all comparisons agree."""
+        """Return all registers for many inputs, and a mask of the inputs for which all comparisons agree."""
         found = np.empty((len(inputs), len(self._start)))
         _replay(self._rows, self._start[:, 0].copy(), inputs, np.empty_like(self._start), found)
         same = (found[:, self._left] == found[:, self._right]) == self._found
@@ -152,7 +152,7 @@ class Recipe:
 
 
 def _gone_on_with(known: np.ndarray, written: Sequence[Any]) -> np.ndarray:
-    """Return recorded rows as an array that begins with existing entries."""
+    """Append the new recorded rows to an existing array, and return the result."""
     new = np.array(written[len(known) :], dtype=known.dtype).reshape(-1, known.shape[1])
     return np.concatenate([known, new])
 

@@ -18,7 +18,7 @@ _NEAR, _SLOWEST = 0.125, 1e-300
 
 @kernel
 def leave_out(A: Any, guards: Any, n: int, usable: Any) -> int:
-    """Write which modes have usable coefficients, and return their number; the guards of the others become -1.
+    """Mark the modes with usable coefficients, and return their number; set the guards of other modes to -1.
 
     A (K, m, m), guards (K, G, m). Two surfaces that cannot be held together give modes with numbers that are not
     finite, which runs have only as neighbours. In the tables their motion is NaN, so that a compiled loop stops there,
@@ -69,9 +69,9 @@ def write_bases(A: Any, n: int, flows: Any, inverse: Any, states: Any, spreads: 
 
 @kernel
 def write_lengths(flows: Any, lasting: Any, near: Any) -> None:
-    """Write how long motions can be computed from one point, and how long they are near it.
+    """Write, for each mode, how long its closed form from one point is accurate, and the length of a short time.
 
-    They last until numbers overflow or blocks lose accuracy. Coordinates of one block have errors relative to the
+    It is accurate until numbers overflow or blocks lose accuracy. Coordinates of one block have errors relative to the
     largest of them. If one grows faster than the others, such as a load that is still very small, the rounding error
     grows as fast.
     """

@@ -93,7 +93,7 @@ def no_tables() -> LinearTables:
 
 @lru_cache(256)
 def _layout(atoms: tuple[int, ...], guards: int, n: int, size: int, widest: int, rows: int) -> ArrayLayout:
-    """Return the layout of tables; atoms: the numbers of atoms, of their terms, and of factors of a monomial."""
+    """Return the layout of tables; `atoms` counts functions of time, their terms, and factors of a monomial."""
     i, c, (count, terms, degree) = np.int64, complex, atoms
     wide, double, blocks = filled_up(n) + filled_up(size - n), filled_up(2 * widest), filled_up(n) // LANES
     of_atoms: list[tuple[Any, tuple[int, ...]]] = [
@@ -139,7 +139,7 @@ class _Rows:
         return tables
 
     def gone_on_with(self, first: int, count: int) -> _Rows:
-        """Return `count` rows that begin with the first rows, in the spare rows behind them if these are free."""
+        """Return `count` rows that include the first rows; use the spare rows behind them if these are free."""
         with _lock:
             rows = self
             if self.count != first or count > self.most:
@@ -198,7 +198,7 @@ def usable_modes(A: np.ndarray, guards: np.ndarray, n: int) -> np.ndarray:
 
 
 def atoms_of(system: System, template: MatrixTemplate, registers: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return the fields that describe functions of time; the last is the range of rounded angles in p."""
+    """Return the fields that describe functions of time; the last field is the range of angles in `p`."""
     angles = np.array([system.layout.phases_at, system.layout.signals_at], dtype=np.int64)
     return *template.atoms(registers), angles
 

@@ -66,7 +66,7 @@ class LoweringState:
         return None if rate == 0 or rate.free_symbols - self.parameters else rate
 
     def convert(self, expression: Expression) -> Any:
-        """Return a declared expression in SymPy, with angles that grow in time relative to the local time."""
+        """Return a declared expression in SymPy, in which angles that grow in time are relative to the local time."""
         sp = self.sp
         value = to_sympy(expression, self.symbols)
         if value.has(sp.I, sp.nan, sp.zoo, sp.oo):

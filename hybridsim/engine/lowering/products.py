@@ -53,7 +53,7 @@ class Products:
         return effects, rest - sum(value * effects[self.number[u]] for u, value in values_by_mode.items())
 
     def items(self) -> list[Item]:
-        """Return items that set the declared values of unknowns, and flags of holding modes."""
+        """Return program items that set the values of unknowns by mode, and the flags of holding modes."""
         found: list[Item] = []
         for d in sorted({d for pair in self.pairs for d in pair}):
             component = self.lowering.components[d]
@@ -63,13 +63,13 @@ class Products:
         return found
 
     def not_together(self, c: int, pull: Any) -> Any:
-        """Return the attraction of surface `c`; it is negative while a factor of the product with unknown `c` holds."""
+        """Return the attraction of surface `c`, made negative while another factor of its products holds."""
         for d in sorted({e for pair in self.pairs if c in pair for e in pair} - {c}):
             pull = pull * (1 - self._holds(d)) - self._holds(d)
         return pull
 
     def diagonal(self, c: int, entry: Any) -> Any:
-        """Return the effect of unknown `c` on surface `c`, plus 1 if `c` and a factor of its products both hold."""
+        """Return the effect of unknown `c` on surface `c`, plus 1 per factor of its products that holds with `c`."""
         return entry + sum(
             self._holds(c) * self._holds(d)
             for d in sorted({e for p in self.pairs if c in p for e in p} - {c})

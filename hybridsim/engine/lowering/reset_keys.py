@@ -1,4 +1,4 @@
-"""This module assigns a key to each reset of a model, and to the part of it that adds amounts."""
+"""This module assigns a key to each reset of a model, and another key to the amounts that the reset adds."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ class Partner:
     factor: Any
 
     def share(self, c: int, d: int, sp: Any) -> Any:
-        """Return a matrix entry of the condition that relay `c` and its partner slide with one weight."""
+        """Return a matrix entry of the condition that relay `c` and its partner slide with equal weights."""
         if d == c:
             return sp.Integer(1)
         return -sp.sign(self.factor) if d == self.component else sp.Integer(0)
@@ -67,7 +67,7 @@ def partners(
 
 
 def attraction(lowering: LoweringState, c: int, partner: Partner, effect: dict[tuple[int, int], Any]) -> Item:
-    """Return how strongly relay `c` attracts by the second derivative while its partner holds."""
+    """Return the item that computes the attraction of relay `c` by the second derivative while its partner holds."""
     sp, other = lowering.sp, lowering.components[partner.component]
     name = user(ATTRACTION + lowering.components[c].surface.unknown)
     pull = -partner.factor * effect[partner.component, c]

@@ -45,8 +45,8 @@ def refuse_changed_rates(lowering: LoweringState, surfaces: dict[int, Any]) -> N
             changing = [d for d in lowering.components if any(state.name in m.der for m in d.modes)]
             if changing and x in s.free_symbols:
                 raise ModelError(
-                    f"modes of {changing[0].name} change the derivative of {state.name}, and so the rate of the "
-                    f"{lowering.title(c)} '{lowering.written(c)}' of {lowering.components[c].name}",
+                    f"modes of {changing[0].name} change the derivative of {state.name}, on which the rate of the "
+                    f"{lowering.title(c)} '{lowering.written(c)}' of {lowering.components[c].name} depends",
                     place=changing[0].place,
                     remedy=f'set a variable in the modes, set = {{ w = "..." }}, and use it in the derivative of '
                     f"{state.name}",

@@ -181,7 +181,7 @@ def load_whole(path: Path | None) -> bytes | None:
 
 
 def _made_by_us(root: Path) -> tuple[list[Path], list[Path]]:
-    """Return the folders of compiled code with hybridsim's mark, and similarly named folders without."""
+    """Return the folders of compiled code that have hybridsim's mark, and folders with similar names that do not."""
     ours, others = [], []
     for entry in sorted(root.glob("engine-*")):
         is_folder = entry.is_dir() and not entry.is_symlink()

@@ -52,7 +52,7 @@ def _found(module: str, name: str) -> Any:
 
 
 def needed(name: str) -> Any:
-    """Return a part of numba that exists, because `is_complete` has checked it."""
+    """Return a part of numba; `is_complete` has checked that the part exists."""
     return next(_found(module, known) for module, known in _NEEDED if known == name)
 
 

@@ -203,7 +203,7 @@ if ENABLED:
         return _compiled(function, inline="always")
 
     def polynomial_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-        """Mark a short kernel to be inlined, in which a product and a sum may be fused."""
+        """Mark a short kernel to be inlined; the compiler may fuse a product and a sum in it."""
         return _compiled(function, forceinline=True, fastmath={"contract"})
 
     def _entry(function: Any, arguments: tuple[Any, ...]) -> Callable[..., Any]:
@@ -376,7 +376,7 @@ if ENABLED:
 else:
 
     def kernel(function: Callable[..., Any]) -> Callable[..., Any]:
-        """Return the function itself, because the compiler is off; NaN causes no warning."""
+        """Return a Python function without NumPy's warnings, because the compiler is off."""
 
         @wraps(function)
         def quiet(*arguments: Any) -> Any:
@@ -386,7 +386,7 @@ else:
         return quiet
 
     def inlined(function: Callable[..., Any]) -> Callable[..., Any]:
-        """Return the function itself, because its caller is a Python function."""
+        """Return the function unchanged, because its caller runs as Python."""
         return function
 
     inline_always = polynomial_kernel = inlined
@@ -402,7 +402,7 @@ else:
     def compile_series(
         stored: Path | None, names: Sequence[str], written: Callable[[], str]
     ) -> tuple[list[int], Any]:
-        """Raise an error, because without a compiler no code is translated."""
+        """Raise NotImplementedError; the translation requires the compiler, which is off."""
         raise NotImplementedError
 
     def is_stored(stored: Path | None) -> bool:
@@ -416,11 +416,11 @@ else:
     def call_series(
         address: int, s: float, error: float, x: Any, guards: Any, constants: Any, out: Any
     ) -> None:
-        """Raise an error, because series functions exist only with a compiler."""
+        """Raise NotImplementedError; series functions require the compiler, which is off."""
         raise NotImplementedError
 
     def _type_by_address(value: Any) -> Any:
-        """Return no type, because nothing is compiled."""
+        """Return None, because kernels need no argument types if the compiler is off."""
         return None
 
     def _kernel_at(function: Callable[..., int], key: tuple[Any, ...]) -> int:
@@ -429,7 +429,7 @@ else:
         return _reached.index(function)
 
     def call_kernel(address: int, arguments: tuple[Any, ...]) -> int:
-        """Call a function by its number, which replaces an address without a compiler."""
+        """Call a function by its number; numbers replace addresses if the compiler is off."""
         return int(_reached[address](*arguments))
 
     def array_at(elements: Any, size: int) -> Any:
@@ -441,7 +441,7 @@ else:
         return (as_compiled(getattr(module, name)),) * 2
 
     def texts_to_compile(module: Any) -> list[str]:
-        """Return no texts, because nothing is compiled."""
+        """Return an empty list, because nothing is compiled."""
         return []
 
     def call_noinline(kernel: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:

@@ -77,7 +77,7 @@ class Powers:
         )
 
     def sum(self, array: str, at: int, is_size: bool) -> str:
-        """Compute the sum of c_k a**k, or of |c_k|, over k > 0, for a series stored in an array."""
+        """Compute the sum of c_k a**k, or of |c_k| a**k, over k > 0, for a series stored in an array."""
         code, total = self.code, self._constants([0.0] * 4)
         for k in self.begins:
             c = self._load(array, at + k)

@@ -125,11 +125,11 @@ if ENABLED:
 
     @intrinsic
     def pack_at(typingctx: Any, address: Any, like: Any) -> Any:
-        """Return the pack whose table is at an address; the pack has the type of another pack."""
+        """Return a pack of the same type as `like`, whose table is at an address."""
         return like(types.int64, like), lambda context, builder, signature, arguments: arguments[0]
 
     def opaque(pack: Any) -> Any:
-        """Return the address of a pack, for a kernel that only passes the pack on."""
+        """Return the address of a pack, for a kernel that only passes the pack to other kernels."""
         return pack.address
 
     def address_in(pack: Any, name: str) -> np.ndarray:
@@ -139,7 +139,7 @@ if ENABLED:
         return place
 
     def replaced(pack: Any, **inner: Any) -> Any:
-        """Return a pack in which other packs are replaced by new addresses; no kernel may be using it."""
+        """Replace packs inside a pack by others, and return the pack; no kernel may be using the pack."""
         for name, other in inner.items():
             if getattr(pack, name) is not other:
                 address_in(pack, name)[0] = other.address
@@ -149,7 +149,7 @@ if ENABLED:
 else:
 
     def pack_at(address: int, like: Any) -> Any:
-        """Raise an error, because there are no addresses without a compiler."""
+        """Raise NotImplementedError; addresses require the compiler, which is off."""
         raise NotImplementedError
 
     def opaque(pack: Any) -> Any:
@@ -157,7 +157,7 @@ else:
         return pack
 
     def address_in(pack: Any, name: str) -> np.ndarray:
-        """Raise an error, because there are no addresses without a compiler."""
+        """Raise NotImplementedError; addresses require the compiler, which is off."""
         raise NotImplementedError
 
     def replaced(pack: Any, **inner: Any) -> Any:

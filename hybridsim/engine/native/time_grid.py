@@ -12,7 +12,7 @@ _COARSE = 2.0**-42
 
 @inlined
 def on_the_grid(s: float, h: float) -> float:
-    """Return the step length from s to the double next to s + h, or 0 if there is none.
+    """Return the step length from s to the double nearest to s + h, or 0 if no such step exists.
 
     A step that is tried with one length and accepted with a length an ulp of time different is another step
     if a state moves far in an ulp. A length of few ulps is never rounded up, because a rejected step must be

@@ -205,7 +205,7 @@ class Translator(ast.NodeVisitor):
         return compare(op, left, right)
 
     def visit_BoolOp(self, node: ast.BoolOp) -> Any:
-        """Translate and, or; all operands are evaluated, since they have no side effects."""
+        """Translate `and` and `or`; all operands are evaluated, since they have no side effects."""
         found, *others = [self.truth(value) for value in node.values]
         join = self.builder.and_ if isinstance(node.op, ast.And) else self.builder.or_
         for other in others:

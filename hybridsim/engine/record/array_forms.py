@@ -56,7 +56,7 @@ def check_finite(what: str, *arrays: np.ndarray) -> None:
 
 
 def check_ascending(what: str, array: np.ndarray, *, strictly: bool = False) -> None:
-    """Raise an error for numbers that decrease, or with `strictly` that do not increase."""
+    """Raise an error unless numbers are in ascending order; with `strictly`, equal numbers are also rejected."""
     steps = np.diff(array)
     if not ((steps > 0).all() if strictly else (steps >= 0).all()):
         raise ValueError(f"{what} is not in ascending order")

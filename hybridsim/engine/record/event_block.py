@@ -28,7 +28,7 @@ def _taking_part(
     due: Any,
     participants: Any,
 ) -> tuple[int, int, bool]:
-    """Return the number of all participants, that of schedules among them, and whether each event has exactly one.
+    """Return the numbers of participants and of schedules among them, and whether every event has one participant.
 
     A participant is a component that changes its mode or is reset, or a schedule that is due.
     due_start, due: the schedules of each kind of known time. participants (2, m): receives event and component of each,

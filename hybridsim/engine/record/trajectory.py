@@ -79,7 +79,7 @@ class Trajectory:
         self.segments.append(end_point(instant, z, p, x))
 
     def close(self, retention: Retention) -> None:
-        """Discard results outside the part of the run to store."""
+        """Discard results outside the part of the run that is stored."""
         if retention == ALL or not self.segments:
             return
         if retention.segments is None:
@@ -105,11 +105,11 @@ class Trajectory:
             self.occurrences.drop(first)
 
     def mark(self, checkpoint: Made) -> None:
-        """Store a function that creates a checkpoint here; only the last stored function is called."""
+        """Mark this point with a function that creates its checkpoint; a later mark replaces this one."""
         self._mark = (checkpoint, self.segments.mark(), self.occurrences.mark(), dict(self.warnings))
 
     def seal(self) -> None:
-        """Create the checkpoint of the last mark, because the run records nothing more."""
+        """Set the checkpoint to the last mark; call this after the run has recorded everything."""
         if self._mark is not None:
             checkpoint, segments, occurrences, self.warnings_there = self._mark
             since = self.segments.since_mark(segments), self.occurrences.since_mark(occurrences)

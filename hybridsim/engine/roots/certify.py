@@ -91,7 +91,7 @@ def _to_the_terms(d: float) -> float:
 
 @inlined
 def zero_of_terms(terms: Any, rest: float, size: float, backward: Any) -> float:
-    """Return the next zero of a falling guard from its Taylor polynomial, or NaN if it is inaccurate."""
+    """Return the next zero of a falling guard from its Taylor polynomial, or NaN if the zero is inaccurate."""
     if not terms[1] < 0.0:
         return math.nan
     d = -terms[0] / terms[1]
@@ -174,7 +174,7 @@ def past_dip(terms: Any, first: int, longest: float, error: float, backward: Any
 
 @inlined
 def falls_over(terms: Any, rest: float, longest: float) -> float:
-    """Return how far on both sides a guard falls at least half as fast as at its zero, or 0."""
+    """Return the distance from a zero within which the guard falls at least half as fast as at the zero, or 0."""
     steepness = -terms[1]
     if not steepness > 0.0:
         return 0.0

@@ -25,7 +25,7 @@ def ahead_size(order: int, n: int, guards: int) -> int:
 
 @inlined
 def parts_of(ahead: Any, order: int, n: int, count: int) -> tuple[Any, Any, Any, Any]:
-    """Return the parts of the array of `look_ahead`: states, rates, function values and sums of series."""
+    """Split the array of `look_ahead` into states, rates, function values and sums of series."""
     x, f = order + 1, order + 1 + 4 * n
     return ahead[x : x + n], ahead[x + n : x + 2 * n], ahead[f : f + count], ahead[f + count : f + 2 * count]
 

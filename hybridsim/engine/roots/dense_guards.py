@@ -84,7 +84,7 @@ def guards_at(
 
 @inlined
 def begin_positive(sides: Any, orders: Any, floors: Any) -> None:
-    """Return whether every guard is positive at the start of the next step or part of a step."""
+    """Record that every guard is positive at the start of the next step or part of a step."""
     for g in range(sides.shape[0]):
         sides[g], orders[g], floors[g] = 1, 0, 0.0
 
@@ -168,7 +168,7 @@ def first_linear_guard(
 
 @kernel
 def likely_reach(V: Any, guard_registers: Any, order: int, rtol: float) -> float:
-    """Return a length at which the search for the accurate range of the guards' series starts."""
+    """Return a first guess of the length over which the guards' series are accurate."""
     longest = math.inf
     for j in range(guard_registers.shape[0]):
         r = guard_registers[j]

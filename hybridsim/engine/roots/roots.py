@@ -44,7 +44,7 @@ POINTS = 0.5 - 0.5 * np.cos(np.pi * np.arange(SAMPLES) / (SAMPLES - 1))
 
 
 def _transforms() -> tuple[np.ndarray, np.ndarray]:
-    """Return matrices that map values at sample points to Bernstein coefficients and to other points."""
+    """Return matrices that map values at sample points to Bernstein coefficients and to values at other points."""
     nodes = POINTS[::2]
     basis = np.array(
         [[comb(DEGREE, i) * x**i * (1 - x) ** (DEGREE - i) for i in range(DEGREE + 1)] for x in POINTS]
@@ -187,7 +187,7 @@ def _deflated(coefficients: np.ndarray, bounds: np.ndarray, order: int, side: in
 def quiet(
     values: np.ndarray, numbers: np.ndarray, sides: np.ndarray, orders: np.ndarray, floors: np.ndarray
 ) -> np.ndarray:
-    """Return which functions certainly keep their signs over a whole step, from samples (17, functions)."""
+    """Return a mask of the functions that certainly keep their signs over a step, from samples (17, functions)."""
     result = np.zeros(numbers.shape[0], dtype=np.bool_)
     coefficients, bounds = np.empty(DEGREE + 1), np.empty(DEGREE + 1)
     samples = np.empty(SAMPLES)
@@ -210,7 +210,7 @@ def quiet(
 def _before(
     sample: Callable[[np.ndarray], np.ndarray], theta: float, side: int, rounding: Callable[[], float]
 ) -> float:
-    """Return a point before theta at which a function that starts at zero has its first sign, or theta.
+    """Return a point before theta at which the function certainly has the sign `side`, or theta.
 
     The sign of the leading coefficient is known. If the coefficient is within the error bound of the
     polynomial, a zero close to the start is lost, and only the function's values give information.
@@ -225,7 +225,7 @@ def _before(
 def _with_touches(
     coefficients: np.ndarray, bounds: np.ndarray, rows: np.ndarray, is_first: bool, is_last: bool
 ) -> np.ndarray:
-    """Return the sign intervals, with undecided ones where values are within their rounding errors.
+    """Return the sign intervals; intervals with values within the rounding error are undecided.
 
     The misfit only shows roundings that differ from sample to sample. A common one, such as that of the steps
     before, shifts the dip and stays hidden. The ends of a step have their own rules for rounding. Where the

@@ -1,4 +1,4 @@
-"""This module finds where a Taylor step must end because a vanishing exponential or root is hidden.
+"""This module shortens Taylor steps that would miss a narrow pulse of an exponential or a root.
 
 For a rate such as exp(-((t - 1)/w)**2) or 1 + exp(-(v/w)**2) all terms are below rounding far away. This may
 be so at the start and at the end of a step that contains the whole pulse. The series of the argument u has no
@@ -68,13 +68,13 @@ def _sizes(u: Any, order: int, h: float) -> tuple[float, float, float]:
 
 @inlined
 def may_end(u: Any, kind: int, size: float) -> bool:
-    """Return whether a step may have to end because of a function of u, by a fast test."""
+    """Return by a fast test whether a function of u may limit the step."""
     return kind == ROOT or size - abs(u[0]) > _SEEN
 
 
 @kernel
 def where_it_ends(u: Any, kind: int, order: int, h: float, a: Any, stack: Any, code: int) -> float:
-    """Return the longest safe step up to h for a given kind of function of a Taylor series u.
+    """Return the longest safe step, at most h, for a given kind of function of the Taylor series u.
 
     h may be negative; order >= 2. a (order,) or longer, stack (STACK_ROWS, order + 2) or larger: scratch space.
     code: address of a function that does `to_bernstein` for as many coefficients as the order
@@ -104,7 +104,7 @@ def where_it_ends(u: Any, kind: int, order: int, h: float, a: Any, stack: Any, c
 
 @kernel
 def where_a_root_ends(u: Any, order: int, h: float, a: Any, stack: Any, code: int) -> float:
-    """Return the longest safe step for sqrt(u), before u comes close to zero and rises again."""
+    """Return the longest safe step for sqrt(u), which ends before u comes close to zero and rises again."""
     change, _, _ = _sizes(u, order, h)
     high, low = _FAR_SHARE * u[0], _NEAR_SHARE * u[0]
     if not (u[0] > 0.0 and u[0] - change < low):

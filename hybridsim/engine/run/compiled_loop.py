@@ -239,7 +239,7 @@ class CompiledLoop:
     def advance(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
     ) -> LoopResult:
-        """Run until an event that needs Python, the target, or full arrays, and store the result."""
+        """Run until an event needs Python, the target is reached, or arrays are full; store the result."""
         run = self.kernel_run or self.go(origin, HybridState.of(outcome, p), target)
         self.kernel_run = None
         if run is None:

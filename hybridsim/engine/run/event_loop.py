@@ -94,7 +94,7 @@ class LoopRecord(NamedTuple):
 
 
 class SegmentStart(NamedTuple):
-    """The input of a segment kernel, passed by value. Its rows in the record are in memory: they need no register."""
+    """The input of a segment kernel that is passed by value, in contrast to the rows of the record."""
 
     mode_row: int  # row of its modes in the tapes
     bound: float  # local time at which it ends at the latest
@@ -103,7 +103,10 @@ class SegmentStart(NamedTuple):
 
 
 class SegmentEnd(NamedTuple):
-    """The result of a segment kernel: only `outcome` unless that is FOLLOWED; from `at` on only if a guard fired."""
+    """The result of a segment kernel; fields after `outcome` have values only if it is FOLLOWED.
+
+    The fields from `at` on have values only if a guard fired.
+    """
 
     outcome: int
     s: float  # local time of the end

@@ -181,7 +181,7 @@ class KernelRun:
 
     @property
     def _have_fired(self) -> np.ndarray:
-        """Return whether a guard ended each segment; otherwise a known time did."""
+        """Return, for each segment, whether a guard ended it; otherwise a known time ended it."""
         return np.asarray(self._fires[self._ended] >= 0)
 
     @property
@@ -207,7 +207,7 @@ class KernelRun:
         return self.count > 0 and self.events == self.count
 
     def count_in(self, counters: Counters) -> None:
-        """Add the costs that all kernels count to the counters."""
+        """Add the costs that every kernel counts to the counters of the run."""
         counters.kernel_time += self.seconds
         counters.steps += self.steps
         counters.restarts += self.count

@@ -45,7 +45,7 @@ class Findings:
 
 
 def polish(sample: Callable[[np.ndarray], np.ndarray], crossing: Crossing) -> float:
-    """Return the zero in a bracket to rounding error, by safeguarded secant steps."""
+    """Return the zero in a bracket, accurate to rounding error, by safeguarded secant steps."""
     left, right = crossing.left, crossing.right
 
     def value(theta: float) -> float:
@@ -214,7 +214,7 @@ class Locator:
         return bound
 
     def _before(self, step: Step, number: int, is_monitor: bool) -> Callable[[float], float]:
-        """Return a function of theta: the error of a guard or monitor due to the errors at the start."""
+        """Return a function that computes, at theta, the error of a guard or monitor due to the errors at the start."""
         known: list[list[float]] = []
 
         def bound(theta: float) -> float:

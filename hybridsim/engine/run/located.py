@@ -47,7 +47,7 @@ def situation(system: System, arrival: Arrival, segment: SegmentRun) -> Situatio
 
 
 def distance_of_zero(series: Any) -> float:
-    """Return the distance in time of the zero of a function by its Taylor coefficients, or 0 if undetermined.
+    """Return the time from a point to the zero of a function, from its Taylor coefficients; 0 if undetermined.
 
     For a function that only touches zero the slope is useless: a double zero is at the distance sqrt(2 |g/g''|).
     """
@@ -164,7 +164,7 @@ def as_stepped(system: System, at: Situation, arrival: Arrival, segment: Segment
 def _as_due(
     system: System, origin: Instant, at: Situation, series: Any, arrival: Arrival, known_at: float
 ) -> tuple[Situation, Any]:
-    """Return the state at a scheduled time; its error bounds are larger if more functions are zero then."""
+    """Return the state at a scheduled time; use the wider error bounds if more functions are zero within them."""
     slopes = np.abs(system.flow(at.s, at.x, at.p, at.z)) if system.n else 0.0
     wide = replace(at, x_error=at.x_error + known_at * slopes, s_error=at.s_error + known_at)
     known = system.series(wide.s, wide.x, wide.p, wide.z, wide.x_error, wide.s_error)
@@ -217,7 +217,7 @@ def _before_instant(series: Any, arrival: Arrival, segment: SegmentRun) -> np.nd
 
 
 def located_backward(system: System, origin: Instant, arrival: Arrival, segment: SegmentRun) -> Located:
-    """Return the guards and monitors that are zero and the state, for a run backward in time."""
+    """Return the state and the guards and monitors that are zero, for a run backward in time."""
     at = situation(system, arrival, segment)
     fired = coincident(system, origin, at, arrival.fired) if arrival.fired else {}
     sides = segment.locator.monitor_sides
@@ -273,7 +273,7 @@ def add_steps(system: System, at: Situation, scale: np.ndarray, steps: int, stag
 
 
 def without_fatal(system: System, found: Located) -> Located:
-    """Return a located event without fatal guards, for the end of a run, after which nothing continues."""
+    """Return a located event without its fatal guards, which have no effect at the end of a run."""
     modes = zip(system.automata, found.at.z.tolist(), strict=True)
     fatal = {g for a, m in modes if m >= 0 for g, message in zip(a.guards[m], a.fatal[m]) if message}
     return replace(found, fired={g: place for g, place in found.fired.items() if g not in fatal})

@@ -103,7 +103,7 @@ class MethodKernels(ABC):
         return own
 
     def end(self, own: Any, tapes: Tapes, lin: Any) -> Any:
-        """Return the parts of a call's result other than its record."""
+        """Return the results of a call that are not part of its record."""
         return None
 
     def count(self, counters: Counters, steps: int, result: Any) -> None:

@@ -284,7 +284,7 @@ class ModeLoop:
     def _run_compiled(
         self, compiled_loop: CompiledLoop, target: Instant, appointment: Appointment | None
     ) -> tuple[bool, bool]:
-        """Run over ordinary events in compiled code; return (target was reached, run stops).
+        """Run in compiled code until an event is not ordinary; return (target was reached, run stops).
 
         Without a renewal the target is the first known time that the loop cannot pass.
         """
@@ -335,7 +335,7 @@ class ModeLoop:
         return True, self._adopt(target, settled, x, appointment.schedules)
 
     def _divide(self, target: Instant) -> None:
-        """Divide the motion at the end of a step, which a compiled loop has reached with all guards away from zero."""
+        """Start a new segment at a step end that a compiled loop reached with all guards away from zero."""
         self.timetable.mark_done(target)
         if self.adopted != target:  # otherwise an event happened there
             self.adopted, outcome = target, self.outcome
@@ -474,7 +474,7 @@ class ModeLoop:
         return resolution.run(fired, resets)
 
     def _apply_crossed(self, outcome: Outcome, s: float, monitors: MonitorSides) -> Outcome:
-        """Apply the resets of monitors that changed sides because of an event or of another such reset."""
+        """Apply the resets of monitors whose side was changed by an event or by another such reset."""
         changes = list(outcome.changes)
         while not outcome.status and self.forward and (due := monitors.fire(outcome, "reset")):
             monitors.fire(outcome)
@@ -528,7 +528,7 @@ class ModeLoop:
         return self._ends_at(hidden or limit)
 
     def _ends_at(self, limit: Limit | None) -> bool:
-        """Return whether the run ends at this limit of events, because no motion continues from the limit."""
+        """Continue the run from a limit of events, if there is one; return whether the run ends there."""
         stop = False if limit is None else self._gathered(limit)
         if limit is None or stop is not None:
             return bool(stop)
@@ -537,7 +537,7 @@ class ModeLoop:
         return True
 
     def _gathered(self, limit: Limit) -> bool | None:
-        """Continue from a limit of events along surfaces, in contacts, or as declared; return whether the run stops.
+        """Continue the run from a limit of events, if a motion exists; return whether the run stops.
 
         The result is None if no motion continues.
         """

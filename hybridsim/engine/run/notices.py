@@ -248,7 +248,7 @@ def _last(blocks: Sequence[Any], count: int) -> list[Occurrence]:
 
 
 def _sampled(block: Any) -> list[Sample]:
-    """Return steps from segments spread evenly over a block: no last ones, and first ones of short segments only."""
+    """Return steps of evenly spaced segments, except their last steps and the first steps of long segments."""
     chosen = _evenly(len(block), _LOOKS)
     share = -(-_LOOKS // len(chosen))
     found: list[Sample] = []

@@ -1,4 +1,4 @@
-"""This module defines a point of a run in steps, from which the next step goes on in compiled code.
+"""This module defines a point between two steps of a run, from which compiled code takes the next step.
 
 A step without events is one call of the compiled loop. The general loop takes a step in which something else happens;
 it continues from the same call.
@@ -29,7 +29,7 @@ _Now = tuple[Instant, HybridState, tuple[int, int], MethodKernels]
 
 
 class ResumePoint:
-    """A point of a run in steps, from which the next step goes on; it never changes.
+    """A point between two steps of a run, from which the next step starts; the point never changes.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ class ResumePoint:
 
     @cached_property
     def now(self) -> _Now | None:
-        """Return the state as a compiled loop reads it, or None if the general loop has to go on from here."""
+        """Return the state for a compiled loop, or None if the general loop has to continue from here."""
         if self._now is not None:
             return self._now
         checkpoint, loop, system = self._before, self.setup.compiled_loop(), self.setup.system
@@ -95,7 +95,7 @@ class ResumePoint:
         return checkpoint.instant, HybridState.of(outcome, outcome.p), loop.used, loop.kernels
 
     def loop(self) -> CompiledLoop:
-        """Return a compiled loop that goes on from here."""
+        """Return a compiled loop that continues from here."""
         assert self.now is not None
         try:
             loop = self.setup.idle_loops.pop()

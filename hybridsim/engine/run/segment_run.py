@@ -153,7 +153,7 @@ class SegmentRun:
                 return Arrival(step.s1, self._projected(step))
 
     def _note_length(self, step: Step, bound: float, first_step: float | None) -> None:
-        """Store the length of a step; a step to the bound, which may be shorter, only if it is longer than others."""
+        """Store the length of a step; a step that ends at the bound can only increase the stored length."""
         length, known = abs(step.s1 - step.s0), first_step if self.last_step is None else self.last_step
         self.last_step = length if step.s1 != bound else known and max(known, length)
 
@@ -435,7 +435,7 @@ class SegmentRun:
         return bool(abs(values[number, 0]) <= bounds[number, 0])
 
     def _look_for_entries(self, step: Step, arrival: Arrival | None) -> tuple[Step, Arrival | None]:
-        """Stop a run backward in time if the present mode may have begun through a guard of another mode."""
+        """Stop a run backward in time if a transition from another mode may have started the present mode."""
         for entry in self.entries:
             sample = self._entry_sampler(step, entry)
             found, *_ = find_roots(sample, sample(POINTS), 0, 0, 0, lambda: 0.0, lambda _: 0.0, 0.0)

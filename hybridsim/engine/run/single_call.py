@@ -86,7 +86,7 @@ class LazyTrajectory(Trajectory):
 
 
 class _FailedCall:
-    """Replaces a compiled loop whose first call failed; it raises the error in the mode loop."""
+    """The replacement of a compiled loop whose first call failed; it raises the error in the mode loop."""
 
     kernel_run = times_ahead = None
 
@@ -102,7 +102,7 @@ _cannot_accumulate = Precompiled(cannot_accumulate)
 
 
 def _is_over(system: System, kernel_run: KernelRun) -> bool:
-    """Return whether one call is certainly the whole run: no events accumulate, and no bounces are hidden."""
+    """Return whether one call certainly completed the run: no events accumulate, and no bounces are hidden."""
     if not kernel_run.is_at_target or kernel_run.has_news or not kernel_run.count:
         return False
     if kernel_run.events == 0:

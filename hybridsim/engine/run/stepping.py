@@ -155,7 +155,7 @@ class Method(Protocol):
 
     @property
     def lacks(self) -> Mapping[str, str]:
-        """Return the missing capabilities with reasons; "adaptive" means a fixed step without rtol."""
+        """Return the missing capabilities with reasons; "adaptive" marks a method with a fixed step and no rtol."""
 
     @property
     def dense_is_accurate(self) -> bool:

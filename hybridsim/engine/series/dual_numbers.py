@@ -89,7 +89,7 @@ def _parts(other: Any) -> tuple[float, Any]:
 def _smooth(
     function: Callable[[float], float], slope: Callable[[float, float], float]
 ) -> Callable[[Any], Any]:
-    """Return a function of one dual number from a function and its derivative `slope`."""
+    """Extend a function of one number, with its derivative `slope`, to dual numbers."""
 
     def lifted(u: Any) -> Any:
         if not isinstance(u, Dual):

@@ -69,7 +69,7 @@ def _results(op: int) -> int:
 
 @dataclass(frozen=True)
 class ModeTape:
-    """The parts of the optimised tape of one combination of modes that the code needs.
+    """The parts of the optimised tape of one combination of modes from which the code is written.
 
     These are its rows, the rows of high orders, the registers of time, states, rates, active guards and
     arguments of fading functions, and the conditions that stay constant as time passes.
@@ -217,12 +217,12 @@ def sizes_function(name: str, guards: int, order: int) -> str:
 
 
 def _start(tape: ModeTape, stride: int) -> _Expansion:
-    """Return code for coefficient 0 in the order of the tape, which keeps costly values for later use."""
+    """Return code that computes coefficient 0 in the order of the tape, and stores costly values for later use."""
     return _in_fixed_order(_expanded(tape, 0, stride))
 
 
 def _in_fixed_order(code: _Expansion) -> _Expansion:
-    """Return the code with instructions that store the costly values of coefficient 0."""
+    """Add instructions that store the costly values of coefficient 0, and return the code."""
     tape, stride = code.tape, code.stride
     for op, *_, out in tape.rows:
         if op in _COSTLY:

@@ -1,4 +1,4 @@
-"""This module rewrites tapes for high orders, in which rates follow from shorter operation chains.
+"""This module rewrites tapes for high orders, so that fewer successive operations lead from states to rates.
 
 A coefficient depends on the one before it through every operation between a state and its rate. With a
 compiled tape this latency is most of a step's time. Successive constants become one factor, a sum adds its
@@ -45,7 +45,7 @@ _EARLY = -(10**6)  # cycle of a value that does not depend on a state
 
 @dataclass(frozen=True)
 class _Scaled:
-    """A register that is a multiple of another register, by constant factors, divisors and a sign."""
+    """A register that equals another register, multiplied and divided by constants, with a sign."""
 
     base: int
     constants: tuple[tuple[int, bool], ...] = ()
@@ -101,7 +101,7 @@ class _Rewriting:
         return self._forms.get(register, _Scaled(register))
 
     def _cycles_after(self, cycles: dict[int, int]) -> dict[int, int]:
-        """Return the cycle at which each register is computed, with the states given at the start."""
+        """Return the processor cycle at which each register is computed, given the cycles of the states."""
         for row in self._of.values():
             op, out = row[0], row[4]
             wait = _EARLY if op == SINCOS_LINEAR else 0 if op in _SAME else _WAITS.get(op, _PRODUCT)

@@ -59,7 +59,7 @@ class Registers:
         return inputs
 
     def rounded(self) -> tuple[Inputs, np.ndarray]:
-        """Return inputs that treat parameters as constants, and an array of numbers and error bounds for `fill`."""
+        """Return inputs with parameters as constants, and their array of values and error bounds, which `fill` sets."""
         known: Inputs = self.inputs
         values = np.zeros((len(known.constants) + len(known.parameters), 2))
         values[: len(known.constants), 0] = known.values[:, 0]

@@ -281,7 +281,7 @@ class TapeBuilder:
 
 
 def _with_exponential(base: Any) -> tuple[Any, Any, Any] | None:
-    """Return (c, d, u) of a sum c + d e^u in which no other term grows as fast, or None."""
+    """Return (c, d, u) of a sum c + d e^u in which c contains no exponential, or None."""
     import sympy as sp
 
     if not base.is_Add:

@@ -184,7 +184,7 @@ class Trace(Lines):
     def on_all_paths(
         self, step: Callable[..., Any], row: Any, tables: tuple[Coefficients, ...], k: int
     ) -> None:
-        """Run a kernel for one row and order on all paths, and choose between the results."""
+        """Run a kernel for one row on all paths of its conditions; emit code that selects one of the results."""
         for table, new in zip(tables, self._results(step, row, tables, k, ()), strict=True):
             table.new = table.known
             table.known.update(new)
@@ -192,7 +192,7 @@ class Trace(Lines):
     def _results(
         self, step: Any, row: Any, tables: tuple[Coefficients, ...], k: int, path: tuple[bool, ...]
     ) -> list[dict[tuple[int, int], Any]]:
-        """Return the results that the kernel writes to each table on one path."""
+        """Return the results that the kernel writes to each table after the conditions of one path."""
         self._truths = list(path)
         for table in tables:
             table.new = {}

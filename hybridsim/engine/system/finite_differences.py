@@ -42,7 +42,7 @@ _SMALLEST = 2.0**-40  # shift of a state of unknown size
 
 @kernel
 def _at(function: Any, s: float, moving: float, C: Any, h: float, p: Any, z: Any, x: Any, out: Any) -> None:
-    """Evaluate a function at the point h of a path, on which states and time change."""
+    """Evaluate a function at the parameter h of a path along which states and time change."""
     for i in range(C.shape[0]):
         total = C[i, 3]
         for k in range(2, -1, -1):

@@ -91,14 +91,14 @@ class TimesAhead:
         self._passed = 0  # number of times in the block up to the present instant
 
     def _is_simple(self, k: int) -> bool:
-        """Return whether a schedule only sets discrete states, or nothing."""
+        """Return whether a schedule sets discrete states only, or changes nothing."""
         system, key = self.system, ("schedule", k)
         if system.model.schedules[k].terminate or added(key) in system.resets:
             return False
         return not set(system.resets.get(key, (0, ()))[1]) & set(system.names)
 
     def after(self, origin: Instant) -> KnownTimes:
-        """Return the known times after an instant that is not before earlier ones."""
+        """Return the known times after an instant, which must not be before that of the last call."""
         block = self._block
         if block is not None:
             ahead = _minus(block.instants[self._passed :], np.array([origin])) > 0.0
@@ -109,7 +109,7 @@ class TimesAhead:
         return self._block
 
     def kind_of(self, due: tuple[int, ...]) -> int | None:
-        """Return the kind of known time at which some schedules are due, or None if it is not simple."""
+        """Return the kind of a known time at which some schedules are due, or None if a schedule is not simple."""
         if due in self._kinds:
             return self._kinds[due]
         targets: list[str] = []
@@ -181,7 +181,7 @@ class TimesAhead:
 
 @per_structure
 def what_surfaces_read(system: System) -> tuple[bool, bool]:
-    """Return whether a surface reads an input, and whether one reads a discrete state."""
+    """Return whether a surface reads an input, and whether a surface reads a discrete state."""
     tape, layout, found = system.code.data["tape"], system.layout, []
     for sources in (range(layout.signals_at, layout.size), range(layout.discrete_at, layout.origin_at)):
         reading = {r for r, source in tape["parameters"] if source in sources}

@@ -61,7 +61,7 @@ class SeriesRun:
         self.monitored_registers = np.concatenate([self.guards, self.optimised.monitors])
 
     def expand(self, s: float, x: np.ndarray, longest: float) -> tuple[float, np.ndarray]:
-        """Return the range of the Taylor series at (s, x), and the coefficients (n, order + 1) of the states.
+        """Return the accurate range of the Taylor series at (s, x), and the coefficients (n, order + 1) of the states.
 
         There are fewer terms if the unit of time is so far from the time scale of the motion that the rest would
         overflow.

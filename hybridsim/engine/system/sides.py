@@ -36,7 +36,7 @@ def modes_by_state(
         return automaton.above if above else automaton.below
 
     def on_side(c: int, automaton: Automaton) -> int:
-        """Return the mode of a corner or table at `x`, found from mode to neighbouring mode."""
+        """Return the mode of a corner or table at `x`, by a search from mode to neighbouring mode."""
         mode = int(z[c])
         for _ in automaton.modes:
             k = violated(c, mode)

@@ -40,7 +40,7 @@ class Signal:
             self._corners = square if self.shape == "square" else _SHAPES[str(self.shape)]
 
     def piece(self, origin: Instant, forward: bool) -> tuple[float, ...]:
-        """Return the six numbers of the piece just after an instant, or backward in time just before it."""
+        """Return the six numbers of the piece after an instant, or before it if the run goes backward in time."""
         if self.kind == "table":
             return self._table_piece(origin, forward)
         if self.kind == "step":
@@ -55,7 +55,7 @@ class Signal:
         return self._wave_piece(origin, forward)
 
     def next_knot(self, after: Instant, forward: bool) -> Instant | None:
-        """Return the first knot after an instant, or backward in time before it, or None."""
+        """Return the first knot after an instant, or before it if the run goes backward in time, or None."""
         if self.kind == "table":
             # pairs compare in order of time, so bisection works for long tables
             index = bisect_right(self._knots, after) if forward else bisect_left(self._knots, after) - 1
@@ -80,7 +80,7 @@ class Signal:
         return not (self.kind == "chirp" or self.shape == "sine")
 
     def ahead(self, after: Instant, most: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the next knots (m, 2), at most so many, and the pieces (m + 1, 6) up to each knot and after the last.
+        """Return at most `most` next knots (m, 2), and the pieces (m + 1, 6) before each knot and after the last.
 
         A piece is given by four coefficients and the instant from which its time is counted, or nan for a constant.
         """
@@ -104,7 +104,7 @@ class Signal:
         return self._rows[first + 1 : first + most + 1, 4:], rows
 
     def _repeated(self, after: Instant, most: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the knots (m, 2) of a wave or step from before an instant on, and the pieces (m, 6) from there."""
+        """Return the knots (m, 2) of a wave or step, some of them before `after`, and the piece (m, 6) at each knot."""
         number = self._number
         if self.kind == "step":
             corners = [(time, (value, 0.0, 0.0, 0.0)) for time, value in self._turns]
@@ -202,7 +202,7 @@ class Signal:
 def step_turns(
     number: Mapping[str, float], declared: Input
 ) -> tuple[float, list[tuple[float, float]], float]:
-    """Return the value of a step input before all its changes, its changes, and its period (or 0).
+    """Return the initial value of a step input, its changes, and its period (or 0).
 
     Raises
     ------

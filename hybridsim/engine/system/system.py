@@ -427,7 +427,7 @@ class System:
         return _optimised_tape(self, z.tobytes())
 
     def high_rows(self, z: np.ndarray) -> list[tuple[int, ...]]:
-        """Return the tape's rows for high orders of states, active guards and monitors."""
+        """Return the tape rows that compute states, active guards and monitors at high orders."""
         return _high_rows(self, z.tobytes())
 
     def series(
@@ -494,7 +494,7 @@ class System:
         return out
 
     def _probing(self, p: np.ndarray) -> np.ndarray:
-        """Return the run-time vector for finite differences, with a flag that exceptions are not reported."""
+        """Return a copy of the run-time vector for finite differences, in which a flag turns off error reports."""
         p = p.copy()
         p[self.layout.pin_at] = 0.0
         return p

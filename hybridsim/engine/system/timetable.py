@@ -93,7 +93,7 @@ class Timetable:
         )
 
     def ahead(self, k: int, after: Instant, most: int) -> np.ndarray:
-        """Return the next times (m, 2) of a schedule after an instant, at most so many, with repetitions."""
+        """Return at most `most` next times (m, 2) of a schedule after an instant; equal times are repeated."""
         times, start, period, count = self._schedules[k]
         if times:
             first = bisect_right(times, after)
@@ -112,7 +112,7 @@ class Timetable:
         return np.asarray(2.0 * np.spacing(np.maximum(np.abs(near), largest)))
 
     def _count(self, k: int, instant: Instant) -> int:
-        """Return how many open times of a due schedule are equal to an instant within rounding; 1 for a clock."""
+        """Return how many open times of a schedule equal an instant within rounding; 1 for a clock."""
         times, slack = self._schedules[k][0], self._slack(instant)
         if not times:
             return 1

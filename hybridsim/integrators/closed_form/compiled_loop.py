@@ -1,4 +1,4 @@
-"""This module contains the part of the method `exact` in the compiled loop: tables, arrays, record."""
+"""This module provides the tables, arrays and record of the method `exact` to the compiled loop."""
 
 from __future__ import annotations
 

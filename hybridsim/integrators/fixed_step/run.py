@@ -55,7 +55,7 @@ def _scale(states: np.ndarray) -> np.ndarray:
 def _checkpoint(
     instant: Instant, arrays: dict[str, np.ndarray], states: np.ndarray, *others: Any
 ) -> Checkpoint:
-    """Return a checkpoint, whose scale is computed on demand."""
+    """Return a checkpoint that includes the largest size of each state."""
     return Checkpoint(instant, arrays | {"scale": _scale(states)}, *others)
 
 
@@ -243,7 +243,7 @@ class FixedStepRun:
         return gaps(self.system, self.x, p, self.z)
 
     def _overlaps(self, of: Iterable[int]) -> bool:
-        """Return whether a gap of some components has an invalid negative value, which ends the run."""
+        """Return whether a gap of some components is negative, which is invalid and ends the run."""
         below = [c for c, (gap, _) in self._gaps().items() if gap < 0 and c in of]
         if below:
             names = ", ".join(self.system.automata[c].name for c in below)

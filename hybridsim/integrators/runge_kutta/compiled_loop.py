@@ -1,4 +1,4 @@
-"""This module contains the part of Runge-Kutta methods in the compiled loop: arrays, record, cost."""
+"""This module provides the arrays, record and cost of Runge-Kutta methods to the compiled loop."""
 
 from __future__ import annotations
 

@@ -151,7 +151,7 @@ class NativeStepper:
         return step
 
     def restep(self, step: Step, s: float) -> Step:
-        """Raise an error, because the step already ends at the event."""
+        """Raise NotImplementedError; a step of `solve_ivp` already ends at its event."""
         raise NotImplementedError("solve_ivp already ends at its event")
 
 

@@ -88,7 +88,7 @@ class SolverStepper:
         return self._advance(self.solver)
 
     def restep(self, step: Step, s: float) -> Step:
-        """Return one step from the start to exactly the local time `s`, or the shorter step of the solver."""
+        """Repeat a step to exactly the local time `s`, or return a shorter step if the solver takes one."""
         solver = self._solver(step.s0, step.x0, s, abs(s - step.s0))
         part = self._advance(solver)
         if solver.status != "running":

@@ -99,7 +99,7 @@ class CvodeStepper:
         return rhs
 
     def _jacobian(self) -> Callable[[float, np.ndarray, np.ndarray, np.ndarray], None]:
-        """Return the model's Jacobian, because CVODE's differences would miss narrow corners."""
+        """Return a function that computes the model's Jacobian; finite differences would miss narrow corners."""
         flow, n = self.flow, self.flow.n
 
         def jacobian(s: float, x: np.ndarray, dx: np.ndarray, out: np.ndarray) -> None:
@@ -147,7 +147,7 @@ class CvodeStepper:
         return Step(s0, s1, x0, x1, self._dense(s0, s1, x0, x1))
 
     def restep(self, step: Step, s: float) -> Step:
-        """Raise an error, because the dense output is as accurate as the method."""
+        """Raise NotImplementedError; events are located on the dense output, which is as accurate as the method."""
         raise NotImplementedError("events of CVODE are located on its dense output")
 
 

@@ -1,4 +1,4 @@
-"""This module contains the part of Taylor's method in the compiled loop: arrays, record, cost."""
+"""This module provides the arrays, record and cost of Taylor's method to the compiled loop."""
 
 from __future__ import annotations
 

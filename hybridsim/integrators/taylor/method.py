@@ -91,7 +91,7 @@ class TaylorStepper:
             self.creeping, self.since, self.shortest = 1, self.s, h
         if self.creeping == _CREEPING:
             raise Creeping(
-                f"{_CREEPING} consecutive steps were a hundredth as long as their series allow, and were discarded; "
+                f"{_CREEPING} consecutive steps were 100 times shorter than their series allow, and were discarded; "
                 f"the last step was {h:.3g}",
                 self.since,
             )
@@ -136,7 +136,7 @@ class TaylorStepper:
         return bool((defect <= _DEFECT * (scale + self.series.rtol * change)).all())
 
     def restep(self, step: Step, s: float) -> Step:
-        """Prepare a shorter repetition of a step whose Taylor series is inaccurate at the local time `s`."""
+        """Repeat a step with a shorter length, because its Taylor series is inaccurate at the local time `s`."""
         self.flow.counters.rejected += 1
         self.s, self.x, self.longest = step.s0, step.x0, _SHORTER * abs(s - step.s0)
         return self.step()

@@ -28,7 +28,8 @@ def weights(part: Declared, direction: Any) -> tuple[tuple[tuple[int, float], ..
     is_mapping = isinstance(direction, Mapping)
     if not (is_mapping or is_row(direction)):
         raise part._fault(
-            f"`direction` cannot be {direction!r}", "use a row of weights, or a mapping from coordinates"
+            f"`direction` cannot be {direction!r}",
+            "use a row of weights, or a mapping from coordinates to weights",
         )
     row = list(direction.items() if is_mapping else enumerate(direction))
     entries = [(i, finite(part, "direction", w)) for i, w in row]

@@ -228,13 +228,13 @@ class MechanicalSystem:
             if not is_row(forcing):
                 raise UsageError(
                     f"{self.name}: `forcing` cannot be {forcing!r}",
-                    remedy="use one entry for each coordinate, or a mapping from coordinates",
+                    remedy="use one entry for each coordinate, or a mapping from coordinates to entries",
                 )
             forcing = tuple(forcing)
         if not isinstance(forcing, Mapping) and len(forcing) != self.n:
             raise UsageError(
                 f"{self.name}: `forcing` has {len(forcing)} entries for {self.n} coordinates",
-                remedy="use one entry for each coordinate, or a mapping from coordinates",
+                remedy="use one entry for each coordinate, or a mapping from coordinates to entries",
             )
         pairs = dict(forcing if isinstance(forcing, Mapping) else enumerate(forcing))
         found: dict[int, tuple[float | Harmonic, ...]] = {}
@@ -280,7 +280,7 @@ class MechanicalSystem:
             if contact.weights not in (0, self.n):
                 raise UsageError(
                     f"{what} {contact.name}: its direction has {contact.weights} weights for {self.n} coordinates",
-                    remedy="use one weight for each coordinate, or a mapping from coordinates",
+                    remedy="use one weight for each coordinate, or a mapping from coordinates to weights",
                 )
             for i, _ in contact.direction:
                 if not 0 <= i < self.n:

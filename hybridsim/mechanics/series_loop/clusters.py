@@ -53,7 +53,7 @@ def factorise(arrays: Any, state: Any, scratch: Any, j: int) -> None:
 
 @kernel
 def _anchors(arrays: Any, state: Any, first: int, last: int) -> None:
-    """Choose a coordinate for each sticking contact that acts on several, to satisfy its constraint exactly.
+    """For each sticking contact on several coordinates, choose the one that satisfies its constraint exactly.
 
     It is the coordinate with the largest weight. Contacts that share coordinates are solved by least squares only.
     """
@@ -76,7 +76,7 @@ def _anchors(arrays: Any, state: Any, first: int, last: int) -> None:
 
 @kernel
 def pseudo_inverse(G: Any, m: int, order: Any, size: int, L: Any, P: Any) -> int:
-    """Write the pseudo-inverse of the rows and columns `order` of G, which is semidefinite; return the rank.
+    """Write the pseudo-inverse of the submatrix `order` of a semidefinite matrix G, and return its rank.
 
     Pivoted Cholesky gives G = L L^T with L of full column rank; then G^+ = L (L^T L)^-2 L^T.
     """

@@ -1,4 +1,4 @@
-"""Choose the modes of node j at time tau after a mode of contact `fired` has ended (-1: no contact).
+"""This module chooses the modes of node j at time tau, after contact `fired` (-1: none) has left its mode.
 
 A candidate gives each contact at zero relative velocity a mode. It is admissible if, just after the instant,
 the forces of all sticking contacts stay within their limits and all slipping contacts move in their
@@ -244,7 +244,7 @@ def _change(state: Any, scratch: Any, count: int, together: bool) -> None:
 
 @kernel
 def _hold_at_limits(arrays: Any, state: Any, scratch: Any, j: int, count: int) -> None:
-    """Hold slipping contacts that sticking contacts keep from moving, by the limit force; release others."""
+    """Hold slipping contacts at their limit force if sticking contacts prevent their motion; release others."""
     for z in range(count):
         c = scratch.zero[z]
         if state.mode[c] == STICK and state.held[c] == 0:

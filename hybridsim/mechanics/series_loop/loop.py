@@ -1,4 +1,4 @@
-"""This module contains the compiled loop: all nodes step together; an event restarts nodes near it.
+"""This module contains the compiled loop, in which all nodes step together and an event restarts nearby nodes.
 
 The series of a node far from an event does not change: a jump of an acceleration changes coefficient 2 + 2 r
 of the positions r couplings away. Beyond half the order nothing changes, and nearer nodes soon change by less
@@ -126,7 +126,7 @@ def _changes_outside(
     top: int,
     rtol: float,
 ) -> float:
-    """Return the effect of the outermost nodes' new series on other nodes over a time h, in units of tolerance."""
+    """Return how much the new series of the outermost nodes change other nodes over h, relative to the tolerance."""
     worst = 0.0
     for i in range(outer, count):
         j = scratch.nodes[i]
@@ -162,7 +162,7 @@ def _changes_outside(
 def _restart(
     arrays: Any, laws: Any, state: Any, scratch: Any, record: Any, control: Any, j: int, tau: float
 ) -> int:
-    """Restart a patch around node j at tau; return 1 for success, 0 if too large, -1 without a series."""
+    """Restart a patch around node j at tau; return 1, or 0 if it would be too large, or -1 without a series."""
     rtol, _, top, is_recorded, _ = control
     nodes = arrays.node_dof.shape[0] - 1
     left = state.clock[2] - tau

@@ -341,7 +341,7 @@ def step_length_kernel(arrays: Any, laws: Any, state: Any, scratch: Any) -> int:
 
 @inlined
 def step_length(arrays: Any, laws: Any, state: Any, scratch: Any, longest: float, rtol: float) -> float:
-    """Return how long the series of a patch can be used, and find the exits from modes in this time.
+    """Return the time over which the series of a patch are accurate, and find the exits from modes within it.
 
     NaN if there is no such length.
     """

@@ -24,7 +24,7 @@ _NOTHING = 1e-2  # of the tolerance; a smaller change of an impulse is not passe
 
 
 class SteppedState(NamedTuple):
-    """The state of a run: positions q and velocities v (n,), modes and impulses (m,), works, and counts."""
+    """The state of a run: positions q and velocities v (n,), modes and impulses (m,), works of forces, and counts."""
 
     q: np.ndarray
     v: np.ndarray

@@ -109,7 +109,7 @@ class SteppedRun:
         self.kernel_time = perf_counter() - began - self.compile_time
 
     def _begin(self) -> None:
-        """Find the modes at the start from the motion, and the gaps that are negative there."""
+        """Find the modes at the start from the velocities, and the gaps that are negative at the start."""
         system, arrays, n = self.system, self.arrays, self.system.n
         W, nc, x = directions(system), len(system.contacts), self.start
         turns = arrays.rates * self.span[0]

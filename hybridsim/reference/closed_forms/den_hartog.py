@@ -1,4 +1,4 @@
-"""This module gives Den Hartog's steady motion without stops of an oscillator with Coulomb and viscous friction.
+"""This module gives Den Hartog's steady motion of an oscillator with Coulomb and viscous friction, without stops.
 
 J. P. Den Hartog, Forced vibrations with combined Coulomb and viscous friction, Trans. ASME 53 (1931) 107.
 Displacement is in F0/k, time in 1/wn; r = w/wn, f = mu N/F0. Over the half period in which the velocity is negative

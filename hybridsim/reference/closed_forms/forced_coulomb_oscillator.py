@@ -124,7 +124,7 @@ class ForcedCoulombOscillator:
 
 
 class _Clock:
-    """A time as whole turns of the forcing and an angle in [0, 2 pi)."""
+    """A time, stored as whole periods of the forcing and an angle in [0, 2 pi)."""
 
     def __init__(self, t0: float, frequency: float, phase: float) -> None:
         self.t0, self.frequency = t0, frequency

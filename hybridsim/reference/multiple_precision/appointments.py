@@ -40,7 +40,7 @@ class Appointments:
                 clock.count += 1
 
     def next(self, t: Number) -> Appointment:
-        """Return the next scheduled time after t, finally the end of the run."""
+        """Return the next scheduled time after t, or the end of the run if no time is left."""
         ahead = [(time, k) for k, clock in enumerate(self._clocks) if (time := clock.next) is not None]
         nearest = min((time for time, _ in ahead), default=self._t1)
         knots = [knot for signal in self._signals if (knot := signal.next_knot(t)) is not None]

@@ -24,7 +24,7 @@ _FOREVER = 1000.0
 
 @dataclass(frozen=True)
 class Term:
-    """A term of a sum, whose size bounds the rounding error of the sum."""
+    """One term of a sum; the sizes of the terms bound the rounding error of the sum."""
 
     log2_factor: int
     c: Coefficients
@@ -114,7 +114,7 @@ class Expansion:
         return bool(abs(quantity.c[0]) <= self.precision.zero * self.scale(quantity))
 
     def scale(self, quantity: QuantitySeries) -> Number:
-        """Return the largest term of a quantity within the accurate range, to the next power of two."""
+        """Return the largest term of a quantity within the accurate range, rounded up to a power of two."""
         log2_reach = self.precision.log2(self.reach)
         sizes = [
             max(log + n * log2_reach for n, log in logs) + term.log2_factor + log2_reach * term.late

@@ -26,7 +26,7 @@ class Functions:
         return Integral(self.context, u, self.context.exp)  # exp is its own slope
 
     def _pair(self, u: Node, names: tuple[str, str], minus: bool) -> tuple[Integral, Integral]:
-        """Return two functions, each of which is the slope of the other, except for a sign."""
+        """Return two functions, such as sine and cosine, each of which is the other's derivative up to a sign."""
         first, second = (Integral(self.context, u, getattr(self.context, name)) for name in names)
         first.slope, second.slope = (second, False), (first, minus)
         return first, second
@@ -86,8 +86,8 @@ class Functions:
         def value(x: Number) -> Number:
             if not allowed(x):
                 raise UsageError(
-                    f"{name}({float(x):g}), reached during the run, has no Taylor series",
-                    remedy="use reference='runs', as the multiple-precision run cannot pass this point",
+                    f"the run reaches {name}({float(x):g}), which has no Taylor series",
+                    remedy="use reference='runs', because the multiple-precision run cannot pass this point",
                 )
             return function(x)
 

@@ -30,7 +30,7 @@ class Holding:
         self.pins: list[int] = []
 
     def begin(self, effects: list[list[Number]]) -> None:
-        """Store the effects of the unknowns, and find surface slopes and states to solve for."""
+        """Store the effects of the unknowns, compute the slopes of the surfaces, and choose the states to solve for."""
         self._effects = effects
         self._find_slopes()
         self._product = [[self.context.fdot(row, effect) for effect in effects] for row in self._slopes]
@@ -55,7 +55,7 @@ class Holding:
         return [-value for value in self._solve(self._product, rates)]
 
     def reach_of(self, unknowns: Sequence[Number]) -> Number:
-        """Return the largest rate of a surface that unknowns of a given size cause."""
+        """Return the largest rate of a surface for unknowns of the given sizes."""
         return max(abs(a * u) for row in self._product for a, u in zip(row, unknowns, strict=True))
 
     def pin_changes(self, values: list[Number]) -> list[Number]:

@@ -122,7 +122,7 @@ class Quotient(Node):
         if b.c[0] == 0:
             raise UsageError(
                 "division by zero",
-                remedy="use reference='runs', as the multiple-precision run cannot pass this point",
+                remedy="use reference='runs', because the multiple-precision run cannot pass this point",
             )
         value = a.coefficient(n)
         if n and not b.constant:
@@ -143,8 +143,8 @@ class Power(Node):
         u = self.operands[0].c
         if u[0] < 0 or (u[0] == 0 and (self.exponent < 0 or not self.constant)):
             raise UsageError(
-                f"the power {float(self.exponent):g} of {float(u[0]):g}, reached during the run, has no Taylor series",
-                remedy="use reference='runs', as the multiple-precision run cannot pass this point",
+                f"the run reaches the power {float(self.exponent):g} of {float(u[0]):g}, which has no Taylor series",
+                remedy="use reference='runs', because the multiple-precision run cannot pass this point",
             )
         if n == 0:
             self.c.append(u[0] ** self.exponent)
@@ -196,7 +196,7 @@ class Pointwise(Node):
     def extend(self, n: int) -> None:
         if n:
             raise UsageError(
-                f"'{self.text}' is not smooth, and the multiple-precision run follows smooth modes only",
+                f"'{self.text}' is not smooth, but the multiple-precision run supports smooth modes only",
                 remedy="write its sides as modes with guards, or use reference='runs'",
             )
         self.c.append(self.function(*(node.c[0] for node in self.operands)))

@@ -1,4 +1,4 @@
-"""This module chooses the number of digits and of terms, and the size regarded as zero."""
+"""This module chooses the number of digits and of terms, and the size below which a number counts as zero."""
 
 from __future__ import annotations
 

@@ -108,7 +108,7 @@ class Program:
         return node.c[0]
 
     def project(self, point: Point) -> Point:
-        """Return the point with the held surfaces exactly zero; one state per surface changes."""
+        """Return the point with the held surfaces exactly zero, by a change of one state per surface."""
         if self.holding is None:
             return point
         x = list(point.x)
@@ -133,7 +133,7 @@ class Program:
                 node.extend(n)
 
     def _first_coefficients(self) -> None:
-        """Compute the rates at the start, without unknown forces and with each equal to 1."""
+        """Compute the rates at the start without unknown forces, and with each unknown force equal to 1 in turn."""
         one, zero = self.context.one, self.context.zero
         rates: list[list[Number]] = []
         for j in (*range(len(self.unknowns)), -1):  # finally with all of them zero
@@ -149,7 +149,7 @@ class Program:
             self._solve(0)
 
     def _again(self, n: int) -> None:
-        """Compute again the n-th coefficients of all nodes that depend on the unknown forces."""
+        """Recompute the n-th coefficients of all nodes that depend on the unknown forces."""
         for node in self.forced:
             node.forget(n)
         self._extend(self.nodes, n)

@@ -78,7 +78,7 @@ def multiple_precision_trajectory(
     model = smoothed(model.validate())
     if names := ", ".join(c.name for c in model.components if c.surface and c.surface.unique):
         raise UsageError(
-            f"model {model.name} jumps in a rate ({names}): the multiple-precision run does not support sliding",
+            f"rates of model {model.name} jump ({names}): the multiple-precision run does not support sliding",
             remedy="compare with another integrator at a tight tolerance, or with a closed form",
         )
     corners = {component.name for component in model.components if isinstance(component, Corner)}

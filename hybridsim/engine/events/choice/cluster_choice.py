@@ -26,7 +26,7 @@ from hybridsim.engine.system.system import System
 
 
 def with_tied(system: System, members: list[int]) -> list[int]:
-    """Return the components that are decided together, with the friction contacts along their gaps."""
+    """Return the given components and the friction contacts along their gaps."""
     tied = {along for gap, along, is_one in system.stop_couplings if is_one and gap in members}
     return sorted(tied.union(members))
 

@@ -65,7 +65,7 @@ class EventVerdicts(EventData):
         return int(_verdict(self.automata, None, 0, self.judged(z), z, members, continuous, True, 0))
 
     def is_continuous(self, z: np.ndarray, components: Iterable[int]) -> bool:
-        """Return whether no change of mode so far has changed an unknown."""
+        """Return whether the changes of mode so far have left all unknowns unchanged."""
         if self.jumped:
             return False
         members, event = np.array(list(components), dtype=np.int64), self.event()
@@ -76,12 +76,12 @@ class EventVerdicts(EventData):
         return bool(_is_smooth(self.automata, event, z, members, jumps))
 
     def guard_verdicts(self, components: Iterable[int]) -> dict[int, int]:
-        """Return a verdict for each component, on its guards in the present modes."""
+        """Return, for each component, the verdict on its guards in the present modes."""
         continuous = self.is_continuous(self.at.z, range(len(self.system.automata)))
         return {c: self.verdict_on_guards(self.at.z, [c], continuous) for c in components}
 
     def with_modes(self, components: list[int], modes: np.ndarray) -> np.ndarray:
-        """Return the modes after changes of some modes, with corners on the sides of the motion."""
+        """Return a copy of the modes with some modes replaced and the sides of corners updated."""
         z = self.at.z.copy()
         z[components] = modes
         return sides_along(self, np.maximum(z, 0), self.at.x)[0] if self.system.led else np.maximum(z, 0)

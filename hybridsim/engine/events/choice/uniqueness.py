@@ -24,7 +24,7 @@ _is_below_limit = Precompiled(is_below_limit)
 
 
 def below_limits(resolution: EventVerdicts, members: list[int]) -> np.ndarray:
-    """Return a mask of the contacts that are certainly below their limits, if several are in a cluster."""
+    """Return a mask of the contacts certainly below their limits; a contact alone in its cluster is not tested."""
     automata, at = resolution.system.automata, resolution.at
     modes, keeps = np.maximum(at.z, 0), np.zeros(len(members), dtype=np.bool_)
     holding = [
@@ -50,7 +50,7 @@ def other_outcomes(
     open_: set[int],
     cluster: tuple[int, ...],
 ) -> np.ndarray:
-    """Return admissible candidates with another motion than the chosen one, if an opening contact loads friction.
+    """Return admissible candidates with a different motion, if an opening gap changes the load of friction.
 
     Contacts that keep their mode are not examined, because the present mode stays if it is admissible.
     """

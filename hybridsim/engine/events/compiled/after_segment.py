@@ -79,7 +79,7 @@ def resolve(model: Any, s: float, s_error: float, fired: int, state: Any, work: 
 
 @inlined
 def fill_guard_series(model: Any, s: float, s_error: float, state: Any, work: Any) -> None:
-    """Write the Taylor series of the active guards and their bounds to `judged` of the work space."""
+    """Write the Taylor series of the active guards and their bounds to the array `judged` of the work space."""
     resolve(model, s, s_error, NOBODY, state, work)
 
 
@@ -115,7 +115,7 @@ def differ_by_rounding(model: Any, k: int, s: float, values: Any, sums: Any, sta
 
 @inlined
 def moved_on(high: float, low: float, s: float) -> tuple[float, float]:
-    """Return the instant (high, low) later by a time s."""
+    """Return the instant (high, low) that is later by the time s."""
     high, rest = two_sum(high, s)
     return two_sum(high, rest + low)
 

@@ -1,4 +1,4 @@
-"""This module changes held inputs in compiled code, if all modes certainly stay as they are.
+"""This module changes held inputs in compiled code, if all modes certainly stay admissible.
 
 The rules are those of `hybridsim.engine.events.resolve`, which resolves the other cases.
 """
@@ -40,7 +40,7 @@ class SurfaceTape(NamedTuple):
 
 @inline_always
 def _surfaces_stay(inputs: Any, tape: Any, pin_at: int, former: Any, state: Any, work: Any) -> bool:
-    """Return whether no surface differs between the run-time vectors before and after the change."""
+    """Return whether every surface has the same value before and after the change of the run-time vector."""
     V, E, exact, values = work.V, work.E, work.y_error, work.jumps
     count = tape.surfaces.shape[0]
     for i in range(exact.shape[0]):
@@ -70,7 +70,7 @@ def admit_modes(
     state: Any,
     work: Any,
 ) -> bool:
-    """Judge the modes in `state` after a change of its run-time vector; return False unless they certainly stay.
+    """Return whether the modes in `state` certainly stay admissible when its run-time vector changes.
 
     none: empty tables, so that guards are judged by the tape. tape: `SurfaceTape` of the modes. pin_at: position of
     the pin in p. former: the run-time vector before the change.
@@ -107,7 +107,7 @@ def _surface_tape(system: System, modes: bytes) -> SurfaceTape:
 
 @per_structure
 def _is_supported(system: System) -> bool:
-    """Return whether the model consists of expressions, without impacts, corners, loads and monitors."""
+    """Return whether the model consists of expressions, and has no impacts, corners, loads or monitors."""
     is_plain = not (system.led or system.is_unilateral.any() or system.stop_couplings or system.monitor_names)
     return ENABLED and system.has_tape and is_plain
 

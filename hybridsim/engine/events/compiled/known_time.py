@@ -1,4 +1,4 @@
-"""Resolve what happens at a known time in a compiled loop: new pieces of inputs, and resets of discrete states.
+"""Process a known time in a compiled loop: start new pieces of inputs, and reset discrete states.
 
 The rules are those of `hybridsim.engine.events.resolve`. A known time is ordinary if all guards of the present modes
 are certainly positive just after it. Otherwise nothing is changed, and the general loop resolves it.
@@ -34,7 +34,7 @@ NO_RESET = -1
 
 
 class KnownTimeArrays(NamedTuple):
-    """The known times ahead of a compiled loop; the last one used is the target of the call, of kind -1."""
+    """The known times ahead of a compiled loop; the last one is the target of the call and has the kind -1."""
 
     times: np.ndarray  # (K, 2) instants (high, low)
     kinds: np.ndarray  # (K,) rows of `resets`
@@ -45,7 +45,7 @@ class KnownTimeArrays(NamedTuple):
 
 
 def has_known_times(system: System) -> bool:
-    """Return whether a model has inputs or schedules, and so times that are known before a run."""
+    """Return whether a model has times that are known before a run: it has inputs or schedules."""
     return bool(system.signals or system.model.schedules)
 
 
@@ -93,7 +93,7 @@ def set_inputs(signals_at: int, starts: Any, hi: float, lo: float, p: Any) -> No
 
 @inlined
 def errors_at_known_time(model: Any, loop: Any, s: float, steps: int, state: Any, work: Any) -> None:
-    """Write error bounds of the states at a known time, as `hybridsim.engine.run.located.errors_when_due`."""
+    """Write error bounds of the states at a known time, like `hybridsim.engine.run.located.errors_when_due`."""
     functions, automata, p, z = called_by(work), model.automata, state.p, state.z
     y, out, other, slopes = work.y, work.y_error, work.x_after, work.slopes
     ulp, is_holding = 2.0**-52 * abs(loop.times[0]), False
@@ -143,7 +143,7 @@ def apply_resets(loop: Any, kind: int, state: Any, work: Any) -> bool:
 
 @inlined
 def needs_choice(automata: Any, z: Any, has_resets: bool) -> bool:
-    """Return whether modes that may hold after a known time have to be compared, even if the present ones may hold.
+    """Return whether modes have to be chosen after a known time even if the present modes stay admissible.
 
     An input may strike a closed gap, and after a reset another motion beside a sliding one may be possible.
     """

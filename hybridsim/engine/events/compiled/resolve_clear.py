@@ -22,7 +22,7 @@ from hybridsim.engine.system.programs.modes_index import find_modes
 
 @inlined
 def _zeros_of(automata: Any, c: int, g: int, zeros: int) -> int:
-    """Return how many Taylor coefficients of a guard are exactly zero; `zeros` is their number for c's surface."""
+    """Return the number of leading zero coefficients of a guard; `zeros` is the number for the surface of `c`."""
     return zeros if automata.place[g] == 0 and automata.owner[g] == c else 0
 
 

@@ -58,7 +58,7 @@ def is_alone(automata: Any, tapes: Any, lin: Any, k: int, fired: int, z: Any, wo
 
 @inlined
 def way_back(automata: Any, c: int, mode: int, to: int) -> int:
-    """Return the guard through which a mode of a corner leads back to the previous mode, or NOBODY."""
+    """Return the guard of `mode` whose transition leads to the mode `to`, or NOBODY."""
     for j in range(automata.guards_of.shape[2]):
         if automata.guards_of[c, mode, j] >= 0 and automata.target[c, mode, j, 0] == to:
             return int(automata.guards_of[c, mode, j])

@@ -50,7 +50,7 @@ def plain_start(
     state: Any,
     work: Any,
 ) -> bool:
-    """Choose all modes at the states, error bounds and run-time vector in `state`; return False if uncertain.
+    """Choose all modes from the states, error bounds and run-time vector in `state`; return False if uncertain.
 
     none: empty tables, so that guards are judged by the tape. pin_at: position of the pin in p. surfaces: see
     `surfaces_of`.
@@ -152,7 +152,7 @@ def surfaces_of(system: System) -> tuple[np.ndarray, ...]:
 
 @per_structure
 def _is_supported(system: System) -> bool:
-    """Return whether all components are contacts, and few enough that all their tapes exist from the start."""
+    """Return whether compiled code can choose the first modes: the system consists of few contacts only."""
     are_set_valued = all(a.has_surface and not (a.is_unique or a.is_unilateral) for a in system.automata)
     count = len(system.automata)
     return ENABLED and system.has_tape and are_set_valued and 0 < count <= MAX_JOINT_COMPONENTS and not (
@@ -161,7 +161,7 @@ def _is_supported(system: System) -> bool:
 
 
 class StartScratch:
-    """The arrays of one call that judges modes at an instant without an event; modes: those that have tapes."""
+    """The arrays of one call that judges modes without an event; `modes` lists the combinations with tapes."""
 
     def __init__(self, system: System) -> None:
         n, count, guards, whole = system.n, len(system.automata), system.guard_count, np.int64
@@ -197,7 +197,7 @@ _plain_start = Precompiled(plain_start)
 
 
 def compiled_start(system: System, x0: np.ndarray, x_error: np.ndarray, p: np.ndarray) -> HybridState | None:
-    """Return the state just after a start at states with error bounds, or None if the general rules must decide."""
+    """Return the state just after the start from `x0` with error bounds, or None if the general rules must decide."""
     if not _is_supported(system):
         return None
     spare = spare_scratch(system, "start")

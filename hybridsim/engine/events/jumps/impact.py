@@ -22,7 +22,7 @@ Failure = tuple[str, str]
 
 
 def strike(resolution: EventData, open_: set[int]) -> Failure | None:
-    """Compute the collision of contacts whose gaps close; contacts at rest after it stay in `open_`.
+    """Compute the collision of contacts whose gaps close; contacts that are at rest afterwards stay in `open_`.
 
     A contact at zero gap with a velocity of separation is open from now on.
     """
@@ -118,7 +118,7 @@ class _Collision:
         return _surfaces(self.resolution)
 
     def _join(self) -> None:
-        """Include friction contacts at zero velocity, whose modes depend on the normal forces."""
+        """Include the friction contacts at zero velocity, because their modes depend on the normal forces."""
         values, bounds = self._surfaces
         for c in self.cluster:
             k = self.place[c]

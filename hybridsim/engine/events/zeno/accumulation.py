@@ -276,7 +276,7 @@ class Accumulation:
         return self._shared(self._sign * min(ended)[0], min(ended)[1]) if ended else None
 
     def expected(self, instant: Instant) -> Limit | None:
-        """Return the limit of accumulating events if it is close to an instant that is not one of them, else None."""
+        """Return the limit of accumulating events if `instant`, which is not one of them, is close to it, else None."""
         for c in sorted(self.under_way):
             time = _expected(self.paces[c], instant)
             if time is not None:
@@ -344,7 +344,7 @@ def _next_turn(pace: Pace) -> tuple[int, float]:
 
 
 def _expected(pace: Pace, instant: Instant) -> float | None:
-    """Return the limit of accumulating events if it is close to an instant that is not one of them, else None."""
+    """Return the limit of accumulating events if `instant`, which is not one of them, is close to it, else None."""
     if pace.forecast is None:
         return None
     limit, rest = pace.forecast
@@ -354,7 +354,7 @@ def _expected(pace: Pace, instant: Instant) -> float | None:
 
 
 def _steadier(before: Pace, limit: float, least: float) -> tuple[float, float, float]:
-    """Return the forecast of the limit that changed least, as (last change, least change, forecast).
+    """Return the most stable forecast of the limit so far, as (last change, least change, forecast).
 
     The first forecasts miss the deviation of the series from a geometric one. The last ones are dominated by rounding,
     unless the events are located at zero.

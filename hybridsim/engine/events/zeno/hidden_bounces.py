@@ -67,7 +67,7 @@ def bounces_of(outcome: Outcome, now: Instant, x_minus: np.ndarray) -> dict[int,
 
 
 def last_bounces(system: System, happened: Sequence[Occurrence]) -> dict[int, Bounce]:
-    """Return the last recorded event of a run as bounces; none if a schedule or a clock was due last."""
+    """Return the last recorded event as bounces of its components; empty for a schedule or a clock tick."""
     last = next((o for o in reversed(happened) if o.kind != "monitor"), None)
     components = [
         c for c, automaton in enumerate(system.automata) if last and automaton.name == last.component
@@ -104,7 +104,7 @@ def may_be_hidden(system: System, outcome: Outcome, happened: Sequence[Occurrenc
 
 
 def _barely_seen(system: System, outcome: Outcome, bounces: dict[int, Bounce]) -> dict[int, _Departure]:
-    """Return the departures with flights so short that rounding may hide the loss of speed."""
+    """Return the departures after which flights are so short that rounding may hide the loss of speed."""
     found = {}
     for c, last in bounces.items() if system.has_tape else ():
         automaton = system.automata[c]
@@ -120,7 +120,7 @@ def _barely_seen(system: System, outcome: Outcome, bounces: dict[int, Bounce]) -
 def _agreed(
     system: System, outcome: Outcome, c: int, best: _Forecast, speed: float, last: Bounce, record: Trajectory
 ) -> tuple[float, int]:
-    """Return the forecast with which all later forecasts agree, and how many agree."""
+    """Return the earliest forecast that agrees with all later ones, and the number of these forecasts."""
     count = 1
     for bounce in _backward(system.automata[c], last, record):
         departure = _departure(system, outcome, c, bounce)
@@ -136,7 +136,7 @@ def _agreed(
 
 
 def _departure(system: System, outcome: Outcome, c: int, bounce: Bounce) -> _Departure | None:
-    """Return how a guard of the new mode leaves zero and returns, or None if no guard does."""
+    """Return the motion of the guard that leaves zero and returns in the new mode, or None if no guard does."""
     series = _series(system, outcome, c, bounce.instant, bounce.target, bounce.x_plus)
     for guard in system.automata[c].guards[bounce.target]:
         (value, rate, curve), bound = series.guards[guard, :3].tolist(), float(series.guard_bounds[guard, 0])

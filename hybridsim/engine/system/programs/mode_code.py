@@ -50,7 +50,7 @@ def mode_tape(system: System, z: np.ndarray) -> ModeTape:
 
 
 def _holding(system: System, z: np.ndarray) -> Iterator[int]:
-    """Yield the registers of a condition that is true in every mode: held states follow from constraints."""
+    """Yield the registers of the condition that held states follow from constraints, which is true in every mode."""
     tape = system.code.data["tape"]
     zeros = [register for register, value, _ in tape["constants"] if value == 0.0]
     pins = [register for register, source in tape["parameters"] if source == system.layout.pin_at]
@@ -60,7 +60,7 @@ def _holding(system: System, z: np.ndarray) -> Iterator[int]:
 
 
 def computed_rates(system: System, z: np.ndarray) -> list[bool]:
-    """Return for each state whether its rate is computed and not constant, another state, or held."""
+    """Return for each state whether its rate is computed; constant rates, states and held rates are not."""
     tape, sure = system.optimised_tape(z), frozenset(_holding(system, z))
     rows = _rows(tape.rows)
     chosen = {out: b for op, a, b, _, out in rows if op == SELECT and a in sure}
@@ -88,7 +88,7 @@ def fading(system: System, z: np.ndarray) -> list[int]:
 
 
 def _highest_power(rows: Iterable[tuple[int, ...]], first: int, count: int) -> int:
-    """Return the highest power to which products raise some registers."""
+    """Return the highest power of some registers that occurs in products."""
     powers = dict.fromkeys(range(first, first + count), 1)
     for row in rows:
         op, out = row[0], row[4]
@@ -127,7 +127,7 @@ def constant_sources(system: System) -> ConstantSources:
 
 
 def code_path(system: System, kind: str, z: np.ndarray) -> Path | None:
-    """Return the path of stored code without its file ending, or None without a cache."""
+    """Return the path of stored code without the file extension, or None if there is no cache."""
     file = getattr(system.code.module, "__file__", None)
     if file is None:
         return None

@@ -1,4 +1,4 @@
-"""This module finds the row of a combination of modes among the tapes, by a hash table.
+"""This module looks up the row of a combination of modes in a hash table.
 
 The table uses open addressing: a vector is stored at the first free slot after its hash, the number with its modes as
 digits modulo the table size (D. E. Knuth, The Art of Computer Programming, vol. 3, 2nd ed. 1998, section 6.4,

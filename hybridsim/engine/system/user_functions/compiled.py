@@ -198,7 +198,7 @@ overload(_put)(_put_compiled)
 
 @numba.njit
 def _nothing(s: float, x: Any, p: Any, z: Any, out: Any) -> None:
-    """Do nothing, as the last function of a chain of functions."""
+    """Do nothing; this function ends a chain of functions."""
 
 
 def _constant(value: float) -> Any:
@@ -210,7 +210,7 @@ def _constant(value: float) -> Any:
 
 
 def _one_more(write: Any, place: int, component: int, mode: int, rest: Any) -> Any:
-    """Return a chain that first writes one more number, or 1 if the mode of this number is not active."""
+    """Return a function that writes one number, or 1 if its mode is not active, and then calls `rest`."""
 
     @numba.njit
     def write_row(s: float, x: Any, p: Any, z: Any, out: Any) -> None:

@@ -92,7 +92,7 @@ class Failures:
         self.last = ""
 
     def note(self, function: Function, t: float, fault: Exception, on_the_run: bool) -> None:
-        """Store an exception, unless it comes from finite differences far away from the run."""
+        """Store an exception that was raised at a point of the run, not in a finite difference."""
         if on_the_run:
             self.last = (
                 f"the function {function_name(function)} raised {type(fault).__name__}: {fault} at t = {t!r}"
