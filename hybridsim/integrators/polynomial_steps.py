@@ -1,4 +1,4 @@
-"""This module contains the base class of compiled methods whose dense output is a polynomial, and its kernels.
+"""This module contains the base class and the kernels of compiled methods with polynomial dense output.
 
 A segment kernel takes steps and fits a polynomial to each. The kernels here begin a segment, find the first zero of a
 guard along a polynomial, compute guards at the end of a step, and write the end of the segment for the event loop.
@@ -89,7 +89,7 @@ class PolynomialArrays(NamedTuple):
 
 
 class PolynomialKernels(MethodKernels):
-    """The part of a method whose steps have polynomials of one degree as dense output."""
+    """The kernels of a method whose steps have polynomials of one degree as dense output."""
 
     rows = PolynomialRows
     degree: ClassVar[int]

@@ -75,7 +75,7 @@ def simulate_mechanical(
         arguments.refuse_unused(method, rtol=rtol, atol=atol)
     for argument, value in refused.items():
         if argument in _OF_MOREAU:
-            raise UsageError(f"{argument} is an option of moreau", remedy='use integrator="moreau"')
+            raise UsageError(f"`{argument}` is an option of moreau", remedy='use integrator="moreau"')
         if argument not in _OF_MODELS:
             taken = (*(simulate_mechanical.__kwdefaults__ or ()), *_OF_MOREAU)
             raise UsageError(
@@ -83,7 +83,7 @@ def simulate_mechanical(
                 remedy=keyword_elsewhere(argument) or nearest(argument, taken, kind="arguments"),
             )
         if value is not None:
-            raise UsageError(f"a MechanicalSystem does not support {argument}", remedy=_OF_MODELS[argument])
+            raise UsageError(f"a MechanicalSystem does not support `{argument}`", remedy=_OF_MODELS[argument])
     span = arguments.time_span(t_span)
     if span[1] < span[0]:
         raise UsageError(

@@ -19,9 +19,9 @@ def test_arguments_that_it_does_not_take_are_named() -> None:
     with pytest.raises(hs.UsageError, match=r"simulate\(\) has no argument 'rtoll'") as caught:
         hs.simulate(system, (0, 1), rtoll=0)
     assert caught.match("did you mean 'rtol'")
-    with pytest.raises(hs.UsageError, match="step is an option of moreau"):
+    with pytest.raises(hs.UsageError, match="`step` is an option of moreau"):
         hs.simulate(system, (0, 1), step=0.1)
-    with pytest.raises(hs.UsageError, match="does not support params"):
+    with pytest.raises(hs.UsageError, match="does not support `params`"):
         hs.simulate(system, (0, 1), params={})
 
 

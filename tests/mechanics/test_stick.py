@@ -70,10 +70,10 @@ def test_restarting_parts_is_as_good_as_restarting_everything() -> None:
     [
         ({"integrator": "dop853"}, "dop853 cannot simulate a MechanicalSystem"),
         ({"t_span": (1, 0)}, "forward only"),
-        ({"z0": {"f1": "stick"}}, "does not support z0"),
+        ({"z0": {"f1": "stick"}}, "does not support `z0`"),
         ({"save": 3.0}, "`save` cannot be 3.0"),
         ({"x0": {"w": 1.0}}, "contains 'w'"),
-        ({"tolerance": 1e-3}, "tolerance is an option of moreau"),
+        ({"tolerance": 1e-3}, "`tolerance` is an option of moreau"),
     ],
 )
 def test_what_it_does_not_take_is_refused_with_a_remedy(changes: dict, said: str) -> None:

@@ -90,7 +90,7 @@ def _bend(lin: Any, k: int, i: int, v: Any, is_shrinking: bool) -> tuple[float, 
 
 @inlined
 def _is_shrinking(lin: Any, k: int) -> bool:
-    """Return whether no modal coordinate grows, so that bounds from the coordinates stay valid."""
+    """Return whether bounds from the modal coordinates stay valid, because no coordinate grows."""
     for j in range(lin.counts[k]):
         if lin.values[k, j].real > 0.0:
             return False

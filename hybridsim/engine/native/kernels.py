@@ -213,7 +213,7 @@ if ENABLED:
         return found
 
     def compile_model_function(module: Any, name: str) -> tuple[Any, Any]:
-        """Compile one function of a generated module; return its address and an object to keep alive."""
+        """Compile one function of a generated module; return its address and an object that keeps it alive."""
         path = getattr(module, "__file__", None)  # None for a module that exists only in memory
         stored = None if path is None else _of_this_machine(Path(path).with_suffix(f".{name}"))
         return compile_text(module.__loader__.get_source(module.__name__), name, stored)

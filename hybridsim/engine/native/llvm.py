@@ -42,7 +42,7 @@ def _machine() -> Any:
 
 
 def compile_text(text: str, name: str, stored: Path | None) -> tuple[int, Any]:
-    """Compile a function from the text of a module; return its address and an object to keep alive.
+    """Compile a function from the text of a module; return its address and an object that keeps it alive.
 
     stored: path of its cached machine code, if any; written at the first compilation.
     """

@@ -72,7 +72,7 @@ def high_rows(
 
 
 class _Rewriting:
-    """Rewrites operations to shorten sequences of scalings and sums, except those that guards need."""
+    """Rewrites operations to shorten sequences of scalings and sums, except operations that guards need."""
 
     def __init__(
         self, rows: Sequence[Row], states: Sequence[int], rates: Sequence[int], guard_registers: set[int]

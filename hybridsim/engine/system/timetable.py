@@ -107,7 +107,7 @@ class Timetable:
         return found[(found[:, 0] - after.high) + (found[:, 1] - after.low) > 0.0][:most]
 
     def slacks(self, near: np.ndarray) -> np.ndarray:
-        """Return the rounding errors of scheduled times near some times."""
+        """Return the rounding errors of scheduled times near the given times."""
         largest = max((abs(start) for _, start, _, _ in self._schedules), default=0.0)
         return np.asarray(2.0 * np.spacing(np.maximum(np.abs(near), largest)))
 

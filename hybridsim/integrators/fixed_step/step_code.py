@@ -155,7 +155,7 @@ class StepCode:
         yield from (f"out[{width + k}] = values[{k}]" for k in range(self.surfaces))
 
     def _here(self) -> Iterator[str]:
-        """Yield code that copies the states and the forcing at their time."""
+        """Yield code that copies the states and the forcing at the time of the states."""
         yield f"here = doubles({self.width})"
         yield from (f"here[{i}] = x[{i}]" for i in range(self.n))
         if self.forcing:

@@ -246,7 +246,7 @@ def stick_limits(contacts: list[MechanicalContact]) -> tuple[np.ndarray, np.ndar
             if limits[i, side] < 0.0 or onset < 0.0:
                 raise ModelError(
                     f"contact {contact.name}: the law '{law.name}' gives a negative force at rest",
-                    remedy="write slip and stick as magnitudes, which are >= 0",
+                    remedy="write `slip` and `stick` as magnitudes, which are >= 0",
                 )
     return limits, smooth
 

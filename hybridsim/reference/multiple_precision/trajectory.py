@@ -20,7 +20,7 @@ def multiple_precision_trajectory(
     digits: int = 32,
     progress: Callable[[float], None] | None = None,
 ) -> Trajectory:
-    """Follow a model by Taylor series in multiple precision, with its own event decisions.
+    """Integrate a model by Taylor series in multiple precision, with event decisions independent of the engine.
 
     It reads only the declaration: expressions become series in mpmath numbers, an event is a guard's series
     passing zero downward, and the next modes are found by trial (`multiple_precision.settling` states the

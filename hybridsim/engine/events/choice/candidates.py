@@ -1,4 +1,4 @@
-"""Judge combinations of modes at the surfaces of a cluster, as far as the choice requires."""
+"""Judge the combinations of modes at the surfaces of a cluster on which the choice depends."""
 
 from __future__ import annotations
 

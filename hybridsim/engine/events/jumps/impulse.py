@@ -145,7 +145,7 @@ def _answers(problem: ImpactProblem, rebound: np.ndarray) -> list[Answer]:
 
 
 def _combinations(problem: ImpactProblem) -> np.ndarray:
-    """Return the combinations of contact states, one per row, those with most closed contacts first."""
+    """Return the combinations of contact states, one per row; rows with more closed contacts come first."""
     found = []
     for normal in product((_ON, _OFF), repeat=problem.normal):
         pushed = np.array(normal) == _ON

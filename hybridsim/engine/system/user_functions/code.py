@@ -148,7 +148,7 @@ class PythonCode:
     @property
     def refusal_message(self) -> str:
         """Return the reason why the functions are not compiled."""
-        return f"numba cannot compile its Python functions ({self.refused})"
+        return f"numba cannot compile the model's Python functions ({self.refused})"
 
     def report(self, trajectory: RunRecord) -> None:
         """Add warnings on derivatives, compilation and exceptions to the record of a run."""
