@@ -94,7 +94,7 @@ def known_name(value: Any, known: Sequence[str], what: str, kind: str) -> str:
 
 
 def known_entry(name: Any, known: Sequence[str], argument: str, what: str, kind: str) -> None:
-    """Raise an error if an argument contains a name that is not, for example, "a state of model 'm'"."""
+    """Raise an error for an unknown name in an argument; `what` is a phrase such as "a state of model 'm'"."""
     if name not in known:
         message = f"`{argument}` contains {name!r}, which is not {what}"
         raise UsageError(message, remedy=nearest(str(name), known, kind=kind))
@@ -323,7 +323,7 @@ def initial_modes(system: System, z0: Any) -> np.ndarray:
 
 
 def retention_of(save: Any, system: System) -> Retention:
-    """Return which parts of the run to store, from a word or from a length of time at its end."""
+    """Return the parts of the run to store; `save` is a word, or a length of time before the end of the run."""
     from hybridsim.engine.record.retention import ALL, EVENTS, NOTHING, Retention
 
     retentions = {"all": ALL, "events": EVENTS, "nothing": NOTHING}

@@ -35,7 +35,7 @@ _PLAIN = frozenset({int, float, np.float64, str, type(None)})  # types whose equ
 
 
 def _run_key(t_span: Any, settings: tuple[Any, ...]) -> tuple[Any, ...] | None:
-    """Return a key of the arguments of a run, or None if an argument is not a plain value.
+    """Return a key that identifies the arguments of a run, or None if an argument is not a plain value.
 
     Checking the arguments costs up to a tenth of a short run, and loops often repeat the same arguments.
     """

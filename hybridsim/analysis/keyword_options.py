@@ -1,4 +1,4 @@
-"""Check the keyword arguments that an analysis passes on to other functions, before its first run."""
+"""This module checks the keyword arguments of an analysis before its first run."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _OF_AUTO = ("exact", "dop853", "taylor", "rodas5p", "cvode-bdf", "scipy-dop853",
 
 
 def refuse_unknown(calls: Iterable[Callable[..., Any]], options: Mapping[str, Any]) -> None:
-    """Reject options that none of several functions accepts; the last one passes some to an integrator.
+    """Reject options that neither the given functions nor the integrator accept.
 
     Raises
     ------

@@ -9,7 +9,7 @@ Progress = Callable[[int, int, str], None]
 
 
 class Steps:
-    """A progress counter of `total` steps; each call reports the step that begins and the steps done."""
+    """A progress counter of `total` steps; each call reports the step that begins and the number of finished steps."""
 
     def __init__(self, total: int, progress: Progress | None) -> None:
         self._total, self._done, self._progress = total, 0, progress

@@ -40,7 +40,7 @@ def add_to(commands: Any) -> None:
         "--integrators",
         metavar="A,B",
         type=values.names,
-        help="run only these integrators and their variants, or 'rk4 tanh', 'rk4 karnopp' (default: all)",
+        help="run only these integrators with their variants, or single variants such as 'rk4 tanh' (default: all)",
     )
     parser.add_argument(
         "--quick", action="store_true", help="run only the loosest setting, which finds gross failures"

@@ -81,5 +81,5 @@ def check_plot(args: argparse.Namespace) -> None:
 
 
 def add_json(parser: argparse.ArgumentParser, what: str, instead: str = "the table") -> None:
-    """Add the option that prints JSON; in its help, `what` is printed instead of `instead`."""
+    """Add the option that prints JSON; `what` and `instead` name the two possible outputs in its help text."""
     parser.add_argument("--json", action="store_true", help=f"print {what} as JSON instead of {instead}")

@@ -164,7 +164,7 @@ def deliver(
 
 
 def _explanations(solution: Solution, numbers: Sequence[int]) -> tuple[list[Explanation], UsageError | None]:
-    """Return the explanations of events as text, and the first error, to raise after the output."""
+    """Return the explanations of events as text, and the first error, which is raised after the output."""
     found, fault = [], None
     for number in numbers:
         try:

@@ -67,7 +67,7 @@ def load(name_or_path: str | os.PathLike[str]) -> Model:
 
 
 def loaded(name_or_path: str | os.PathLike[str]) -> Model:
-    """Return a model by name or path: one object, as long as its file does not change."""
+    """Return a model by name or path; repeated calls return the same object until the model's file changes."""
     argument: object = name_or_path
     if not isinstance(argument, str | os.PathLike):
         remedy = "use a Model, a name or a path"
@@ -97,7 +97,7 @@ def loaded(name_or_path: str | os.PathLike[str]) -> Model:
 
 
 def path_of(name_or_path: str, folder: Path) -> Path:
-    """Return the path of a model: of a packaged model by its name, or a path relative to a folder.
+    """Return the path of a packaged model from its name, or a path relative to a folder.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def _is_path(text: str) -> bool:
 
 
 def _state_of(*paths: str) -> State:
-    """Return the state of files; an empty one for a file that does not exist."""
+    """Return device, inode, time and size of each file, or an empty tuple for a missing file."""
     states: list[tuple[int, ...]] = []
     for path in paths:
         try:

@@ -78,7 +78,7 @@ def _window(errors: Iterable[float], tol: float) -> tuple[float, float]:
 
 
 def _draw(axes: Axes, k: int, step: Step, tol: float, ends: tuple[float, float]) -> None:
-    """Draw a stem from the tolerance to the error, filled if adequate; an arrow marks a far error."""
+    """Draw a stem from the tolerance to the error, filled if adequate; an arrow marks an error outside the axis."""
     low, high = ends
     colour = style.PALETTE[0] if step.is_adequate else style.PALETTE[1]
     at = min(max(step.error, low), high)

@@ -45,7 +45,7 @@ class Look:
     dashes: str
 
     def handle(self, label: str, size: float = SIZE) -> Line2D:
-        """Return the legend entry of a line with this look."""
+        """Return the legend entry of a line with this style."""
         return Line2D(
             [], [], color=self.colour, marker=self.marker, linestyle=self.dashes, markersize=size, linewidth=1.1,
             label=label,
@@ -53,7 +53,7 @@ class Look:
 
 
 def looks(rows: Iterable[Row]) -> dict[str, Look]:
-    """Return the look of each label, in the order of the rows of the comparison.
+    """Return the style of each label, in the order of the rows of the comparison.
 
     Methods of one family share a hue and differ in lightness and marker. Several lines of one method (our
     events and its own, published and refined) or of one regularised form differ in their dashes.

@@ -26,7 +26,7 @@ _VISIBLE = 1e-3  # of the range: a smaller part is a point, a smaller jump is no
 def draw_orbit(
     solution: Solution, across: str, up: str, t_span: tuple[float, float] | None, axes: Axes | None
 ) -> Axes:
-    """Draw `up` over `across` in the colours of the modes, with thick held parts and dashed jumps.
+    """Draw the quantity `up` over `across` in the colours of the modes; held parts are thick, and jumps are dashed.
 
     The colours show the modes of the components that belong to the quantities, such as a contact whose force
     or velocity is drawn. If there is no such component, or several, the colour shows the mode of the first

@@ -194,7 +194,7 @@ def _strip(axis: Axes, solution: Solution, window: Window) -> None:
 
 
 def _columns(axis: Axes) -> int:
-    """Return how many lines of the least visible width a strip has room for."""
+    """Return the number of lines of the least visible width that fit into a strip."""
     whole = axis.get_figure(root=True)
     assert whole is not None
     return max(20, int(72 * whole.get_figwidth() * axis.get_position().width / _HAIRLINE))

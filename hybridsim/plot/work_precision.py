@@ -117,7 +117,7 @@ def _point(comparison: Comparison, row: Row, quantity: str) -> tuple[float, floa
 
 
 def is_cold(row: Row) -> bool:
-    """Return whether a run was timed only once, while it still warmed up."""
+    """Return whether a run was timed only once, during its warm-up."""
     return row.cost is not None and row.cost.repetitions == 0
 
 
@@ -127,7 +127,7 @@ def verdict_of(row: Row) -> bool | None:
 
 
 def label_ticks(panel: Axes) -> None:
-    """Set few enough tick labels of wall times to be readable, and one tick per decade of the error."""
+    """Set a readable number of tick labels for wall times, and ticks at powers of ten for the error."""
     low, high = panel.get_xlim()
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     for steps in ((1, 2, 3, 4, 6, 8), (1, 2, 5), (1, 3), (1,)):

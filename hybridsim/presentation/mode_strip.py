@@ -20,7 +20,7 @@ class Interval(Protocol):
 
 
 class Bar(NamedTuple):
-    """A rectangle of a strip: its times, its lower and upper edge as parts of the height, and its mode."""
+    """A rectangle of a strip: its times, its lower and upper edge as fractions of the height, and its mode."""
 
     start: float
     end: float

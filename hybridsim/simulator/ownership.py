@@ -1,4 +1,4 @@
-"""This module lets one thread at a time use a simulator, and one call at a time."""
+"""This module ensures that only one thread, and only one call, uses a simulator at a time."""
 
 from __future__ import annotations
 

@@ -111,7 +111,7 @@ def begun(run: Run, commit: Callable[[Position], None]) -> None:
 
 
 def stepped(run: Run) -> Run:
-    """Return a prepared run for steps: it stores events, and states only to find poles."""
+    """Return a prepared run for single steps, which stores events; states are stored only if needed to find poles."""
     retention = ALL if denominators(run.model) else EVENTS
     return replace(run, task=replace(run.task, is_stepped=True, retention=retention))
 
@@ -168,7 +168,7 @@ def _follow(
     go: Callable[[Task], Trajectory],
     commit: Callable[[Position], None],
 ) -> None:
-    """Carry out a task, and pass its end to `commit`, or the last event before it stopped with an error."""
+    """Carry out a task, and pass the position at its end to `commit`; after an error, at the last event."""
     record = task.record
     try:
         record = go(task)

@@ -15,7 +15,7 @@ from hybridsim.simulator.position import Position, stepped
 
 @dataclass(frozen=True)
 class SavedState:
-    """A state of a `Simulator`, to which `Simulator.restore` goes back. It never changes and can be pickled.
+    """A saved state of a `Simulator`, for `Simulator.restore`. It never changes and can be pickled.
 
     Parameters
     ----------

@@ -281,7 +281,7 @@ class Simulator(CurrentState):
     # -- copies ---------------------------------------------------------------------------------------------
 
     def copy(self) -> Simulator:
-        """Return an independent copy at the same state, which belongs to the thread that calls this.
+        """Return an independent copy in the same state, which belongs to the calling thread.
 
         Returns
         -------
@@ -304,7 +304,7 @@ class Simulator(CurrentState):
         return _unpickled, (source_of(self.model), self._settings | self._options, *saved)
 
     def save(self) -> SavedState:
-        """Return the present state, to which `restore` goes back. It can be pickled.
+        """Return the present state, which can be pickled and restored by `restore`.
 
         Returns
         -------
@@ -315,7 +315,7 @@ class Simulator(CurrentState):
 
     @property
     def _about(self) -> str:
-        """The settings as text, which must agree for a saved state."""
+        """The settings as text; a saved state can be restored only in a simulator with equal settings."""
         return repr((self._settings, self._options))
 
     @refusing
@@ -334,7 +334,7 @@ class Simulator(CurrentState):
         """
         with self._mine("restore"):
             if not isinstance(saved, SavedState):
-                raise arguments.cannot_be("saved", saved, "use what sim.save() returned")
+                raise arguments.cannot_be("saved", saved, "use a result of sim.save()")
             require_fit(saved, self.model, self._about)
             self._position = saved.position
 

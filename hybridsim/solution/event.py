@@ -66,7 +66,7 @@ class Event:
 
 
 def counted_kind(kind: str, count: int) -> str:
-    """Return how many events of one kind happened as text, such as "2 transitions"."""
+    """Return the number of events of one kind as text, such as "2 transitions"."""
     return f"{count} {kind}{'s' * (count > 1 and kind != 'scheduled')}"
 
 

@@ -110,7 +110,7 @@ class ModelTrajectory:
     def by_segment(
         self, times: np.ndarray, side: str
     ) -> tuple[np.ndarray, list[tuple[Segment, np.ndarray, np.ndarray]]]:
-        """Return states (k, n) at given times, and for each segment the indices and local times."""
+        """Return states (k, n) at given times, and for each segment the indices and local times of the times in it."""
         index, s = self.segment_at(times, side)
         parts = [(i, np.flatnonzero(index == i)) for i in np.unique(index)]
         by_segment = [(self.segments[int(i)], chosen, s[chosen]) for i, chosen in parts]

@@ -130,7 +130,7 @@ class States:
             )
         if self._save in ("events", "nothing"):
             raise UsageError(
-                f"the run was made with save={self._save!r}, which keeps no states between the ends",
+                f"the run was made with save={self._save!r}, which keeps no states between start and end",
                 remedy="simulate it with save='all', or store the end of it with save='last-period'",
             )
         if (outside := self._outside(times)) is not None:

@@ -59,7 +59,7 @@ def test_a_border_that_is_a_constant_input(method: str) -> None:
 def test_a_derivative_by_what_moves_the_time_is_refused() -> None:
     model = on_a_belt("v", "(4 if t < a else 1)", "1")
     sol = hs.simulate(model, (0.0, 3.0), integrator="dop853")
-    with pytest.raises(hs.UsageError, match="depends on c, but its derivative by c is not known"):
+    with pytest.raises(hs.UsageError, match="depends on c, but its derivative with respect to c is unknown"):
         hs.sensitivities(sol, ["c"])
 
 

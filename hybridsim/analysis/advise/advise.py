@@ -217,7 +217,7 @@ def _chosen(names: Sequence[str] | None) -> tuple[LadderStep, ...]:
 
 
 class _ProgressReport:
-    """Report progress: the item that begins, repeated while the item takes long."""
+    """Report to the progress callback which item begins, and repeat the report during long items."""
 
     def __init__(self, progress: Progress | None, total: int) -> None:
         self._progress, self._total, self._done = arguments.callback(progress), total, -1
@@ -228,7 +228,7 @@ class _ProgressReport:
         self.again()
 
     def again(self) -> None:
-        """Repeat the last report, unless it was made less than a pause ago."""
+        """Repeat the last report, unless the last report is very recent."""
         if self._progress is not None and time.monotonic() >= self._next:
             self._next = time.monotonic() + _PAUSE
             self._progress(self._done, self._total, self._what)

@@ -98,7 +98,7 @@ class Limits:
 
     @property
     def spent(self) -> str:
-        """The reason that is reported for a computation for which no time is left."""
+        """The reason for which a computation is skipped when no time is left."""
         return f"the budget of {self.budget.seconds:.3g} s is spent"
 
     def warm(self, ask: Callable[[Watch | None], Answer], watch: Watch) -> Answer:

@@ -247,7 +247,7 @@ def with_contact_outputs(model: Model) -> Model:
         }
         for name in known & texts.keys():
             raise UsageError(
-                f"the output '{name}' has the name of a quantity of contact {contact.name} that is compared",
+                f"the output '{name}' has the name of a quantity that is added for contact {contact.name}",
                 remedy="rename the output",
             )
         more += [Output(name, text) for name, text in texts.items()]  # type: ignore[arg-type]  # made one

@@ -226,7 +226,7 @@ def _heading(comparison: Comparison) -> list[str]:
 
 
 def differences(comparison: Comparison, errors: Errors | None = None) -> str:
-    """Return errors as text in the units of the table; by default the difference of the second reference."""
+    """Return errors as text in the units of the table; the default is the difference of the two references."""
     readings = {name: comparison.scaled(errors or comparison.difference, name) for name in QUANTITIES}
     return ", ".join(f"{_NAMES[name]} {value:.1e}" for name, value in readings.items() if value) or "nothing"
 

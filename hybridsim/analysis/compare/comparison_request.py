@@ -22,7 +22,7 @@ def positive(value: Any, what: str) -> float:
 
 
 def whole(value: Any, what: str, most: int = MOST) -> int:
-    """Return a whole number above zero, up to a limit beyond which memory and time do not suffice."""
+    """Return a whole number between 1 and a limit; larger numbers would exceed memory and time."""
     remedy = f"use a whole number from 1 to {most}"
     found = number(value, what, remedy)
     if not (1 <= found <= most and found.is_integer()):
@@ -41,7 +41,7 @@ def wholes(values: Any, what: str) -> tuple[int, ...] | None:
 
 
 def mapping(value: Any, what: str) -> Mapping[str, Any]:
-    """Return a mapping with names as keys; None becomes an empty mapping."""
+    """Return a mapping whose keys are names; None becomes an empty mapping."""
     if value is None:
         return {}
     if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):

@@ -49,7 +49,7 @@ class Errors:
 
 
 class Yardstick:
-    """A reference that is sampled once, with which any number of runs are then compared.
+    """A reference that is sampled once and then compared with any number of runs.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ class Yardstick:
         return CompletedGraph(trajectory, jumps, self.period or t1 - t0, self.amplitude)
 
     def measure(self, run: Trajectory) -> Errors:
-        """Return the errors of a run that starts like the reference, up to the shorter of their ends."""
+        """Return the errors of a run that starts like the reference, up to the earlier of the two ends."""
         matched = match_events(self.trajectory, run)
         end = min(self.trajectory.t_span[1], run.t_span[1])
         shared = self.times <= end

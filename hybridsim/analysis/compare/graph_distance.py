@@ -123,7 +123,7 @@ class CompletedGraph:
 
 
 def graph_distance(first: CompletedGraph, second: CompletedGraph) -> float:
-    """Return the Hausdorff distance of two completed graphs in the same scaling, up to the shorter end.
+    """Return the Hausdorff distance of two completed graphs in the same scaling, up to the earlier end.
 
     It is the maximum over the points of either graph of the distance to the other graph. The distance of two
     points is their largest coordinate difference: |t - t'| / time or |x_i - x_i'| / amplitude_i. The result

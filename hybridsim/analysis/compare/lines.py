@@ -124,7 +124,7 @@ def _line(
 
 
 def _shown_unasked(name: str) -> list[tuple[Mapping[str, Any], str]]:
-    """Return options and label of each line that an integrator has by default."""
+    """Return the options and the label of each default line of an integrator."""
     if name in _ALSO_NATIVE:
         return [({}, ""), ({"events": "native"}, f"{name}, native events")]
     if name != "rk4-dichotomy":

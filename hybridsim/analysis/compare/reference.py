@@ -41,7 +41,7 @@ DIGITS = 32
 
 @dataclass(frozen=True)
 class Reference:
-    """The trajectory with which the runs of a comparison are compared, and its uncertainty.
+    """The reference trajectory of a comparison, and its uncertainty.
 
     Parameters
     ----------

@@ -36,7 +36,7 @@ class Cost:
 
     @property
     def work(self) -> int:
-        """The number of evaluations and steps, which is equal on every machine."""
+        """The numbers of evaluations and steps, which are equal on every machine."""
         return max(self.rhs_evaluations + self.guard_evaluations, self.steps, 1)
 
     @property
@@ -77,7 +77,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Reading:
-    """An error as a value, or only as a bound if it is below the uncertainty of the reference."""
+    """An error, or only an upper bound of an error below the uncertainty of the reference."""
 
     value: float
     is_bound: bool

@@ -37,7 +37,7 @@ def failure_of(row: Row) -> str:
 
 
 def aligned_cells(cells: tuple[str, ...], widths: list[int]) -> str:
-    """Return the cells of one line of the table, the numbers to the right."""
+    """Return the cells of one line of the table as text, with numbers aligned to the right."""
     first, *numbers, last = cells
     inner = [cell.rjust(width) for cell, width in zip(numbers, widths[1:])]
     return "  ".join([first.ljust(widths[0]), *inner, last])

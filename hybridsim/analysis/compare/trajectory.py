@@ -22,7 +22,7 @@ def trajectory_of(solution: Solution) -> Trajectory:
 
 
 def as_trajectory(value: Any, t_span: tuple[float, float]) -> Trajectory:
-    """Return a trajectory from a Trajectory, an object like a Solution, or a function t -> states."""
+    """Convert a Trajectory, an object like a Solution, or a function t -> states to a trajectory."""
     if isinstance(value, Trajectory):
         return value
     if all(hasattr(value, name) for name in ("t_end", "events", "modes")):

@@ -105,7 +105,7 @@ def equilibria(
     system = system_of(model)
     if model.schedules:
         raise UsageError(
-            f"model {model.name} has {model.schedules[0].name}, which changes the model over time: there "
+            f"schedule {model.schedules[0].name} changes model {model.name} over time, so there "
             "is no equilibrium",
             remedy="use hs.steady_state",
         )
@@ -130,7 +130,7 @@ def equilibria(
 
 
 def _add(found: list[Equilibrium], new: Equilibrium, rounding: np.ndarray) -> None:
-    """Add an equilibrium; a point on a corner is kept once, with the larger growth of its two sides."""
+    """Add an equilibrium; a point on a corner is stored once, with the larger growth rate of its two sides."""
     for i, old in enumerate(found):
         is_same = old.is_point and new.is_point and old.modes == new.modes
         if is_same and (np.abs(old.x - new.x) <= rounding).all():
@@ -178,7 +178,7 @@ def _scaled(A: np.ndarray) -> np.ndarray:
 
 
 def _extent(field: Field, x: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """Return the range of each state over the equilibria around x; None if the guards admit no point."""
+    """Return the range of each state over the equilibria around x, or None if the guards admit no point."""
     n = len(x)
     low, high = np.empty(n), np.empty(n)
     for i in range(n):

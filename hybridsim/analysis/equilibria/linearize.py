@@ -226,8 +226,8 @@ def equilibrium_near(field: Field, x: np.ndarray) -> np.ndarray:
     raise SimulationError(
         f"no equilibrium of model {field.system.model.name} was found from its initial state"
         + (f", in the modes {modes}" if modes else ""),
-        remedy="use initial values closer to an equilibrium, declare nominal values, or pass a point "
-        "to linearise about as `at`",
+        remedy="use initial values closer to an equilibrium, declare nominal values, or set `at` to the "
+        "point of the linearization",
     )
 
 

@@ -24,7 +24,7 @@ def _need_velocity_law(model: Model) -> None:
 
 
 class ConstantAtRest(LadderStep):
-    """The simplified model with slip := stick := slip(0)."""
+    """The simplified model in which the slip force and the stick limit both equal slip(0)."""
 
     name = "constant-mu-at-rest"
     title = "constant mu from the friction force at rest"
@@ -38,7 +38,7 @@ class ConstantAtRest(LadderStep):
 
 
 class ConstantAtMeanSpeed(LadderStep):
-    """The simplified model with slip := stick := slip(mean sliding speed of the full motion)."""
+    """The simplified model in which slip force and stick limit equal the slip force at the mean sliding speed."""
 
     name = "constant-mu-mean"
     title = "constant mu from the friction force at the mean sliding speed"

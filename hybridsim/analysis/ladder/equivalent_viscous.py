@@ -24,7 +24,7 @@ _ANGLES = 0.25 * math.pi * (1.0 + _NODES)
 
 
 class FirstHarmonic:
-    """F1(V) = (4/pi) integral over a quarter cycle of slip(V cos a) cos a da, with force F1 cos = (F1/V) v."""
+    """The first harmonic F1(V) of the friction force at velocity V cos a: (4/pi) integral of slip(V cos a) cos a da."""
 
     def __init__(self, model: Model, contact: Contact) -> None:
         if contact.normal.names - model.constant_names():
@@ -140,7 +140,7 @@ def _by_runs(viscous: Model, scene: Scene, names: list[str]) -> Response:
 
 
 def _solve(response: Response, forces: list[FirstHarmonic], most: int) -> np.ndarray:
-    """Return the damping coefficients (contacts,) that agree with the motion they cause.
+    """Return the damping coefficients (contacts,) that are consistent with the motion with these dampers.
 
     The search starts at small dampers, so that it finds the solution with the largest motion. A single damper
     is found by bisection of log(F1(V(c))/(c V(c))), several by rounds of c <- F1(V(c))/V(c) with half steps

@@ -56,7 +56,7 @@ def with_contacts(model: Model, change: Callable[[Contact], Contact], title: str
 
 
 def at_speed(slip: Expression, speed: str) -> Expression:
-    """Return the slip force at a given speed, which is a number or a parameter name of the law."""
+    """Return the slip force at a speed, which is a number or the name of a parameter."""
     return substitute(slip, {SPEED: parse(speed)})
 
 

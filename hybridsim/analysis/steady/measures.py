@@ -36,7 +36,7 @@ class UnknownName(UsageError, KeyError):
 
 
 class ByName(Mapping[str, float]):
-    """A mapping from names to one measure, whose values are computed on demand.
+    """The values of one measure by the names of the quantities, computed on demand.
 
     Quantities that cannot be read (`unreadable`) are not items of it; accessing them raises an error with the
     reason.
@@ -201,7 +201,7 @@ class Measures:
         return ByName(self._contacts, self._stops, "contact")
 
     def _stops(self, contact: str) -> float:
-        """Count the stick intervals; an interval across the end counts once, permanent stick as zero."""
+        """Count the stick intervals; one across the end counts once, and permanent stick is not counted."""
         hold, intervals = (
             self.held_mode(contact),
             [i.mode for i in self.solution.modes[contact] if i.t1 > i.t0],

@@ -18,7 +18,7 @@ USELESS = 0.1
 
 
 class Verdict(Enum):
-    """Whether the run of an integrator on a scene is right, and why not."""
+    """Whether the run of an integrator on a scene is right, and the reason if it is wrong."""
 
     RIGHT = "right"
     OFF = "off"

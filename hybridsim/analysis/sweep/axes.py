@@ -83,7 +83,7 @@ class Points:
 
 
 def points_of(model: Model, values: Any, mode: Any) -> Points:
-    """Return the points of a sweep, given by its arguments.
+    """Return the points of a sweep from its arguments.
 
     Raises
     ------
@@ -129,7 +129,7 @@ def points_of(model: Model, values: Any, mode: Any) -> Points:
 
 
 def _length(row: Any) -> int:
-    """Return the number of values in a row, or 1 if the row has no length."""
+    """Return the number of values of an axis, or 1 for a single value."""
     try:
         return len(row)
     except TypeError:  # not a row, or an iterator
@@ -201,7 +201,7 @@ def _dependencies(declared: Mapping[str, Expression], name: str) -> dict[str, Ex
 
 
 def _number(name: str, dependencies: Mapping[str, Expression]) -> float:
-    """Return the value of a parameter, or NaN for a missing value, which fails this point only."""
+    """Return the value of a parameter, or NaN for a missing value, so that only this point fails."""
     try:
         return resolve(dependencies)[name]
     except ExpressionError:

@@ -44,7 +44,7 @@ class _Branches:
         return len(self._rising), 2
 
     def settings(self, numbers: range) -> list[Settings]:
-        """Return the settings of points; even numbers belong to the rising branch, odd ones to the other."""
+        """Return the settings of points; even numbers belong to the rising branch, odd numbers to the other."""
         return [self._rising[-1 - k // 2 if k % 2 else k // 2] for k in numbers]
 
 

@@ -141,8 +141,8 @@ class _Describer:
             raise UsageError(
                 f"the measure uses an object of {type(value).__qualname__}, which a journal cannot identify: "
                 f"{error}",
-                remedy="sweep without a journal, or add a method __getstate__ to the class that returns "
-                "the content",
+                remedy="sweep without a journal, or add to the class a method __getstate__ that returns "
+                "its content",
             ) from error
         if isinstance(state, str):
             return f"{_of_module(_module(value))}.{state}"

@@ -46,7 +46,7 @@ class MeasuredPeriod(Measures):
 
 @dataclass(frozen=True)
 class LastPeriod:
-    """This class measures a result over the forcing period that follows the first `after` periods."""
+    """A measure over the one forcing period that follows the first `after` periods."""
 
     reading_names: tuple[str, ...]
     after: int
@@ -76,7 +76,7 @@ class LastPeriod:
         alone: Callable[[Settings], Outcome],
         watch: Watch,
     ) -> list[Outcome] | None:
-        """Run all points in compiled code except those in `alone`; return None if no point can be run there.
+        """Run all points in one compiled call, or return None; the function `alone` runs the points that fail in it.
 
         If the watch requests a stop, the outcomes are those of the first points, as far as they were run.
         """

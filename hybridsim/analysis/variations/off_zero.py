@@ -54,7 +54,7 @@ def differ(one: np.ndarray, other: np.ndarray) -> bool:
 
 
 def off_zero(changes: Changes, at: Place) -> tuple[np.ndarray, list[OffZero]]:
-    """Return the derivatives after held states have returned to their surfaces; list functions at zero."""
+    """Return the derivatives with held states on their surfaces, and a list of the functions at zero."""
     sides = _Sides(changes, at)
     off = sides.surfaces()
     return sides.at.Y, off + sides.guards()
@@ -67,7 +67,7 @@ def limits_reached(changes: Changes, at: Place, components: Sequence[int]) -> li
 
 
 def monitors_reached(changes: Changes, at: Place, later: Place) -> list[OffZero]:
-    """Return the monitors at zero at the start that would fire after a small change of the start.
+    """Return the monitors that are zero at the start and would fire after a small change of the start.
 
     later : a later place; it gives the side if the rate at the start is zero.
     """
@@ -282,7 +282,7 @@ class _Sides:
         return z
 
     def _is_smooth(self, z: np.ndarray) -> bool:
-        """Return whether the rates and their derivatives are equal in the modes `z` and in the run's own."""
+        """Return whether the rates and their derivatives are equal in the modes `z` and in the modes of the run."""
         one, other = (self.changes.flow(replace(self.at, z=modes)) for modes in (z, self.at.z))
         return not any(differ(a, b) for a, b in zip(one, other, strict=True))
 

@@ -52,7 +52,7 @@ def refuse_inputs(model: Model, G: np.ndarray) -> None:
         used = sorted(moving & names.union(*(starts.get(name, ()) for name in names)))
         if used:
             raise UsageError(
-                f"{declared.subject} depends on {used[0]}, but its derivative by {used[0]} is not known",
+                f"{declared.subject} depends on {used[0]}, but its derivative with respect to {used[0]} is unknown",
                 remedy=f"do not request derivatives by {used[0]}, or write the input as an expression of t"
                 if declared.kind != "step"
                 else f"do not request derivatives by {used[0]}, or let a schedule reset a discrete state instead",

@@ -92,7 +92,7 @@ class Rounds:
         self._run(happened, segment.p, float(segment.s[-1]), float(segment.origin))
 
     def at_appointment(self, instant: Instant, happened: Sequence[Occurrence]) -> None:
-        """Apply the resets of scheduled events, with inputs on their next pieces."""
+        """Apply the resets of scheduled events; inputs with a knot at this instant are on their next pieces."""
         self._run(happened, self.system.vector(instant, self.d), 0.0, float(instant))
 
     def _run(self, happened: Sequence[Occurrence], p: np.ndarray, s: float, origin: float) -> None:
@@ -236,7 +236,7 @@ class Rounds:
 def lifted_vector(
     layout: Any, p: np.ndarray, G: np.ndarray, by_angles: np.ndarray, d: np.ndarray, Yd: np.ndarray
 ) -> list[Any]:
-    """Return the run-time vector as dual numbers, by parameters, angles and discrete states."""
+    """Return the run-time vector as dual numbers, with derivatives of parameters, angles and discrete states."""
     found: list[Any] = list(p)
     P, at = layout.parameters, layout.phases_at
     found[:P] = with_slopes(p[:P], G)

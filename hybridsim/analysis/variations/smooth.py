@@ -109,7 +109,7 @@ def transition(slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: 
 
 
 def _work(slopes: Slopes, begins: np.ndarray, ends: np.ndarray) -> tuple[float, float]:
-    """Return the number of e-folds by which the fastest change decays, and the work for all changes."""
+    """Return the integral of the fastest decay rate, and the integral of the largest absolute eigenvalue."""
     middle, lengths = 0.5 * (begins + ends), ends - begins
     found = slopes(middle)
     A = found[:, :, : found.shape[1]]

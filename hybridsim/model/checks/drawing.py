@@ -1,4 +1,4 @@
-"""This module checks the shapes of a drawing; `expressions` checks what places them."""
+"""This module checks the shapes of a drawing; the module `expressions` checks their coordinates."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from hybridsim.model.parts.shape import HOLDS, KINDS, Shape
 
 
 def check_drawing(scope: Scope) -> None:
-    """Report unknown kinds, missing or superfluous fields, and names that mean nothing."""
+    """Report unknown kinds, missing or superfluous fields, and unknown names."""
     shapes = scope.model.drawing
     check_labels(scope, "shape", shapes)
     holding = [shape.name for shape in shapes if shape.kind in HOLDS]

@@ -130,7 +130,7 @@ def _circles(scope: Scope) -> None:
 
 
 def _algebraic_loop(fault: CyclicDependency) -> ExpressionError:
-    """Return the error for a circle; a circle through parts, which have none alone, is an algebraic loop."""
+    """Return the error for a cyclic definition; a cycle through several parts is called an algebraic loop."""
     if not any("." in name for name in fault.circle):
         return fault
     return ExpressionError(

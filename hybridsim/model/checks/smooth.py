@@ -1,4 +1,4 @@
-"""This module checks gaps and switching functions: smooth, with a state, independent of modes."""
+"""This module checks that gaps and switching functions are smooth, contain a state and are the same in all modes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""This package writes the parts of a model into the model itself, so that all else sees one flat model.
+"""This package converts a model with parts to one flat model, which all other packages use.
 
 Start with `flatten`.
 """

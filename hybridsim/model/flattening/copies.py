@@ -49,7 +49,7 @@ class Copies:
         }
 
     def of(self, part: Part) -> Part:
-        """Return the copy of a declaration that has a name."""
+        """Return the copy of a named declaration."""
         kind = next(kind for kind in type(part).__mro__ if kind in self._by_kind)
         changed = {"name": self.prefix + vars(part)["name"], "place": self.place(part)}
         return replace(part, **changed, **self._by_kind[kind](part))

@@ -68,7 +68,7 @@ def _errors_of_parts(uses: Iterable[Use]) -> Iterator[ModelError]:
 
 
 def _errors_of_numbers(model: Model) -> Iterator[ModelError]:
-    """Yield errors of the names of parts, and of too many parts."""
+    """Yield errors about invalid names of parts, and about too many parts."""
     taken: set[str] = set()
     for use in model.use:
         if not (use.name.isascii() and use.name.isidentifier()) or keyword.iskeyword(use.name):
@@ -88,7 +88,7 @@ def _errors_of_numbers(model: Model) -> Iterator[ModelError]:
 
 
 def _errors_of_names(model: Model) -> Iterator[ModelError]:
-    """Yield errors of names that parts do not have, and of inputs that are not connected."""
+    """Yield errors about names that parts do not have, and about inputs that are not connected."""
     repeated = [use for use in model.use if use.repeat]
     own = {part.name for kind in KINDS for part in getattr(model, kind)} | dict(model.definitions).keys()
     if repeated and INDEX in own:
@@ -124,7 +124,7 @@ def _size(part: Model) -> int:
 
 
 class _Flat:
-    """The declarations of a model and its parts, collected by kind, and the errors found on the way."""
+    """The declarations of a model and its parts, collected by kind, and the errors found meanwhile."""
 
     def __init__(self, model: Model) -> None:
         self.errors: list[ModelError] = []
@@ -186,7 +186,7 @@ class _Flat:
         return expr
 
     def _define_outputs(self) -> None:
-        """Make a definition of each output of a part that an expression outside the part uses."""
+        """Add a definition for each output of a part that is used outside the part."""
         outputs: list[Output] = self.parts["outputs"]
         for k, output in enumerate(outputs):
             if "." not in output.name or output.name not in self._used or output.expr.text == output.name:

@@ -1,4 +1,4 @@
-"""Expressions about repeated parts: with an index i, and with references such as block[i-1].x."""
+"""This module parses expressions with the index i of repeated parts, and references such as block[i-1].x."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class IndexedExpression:
-    """An expression that becomes an ordinary one for each number of a repeated part.
+    """An expression with an index; for each number of a repeated part it gives an ordinary expression.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def parse_indexed(
 
 
 class _Joined(ast.NodeTransformer):
-    """Replaces each reference to a numbered part by a name, and keeps the references."""
+    """Replaces each reference to a numbered part by a name, and stores the references."""
 
     def __init__(self, text: str, place: Place) -> None:
         self.text = text
@@ -137,7 +137,7 @@ class _Joined(ast.NodeTransformer):
         self.found: list[Reference] = []
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
-        """Return the name of a reference; an attribute of something else is left as it is."""
+        """Replace a reference such as block[i].x by a name; return any other node unchanged."""
         path, owner = [node.attr], node.value
         while isinstance(owner, ast.Attribute):
             path.append(owner.attr)
@@ -147,7 +147,9 @@ class _Joined(ast.NodeTransformer):
         if not isinstance(owner.value, ast.Name):
             remedy = f"{_FORM}; a repeated part inside a part has names such as left.block3.x"
             raise ExpressionError(
-                "only a part of this model has an index", place=self._at(owner), remedy=remedy
+                "an index can follow only the name of a part of this model",
+                place=self._at(owner),
+                remedy=remedy,
             )
         check_size(owner.slice, self.text, self.place, MAX_DEPTH, MAX_LENGTH)
         check_tree(owner.slice, self.text, self.place)
@@ -156,7 +158,7 @@ class _Joined(ast.NodeTransformer):
         return ast.copy_location(ast.Name(f"[{len(self.found) - 1}]", ast.Load()), node)
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
-        """Refuse a subscript without a quantity after it."""
+        """Reject a subscript that no quantity follows."""
         message = f"'{ast.unparse(node)}' is a part and has no value"
         raise ExpressionError(message, place=self._at(node), remedy=_FORM)
 

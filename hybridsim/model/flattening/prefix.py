@@ -1,4 +1,4 @@
-"""Expressions of a part, written with the names of the model that contains the part."""
+"""This module rewrites the expressions of a part with the names of the model that contains the part."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def prefixed(expr: Kind, prefix: str, use: str, own: Collection[str] = ()) -> Ki
 
 
 def _prefixed(node: ast.expr, prefix: str, fixed: Collection[str], starts: list[int] | None) -> ast.expr:
-    """Return a copy of a tree with other names, and with the columns that follow from the starts of the names."""
+    """Return a copy of a tree with a prefix before its names, and with the columns shifted accordingly."""
     made = rebuilt(node, lambda part: _prefixed(part, prefix, fixed, starts))
     if isinstance(node, ast.Name) and node.id not in fixed:
         made = ast.Name(prefix + node.id, ast.Load())

@@ -28,7 +28,7 @@ def require_known(
     model: str,
     remedy: Callable[[str], str] | None = None,
 ) -> None:
-    """Raise an error for a change that is not a value, or of a quantity that the model does not have."""
+    """Raise an error for a changed quantity that the model does not have, or for an invalid value."""
     for name, value in changes.items():
         if not isinstance(value, Expression | str | Real):
             raise UsageError(f"{kind} {name} cannot be {value!r}", remedy="use a number or an expression")

@@ -130,7 +130,7 @@ class Input(Declared):
             self._write_steps()
 
     def _write_steps(self) -> None:
-        """Write a table whose values hold as a linear one with jumps; a faulty one is left for the checks."""
+        """Convert a piecewise constant table to a linear table with jumps; the checks report an invalid table."""
         rises = all(before < after for before, after in pairwise(self.times))
         if rises and len(self.times) == len(self.values) >= 2:
             first, *later = zip(self.times, self.values, strict=True)
@@ -142,7 +142,7 @@ class Input(Declared):
                 object.__setattr__(self, name, entry)
 
     def _read_file(self) -> None:
-        """Read the times and values of a table from its file; the input has them as numbers afterwards."""
+        """Read the times and values of a table from its file, and store them as numbers in the input."""
         assert self.file is not None
         extra = [name for name in ("times", "values") if getattr(self, name)]
         if self.kind != "table" or extra:
@@ -159,7 +159,7 @@ class Input(Declared):
             object.__setattr__(self, name, entry)
 
     def as_held(self) -> HeldInput:
-        """Return an input of kind "held" as the part that a model keeps."""
+        """Convert an input of kind "held" to a `HeldInput`."""
         known = {"place", "name", "kind", *OPTIONAL["held"]}
         extra = [name for name in self.__dataclass_fields__ if name not in known and getattr(self, name)]
         if extra:

@@ -297,7 +297,7 @@ class Model(Declared):
 
     @cached_property
     def _unnumbered(self) -> dict[str, Any]:
-        """The results that depend on the structure and the expressions of parameters, but on no number."""
+        """The results that depend on the structure and the expressions of parameters, but not on numbers."""
         return {}
 
     @cached_property
@@ -391,7 +391,7 @@ class Model(Declared):
         return positions
 
     def affected_by(self, names: Iterable[str]) -> list[tuple[str, Expression]]:
-        """Return the parameters that depend on some others, with their expressions, in an order to evaluate them."""
+        """Return the parameters that depend on the given parameters, with their expressions, in order of evaluation."""
         found, reached = [], set(names)
         for name, value in self.once_per_expressions("derived", self._derived):
             if not reached.isdisjoint(value.names):
@@ -470,7 +470,7 @@ class Model(Declared):
 
     @property
     def changed_numbers(self) -> frozenset[str] | None:
-        """The parameters with other numbers than in the checked model of which this is a copy; None without one."""
+        """The parameters whose numbers differ from the checked model that was copied; None if no model was copied."""
         return self._sound[1] if "_sound" in vars(self) else None
 
     def validate(self) -> Model:

@@ -1,4 +1,4 @@
-"""This module defines the shapes of a drawing: what a picture of the mechanism shows, and where."""
+"""This module defines the shapes of a drawing of the mechanism, and their coordinates."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ class Shape(Declared):
         return self._parsed(pair[0], field, False), self._parsed(pair[1], field, False)
 
     def fields(self) -> tuple[str, ...]:
-        """Return the names of the fields that are declared, without name and kind."""
+        """Return the names of the declared fields, except `name` and `kind`."""
         rest = [name for name in self.__dataclass_fields__ if name not in ("name", "kind", "place")]
         return tuple(name for name in rest if getattr(self, name) not in (None, (), ""))
 

@@ -1,4 +1,4 @@
-"""This module splits conditions with and, or, not into single comparisons.
+"""This module splits conditions with `and`, `or` and `not` into single comparisons.
 
 `a if p and q else b` becomes `(a if q else b) if p else b`; `or`, `not`, chains and nested conditions are split too.
 A comparison with a corner or jump inside is replaced by comparisons of smooth expressions: `abs(u) < d` becomes
@@ -20,11 +20,11 @@ _MOST_COMPARISONS = 64
 
 
 class TooManyConditions(Exception):
-    """Raised if a condition would become too many single comparisons."""
+    """Raised if a condition would be split into too many single comparisons."""
 
 
 def single_comparisons(meanings: Meanings, node: ast.IfExp) -> ast.expr:
-    """Return an equal expression in which every condition is a single smooth comparison.
+    """Return an equivalent expression in which every condition is a single smooth comparison.
 
     Raises
     ------
@@ -114,7 +114,7 @@ class _Conditions:
         return self.chosen(test, first, second)
 
     def _rough(self, tree: ast.expr) -> tuple[ast.expr | None, Sides | None]:
-        """Return the first non-smooth part of a tree that varies, and its values on both sides."""
+        """Return the first non-smooth varying part of a tree, and the values of this part on both sides."""
         for part in ast.walk(tree):
             if isinstance(part, ast.Call | ast.IfExp) and self.meanings.moves(part):
                 if isinstance(part, ast.Call) and len(part.args) > 2:

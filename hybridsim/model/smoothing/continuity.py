@@ -58,7 +58,7 @@ def sides_of_product(meanings: Meanings, node: ast.expr, left: Set[Family] = fro
 
 
 def rooted_in(meanings: Meanings, node: ast.expr) -> frozenset[Family]:
-    """Return the signs in a continuous product whose argument is zero together with a root in the product.
+    """Return each sign in a continuous product whose argument is zero together with a root in the product.
 
     An example is sign(d)*sqrt(abs(d)), which has no Taylor series at d = 0 on either side.
     """

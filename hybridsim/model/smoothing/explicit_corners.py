@@ -38,7 +38,7 @@ class Smoothed:
 
 
 def smoothed(model: Model) -> Model:
-    """Return the model with its corners and jumps as components, or the model itself without any."""
+    """Return the model with its corners and jumps as components, or the model itself if it has none."""
     if model.flow is not None:
         return model
     found: Model | None = model.once("smoothed", lambda: _smoothed(model))
@@ -220,7 +220,9 @@ class _Smoothing:
                 and self.work.never_negative(guard.expr.tree)
                 and self._has_corner(guard.expr.tree)
             ):
-                self.work.note(guard.expr.tree, MODE, "it is never negative, so the guard never fires", here)
+                self.work.note(
+                    guard.expr.tree, MODE, "its value is never negative, so the guard never fires", here
+                )
                 self.work.count += 1
                 continue
             yield replace(guard, expr=self._rewritten(guard.expr, here))

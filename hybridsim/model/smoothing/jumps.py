@@ -173,7 +173,7 @@ def _rank(rows: list[list[Fraction]]) -> int:
 def apart_by(
     meanings: Meanings, first: ast.expr, second: ast.expr
 ) -> tuple[Polynomial, Polynomial, Polynomial]:
-    """Return n, d and the constant g = n*first - d*second for parallel borders, else empty polynomials.
+    """Return n, d and the constant g = n*first - d*second for parallel borders, otherwise empty polynomials.
 
     n and d are numbers times products of parameters, n / d the ratio of the slopes of the second to those of the first.
     """

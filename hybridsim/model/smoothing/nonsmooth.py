@@ -66,7 +66,7 @@ def uses_conditions(model: Model) -> bool:
 
 
 def has_word(expr: Expression) -> bool:
-    """Return whether an expression itself contains a non-smooth function, without its definitions."""
+    """Return whether an expression contains a non-smooth function; the definitions that it uses are ignored."""
     return bool(_WORD.search(expr.text))
 
 
@@ -119,7 +119,7 @@ def is_whole(exponent: ast.expr, meanings: Meanings) -> bool:
 
 
 def is_clear_of_zero(node: ast.expr, numbers: dict[str, float], meanings: Meanings) -> bool:
-    """Return whether an expression is certainly positive by its form, as 1 + v**2 or exp(v)."""
+    """Return whether the form of an expression shows that it is positive, such as 1 + v**2 or exp(v)."""
     match node:
         case ast.Name(id=name) if (tree := meanings.lookup(name)) is not None:
             return is_clear_of_zero(tree, numbers, meanings)

@@ -1,4 +1,4 @@
-"""This module rewrites the expressions of a model, with variables of components for corners."""
+"""This module replaces corners and jumps in the expressions of a model by variables of components."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ class Rewriting(RewritingState):
         return not any(isinstance(part, ast.IfExp) or sides_of(part) for part in parts)  # type: ignore[arg-type]  # others have none
 
     def _signs(self, here: Here, family: Family, sign: int) -> Mapping[Family, int]:
-        """Return the known signs, with the sign of one more family."""
+        """Return the known signs, extended by the sign of another family."""
         known = {**here.signs, family: sign}
         return self._known_signs.setdefault(frozenset(known.items()), known)
 

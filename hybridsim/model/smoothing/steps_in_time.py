@@ -52,13 +52,13 @@ class TimeStep(Input):
 
 
 def constant_inputs(model: Model) -> dict[str, float]:
-    """Return the inputs that are tables with a single value."""
+    """Return the inputs that are tables with the same value at all times."""
     tables = (signal for signal in model.inputs if signal.kind == "table")
     return {table.name: table.values[0] for table in tables if len(set(table.values)) == 1}
 
 
 def lasting(model: Model) -> frozenset[str]:
-    """Return the names that are constant during a run: some discrete states, and inputs that are not held."""
+    """Return the names that are constant during a run: discrete states without resets, and constant inputs."""
     choices = [choice for c in model.components for m in c.modes for g in m.guards for choice in g.then]
     resets = [choice.reset for choice in choices]
     resets += [part.reset for part in model.monitors] + [part.reset for part in model.schedules]

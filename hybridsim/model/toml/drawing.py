@@ -31,7 +31,7 @@ def read_drawing(root: Table) -> Iterable[Shape]:
 
 
 def _field(table: Table, key: str) -> Any:
-    """Return the value of a key as `Shape` takes it; a wrong one is reported."""
+    """Return the value of a key as an argument of `Shape`; a wrong value is reported."""
     if key in _TEXTS:
         return table.text(key)
     if key in ("at", "vector"):

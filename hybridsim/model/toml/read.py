@@ -111,7 +111,7 @@ def _model(text: str, path: str | None, files: PartFiles) -> Model:
 
 
 def _declared(root: Table, name: str, files: PartFiles) -> Model:
-    """Return the model that the tables of a file declare; errors of tables are left in the source."""
+    """Return the model that the tables of a file declare; errors are collected in the source."""
     folder = Path(root.source.file).parent if root.source.file else Path()
     loose = [
         key

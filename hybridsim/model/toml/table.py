@@ -55,7 +55,7 @@ class Table:
                 self.fail(f"unknown key '{key}'", nearest(key, known, kind="keys"), key)
 
     def only_in(self, *known: str, others: Sequence[str], remedy: str) -> None:
-        """Report every unknown key, and keys of another table with their own remedy."""
+        """Report every unknown key; the keys `others`, which belong into another table, get the given remedy."""
         others = [key for key in others if key not in known]
         if others:
             self.fail(f"unknown {', '.join(map(repr, others))}", remedy, others[0])

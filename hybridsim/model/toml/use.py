@@ -94,7 +94,7 @@ def read_uses(root: Table, folder: Path, files: PartFiles) -> Iterator[Use]:
 def _values(
     table: Table, field: str, repeat: int | None
 ) -> Iterator[tuple[str, tuple[IndexedExpression, ...]]]:
-    """Yield the names and values of a table; a table inside it, such as hub.x, stands for a name with dots."""
+    """Yield the names and values of a table; a table inside it gives names with dots, such as hub.x."""
     for keys, value in _leaves(table.mapping(field), ()):
         name = ".".join(keys)
         listed = value if isinstance(value, list) else [value]

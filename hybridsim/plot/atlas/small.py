@@ -14,7 +14,7 @@ _COLOURS = 48
 
 
 def save_small(picture: Any, path: Path, dpi: float = 100.0) -> Path:
-    """Write a .png file with its own palette, which is a third of the normal size."""
+    """Write a .png file with its own palette; the file has a third of the normal size."""
     with whole_file(path) as partly:
         save(picture, partly, dpi)
         with Image.open(partly) as image:

@@ -105,7 +105,7 @@ def check_animation(model: Model, path: Path) -> None:
 
 
 def _counted(clip: Clip, progress: Callable[[float], None] | None) -> Iterator[Picture]:
-    """Yield the pictures of a clip, and report the finished part."""
+    """Yield the pictures of a clip, and report the finished fraction."""
     for k, picture in enumerate(clip.pictures(), start=1):
         yield picture
         if progress is not None:
@@ -113,7 +113,7 @@ def _counted(clip: Clip, progress: Callable[[float], None] | None) -> Iterator[P
 
 
 def _with_one_palette(pictures: Iterator[Picture], clip: Clip) -> Iterator[Image.Image]:
-    """Yield pictures with one palette of few colours: those of the theme, and others from some of the pictures."""
+    """Yield pictures with a common palette: the colours of the theme, and the most common other colours."""
     every = [Image.fromarray(picture) for picture in pictures]
     chosen = every[:: max(1, len(every) // _SAMPLES)]
     mosaic = Image.new("RGB", (every[0].width, every[0].height * len(chosen)))

@@ -33,7 +33,7 @@ _MARGIN = 0.25  # around the drawing, relative to the unit
 
 
 class Canvas:
-    """The drawing of a run: `artists` returns what shows it at one time, in the axes that `frame` prepares."""
+    """The drawing of a run: `frame` prepares the axes, and `artists` returns the artists at one time."""
 
     def __init__(self, solution: Solution, window: Window, theme: Theme) -> None:
         self.solution, self.theme = solution, theme
@@ -56,12 +56,12 @@ class Canvas:
 
     @property
     def aspect(self) -> float:
-        """Return the height of the drawing over its width."""
+        """Return the ratio of the drawing's height to its width."""
         width, height = self.high - self.low
         return float(height / width)
 
     def prepare(self, axes: Axes) -> None:
-        """Set the limits and the equal aspect of axes, and draw the bar that shows the scale."""
+        """Set the limits and an equal aspect ratio of the axes, and draw a scale bar."""
         axes.set_xlim(self.low[0], self.high[0])
         axes.set_ylim(self.low[1], self.high[1])
         axes.set_aspect("equal")
@@ -108,7 +108,7 @@ class Canvas:
         ]
 
     def _colours_at(self, t: float) -> dict[str, str]:
-        """Return the colour of the mode of each shape that shows one."""
+        """Return the mode colour of each shape that shows a mode."""
         modes = self.modes(t)
         return {
             shape.name: self.theme.mode(self.colours[modes[shape.mode_of]])
@@ -118,7 +118,7 @@ class Canvas:
 
 
 def _unit_of(model: Model) -> str:
-    """Return the unit of the states at which shapes are, if they have one unit."""
+    """Return the common unit of the states that are coordinates of shapes, or an empty text without one."""
     states = {state.name: state.unit for state in model.states}
     coordinates = [expr.text for shape in model.drawing for expr in (shape.at or ())]
     found = {states[name] for name in coordinates if name in states}

@@ -1,4 +1,4 @@
-"""This module makes the frames of an animation: the mechanism, its curves and modes, and a line at the time."""
+"""This module makes the frames of an animation: mechanism, curves, modes, and a line at the current time."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class Clip:
         self._build(quantities, window)
 
     def _build(self, names: Sequence[str], window: Window) -> None:
-        """Make the figure with everything that does not move."""
+        """Make the figure with all parts that do not move."""
         solution = self._solution
         rows = len(names) + bool(solution.modes)
         heights = [_CURVE] * len(names) + [0.1 + _ROW * len(solution.modes)] * bool(solution.modes)
@@ -144,7 +144,7 @@ def _draw(artist: Artist, axes: Axes, canvas: FigureCanvasAgg) -> None:
 
 
 def _round_speed(speed: float, has_seconds: bool) -> float:
-    """Return a speed of 1, 2 or 5 times a power of ten near another one; real time if it is near and known."""
+    """Round a speed to 1, 2 or 5 times a power of ten; if time is in seconds, round a speed near 1 to real time."""
     if has_seconds and 0.4 <= speed <= 2.0:
         return 1.0
     power = 10.0 ** math.floor(math.log10(speed))
@@ -152,7 +152,7 @@ def _round_speed(speed: float, has_seconds: bool) -> float:
 
 
 def _how_fast(speed: float, unit: str) -> str:
-    """Return a note on the speed."""
+    """Return a note on the speed of the animation."""
     if not unit:
         return f"({speed:g} in a second)"
     if speed == 1.0:
@@ -161,5 +161,5 @@ def _how_fast(speed: float, unit: str) -> str:
 
 
 def _short(t: float, span: float) -> str:
-    """Return a time with the decimals that its frames need."""
+    """Return a time as text, with as many decimals as the length of the run requires."""
     return f"{t:.{max(0, 2 - math.floor(math.log10(span)))}f}"

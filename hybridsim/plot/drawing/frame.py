@@ -1,4 +1,4 @@
-"""This module defines what each shape is drawn with: all poses at one time, and the colours."""
+"""This module defines a frame, the data for drawing the shapes at one time: poses, layout and colours."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ BAR = 4.5  # width of a line in the colour of a mode, in points
 
 @dataclass(frozen=True)
 class Frame:
-    """A drawing at one time: all poses, the layout, and the colour of the mode of each shape that shows one."""
+    """The data of a drawing at one time: poses, layout, theme, and mode colours by the names of shapes."""
 
     poses: Poses
     layout: Layout
@@ -23,7 +23,7 @@ class Frame:
     colours: dict[str, str]
 
     def colour(self, pose: Pose, default: str) -> str:
-        """Return the colour of the mode of a shape, or another one."""
+        """Return the mode colour of a shape, or the default colour if the shape shows no mode."""
         return self.colours.get(pose.shape.name, default)
 
 

@@ -1,4 +1,4 @@
-"""This module chooses what all frames of a drawing share: sizes, lengths of walls, and the visible range."""
+"""This module chooses quantities that are equal in all frames: sizes, lengths of walls, and the visible range."""
 
 from __future__ import annotations
 
@@ -128,7 +128,7 @@ def _span(name: str, poses: Sequence[Poses], layout: Layout, bodies: Sequence[Po
 
 
 def direction_of(pose: Pose) -> Points:
-    """Return the direction of a ground, wall or belt, to the right or upwards if it is not turned."""
+    """Return the direction of a ground, wall or belt; at angle 0, a wall points upwards and others to the right."""
     angle = pose.number("angle") + (np.pi / 2 if pose.shape.kind == "wall" else 0.0)
     return np.array([np.cos(angle), np.sin(angle)])
 
@@ -162,7 +162,7 @@ def centre_of(pose: Pose, layout: Layout) -> Points:
 
 
 def ends_of(pose: Pose, poses: Poses, layout: Layout) -> tuple[Points, Points]:
-    """Return both ends of a spring, damper, rod or shaft, on the outlines of what they are fixed to."""
+    """Return both ends of a spring, damper, rod or shaft, on the outlines of the shapes to which it is fixed."""
     held = [poses[end] if isinstance(end, str) else None for end in pose.ends]
     middle: list[Points | None] = [
         end if not isinstance(end, str) else centre_of(other, layout) if other and _has_body(other) else None

@@ -24,7 +24,7 @@ class Outline:
     order: float = BODY
 
     def style(self) -> tuple[float, str | None, float, str | None]:
-        """Return everything but the points."""
+        """Return the style of the outline: order, line colour, line width and fill colour."""
         return self.order, self.line, self.width, self.fill
 
 
@@ -51,7 +51,7 @@ def circle(centre: Points, radius: float, start: float = 0.0, stop: float = 2 * 
 
 
 def rectangle(low: Points, width: float, height: float, radius: float = 0.0) -> Points:
-    """Return the corners of a rectangle above the middle of its lower edge, rounded if a radius is given."""
+    """Return the outline of a rectangle from the middle of its lower edge; a radius rounds the corners."""
     x, y, r = width / 2, height, min(radius, width / 2, height / 2)
     corners = [(x - r, r, -0.5), (x - r, y - r, 0.0), (r - x, y - r, 0.5), (r - x, r, 1.0)]
     if not r:
@@ -91,7 +91,7 @@ def hatching(start: Points, end: Points, depth: float) -> list[Points]:
 
 
 def on_outline(centre: Points, direction: Points, outline: Points) -> Points:
-    """Return where a ray from a point inside an outline leaves it; the point itself if it does not."""
+    """Return the point at which a ray from inside an outline leaves it, or the start of the ray if it never leaves."""
     first, second = outline, np.roll(outline, -1, axis=0)
     edge, to_first = second - first, first - centre
     across = direction[0] * edge[:, 1] - direction[1] * edge[:, 0]

@@ -1,4 +1,4 @@
-"""This module writes an animation as one HTML page with a player, without any other file or connection."""
+"""This module writes an animation as one HTML page with a player, which needs no other file and no network."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ Promise.all([load(still), ...parts.map(part => load(part[2]))]).then(([first, ..
 
 
 def page(title: str, pictures: Sequence[Image.Image], fps: float, is_dark: bool) -> str:
-    """Return a page that plays pictures; each is stored as the part that differs from the first one."""
+    """Return a page that plays pictures; of each picture, only the part that differs from the first one is stored."""
     first, theme = pictures[0], DARK if is_dark else LIGHT
     still, clear = np.asarray(first), len(first.getpalette() or []) // 3
     parts: list[list[int | str]] = []
@@ -108,7 +108,7 @@ def page(title: str, pictures: Sequence[Image.Image], fps: float, is_dark: bool)
 
 
 def _as_text(picture: Image.Image, clear: int | None) -> str:
-    """Return a picture as PNG in text, in which one colour is transparent."""
+    """Return a picture as a base64-encoded PNG, in which one colour may be transparent."""
     data = BytesIO()
     picture.save(data, "PNG", compress_level=9, **({} if clear is None else {"transparency": clear}))
     return b64encode(data.getvalue()).decode("ascii")

@@ -1,4 +1,4 @@
-"""This module evaluates where the shapes of a drawing are at given times of a run."""
+"""This module evaluates the coordinates of the shapes of a drawing at given times of a run."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Points = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Pose:
-    """The numbers of a shape at one time; `ends` has points, or names of other shapes."""
+    """The coordinates and sizes of a shape at one time; `ends` contains points, or names of other shapes."""
 
     shape: Shape
     at: Points
@@ -32,7 +32,7 @@ class Pose:
     numbers: Mapping[str, float] = field(default_factory=dict)
 
     def holds(self, name: str) -> bool:
-        """Return whether an end is fixed to the shape of this name."""
+        """Return whether an end is fixed to the shape with a given name."""
         return any(isinstance(end, str) and end == name for end in self.ends)
 
     def number(self, name: str, default: float = 0.0) -> float:
@@ -78,7 +78,7 @@ def poses_at(solution: Solution, times: NDArray[np.float64]) -> list[Poses]:
 def _values(
     solution: Solution, names: set[str], times: NDArray[np.float64]
 ) -> dict[str, NDArray[np.float64]]:
-    """Return the values of names at some times, and a number for those that are constant."""
+    """Return the values of quantities at given times; a constant quantity has one value for all times."""
     model = solution.model
     parameters, definitions = model.parameter_values(), dict(model.definitions)
     found: dict[str, NDArray[np.float64]] = {}

@@ -27,7 +27,7 @@ class Theme:
 
     @property
     def colours(self) -> tuple[str, ...]:
-        """Return all colours."""
+        """Return all colours of the theme."""
         return self.paper, self.ink, self.weak, self.body, self.rim, self.water, self.force
 
     def mode(self, colour: str) -> str:
@@ -46,7 +46,7 @@ _DARK = {
 
 
 def darken(figure: Figure) -> None:
-    """Give a picture of this package the colours for a dark background."""
+    """Change the colours of a picture of this package for a dark background."""
     for artist in [figure, *figure.findobj()]:
         for kind in ("color", "facecolor", "edgecolor", "facecolors", "edgecolors"):
             get, change = getattr(artist, f"get_{kind}", None), getattr(artist, f"set_{kind}", None)

@@ -143,7 +143,7 @@ def check_events(events: Arrays, hidden: object, system: System) -> None:
     known = check_forms("the events", events, lengths, sizes_of(system))
     texts = events.get("words")
     if texts is None or texts.dtype.kind != "U" or texts.shape != (known["E"], 5):
-        raise ValueError("the texts of the events are not five for each event")
+        raise ValueError("an event does not have five texts")
     check_count("the number of events that are not shown", hidden, known["E"])
     check_finite("the time of an event", events["instants"])
     check_range("the direction of an event", events["directions"], -1, 1)

@@ -13,7 +13,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def _walls() -> Scene:
-    """Return the scene of two stiff walls, with flights of length 2 at speed 1 and contacts of pi/sqrt(k)."""
+    """Return the scene of two stiff walls: flights take 2 time units at speed 1, and contacts take pi/sqrt(k)."""
     contact = math.pi / 1e3
     events, t = [], 1.0
     for n in range(5):

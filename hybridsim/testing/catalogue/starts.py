@@ -73,7 +73,7 @@ def _relay() -> Scene:
 
 
 def _gap() -> Scene:
-    """Return the scene of a ball on a force with a corner, which lifts the ball at y = 1/3."""
+    """Return the scene of a ball that a force with a corner lifts at y = 1/3."""
     lifted = 0.5 + 2.0 + 1.0 / 3.0
     rise = 4.0 - lifted
     states = ((0.25, (0.0, 0.0, -0.75)), (2.5, (0.0, 0.0, 0.0)), (4.0, (0.5 * rise**3, 1.5 * rise**2, 1.5)))

@@ -60,7 +60,7 @@ class Job:
     chained: bool
 
     def at(self, settings: Settings) -> Model:
-        """Return the model at a point."""
+        """Return the model with the parameters and initial values of a point."""
         if not self.starts:
             return self.model.with_(**dict(zip(self.names, settings, strict=True)))
         pairs = list(zip(self.names, settings, strict=True))

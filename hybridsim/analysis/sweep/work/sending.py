@@ -32,7 +32,7 @@ class Points(Protocol):
 
 
 def worker_count(executor: Any, workers: int | None) -> int:
-    """Return how many workers to use: as requested, or one per worker of the executor, or per processor."""
+    """Return the number of workers: as requested, otherwise one per worker of the executor or one per processor."""
     if workers is not None:
         return workers
     # The pools of the standard library have no public attribute for it; others count as one worker per

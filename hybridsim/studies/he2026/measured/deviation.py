@@ -41,7 +41,7 @@ class Maps:
 
 
 def maps(size: Size, pool: Pool) -> Maps:
-    """Compute the steady states on a map by the exact method and by every reading of the published ones."""
+    """Compute the steady states on a map by the exact method and by each interpretation of the published methods."""
     ratios, r = np.array(size.ratios), np.array(size.r)
     points = [Point(float(b), float(a)) for a in ratios for b in r]
     methods: tuple[Variant, ...] = (*SIGNS, *MATTERING)

@@ -1,4 +1,4 @@
-"""This module compares readings of the published method at three points, to find which choices matter."""
+"""This module compares interpretations of the published method at three points, to find which choices matter."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MAP_POINTS = {
 
 @dataclass(frozen=True)
 class Readings:
-    """Least, mean and greatest signed deviation of A from the exact value, by reading and by place."""
+    """Least, mean and greatest signed deviation of A from the exact value, by interpretation and by point."""
 
     table: dict[str, dict[str, tuple[float, float, float]]]
 
@@ -37,7 +37,7 @@ class Readings:
 
 
 def readings(size: Size, pool: Pool) -> Readings:
-    """Run every reading of the published method at every place."""
+    """Run every interpretation of the published method at each of the three points."""
     variants = (*SIGNS, *DICHOTOMIES)
     truth = {map_point: exact(point).amplitude for map_point, point in MAP_POINTS.items()}
     tasks = list(itertools.product(variants, MAP_POINTS))

@@ -211,7 +211,7 @@ def claim_figure_13(runs: dict[str, Response], figure_12: dict[str, Response]) -
 def _deviations(
     runs: dict[str, Response], published: float
 ) -> tuple[dict[str, dict[str, Any]], dict[str, Any], str]:
-    """Return the deviation (Eq. 9) of every pair of readings, and the pair nearest to the paper."""
+    """Return the deviation (Eq. 9) of every pair of interpretations, and the pair nearest to the paper."""
     ours = {
         f"{sign.name}; {with_.name}": {
             "A_D": abs(runs[sign.name].amplitude / runs[with_.name].amplitude - 1.0),

@@ -53,7 +53,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Variant:
-    """One reading of the published method: a choice for each detail that the paper leaves open."""
+    """One interpretation of the published method: a choice for each detail that the paper leaves open."""
 
     name: str
     integrator: str

@@ -33,7 +33,7 @@ _SHRINKS = 0.5
 
 @dataclass(frozen=True)
 class StepStudy:
-    """Deviations from the exact motion over places (rows) and settings (columns), averaged over periods.
+    """Deviations from the exact motion over points (rows) and settings (columns), averaged over periods.
 
     by_step : method without stick -> quantity -> deviations over `STEPS`.
     by_eps : method with stick -> quantity -> deviations over `EPS`.
@@ -54,7 +54,7 @@ class StepStudy:
         return np.asarray(np.sqrt((self.by_eps[method][quantity] ** 2).mean(axis=0)))
 
     def shrinks(self, quantity: str) -> bool:
-        """Return whether the deviation along the ridge decreases with the step for every reading."""
+        """Return whether the deviation along the ridge decreases with the step for every interpretation."""
         first = STEPS.index(STEPS_PER_PERIOD)
         return all(
             self.along(v.name, quantity)[-1] < _SHRINKS * self.along(v.name, quantity)[first] for v in SIGNS

@@ -30,7 +30,7 @@ def edges(centres: np.ndarray) -> np.ndarray:
 
 
 def deviation_maps(maps: Maps, quantity: str) -> Figure:
-    """Draw the deviation (Eq. 9) over r and F0/N, from two readings of the paper and from the exact value."""
+    """Draw the deviation (Eq. 9) over r and F0/N, from two interpretations of the paper and from the exact value."""
     columns = (LITERAL.name, ZEROED.name, EXACT)
     figure = style.figure(10.2, 6.4)
     number = {"A": "10", "E": "11"}[quantity]
