@@ -94,7 +94,7 @@ __all__ = ["__version__", *_HOME]
 
 
 class _Package(ModuleType):
-    """A module type whose submodules do not hide public names with the same spelling.
+    """A module type in which a public function is not replaced by the submodule of the same name.
 
     The import system binds every submodule to its package on first import, so that after
     `import hybridsim.simulate` anywhere, `hs.simulate` would be the module and not the function.

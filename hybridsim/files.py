@@ -102,7 +102,7 @@ def _dress(path: str, before: os.stat_result) -> None:
 
 @contextmanager
 def held(path: str | PathLike[str], busy: str) -> Iterator[None]:
-    """Lock a file or folder during a block; others that try to lock it get an error.
+    """Lock a file or folder during a block; a second attempt to lock it raises an error.
 
     The operating system releases the lock when the process ends. On systems without such locks nothing is locked.
 

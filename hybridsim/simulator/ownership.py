@@ -17,7 +17,7 @@ class Ownership:
         self._name, self._owner, self._is_busy = name, threading.current_thread(), False
 
     def __call__(self, call: str) -> Ownership:
-        """Raise an error for calls of other threads, and for calls from within a call."""
+        """Raise an error for calls from other threads, and for calls during another call."""
         here = threading.current_thread()
         if self._owner is not here:
             raise UsageError(

@@ -299,7 +299,7 @@ class Simulator(CurrentState):
         return self.copy()
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the model as text and the state as numbers; the result belongs to the thread that reads it."""
+        """Pickle the model as text and the state as numbers; the simulator belongs to the thread that unpickles it."""
         saved = [position and SavedState(position, self._about) for position in (self._position, self._first)]
         return _unpickled, (source_of(self.model), self._settings | self._options, *saved)
 

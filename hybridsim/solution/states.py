@@ -122,7 +122,7 @@ class States:
         return ~((times >= low) & (times <= high))
 
     def _within(self, times: np.ndarray, side: str) -> tuple[np.ndarray, str]:
-        """Return times and side, after checking that the run stored the states there."""
+        """Return the times and the side after checking that the run stored the states at these times."""
         side = side_of_event(side)
         if not self._trajectory.has_states:
             raise UsageError(

@@ -70,7 +70,7 @@ def relative_error(value: Number, full: Number) -> float:
 
 @dataclass(frozen=True)
 class Limits:
-    """The limits on time for the parts of an advice.
+    """The time limits for the parts of an advice.
 
     Parameters
     ----------

@@ -45,7 +45,7 @@ class NoAnswer(Exception):
 
 
 class OverRun(Measures):
-    """Measures like those of a steady state, but taken over a whole run instead of a period."""
+    """The measures of a steady state, computed over a whole run instead of a period."""
 
     period = math.nan
 

@@ -145,7 +145,7 @@ def settings(
 
 
 def rank(setting: Setting) -> tuple[bool, bool, float]:
-    """Return the sort key: adequate settings first, then fast ones; a fixed step must be clearly faster."""
+    """Return the sort key: adequate settings come first, then fast settings; fixed steps get a handicap in time."""
     worth = _UNCONTROLLED if "step" in setting.options else 1.0
     return not setting.is_adequate, math.isnan(setting.seconds), worth * setting.seconds
 

@@ -204,7 +204,7 @@ def free_passings(
 def _without_events(
     late: Solution, orbit: Orbit, times: np.ndarray, j: int, may_be_passed: np.ndarray
 ) -> tuple[np.ndarray, int]:
-    """Return the times at which a motion passes a section, moved to where no events happen, and its state.
+    """Return the times of the passages of an event-free section, and the index of the state that defines the section.
 
     times, j: a first section, which is kept if no event is there. Otherwise the section moves to the middle
     of the longest event-free interval of a period. It becomes a level of the state that moves fastest there,

@@ -144,5 +144,5 @@ def bifurcation(
 
 
 def _turned(array: np.ndarray) -> np.ndarray:
-    """Reorder results from (step, branch, ...) to (branch, value, ...), so that both branches rise."""
+    """Reorder results from (step, branch, ...) to (branch, value, ...), with rising values in both branches."""
     return np.stack([array[:, 0], array[::-1, 1]])

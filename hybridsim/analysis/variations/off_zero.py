@@ -185,7 +185,7 @@ class _Sides:
         return off
 
     def _passed(self, c: int, both: list[Changed], above: np.ndarray, below: np.ndarray) -> list[OffZero]:
-        """Describe a surface that the run leaves, before and after the impulses of held components.
+        """Return data of a surface that the run leaves, before and after the impulses of held components.
 
         On the other side, directions with impulses do not return by themselves.
         """

@@ -50,7 +50,7 @@ def flattened(model: Model) -> dict[str, Any]:
 
 
 def _errors_of_parts(uses: Iterable[Use]) -> Iterator[ModelError]:
-    """Check each part by itself once, and yield its errors as seen from the whole model."""
+    """Check each part once on its own, and yield its errors as seen from the whole model."""
     seen: set[int] = set()
     for use in uses:
         if id(use.model) not in seen:
@@ -202,7 +202,7 @@ class _Flat:
 
 
 def _of_law(contact: Contact, part: Model, start: Mapping[str, Expression]) -> dict[str, Expression]:
-    """Return the initial values that belong to states of the law of a contact, by their names in the law."""
+    """Return the initial values of the states of a contact's law, by the names of the states in the law."""
     states = {state.name for state in part.states if isinstance(state, ContactState)}
     found = {}
     for name in states & start.keys():
@@ -213,7 +213,7 @@ def _of_law(contact: Contact, part: Model, start: Mapping[str, Expression]) -> d
 
 
 def _expressions(value: Any) -> Iterator[Expression]:
-    """Yield the expressions in a declaration; a law has names of its own and is left out."""
+    """Yield the expressions in a declaration, except those of a friction law, which has its own names."""
     if isinstance(value, Expression):
         yield value
     elif isinstance(value, Mapping):

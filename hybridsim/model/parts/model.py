@@ -311,7 +311,7 @@ class Model(Declared):
         return self._common[name]
 
     def once_per_expressions(self, name: str, make: Callable[[], Any]) -> Any:
-        """Return a result that depends only on structure and expressions of parameters, shared by their copies."""
+        """Return a result that depends only on the structure and on parameter expressions; copies share the result."""
         if name not in self._unnumbered:
             self._unnumbered[name] = make()
         return self._unnumbered[name]
@@ -439,7 +439,7 @@ class Model(Declared):
         return names
 
     def _never_negative_names(self) -> frozenset[str]:
-        """Return names that cannot be negative: constants and the normal forces of impacts."""
+        """Return the names whose signs need no check during a run: constants, and the normal forces of impacts."""
         return self.constant_names() | {impact.name for impact in self.impacts}
 
     def _constant_names(self) -> frozenset[str]:

@@ -98,5 +98,5 @@ class Use(Declared):
             raise ExpressionError(message, place=fault.place, remedy=fault.remedy) from None
 
     def numbers(self) -> tuple[int | None, ...]:
-        """Return the number of each copy, from 1; a single None for a part that is not repeated."""
+        """Return the numbers 1, 2, ... of the copies, or a single None for a part that is not repeated."""
         return (None,) if self.repeat is None else tuple(range(1, self.repeat + 1))

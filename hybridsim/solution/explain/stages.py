@@ -141,7 +141,7 @@ class _Instant:
         return [self._settled(found, self.stopping, (), begins=found.inputs is not None)]
 
     def _nothing(self, at: Situation, fired: dict[int, int] | None = None) -> Located:
-        """Return the located guards, with no monitor at zero."""
+        """Return a `Located` with given guards, in which no monitor is at zero."""
         monitors = self.system.model.monitors
         none = MonitorSides.of(monitors, np.zeros(len(monitors), dtype=np.int64))
         return Located(at, fired or {}, none, True)

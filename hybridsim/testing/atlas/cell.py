@@ -121,7 +121,7 @@ def row(setting: str, run: Measured) -> Row:
 
 
 def loosened(tolerances: tuple[float, float], setting: Setting) -> tuple[float, float]:
-    """Return the errors that are allowed in a single loose run."""
+    """Return the errors that are allowed in a single run with the loosest setting."""
     allowed = 1e3 * setting.options.get("rtol", 1e-4)
     return max(tolerances[0], allowed), max(tolerances[1], allowed)
 

@@ -16,7 +16,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def grazing() -> tuple[Scene, ...]:
-    """Return scenes of sin(t) with thresholds 1 +- 1e-6: no event, or a visit of 2.8e-3 at each maximum."""
+    """Return scenes of sin(t) with threshold 1 + 1e-6 (no event) and 1 - 1e-6 (above it for 2.8e-3 at each maximum)."""
     gap = 1e-6
     half = math.acos(1 - gap)
     tops = [math.pi / 2 + 2 * math.pi * n for n in range(3)]
@@ -239,7 +239,7 @@ def monitored() -> tuple[Scene, ...]:
 
 
 def emptied(solution: Any) -> list[str]:
-    """Return the scene of a tank: low water once at t = 1.998, then empty at t = 2 with bounded work."""
+    """Check that a tank has low water once at t = 1.998, and that the run stops at t = 2 or ends with an empty tank."""
     wrong = []
     low = [event.t for event in solution.events if event.component == "low"]
     if len(low) != 1 or abs(low[0] - 1.998) > 2e-3:

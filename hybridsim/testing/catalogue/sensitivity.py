@@ -21,7 +21,7 @@ def scenes() -> tuple[Scene, ...]:
 
 
 def grazing_stop() -> Scene:
-    """Return the scene of a swing that passes a rigid stop by 1e-4, near an infinitely steep map."""
+    """Return the scene of a vibration that hits a rigid stop at low speed, which amplifies errors."""
     events, states = recomputed("grazing-stop")
     return Scene(
         "grazing-stop",

@@ -1,4 +1,4 @@
-"""Scenes of stick at its limits: forces just above it, fading loads, small speeds, many stops."""
+"""Scenes near the stick limit: forces just above the limit, decreasing loads, small speeds, many stops."""
 
 from __future__ import annotations
 
