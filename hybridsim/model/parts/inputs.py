@@ -198,7 +198,7 @@ class HeldInput(Discrete):
     start : str or float
         Its initial value.
     unit : str, optional
-        Unit, for labels.
+        Unit, for labels and the check of units.
     place : Place, optional
         Place of the declaration, for error messages.
     """

@@ -21,7 +21,7 @@ class Parameter(Declared):
     value : str or float
         Number, or expression of other parameters.
     unit : str, optional
-        Unit, for labels.
+        Unit, for labels and the check of units.
     title : str, optional
         Description.
     place : Place, optional
@@ -65,7 +65,7 @@ class State(Declared):
         Rate, an expression of any names of the model. A mode may replace it in its ``der``. It is 0 if the rates of
         the model are a Python function.
     unit : str, optional
-        Unit, for labels; it does not affect computations.
+        Unit, for labels and the check of units; it does not affect computations.
     nominal : float, optional
         Typical size in this unit, which sets the default of the absolute tolerance. The default is ``|x0|`` or 1.
     place : Place, optional
@@ -103,7 +103,7 @@ class Discrete(Declared):
     start : str or float
         Initial value, an expression of parameters.
     unit : str, optional
-        Unit, for labels.
+        Unit, for labels and the check of units.
     place : Place, optional
         Place of the declaration, for error messages.
 
@@ -135,7 +135,7 @@ class Output(Declared):
     expr : str or float
         Expression of states, inputs, parameters, definitions and t.
     unit : str, optional
-        Unit, for labels.
+        Unit, for labels and the check of units.
     modes : mapping of str to str or float, optional
         Expressions that replace ``expr`` in a mode, by ``"component.mode"``; if several apply, the last one is used.
     place : Place, optional

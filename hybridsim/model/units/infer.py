@@ -15,7 +15,7 @@ from fractions import Fraction
 from hybridsim.expr.walk import NoValue, value_of
 from hybridsim.expr.write import write
 from hybridsim.model.smoothing.one_sided import names_of
-from hybridsim.model.units.unit import ONE, Unit
+from hybridsim.model.units.unit import ONE, Unit, most_frequent
 
 Units = Mapping[str, Unit]
 
@@ -94,7 +94,8 @@ class Inference:
         known = [(node, unit) for node in nodes if (unit := self.unit(node)) is not None]
         if not known:
             return None
-        usual, common = max(known, key=lambda one: sum(not one[1].differs(other) for _, other in known))
+        common = most_frequent([unit for _, unit in known])
+        usual = next(node for node, unit in known if unit == common)
         for node, unit in known:
             if unit.differs(common):
                 self.disagreements.append(Disagreement(node, unit, common, f"'{write(usual)}'"))

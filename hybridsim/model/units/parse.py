@@ -18,11 +18,12 @@ _PREFIXES = {
     "f": 1e-15, "p": 1e-12, "n": 1e-9, "u": 1e-6, "µ": 1e-6, "m": 1e-3, "c": 1e-2, "d": 1e-1, "h": 1e2, "k": 1e3,
     "M": 1e6, "G": 1e9, "T": 1e12,
 }  # fmt: skip
-# Units that take prefixes, each by simpler ones.
+# Units that take prefixes, each by simpler ones. C is left out, because many write it for degC.
 _PREFIXED = {
     "m": "", "g": "1e-3 kg", "s": "", "A": "", "K": "", "mol": "", "cd": "", "rad": "", "N": "kg m/s^2", "Pa": "N/m^2",
-    "J": "N m", "W": "J/s", "V": "W/A", "ohm": "V/A", "Ohm": "V/A", "Ω": "V/A", "S": "A/V", "C": "A s", "F": "C/V",
+    "J": "N m", "W": "J/s", "V": "W/A", "ohm": "V/A", "Ohm": "V/A", "Ω": "V/A", "S": "A/V", "F": "A s/V",
     "Wb": "V s", "T": "Wb/m^2", "H": "Wb/A", "Hz": "turn/s", "bar": "1e5 Pa", "L": "1e-3 m^3", "l": "1e-3 m^3",
+    "Nm": "N m", "Ns": "N s", "Wh": "3600 J",
 }  # fmt: skip
 # Units without prefixes. Only the size of degC is checked, not its zero.
 _PLAIN = {
@@ -131,12 +132,17 @@ class _Reader:
         return found
 
     def _power(self) -> Unit:
-        base = self._atom()
+        symbol = self._next()
+        base, exponent = self._atom(), Fraction(1)
         if self._take("^", "**"):
-            return base.power(self._exponent())
-        kind, text = self._tokens[self._at] if self._at < len(self._tokens) else ("", "")
-        signed = text == "-" or (kind == "number" and self._tokens[self._at - 1][0] == "symbol")
-        return base.power(self._number()) if signed else base  # as in m s-1 and m2
+            exponent = self._exponent()
+        else:
+            kind, text = self._tokens[self._at] if self._at < len(self._tokens) else ("", "")
+            if text == "-" or (kind == "number" and self._tokens[self._at - 1][0] == "symbol"):
+                exponent = self._number()  # as in m s-1 and m2
+        if symbol == "ms" and exponent < 0:
+            raise _NotAUnit("m s^-1 or 1/ms")
+        return base.power(exponent)
 
     def _atom(self) -> Unit:
         if self._take("("):

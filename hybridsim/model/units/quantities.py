@@ -12,7 +12,7 @@ from hybridsim.model.parts.model import Model
 from hybridsim.model.parts.quantities import Discrete, Parameter, State
 from hybridsim.model.units.infer import Inference
 from hybridsim.model.units.parse import read_unit
-from hybridsim.model.units.unit import ONE, Unit
+from hybridsim.model.units.unit import ONE, Unit, most_frequent
 
 _SECOND = Unit((("s", Fraction(1)),))
 _TIMES = ("s", "ms", "us", "µs", "min", "h", "d")
@@ -88,11 +88,8 @@ def _time_of(model: Model, known: Quantities) -> Unit | None:
     votes = [unit for unit in votes if unit.dimension == _SECOND.dimension]
     if any("s" in dict(unit.powers) for unit in known.units.values()):
         votes.append(_SECOND)  # as in N
-    if not votes:
-        return None
-    return max(
-        votes, key=lambda unit: (sum(not unit.differs(one) for one in votes), not unit.differs(_SECOND))
-    )
+    votes.sort(key=lambda unit: bool(unit.differs(_SECOND)))  # of equally many, s
+    return most_frequent(votes) if votes else None
 
 
 def _contains(text: str, symbol: str) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -74,6 +74,11 @@ class Unit:
 
 
 ONE = Unit()
+
+
+def most_frequent(units: Sequence[Unit]) -> Unit:
+    """Return the unit that agrees with most of some units; of equally many the first."""
+    return max(dict.fromkeys(units), key=lambda unit: sum(not unit.differs(other) for other in units))
 
 
 def _sum(powers: Iterable[tuple[str, Fraction]]) -> Powers:

@@ -17,7 +17,7 @@ from hybridsim.model.smoothing.one_sided import names_of
 from hybridsim.model.units.infer import factors_of, terms_of
 from hybridsim.model.units.parse import read_unit
 from hybridsim.model.units.quantities import Quantities, declared_quantities
-from hybridsim.model.units.unit import Unit
+from hybridsim.model.units.unit import Unit, most_frequent
 
 # Largest number of passes over the names without a declared unit; each pass finds at least one more unit.
 _PASSES = 50
@@ -89,9 +89,7 @@ class _Witnesses:
     def unit(self, name: str) -> Unit | None:
         """Return the unit that most expressions tell for a name; of equally many the first."""
         votes = [*self._votes(name)]
-        if not votes:
-            return None
-        return max(votes, key=lambda unit: sum(not unit.differs(other) for other in votes))
+        return most_frequent(votes) if votes else None
 
     def _votes(self, name: str) -> Iterator[Unit]:
         known = self.known
