@@ -100,7 +100,7 @@ class Position:
                 remedy=nearest(str(name), known, kind="quantities"),
             )
         segment = end_point(instant, self.z, p, self.x)
-        return float(trajectory.value_at(name, segment, segment.s, segment.x)[0])
+        return float(trajectory.values_at([name], segment, segment.s, segment.x)[0][0])
 
 
 def begun(run: Run, commit: Callable[[Position], None]) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -11,8 +10,9 @@ import numpy as np
 
 from hybridsim.engine.record.time_lookup import Frame, locate_times
 from hybridsim.solution.by_name import ByName
-from hybridsim.solution.event import Event, ModeInterval, counted_kind
+from hybridsim.solution.event import ModeInterval, counted_kind
 from hybridsim.solution.files.tabulated import at_steps, tabulated
+from hybridsim.solution.model_events import ModelEvents
 from hybridsim.solution.run import Run
 from hybridsim.solution.run_trajectory import relative_velocity
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from hybridsim.presentation.tables import Table
 
 
-class ModelTrajectory:
+class ModelTrajectory(ModelEvents):
     """The trajectory of a run of a `Model`, from which a solution reads its results."""
 
     work = None
@@ -112,8 +112,12 @@ class ModelTrajectory:
     ) -> tuple[np.ndarray, list[tuple[Segment, np.ndarray, np.ndarray]]]:
         """Return states (k, n) at given times, and for each segment the indices and local times of the times in it."""
         index, s = self.segment_at(times, side)
-        parts = [(i, np.flatnonzero(index == i)) for i in np.unique(index)]
-        by_segment = [(self.segments[int(i)], chosen, s[chosen]) for i, chosen in parts]
+        order = np.argsort(index, kind="stable")
+        found, first = np.unique(index[order], return_index=True)
+        starts, blocks = self.segments.starts(), self.segments.blocks
+        block = np.searchsorted(starts, found, side="right") - 1
+        within = zip(block.tolist(), (found - starts[block]).tolist(), np.split(order, first[1:]))
+        by_segment = [(blocks[b][i], chosen, s[chosen]) for b, i, chosen in within]
         return self.segments.states(index, s), by_segment
 
     # -- quantities -----------------------------------------------------------------------------------------
@@ -133,25 +137,35 @@ class ModelTrajectory:
 
     def own_values(self, name: str) -> np.ndarray:
         """Return the values of a quantity at the steps of the run."""
-        parts = [self.value_at(name, g, g.s, g.x) for g in self.segments]
+        parts = [self.values_at([name], g, g.s, g.x)[0] for g in self.segments]
         return np.concatenate(parts) if parts else np.zeros(0)
 
     def values(self, name: str, times: np.ndarray, side: str) -> np.ndarray:
         """Return the values (k,) of a quantity at given times."""
-        out = np.empty(len(times))
+        return self.values_of([name], times, side)[0]
+
+    def values_of(self, names: Sequence[str], times: np.ndarray, side: str) -> np.ndarray:
+        """Return the values (m, k) of several quantities at given times."""
+        if all(name in self.names for name in names):
+            return self.states(times, side).T[[self.names.index(name) for name in names]]
+        out = np.empty((len(names), len(times)))
         x, by_segment = self.by_segment(times, side)
         for segment, chosen, s in by_segment:
-            out[chosen] = self.value_at(name, segment, s, x[chosen])
+            out[:, chosen] = self.values_at(names, segment, s, x[chosen])
         return out
 
-    def value_at(self, name: str, segment: Segment, s: np.ndarray, x: np.ndarray) -> np.ndarray:
-        if name in self.names:
-            return x[:, self.names.index(name)]
-        if name in self._velocities:
-            system = self.system
+    def values_at(
+        self, names: Sequence[str], segment: Segment, s: np.ndarray, x: np.ndarray
+    ) -> list[np.ndarray]:
+        """Return the values of states and quantities at points of a segment."""
+        system = self.system
+        found = {name: x[:, self.names.index(name)] for name in names if name in self.names}
+        if any(name in self._velocities for name in names):
             rows = system.rows("surfaces", len(system.surface_of), s, x, segment.p, segment.z)
-            return rows[:, self._velocities[name]]
-        return self.values_in([name], segment, s, x)[0]
+            found |= {name: rows[:, k] for name, k in self._velocities.items() if name in names}
+        others = [name for name in names if name not in found]
+        found |= dict(zip(others, self.values_in(others, segment, s, x), strict=True))
+        return [found[name] for name in names]
 
     def values_in(
         self, names: Sequence[str], segment: Segment, s: np.ndarray, x: np.ndarray
@@ -182,44 +196,12 @@ class ModelTrajectory:
             t, (x, parts) = times, self.by_segment(times, "+") if len(times) else nothing
         return tabulated(self.run, self.status, t, x, parts, self.values_in)
 
-    # -- events and modes -----------------------------------------------------------------------------------
+    # -- modes -----------------------------------------------------------------------------------
 
     @property
     def components(self) -> tuple[Component, ...]:
         """Return the components of the model, including those added for jumps in its rates."""
         return tuple(self.system.model.all_components()[: len(self.system.declared)])
-
-    @property
-    def event_names(self) -> Sequence[str]:
-        """Return the names of components, monitors and schedules."""
-        return self.system.event_names
-
-    @cached_property
-    def _happened(self) -> tuple[Event, ...]:
-        return tuple(Event(float(o.instant), *o[1:]) for o in self.record.occurrences)
-
-    @cached_property
-    def events(self) -> tuple[Event, ...]:
-        """Return all events except changes of side at corners."""
-        return tuple(event for event in self._happened if event.kind != "corner")
-
-    @property
-    def corners(self) -> tuple[Event, ...]:
-        """Return the instants at which corners changed their sides, as events."""
-        return tuple(event for event in self._happened if event.kind == "corner")
-
-    def event_times(self, component: str, kind: str | None) -> np.ndarray:
-        """Return the times (m,) of the events of one component."""
-        found = [block.times_of(component, kind) for block in self.record.occurrences.blocks]
-        return found[0] if len(found) == 1 else np.concatenate([np.empty(0), *found])
-
-    def event_states(self, component: str, kind: str | None, side: str) -> np.ndarray:
-        """Return the states (m, n) at the events of one component."""
-        blocks: list[Any] = self.record.occurrences.blocks
-        found = [block.states_of(component, kind, "-+".index(side)) for block in blocks]
-        if len(found) == 1 and len(found[0]):
-            return found[0]
-        return np.concatenate([np.empty((0, self.system.n)), *(states for states in found if len(states))])
 
     @cached_property
     def modes(self) -> dict[str, tuple[ModeInterval, ...]]:
@@ -277,13 +259,6 @@ class ModelTrajectory:
     def stats(self) -> dict[str, float]:
         """Return the cost of the run, summed over all segments."""
         return {**vars(self.record.counters), "wall_time": self.cost[0], "compile_time": self.cost[1]}
-
-    def kinds(self) -> Counter[str]:
-        """Return how many events of each kind happened, including corners."""
-        found: Counter[str] = Counter()
-        for block in self.record.occurrences.blocks:
-            found += block.kinds()
-        return found
 
     def summary(self) -> list[str]:
         """Return the end state, the events by kind, and the cost."""

@@ -22,7 +22,7 @@ from hybridsim.solution.explain.candidate import candidate, views
 from hybridsim.solution.explain.grazing import grazed
 from hybridsim.solution.explain.impact_text import errors_beside, is_struck
 from hybridsim.solution.explain.monitor_way import way_of_monitor
-from hybridsim.solution.explain.one_instant import BY_RESET, changes_text, fired_guards
+from hybridsim.solution.explain.one_instant import BY_RESET, at_same_instant, changes_text, fired_guards
 from hybridsim.solution.explain.reason import reason
 from hybridsim.solution.explain.remarks import change_of_side, remarks
 from hybridsim.solution.explain.stages import place_of, situation
@@ -114,11 +114,12 @@ class Explanation(Readable):
 
 def explain(solution: Solution, number: int | Event) -> Explanation:
     """Return the explanation of one event of a solution, as `Solution.explain` does."""
-    events, occurrences = solution.events, solution._of_model.record.occurrences
+    events, occurrences = solution.events, solution._of_model.occurrences
     if isinstance(number, Event) and number in solution.corners:
-        corner = [o for o in occurrences if o.kind == CORNER][solution.corners.index(number)]
+        k = [i for i, o in enumerate(occurrences) if o.kind == CORNER][solution.corners.index(number)]
+        corner = occurrences[k]
         found = Explanation(number, (), (), change_of_side(solution, corner), _state(solution, number))
-        return replace(found, remarks=remarks(solution, corner, occurrences))
+        return replace(found, remarks=remarks(solution, corner, at_same_instant(occurrences, k)))
     if isinstance(number, Event) and number in events:
         number = events.index(number)
     if isinstance(number, bool) or not isinstance(number, int) or not -len(events) <= number < len(events):
@@ -126,22 +127,21 @@ def explain(solution: Solution, number: int | Event) -> Explanation:
             f"there is no event {number!r}: the run has {len(events)} events",
             remedy=f"use a number from 0 to {len(events) - 1}, or -1 for the last" if events else None,
         )
-    happened = [o for o in occurrences if o.kind != CORNER]
-    found = _explained(solution, events[number], happened, number)
-    return replace(found, remarks=remarks(solution, happened[number], occurrences))
+    k = solution._of_model.event_positions[number]
+    together = at_same_instant(occurrences, k)
+    found = _explained(solution, events[number], occurrences[k], [o for o in together if o.kind != CORNER])
+    return replace(found, remarks=remarks(solution, occurrences[k], together))
 
 
-def _explained(solution: Solution, event: Event, happened: list[Occurrence], number: int) -> Explanation:
-    """Return the explanation without remarks; `happened` contains the records of all events."""
+def _explained(
+    solution: Solution, event: Event, occurrence: Occurrence, together: list[Occurrence]
+) -> Explanation:
+    """Return the explanation without remarks; `together` contains the records of all events of its instant."""
     if event.kind == "near-grazing":
-        near = grazed(solution, happened[number])
-        return Explanation(
-            event, near, (), _of_another_kind(solution, event, happened[number]), _state(solution, event)
-        )
+        near, why = grazed(solution, occurrence), _of_another_kind(solution, event, occurrence)
+        return Explanation(event, near, (), why, _state(solution, event))
     if event.kind != "transition":
-        return Explanation(event, (), (), _of_another_kind(solution, event, happened[number]))
-    occurrence = happened[number]
-    together = [o for o in happened if o.instant == occurrence.instant]
+        return Explanation(event, (), (), _of_another_kind(solution, event, occurrence))
     segment = _segment_before(solution, occurrence)
     if event.guard == LIMIT and (segment is None or not _is_declared(solution, event)):
         return Explanation(event, (), (), _of_accumulation(solution, event), _state(solution, event))

@@ -24,6 +24,16 @@ BY_RESET = (
 )
 
 
+def at_same_instant(occurrences: Sequence[Occurrence], k: int) -> list[Occurrence]:
+    """Return the records of all events at the instant of the k-th one, in their order."""
+    first, last = k, k + 1
+    while first > 0 and occurrences[first - 1].instant == occurrences[k].instant:
+        first -= 1
+    while last < len(occurrences) and occurrences[last].instant == occurrences[k].instant:
+        last += 1
+    return list(occurrences[first:last])
+
+
 def fired_guards(
     system: System, segment: Segment, together: list[Occurrence], method: Integrator
 ) -> list[int]:

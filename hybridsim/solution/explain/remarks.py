@@ -24,12 +24,11 @@ if TYPE_CHECKING:
 _FIRST_PIECE = "1"  # the name of the first mode of a table's component; its modes are numbered
 
 
-def remarks(solution: Solution, occurrence: Occurrence, everything: Sequence[Occurrence]) -> tuple[str, ...]:
-    """Return remarks on facts that the guards do not show, as text."""
+def remarks(solution: Solution, occurrence: Occurrence, together: Sequence[Occurrence]) -> tuple[str, ...]:
+    """Return remarks on facts that the guards do not show, as text; `together` has all events of the instant."""
     if solution._save != "all":
         return ()  # the modes and the motion around the event were not kept
     system = solution._system
-    together = [one for one in everything if one.instant == occurrence.instant]
     changed = [one for one in together if one.kind == CORNER]
     z = _modes_after(solution, float(occurrence.instant))
     return (
@@ -141,10 +140,8 @@ def _trees(model: Model, occurrence: Occurrence) -> Iterator[ast.expr]:
 
 def _loads(solution: Solution, t: float) -> Iterator[str]:
     """Describe contacts whose normal load reaches, leaves or touches zero at an instant."""
-    times = sorted(
-        {solution.t_start, solution.t_end, *(float(o.instant) for o in solution._of_model.record.occurrences)}
-    )
-    k = times.index(t)
+    times = solution._of_model.instants
+    k = int(np.searchsorted(times, t))
     if not 0 < k < len(times) - 1:
         return
     for contact in solution.model.contacts:
