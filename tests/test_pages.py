@@ -43,6 +43,7 @@ def test_the_lines_of_the_readme_run(tmp_path: Path) -> None:
         ("how-to/relays.md", 8),
         ("how-to/impacts.md", 8),
         ("how-to/draw-a-mechanism.md", 1),
+        ("how-to/report-a-run.md", 1),
         ("how-to/measured-input.md", 4),
         ("how-to/step-a-simulation.md", 9),
         ("how-to/test-your-integrator.md", 7),

@@ -50,6 +50,7 @@ FLOORS = (
     "analysis",
     "testing",
     "plot",
+    "report",
     "studies",
     "cli",
 )

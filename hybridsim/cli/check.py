@@ -8,9 +8,9 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli import values
-from hybridsim.cli.automaton import lines_of
 from hybridsim.cli.output import complain, print_json, print_table, say
 from hybridsim.cli.session import Session
+from hybridsim.presentation.automaton import lines_of
 
 if TYPE_CHECKING:
     from hybridsim.engine.run.report import Report

@@ -29,6 +29,7 @@ from hybridsim.cli import (
     compare,
     integrators,
     models,
+    report,
     resume,
     run,
     schema,
@@ -82,6 +83,7 @@ def _join_negative_values(line: Sequence[str]) -> list[str]:
 COMMANDS: tuple[ModuleType, ...] = (
     run,
     resume,
+    report,
     compare,
     advise,
     steady,

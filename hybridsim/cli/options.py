@@ -23,6 +23,18 @@ def add_integrator(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_limit(parser: argparse.ArgumentParser) -> None:
+    """Add the option for limits of a run."""
+    parser.add_argument(
+        "--limit",
+        metavar="NAME=VALUE",
+        type=values.assignment,
+        action="append",
+        default=[],
+        help="stop the run, and keep its result, after this number of events, steps, seconds or megabytes",
+    )
+
+
 def add_rtol(parser: argparse.ArgumentParser, default: str) -> None:
     """Add the option for the relative tolerance; `default` is the text of the default in the help."""
     parser.add_argument(

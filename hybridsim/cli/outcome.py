@@ -23,15 +23,7 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options for output files and for limits of a run."""
-    parser.add_argument(
-        "--limit",
-        metavar="NAME=VALUE",
-        type=values.assignment,
-        action="append",
-        default=[],
-        help="stop the run, and keep its result, after this number of events, steps, seconds or megabytes",
-    )
+    """Add the options for output files of a run."""
     options.add_plot(parser, "the run")
     parser.add_argument(
         "--animate",
@@ -140,13 +132,21 @@ def deliver(
     finally:
         if args.json:
             more = {"explanations": [asdict(e) for e in explanations]} if explanations else {}
-            print_json(_record(solution) | more)
+            print_json(record(solution) | more)
         else:
-            say("\n".join([*_summary(solution), *map(str, explanations)]))
-    for warning in (one for one in solution.warnings if one not in already_reported):
-        complain(f"warning: {warning}")
+            say("\n".join([*summary(solution), *map(str, explanations)]))
+    code = exit_code(solution, args.save, session, already_reported)
     if unexplained is not None:
         raise unexplained
+    return code
+
+
+def exit_code(
+    solution: Solution, saved: Path | None, session: Session, already_reported: Container[str] = ()
+) -> int:
+    """Print the warnings of a run and the reason if it stopped early, and return the exit code."""
+    for warning in (one for one in solution.warnings if one not in already_reported):
+        complain(f"warning: {warning}")
     if solution.success:
         return 0
     begins = solution.message.startswith(solution.status)
@@ -155,10 +155,8 @@ def deliver(
         reason = reason.removesuffix(", and sol.resume() continues the run").removesuffix(
             "; the results so far are kept"
         )
-        resume = f"'hybridsim resume {args.save}' continues the run"
-        reason += (
-            f"; {resume if args.save else 'with --save FILE.hsol, hybridsim resume can continue the run'}"
-        )
+        resume = f"'hybridsim resume {saved}' continues the run"
+        reason += f"; {resume if saved else 'with --save FILE.hsol, hybridsim resume can continue the run'}"
     complain(reason)
     return session.interrupted_code if solution.status == "interrupted" else SimulationError.exit_code
 
@@ -220,7 +218,8 @@ def _final(solution: Solution) -> list[tuple[str, float]]:
     return found + [(d.name, float(solution.output(d.name, solution.t_end))) for d in solution.model.discrete]
 
 
-def _summary(solution: Solution) -> list[str]:
+def summary(solution: Solution) -> list[str]:
+    """Return the lines of the summary of a run."""
     from hybridsim.solution.event import counted_kind
 
     model, stats = solution.model, solution.stats
@@ -260,7 +259,8 @@ def _summary(solution: Solution) -> list[str]:
     return lines
 
 
-def _record(solution: Solution) -> dict[str, Any]:
+def record(solution: Solution) -> dict[str, Any]:
+    """Return the result of a run for JSON."""
     model, has_events = solution.model, _has_events(solution)
     return {
         "hybridsim": __version__,

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import hybridsim
-from hybridsim.cli import outcome, values
+from hybridsim.cli import options, outcome, values
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 
@@ -31,6 +31,7 @@ def add_to(commands: Any) -> None:
     parser.add_argument(
         "--t-end", metavar="TIME", help="new end time (default: the end time of the saved run)"
     )
+    options.add_limit(parser)
     outcome.add_arguments(parser)
     parser.set_defaults(
         execute=execute, lighter="a shorter --t-end, or --limit megabytes=1000 to stop with a partial result"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import hybridsim
 from hybridsim.cli import options, outcome, values
@@ -12,6 +12,11 @@ from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.errors import UsageError, near, nearest
 
+if TYPE_CHECKING:
+    from hybridsim.model.parts.model import Model
+    from hybridsim.solution import Solution
+
+LIGHTER = "a shorter --t-end or a looser --rtol, or --limit megabytes=1000 to stop with a partial result"
 _EXAMPLES = """\
 examples:
   hybridsim run dfcs
@@ -30,6 +35,21 @@ def add_to(commands: Any) -> None:
         description="Simulate a model, print a summary, and write the requested files.",
         epilog=_EXAMPLES,
     )
+    add_settings(parser)
+    parser.add_argument(
+        "--keep",
+        metavar="WHAT",
+        help="parts of the run to store; the run does not change. all (default): everything. events: the "
+        "events, but no states between them. last-period, or a number: the last period, or the last units of time. "
+        "nothing: only the final state. --plot, --animate, --csv and --npz need all, last-period or a number; "
+        "--explain needs all",
+    )
+    outcome.add_arguments(parser)
+    parser.set_defaults(execute=execute, lighter=LIGHTER)
+
+
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    """Add the options for the model, the span, the integrator and the limits of one run."""
     values.add_model_arguments(parser)
     values.add_span_argument(parser)
     options.add_integrator(parser)
@@ -49,27 +69,25 @@ def add_to(commands: Any) -> None:
         default=[],
         help="set an option of the integrator itself",
     )
-    parser.add_argument(
-        "--keep",
-        metavar="WHAT",
-        help="parts of the run to store; the run does not change. all (default): everything. events: the "
-        "events, but no states between them. last-period, or a number: the last period, or the last units of time. "
-        "nothing: only the final state. --plot, --animate, --csv and --npz need all, last-period or a number; "
-        "--explain needs all",
-    )
-    outcome.add_arguments(parser)
-    parser.set_defaults(
-        execute=execute,
-        lighter="a shorter --t-end or a looser --rtol, or --limit megabytes=1000 to stop with a partial result",
-    )
+    options.add_limit(parser)
 
 
 def execute(args: argparse.Namespace, session: Session) -> int:
     """Simulate the model and write the output; the exit code is 1 if the simulation failed."""
     outcome.check_arguments(args)
-    settings = _settings(args)
+    settings = run_settings(args)
+    if args.keep is not None:
+        settings["save"] = _save_setting(args)
     model = values.changed_model(args)
     outcome.check_drawing(model, args)
+    solution, cautions = simulated(model, settings, args, session)
+    return outcome.deliver(solution, args, session, already_reported=cautions)
+
+
+def simulated(
+    model: Model, settings: dict[str, Any], args: argparse.Namespace, session: Session
+) -> tuple[Solution, list[str]]:
+    """Return the solution of a run, as far as it came, and the warnings that were printed before it."""
     t_end = values.end_time(model, args.t_end)
 
     from hybridsim.integrators.registry import UnknownOption, integrator_class, option_names
@@ -98,16 +116,14 @@ def execute(args: argparse.Namespace, session: Session) -> int:
             f"--option {fault.option}: integrator {fault.integrator!r} has no such option",
             remedy=remedy or nearest(fault.option, known, kind=f"options of {fault.integrator}"),
         ) from None
-    return outcome.deliver(solution, args, session, already_reported=cautions)
+    return solution, cautions
 
 
-def _settings(args: argparse.Namespace) -> dict[str, Any]:
+def run_settings(args: argparse.Namespace) -> dict[str, Any]:
     """Return the keyword arguments for `simulate` from the command line, without those that were omitted."""
     settings: dict[str, Any] = {
         name: getattr(args, name) for name in ("rtol", "atol", "max_step") if getattr(args, name) is not None
     }
-    if args.keep is not None:
-        settings["save"] = _save_setting(args)
     for name, text in args.option:
         if name in settings:
             raise UsageError(f"--option {name} occurs twice", remedy=f"use --option {name}=... only once")

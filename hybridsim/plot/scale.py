@@ -42,17 +42,22 @@ class Scaled(Formatter):
 
 def label_axis(axis: Axis, name: str, unit: str, low: float, high: float) -> None:
     """Label an axis "name [unit]" with a prefix, or a power of ten, that suits values from low to high."""
+    power, prefixed = scaled_unit(unit, low, high)
+    text = literal(prefixed)
+    if power and prefixed == unit:  # the unit takes no prefix
+        text = f"$10^{{{power}}}$ {text}".rstrip()
+    axis.set_label_text(f"{literal(name)} [{text}]" if text else literal(name))
+    axis.set_major_formatter(Scaled(10.0**power))
+
+
+def scaled_unit(unit: str, low: float, high: float) -> tuple[int, str]:
+    """Return a power of ten that suits values from low to high, and the unit with its prefix if it takes one."""
     size = max(abs(low), abs(high))
     power = 3 * math.floor(math.log10(size) / 3 + 1e-9) if size > 0 and math.isfinite(size) else 0
     power = min(max(power, -12), 9)
     if power and _TAKES_PREFIX.match(unit):
-        text = f"[{_PREFIXES[power]}{literal(unit)}]"
-    elif -3 <= math.log10(size or 1.0) < 4:
-        power, text = 0, f"[{literal(unit)}]" if unit else ""
-    else:
-        text = f"[$10^{{{power}}}$ {literal(unit)}]" if unit else f"[$10^{{{power}}}$]"
-    axis.set_label_text(f"{literal(name)} {text}".rstrip())
-    axis.set_major_formatter(Scaled(10.0**power))
+        return power, f"{_PREFIXES[power]}{unit}"
+    return (0 if -3 <= math.log10(size or 1.0) < 4 else power), unit
 
 
 def with_prefix(value: float, unit: str) -> str:

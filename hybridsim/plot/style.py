@@ -8,6 +8,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 
@@ -78,6 +79,17 @@ def save(picture: Any, path: str | Path, dpi: float = _DPI) -> Path:
     with whole_file(path) as partly:
         Path(partly).write_bytes(drawn.getvalue())
     return path
+
+
+def as_svg(picture: Any) -> str:
+    """Return a picture as an SVG element, with its text as text, for a page of HTML."""
+    drawn = BytesIO()
+    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "hybridsim"}):
+        _figure_of(picture).savefig(
+            drawn, format="svg", transparent=True, metadata={"Date": None, "Creator": None}
+        )
+    text = drawn.getvalue().decode("utf-8")
+    return text[text.index("<svg") :]
 
 
 def _figure_of(picture: Any) -> Figure:

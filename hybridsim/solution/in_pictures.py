@@ -1,4 +1,4 @@
-"""This module animates a run, as a part of `Solution`."""
+"""This module animates a run and writes its report, as a part of `Solution`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hybridsim.solution.files.in_tables import InTables
 
 
 class InPictures(InTables):
-    """The animation of a run, as a part of `Solution`."""
+    """The animation and the report of a run, as a part of `Solution`."""
 
     @refusing
     def animate(
@@ -58,4 +58,33 @@ class InPictures(InTables):
         written: Path = draw(
             self, path, quantities, t_span=t_span, speed=speed, fps=fps, dark=dark, progress=progress
         )
+        return written
+
+    @refusing
+    def report(self, path: str | PathLike[str]) -> Path:
+        """Write the run as one HTML page: curves, modes, events with their reasons, cost, and how to repeat it.
+
+        The page needs no other file and no connection. It stays below 5 MB: of a very long run it has the whole curves
+        of the first and last part, and the range of each quantity in short intervals between them.
+
+        Parameters
+        ----------
+        path : ends in .html.
+
+        Returns
+        -------
+        Path
+            The path of the file.
+
+        Raises
+        ------
+        UsageError
+            For another file type, for a run of a `MechanicalSystem`, or if the file cannot be written.
+
+        Examples
+        --------
+        >>> import hybridsim as hs
+        >>> hs.simulate("dfcs", (0, 0.1)).report("dfcs.html")  # doctest: +SKIP
+        """
+        written: Path = import_module("hybridsim.report").write_report(self, path)
         return written

@@ -73,6 +73,7 @@ CASES = {
         *("--rtol", "1e-4,1e-6", "--repeat", "1", "--out", "c"),
     ],
     "advise": ["advise", "dfcs", "--quantity", "amplitude.x", "--rungs", "no-friction", "--no-integrators"],
+    "report": ["report", "dfcs", "--t-end", "0.01"],
     "steady": ["steady", "dfcs"],
     "sweep": ["sweep", "dfcs", "F0=20,30", "--measure", "amplitude.x", "--out", "s"],
     "study": ["study", "he2026", "--quick"],
@@ -85,6 +86,7 @@ WITHOUT_JSON = {"cache", "schema"}  # the schema is JSON by itself
 FAULTY = {
     "run": ["run", "dfsc"],
     "resume": ["resume", "none.hsol"],
+    "report": ["report", "dfsc"],
     "compare": ["compare", "dfcs", "--integrators", "exakt"],
     "advise": ["advise", "dfcs", "--quantity", "amplitud.x"],
     "steady": ["steady", "dfcs", "--tol", "-1"],

@@ -179,6 +179,7 @@ def test_the_same_program_as_a_module() -> None:
 LINES = {
     "run": ["dfcs"],
     "resume": ["r.hsol"],
+    "report": ["dfcs"],
     "compare": ["dfcs"],
     "advise": ["dfcs", "--quantity", "x"],
     "steady": ["dfcs"],

@@ -8,11 +8,11 @@ import time
 import pytest
 
 import hybridsim as hs
-from hybridsim.cli.automaton import lines_of
 from hybridsim.engine.native.kernels import ENABLED
 from hybridsim.engine.native.llvm import functions_in
 from hybridsim.engine.run.report import describe
 from hybridsim.engine.system.modules import compiled
+from hybridsim.presentation.automaton import lines_of
 
 pytestmark = pytest.mark.skipif(not ENABLED, reason="nothing is compiled")
 

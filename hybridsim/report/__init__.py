@@ -1,0 +1,5 @@
+"""This package writes a run as one HTML page that needs no other file and no connection; start with `page`."""
+
+from hybridsim.report.page import write_report
+
+__all__ = ["write_report"]

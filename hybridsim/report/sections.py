@@ -1,0 +1,154 @@
+"""This module writes the parts of a report that need no script: summary, drawing, cost, model, and how to repeat it."""
+
+from __future__ import annotations
+
+import re
+from base64 import b64encode
+from collections.abc import Iterator
+from html import escape
+
+from hybridsim import __version__
+from hybridsim.engine.run.report import describe
+from hybridsim.model import Model
+from hybridsim.model.checks.starting_facts import starting_facts
+from hybridsim.model.checks.units import time_unit
+from hybridsim.model.smoothing.explicit_corners import smoothing_of
+from hybridsim.plot.drawing.mechanism import mechanism
+from hybridsim.plot.drawing.theme import LIGHT
+from hybridsim.plot.style import as_svg
+from hybridsim.presentation.automaton import lines_of
+from hybridsim.report.repeat import Settings
+from hybridsim.solution import Solution
+from hybridsim.solution.event import counted_kind
+
+_LONGEST = 400_000  # characters of the text of a model; a longer one, with tables of data, is left out
+_COSTS = {
+    "steps": "steps",
+    "rejected": "rejected steps",
+    "rhs_evaluations": "evaluations of the right-hand side",
+    "guard_evaluations": "evaluations of guards",
+    "events": "events",
+    "restarts": "restarts of the integrator",
+    "wall_time": "time of the run [s]",
+    "kernel_time": "part of it in compiled loops [s]",
+    "compile_time": "time to compile before it [s]",
+}
+
+
+def head(solution: Solution) -> str:
+    """Return the title, the state of the run, and the texts of the model about itself."""
+    model: Model = solution.model
+    mark, state = ("✔", "good") if solution.success else ("✘", "bad")
+    texts = [model.description, model.look, model.source and f"Source: {model.source}"]
+    return "\n".join(
+        [
+            "<header>",
+            f"<h1>{escape(model.title or model.name)}</h1>",
+            f'<p class="status"><span class="{state}">{mark} {escape(solution.status)}</span> '
+            f"<code>{escape(model.name)}</code> by <code>{escape(solution.integrator)}</code></p>",
+            *(f"<p>{escape(' '.join(text.split()))}</p>" for text in texts if text),
+            "</header>",
+        ]
+    )
+
+
+def messages(solution: Solution) -> str:
+    """Return the message of a run that stopped early, and its warnings."""
+    found = [] if solution.success else [solution.message]
+    found += solution.warnings
+    if not found:
+        return ""
+    items = "\n".join(f"<li>{escape(text)}</li>" for text in found)
+    heading = '<h2 id="h-warnings">Warnings</h2>'
+    return f'<section class="warnings" aria-labelledby="h-warnings">{heading}\n<ul>{items}</ul></section>'
+
+
+def summary(solution: Solution) -> str:
+    """Return the main facts of a run as a list."""
+    trajectory, stats = solution._of_model, solution.stats
+    unit = time_unit(solution.model)
+    kinds = trajectory.kinds() if solution._run.save != "nothing" else {}
+    counted = ", ".join(counted_kind(kind, n) for kind, n in kinds.items() if kind != "corner")
+    facts = {
+        "Time": f"{solution.t_start:.9g} to {solution.t_end:.9g} {unit}".rstrip(),
+        "Integrator": solution.integrator
+        + (f", chosen because {solution.chosen_because}" if solution.chosen_because else ""),
+        "Events": counted or ("none" if kinds or solution._run.save != "nothing" else "not stored"),
+        "Cost": f"{stats['steps']} steps, {stats['rhs_evaluations']} evaluations, {stats['wall_time']:.3g} s",
+        "Result": solution.message,
+    }
+    rows = "\n".join(f"<div><dt>{escape(k)}</dt><dd>{escape(v)}</dd></div>" for k, v in facts.items())
+    return f'<section aria-labelledby="h-run"><h2 id="h-run">Run</h2>\n<dl>{rows}</dl></section>'
+
+
+def drawing(solution: Solution) -> str:
+    """Return the mechanism at the end of the run as SVG in the colours of the page, or nothing without a drawing."""
+    if not solution.model.drawing or solution._run.save in ("events", "nothing") or len(solution.t) < 2:
+        return ""
+    svg = re.sub(r"<metadata>.*?</metadata>", "", as_svg(mechanism(solution)), flags=re.DOTALL)
+    svg = re.sub(r'(<svg[^>]*?) width="[^"]*" height="[^"]*"', r"\1", svg, count=1)
+    for number, colour in enumerate(LIGHT.colours):
+        svg = svg.replace(colour, f"var(--drawing-{number})")
+    label = f"The mechanism at t = {solution.t_end:.6g}"
+    svg = svg.replace("<svg ", f'<svg role="img" aria-label="{escape(label)}" ', 1)
+    return f'<section class="drawing" aria-labelledby="h-drawing"><h2 id="h-drawing">Mechanism</h2>\n{svg}</section>'
+
+
+def cost(solution: Solution) -> str:
+    """Return the cost of a run as a table."""
+    rows = "\n".join(
+        f'<tr><th scope="row">{escape(_COSTS.get(name, name.replace("_", " ")))}</th>'
+        f"<td>{value:.4g}</td></tr>"
+        if isinstance(value, float)
+        else f'<tr><th scope="row">{escape(_COSTS.get(name, name.replace("_", " ")))}</th><td>{value}</td></tr>'
+        for name, value in solution.stats.items()
+    )
+    return f'<section aria-labelledby="h-cost"><h2 id="h-cost">Cost</h2>\n<table class="cost">{rows}</table></section>'
+
+
+def described(solution: Solution) -> str:
+    """Return the equations and the automaton of the model as text, as `hybridsim check` prints them."""
+    text = "\n".join(_lines(solution.model))
+    return (
+        '<section aria-labelledby="h-model"><h2 id="h-model">Model</h2>\n'
+        f'<pre tabindex="0" aria-labelledby="h-model">{escape(text)}</pre></section>'
+    )
+
+
+def _lines(model: Model) -> Iterator[str]:
+    if model.flow is not None:
+        yield "The equations of this model are Python functions."
+        for name, value in model.parameter_values().items():
+            yield f"{name} = {value!r}"
+        return
+    yield from lines_of(model, describe(model), smoothing_of(model).primitives, starting_facts(model))
+
+
+def repeated(settings: Settings) -> str:
+    """Return how to repeat the run, in Python and on the command line, with the file of the model if it needs one."""
+    parts = ['<section aria-labelledby="h-again"><h2 id="h-again">Repeat this run</h2>']
+    if settings.text is not None and not settings.is_packaged:
+        name = f"{settings.name}.toml"
+        link = b64encode(settings.text.encode("utf-8")).decode("ascii")
+        if len(settings.text) <= _LONGEST:
+            parts.append(
+                f'<p>Save <a download="{escape(name)}" href="data:text/plain;base64,{link}">{escape(name)}</a>, the '
+                "model with its parameters and start values, in the folder where you work.</p>"
+            )
+        else:
+            parts.append(f"<p>The file <code>{escape(name)}</code> is too large to be part of this page.</p>")
+    command = settings.command()
+    parts += [
+        "<h3>Python</h3>",
+        f'<pre tabindex="0" id="again-python">{escape(settings.python(__version__))}</pre>',
+        "<h3>Command line</h3>",
+        f'<pre tabindex="0" id="again-command">{escape(command)}</pre>'
+        if command
+        else "<p>The command line has no options for all settings of this run.</p>",
+    ]
+    if settings.text is not None and len(settings.text) <= _LONGEST:
+        parts.append(
+            f'<details><summary>The model as one file</summary>\n<pre tabindex="0" id="again-model">'
+            f"{escape(settings.text)}</pre></details>"
+        )
+    return "\n".join([*parts, "</section>"])
