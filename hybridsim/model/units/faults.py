@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -18,6 +19,8 @@ from hybridsim.model.units.votes import quantities_of
 
 HEADER = ("what", "unit", "how it is known")
 DECLARED, INFERRED, UNKNOWN, AGREES, DISAGREES = "declared", "inferred", "unknown", "agrees", "disagrees"
+
+_COPY = re.compile(r"(?<=\w)\d+(?=\.[A-Za-z_])")  # the number of a copy in a name such as block12.x
 
 
 @dataclass(frozen=True)
@@ -41,10 +44,10 @@ def unit_faults(model: Model) -> Iterator[Caution]:
 def units_of_expressions(model: Model, known: Quantities) -> Iterator[UnitOfExpression]:
     """Yield the unit of each expression of a model.
 
-    A warning is given once for each line. In the expressions of a friction law it is left out if an argument of the
-    law or another expression of the law has it.
+    A warning is given once for each line, and for the first copy of a repeated part. In the expressions of a friction
+    law it is left out if an argument of the law or another expression of the law has it.
     """
-    reported: set[tuple[int | None, str]] = set()
+    reported: set[tuple[str, str]] = set()
     for statement in statements_of(model, known):
         inference = known.inference(statement.counts)
         unit = inference.unit(statement.expr.tree)
@@ -53,11 +56,11 @@ def units_of_expressions(model: Model, known: Quantities) -> Iterator[UnitOfExpr
             found.append(Disagreement(statement.expr.tree, unit, statement.required, statement.because))
         cautions = []
         for caution in (_caution(statement, one, known) for one in found):
-            text = caution.message.partition(": ")[2]
-            line = caution.place.line if caution.place and not statement.is_of_law else None
-            if (line, text) not in reported:
+            text = _COPY.sub("", caution.message.partition(": ")[2])
+            where = "" if statement.is_of_law else _line_of(caution) or statement.what
+            if (where, text) not in reported:
                 cautions.append(caution)
-            reported |= {(line, text), (None, text)}
+            reported |= {(where, text), ("", text)}
         yield UnitOfExpression(statement, unit, tuple(inference.unknown), tuple(cautions))
 
 
@@ -74,6 +77,12 @@ def _caution(statement: Statement, found: Disagreement, known: Quantities) -> Ca
             f'{{ value = {factor:.9g}, unit = "{ratio}" }}'
         )
     return Caution(message, statement.expr.error(message, node=node).place, remedy)
+
+
+def _line_of(caution: Caution) -> str:
+    """Return the file and line of a warning, or an empty string for a model in Python."""
+    place = caution.place
+    return f"{place.file}:{place.line}" if place and place.line is not None else ""
 
 
 def _is_in(unit: str) -> str:

@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from fractions import Fraction
 from functools import cache
 
+from hybridsim.expr.grammar import MAX_POWER
 from hybridsim.model.units.unit import RADIAN, TURN, Unit, product_text
 
 _PREFIXES = {
@@ -39,6 +40,7 @@ _SHOWN = (
     "W", "Pa", "MPa", "kN", "kN/m", "V", "A", "ohm", "F", "H", "ms", "N s", "N/s", "N s^2/m", "N m/s", "N/mm",
     "N s/mm", "N/kg", "1/s", "A/s", "V/s", "K/h", "h", "min", "N m/rad", "N m s/rad",
 )  # fmt: skip
+_LONGEST = 200  # characters of a text; parentheses are read recursively
 _SUPERSCRIPTS = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _TOKEN = re.compile(
     r"\s*(?:(?P<number>\d+\.?\d*(?:[eE][+-]?\d+)?)|(?P<symbol>[A-Za-zµΩ°%]+)|(?P<sign>\*\*|[*·/^()+-]))\s*"
@@ -55,6 +57,8 @@ def read_unit(text: str) -> Unit | None:
 
     A quotient followed by a product, as in "J/kg K", is ambiguous and therefore not known.
     """
+    if len(text) > _LONGEST:
+        return None
     try:
         return _Reader(text).unit()
     except (_NotAUnit, OverflowError, ZeroDivisionError):
@@ -176,7 +180,7 @@ class _Reader:
     def _number(self) -> Fraction:
         sign = -1 if self._take("-") else 1
         kind, text = self._tokens[self._at] if self._at < len(self._tokens) else ("", "")
-        if kind != "number":
+        if kind != "number" or float(text) > MAX_POWER:
             raise _NotAUnit(text)
         self._at += 1
         return sign * Fraction(text).limit_denominator(1000)

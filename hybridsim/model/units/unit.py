@@ -38,9 +38,11 @@ class Unit:
 
     def power(self, exponent: Fraction) -> Unit:
         """Return a power of the unit."""
-        return Unit(
-            _sum((name, power * exponent) for name, power in self.powers), self.scale ** float(exponent)
-        )
+        powers = _sum((name, power * exponent) for name, power in self.powers)
+        try:
+            return Unit(powers, self.scale ** float(exponent))
+        except (OverflowError, ZeroDivisionError):
+            return Unit(powers, math.nan)
 
     def without_angles(self) -> Unit:
         """Return the unit without radians and turns."""
@@ -65,6 +67,8 @@ class Unit:
             return "dimension"
         own, others = dict(self.powers), dict(other.powers)
         mixed = (TURN in own and RADIAN in others) or (RADIAN in own and TURN in others)
+        if not all(0.0 < scale < math.inf for scale in (self.scale, other.scale)):
+            return ""  # a power that no double holds
         return "" if not mixed and math.isclose(self.scale, other.scale, rel_tol=_TOLERANCE) else "scale"
 
     def factor(self, other: Unit) -> float:

@@ -17,7 +17,7 @@ from hybridsim.model.smoothing.one_sided import names_of
 from hybridsim.model.units.infer import factors_of, terms_of
 from hybridsim.model.units.parse import read_unit
 from hybridsim.model.units.quantities import Quantities, declared_quantities
-from hybridsim.model.units.unit import Unit, most_frequent
+from hybridsim.model.units.unit import ONE, Unit, most_frequent
 
 # Largest number of passes over the names without a declared unit; each pass finds at least one more unit.
 _PASSES = 50
@@ -94,7 +94,8 @@ class _Witnesses:
     def _votes(self, name: str) -> Iterator[Unit]:
         known = self.known
         for use in self.uses.get(name, ()):
-            yield from _solved(known, use.expr.tree, use.required(known), name)
+            required = use.required(known)
+            yield from _solved(known, use.expr.tree, () if required is None else (required,), name)
         for expr in self.setting.get(name, ()):
             units = (known.inference().unit(term) for term in terms_of(expr.tree))
             yield from (unit for unit in units if unit is not None)
@@ -135,29 +136,28 @@ def _resets(model: Model) -> Iterator[Mapping[str, Expression]]:
         yield from (choice.reset for guard in guards for choice in guard.then)
 
 
-def _solved(known: Quantities, node: ast.expr, required: Unit | None, name: str) -> Iterator[Unit]:
-    """Yield units that a name must have: for an expression to have a unit, and to fit the other terms of a sum."""
+def _solved(known: Quantities, node: ast.expr, required: tuple[Unit, ...], name: str) -> Iterator[Unit]:
+    """Yield units that a name must have for an expression to have each of some units, and to fit the terms of sums."""
     match node:
-        case ast.Name(id=own):
-            if own == name and required is not None:
-                yield required
+        case ast.Name(id=own) if own == name:
+            yield from required
         case ast.UnaryOp(operand=operand):
             yield from _solved(known, operand, required, name)
         case ast.BinOp(op=ast.Add() | ast.Sub()):
             common = known.inference().unit(node)
+            both = required if common is None else (common, *required)
             for term in terms_of(node):
-                for unit in (common, required):
-                    if unit is not None and name in names_of(term):
-                        yield from _solved(known, term, unit, name)
-        case ast.BinOp(op=ast.Mult() | ast.Div()) if required is not None:
-            inside: list[ast.expr] = []
+                if name in names_of(term):
+                    yield from _solved(known, term, both, name)
+        case ast.BinOp(op=ast.Mult() | ast.Div()):
+            inside, rest = None, ONE
             for factor, sign in factors_of(node):
                 unit = known.inference().unit(factor)
-                if name in names_of(factor) and sign > 0:
-                    inside.append(factor)
+                if name in names_of(factor) and sign > 0 and inside is None:
+                    inside = factor
                 elif unit is None:
                     return
                 else:
-                    required = required / unit if sign > 0 else required * unit
-            if len(inside) == 1:
-                yield from _solved(known, inside[0], required, name)
+                    rest = rest * unit if sign > 0 else rest / unit
+            if inside is not None:
+                yield from _solved(known, inside, tuple(unit / rest for unit in required), name)

@@ -90,6 +90,8 @@ def test_a_text_is_a_unit(text: str, expected: Unit) -> None:
         "m + s",
         "0 m",
         "widgets",
+        "m^1e999999999",
+        "(" * 5000 + "m" + ")" * 5000,
         "1e999 m",
     ],
 )

@@ -292,3 +292,28 @@ def test_a_unit_in_python_is_checked_without_a_line() -> None:
     fall = [hs.State("h", 10, der="w", unit="m"), hs.State("w", 0, der="h", unit="m/s")]
     (caution,) = unit_faults(hs.Model("fall", states=fall))
     assert caution.sentence.startswith("state w, der: 'h' is in m, but the rate of w is in m/s^2: ")
+
+
+def test_states_in_python_have_a_warning_each() -> None:
+    pair = [hs.State(name, 0, der="h", unit="m/s") for name in ("a", "b")]
+    found = [*unit_faults(hs.Model("pair", states=[hs.State("h", 0, der=1, unit="m"), *pair]))]
+    assert [one.message.partition(",")[0] for one in found] == ["state a", "state b"]
+
+
+def test_a_fault_of_a_repeated_part_is_one_warning(tmp_path: Path) -> None:
+    (tmp_path / "part.toml").write_text('[states]\ny = { start = 0, unit = "m/s", der = "y" }\n')
+    path = tmp_path / "whole.toml"
+    path.write_text('[use]\nblock = { model = "part.toml", repeat = 12 }\n')
+    (caution,) = unit_faults(hs.load(path))
+    assert (
+        "state block1.y, der: 'block1.y' is in m/s, but the rate of block1.y is in m/s^2" in caution.message
+    )
+
+
+def test_a_power_beyond_doubles_and_deep_sums_are_no_problem() -> None:
+    text = '[parameters.q]\nvalue = 1\nunit = "1e300 m"\n'
+    assert faults(f'{text}[outputs]\ny = "q**9/q**9 + q**-9 + q**9"\n')[0].startswith("m.toml:")
+    nested = "held"
+    for _ in range(25):
+        nested = f"k*(x + ({nested})/k)"
+    assert faults(f'[discrete]\nheld = 0\n[definitions]\ny = "{nested}"\n') == []
