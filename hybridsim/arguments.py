@@ -12,6 +12,7 @@ import numpy as np
 from hybridsim.errors import UsageError, nearest
 from hybridsim.model import Model
 from hybridsim.model.library import loaded
+from hybridsim.model.parts.remedies import remedy_for_state
 
 if TYPE_CHECKING:
     from hybridsim.engine.record.limits import Limits
@@ -203,16 +204,6 @@ def two_numbers(value: Any, what: str, remedy: str, but: str = "") -> tuple[floa
     return ends[0], ends[1]
 
 
-def _states_in_order(name: str, states: list[str], discrete: list[str]) -> str:
-    """Return the remedy for an unknown state: similar names, or all states in order."""
-    remedy = nearest(name, states + discrete, kind="states")
-    if "did you mean" in remedy or not states or len(states) > 12:
-        return remedy
-    return f"known states, in this order: {', '.join(states)}" + "".join(
-        f"; {d} (discrete)" for d in discrete
-    )
-
-
 def start_values(model: Model, x0: Any, what: str = "x0") -> tuple[dict[str, float], Model]:
     """Return initial values by name, and the model with the given discrete states; `what` names the argument."""
     names = [s.name for s in model.states]
@@ -234,7 +225,7 @@ def start_values(model: Model, x0: Any, what: str = "x0") -> tuple[dict[str, flo
         if name not in names + discrete:
             raise UsageError(
                 f"`{what}` contains {name!r}, which is not a state of model '{model.name}'",
-                remedy=_states_in_order(str(name), names, discrete),
+                remedy=remedy_for_state(model, str(name)),
             )
         found[name] = number(
             value, f"`{what}` of {name}", f"use a number; for an expression use model.with_start({name}=...)"

@@ -100,7 +100,8 @@ def add_model_arguments(parser: argparse.ArgumentParser, optional: bool = False)
         type=assignment,
         action="append",
         default=[],
-        help="set a parameter; VALUE may be an expression of other parameters, such as 'omega=0.6*sqrt(k/m)'",
+        help="set a parameter (for a state or a held input use --x0); VALUE may be an expression of other parameters, "
+        "such as 'omega=0.6*sqrt(k/m)'",
     )
     parser.add_argument(
         "--x0",
@@ -108,7 +109,7 @@ def add_model_arguments(parser: argparse.ArgumentParser, optional: bool = False)
         type=assignment,
         action="append",
         default=[],
-        help="set the initial value of a state",
+        help="set the initial value of a state or of a held input; VALUE may be an expression of parameters",
     )
 
 

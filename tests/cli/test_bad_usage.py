@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -60,7 +61,8 @@ BAD = {
     "code in a parameter": (["run", "dfcs", "-p", "N=open('canary','w')"], ["open"]),
     "negative normal load": (["run", "dfcs", "-p", "N=-40"], ["N", "-40"]),
     "unknown state": (["run", "dfcs", "--x0", "y=1"], ["y", "x"]),
-    "state as a parameter": (["run", "dfcs", "-p", "x=1"], ["x"]),
+    "state as a parameter": (["run", "dfcs", "-p", "x=1"], ["'x' is a state", "--x0 x=VALUE"]),
+    "parameter as a state": (["run", "dfcs", "--x0", "F0=1"], ["'F0' is a parameter", "-p F0=VALUE"]),
     "picture of an unknown kind": (["run", "dfcs", "--plot", "out.doc"], ["'.doc'", ".png"]),
     "what is kept in place of a file": (
         ["run", "dfcs", "--save", "last-period"],
@@ -94,6 +96,23 @@ def test_bad_usage(case: str, hybridsim: Callable, tmp_path: Path) -> None:
     assert all(fragment in err for fragment in fragments), err
     assert len(err.splitlines()) > 1, f"no remedy: {err}"
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_held_input_as_a_parameter(hybridsim: Callable, tmp_path: Path) -> None:
+    """The remedy of the error works: x' = u gives x(2) = 2*u."""
+    (tmp_path / "driven.toml").write_text(
+        'schema = 1\nname = "driven"\n[inputs]\nu = { kind = "held", value = 1 }\n'
+        'w = { kind = "wave", shape = "sine", period = 1, amplitude = 0 }\n'
+        '[states]\nx = { start = 0, der = "u + w" }\n'
+    )
+    code, _, err = hybridsim("run", "driven.toml", "-p", "u=12")
+    assert code == 2 and "'u' is a held input" in err and "--x0 u=VALUE" in err
+    code, out, _ = hybridsim(
+        "run", "driven.toml", "--x0", "u=12", "--t-end", "2", "--json", "--integrator", "dop853"
+    )
+    assert code == 0 and json.loads(out)["final"]["x"] == pytest.approx(24, rel=1e-9)
+    code, _, err = hybridsim("run", "driven.toml", "-p", "w=12")
+    assert code == 2 and "'w' is an input of kind 'wave'" in err
 
 
 @pytest.mark.parametrize("command", ["run", "compare", "check"])

@@ -11,6 +11,7 @@ from hybridsim.analysis.advise.question import Number, Question
 from hybridsim.arguments import cannot_be, is_row, number
 from hybridsim.errors import UsageError
 from hybridsim.model import Model
+from hybridsim.model.parts.remedies import remedy_for_parameter
 
 _MAX_RANGES = 6  # ranges; 2**6 corners need as many runs
 
@@ -50,7 +51,7 @@ def ranges_of(model: Model, declared_ranges: Any) -> dict[str, tuple[float, floa
         if name not in known:
             raise UsageError(
                 f"`uncertain` contains {name!r}, which is not a parameter of model {model.name}",
-                remedy=model.remedy_for_parameter(str(name)),
+                remedy=remedy_for_parameter(model, str(name)),
             )
         if not low <= known[name] <= high:
             raise UsageError(

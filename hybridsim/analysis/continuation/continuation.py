@@ -26,6 +26,7 @@ from hybridsim.engine.system.period import common_period
 from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import HybridsimError, UsageError
 from hybridsim.model import Model
+from hybridsim.model.parts.remedies import remedy_for_parameter
 from hybridsim.solution import Solution
 
 _CORRECTIONS = 8
@@ -103,13 +104,12 @@ def continuation(
     True
     """
     model = arguments.chosen_model(model, params)
-    names = [p.name for p in model.parameters]
     parameter = arguments.text(parameter, "parameter")
     most = whole(max_points, "max_points")
-    if parameter not in names:
+    if parameter not in [p.name for p in model.parameters]:
         raise UsageError(
             f"model {model.name} has no parameter {parameter!r}",
-            remedy=model.remedy_for_parameter(str(parameter)),
+            remedy=remedy_for_parameter(model, parameter),
         )
     low, high = arguments.two_numbers(bounds, "bounds", "use two numbers, (low, high)")
     progress = arguments.callback(progress)

@@ -16,6 +16,7 @@ from hybridsim.errors import ExpressionError, UsageError
 from hybridsim.expr import Expression, parse, require_names, resolve
 from hybridsim.model import Model
 from hybridsim.model.checks.units import label_of
+from hybridsim.model.parts.remedies import remedy_for_parameter
 
 MODES = ("grid", "list")
 POINT = "point"  # the dimension of a list
@@ -103,7 +104,7 @@ def points_of(model: Model, values: Any, mode: Any) -> Points:
         if name not in units and name not in starts:
             raise UsageError(
                 f"model {model.name} has no parameter or state {name!r} to sweep over",
-                remedy=model.remedy_for_parameter(str(name), tuple(starts)),
+                remedy=remedy_for_parameter(model, str(name), tuple(starts)),
             )
     _refuse_too_many({name: _length(row) for name, row in values.items()}, mode)
     settings = {name: _settings(name, row) for name, row in values.items()}

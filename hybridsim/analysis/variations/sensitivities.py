@@ -16,6 +16,7 @@ from hybridsim.analysis.variations.refused import refuse_limits
 from hybridsim.arguments import cannot_be, flag
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
+from hybridsim.model.parts.remedies import remedy_for_parameter
 from hybridsim.presentation.readable import Readable, aligned
 from hybridsim.solution import Solution
 
@@ -148,7 +149,7 @@ def _found(
         if name not in names:
             raise UsageError(
                 f"model {model.name} has no parameter {name!r}",
-                remedy=model.remedy_for_parameter(name),
+                remedy=remedy_for_parameter(model, name),
             )
     _refuse(solution)
     n, d = system.n, system.layout.discrete

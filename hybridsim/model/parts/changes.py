@@ -7,7 +7,7 @@ from dataclasses import replace
 from numbers import Real
 from typing import Any
 
-from hybridsim.errors import ExpressionError, Place, UsageError, nearest
+from hybridsim.errors import ExpressionError, Place, UsageError
 from hybridsim.expr import Expression, parse
 
 
@@ -26,14 +26,11 @@ def require_known(
     allowed: Collection[str],
     kind: str,
     model: str,
-    remedy: Callable[[str], str] | None = None,
+    remedy: Callable[[str], str],
 ) -> None:
     """Raise an error for a changed quantity that the model does not have, or for an invalid value."""
     for name, value in changes.items():
         if not isinstance(value, Expression | str | Real):
             raise UsageError(f"{kind} {name} cannot be {value!r}", remedy="use a number or an expression")
         if name not in allowed:
-            raise UsageError(
-                f"the model '{model}' has no {kind} '{name}'",
-                remedy=remedy(name) if remedy else nearest(name, list(allowed), kind=f"{kind}s"),
-            )
+            raise UsageError(f"the model '{model}' has no {kind} '{name}'", remedy=remedy(name))

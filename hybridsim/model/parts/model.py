@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, ClassVar
 
-from hybridsim.errors import ModelError, UsageError, nearest
+from hybridsim.errors import ModelError, UsageError
 from hybridsim.expr import Expression, evaluate, parse, resolve
 from hybridsim.expr.evaluate import dependency_order
 from hybridsim.files import path_text
@@ -21,6 +21,7 @@ from hybridsim.model.parts.impact import Impact
 from hybridsim.model.parts.inputs import Input
 from hybridsim.model.parts.monitor import Monitor
 from hybridsim.model.parts.quantities import Discrete, Output, Parameter, State
+from hybridsim.model.parts.remedies import remedy_for_parameter, remedy_for_state
 from hybridsim.model.parts.schedule import Schedule
 from hybridsim.model.parts.shape import Shape
 from hybridsim.model.parts.switching import SwitchingSurface
@@ -46,7 +47,7 @@ _PARTS: dict[str, type[Declared]] = {
 # methods that other parts of the package call; completion does not offer them
 _INTERNAL = {
     "affected_by", "changed_numbers", "components_of", "connected_units", "error", "is_known_to_be_sound", "once",
-    "once_per_expressions", "place", "remedy_for_parameter", "structure", "with_values_of",
+    "once_per_expressions", "place", "structure", "with_values_of",
 }  # fmt: skip
 
 
@@ -236,7 +237,7 @@ class Model(Declared):
             For a value that is not a valid expression.
         """
         positions = self._positions()
-        require_known(changes, positions, "parameter", self.name, self.remedy_for_parameter)
+        require_known(changes, positions, "parameter", self.name, partial(remedy_for_parameter, self))
         parameters, are_numbers = list(self.parameters), True
         for name in changes:
             former = parameters[positions[name]]
@@ -250,26 +251,10 @@ class Model(Declared):
                 vars(copy)["_sound"] = values, others.union(changes)
         return copy
 
-    def remedy_for_parameter(self, name: str, others: tuple[str, ...] = ()) -> str:
-        """Return the remedy for an unknown parameter: similar names, or the argument of a law to change."""
-        names = [parameter.name for parameter in self.parameters]
-        for contact in self.contacts:
-            if name not in contact.law.parameters:
-                continue
-            argument = contact.arguments.get(name, contact.law.parameters[name])
-            if argument is not None and argument.text in names:
-                return f"contact {contact.name} has '{name} = {argument.text}'; change '{argument.text}'"
-            text = "its default" if argument is None else argument.text
-            return (
-                f"'{name}' is an argument of the law of contact {contact.name} with the value {text}; declare a "
-                f'parameter, {name} = {text} under [parameters], and write law = {{ ..., {name} = "{name}" }}'
-            )
-        return nearest(name, [*names, *others], kind="parameters and states" if others else "parameters")
-
     def with_start(self, /, **changes: Expression | str | float) -> Model:
         """Return a copy with changed initial values of (discrete) states: ``model.with_start(x=0.1)``."""
         names = [*(part.name for part in self.states), *(part.name for part in self.discrete)]
-        require_known(changes, names, "state", self.name)
+        require_known(changes, names, "state", self.name, partial(remedy_for_state, self))
         contacts = tuple(self._started(contact, changes) for contact in self.contacts)
 
         def changed(parts: Iterable[Any]) -> tuple[Any, ...]:

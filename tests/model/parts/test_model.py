@@ -50,9 +50,10 @@ def test_changed_copies() -> None:
     [
         (lambda model: model.with_(n=1), "did you mean 'N'?"),
         (lambda model: model.with_(omega=1), "known parameters: N, k, m, mu"),
-        (lambda model: model.with_(x=1), "known parameters"),
+        (lambda model: model.with_(x=1), "'x' is a state; set its initial value, with --x0 x=VALUE"),
+        (lambda model: model.with_start(N=1), "'N' is a parameter; set it with -p N=VALUE"),
         (lambda model: model.with_start(X=1), "did you mean 'x'?"),
-        (lambda model: model.with_start(f=1), "known states: v, x"),
+        (lambda model: model.with_start(f=1), "known states, in this order: x, v"),
     ],
 )
 def test_changing_what_is_not_there(change: Callable[[hs.Model], hs.Model], near: str) -> None:

@@ -1,0 +1,55 @@
+"""This module defines the remedies for names that a model has no parameter or no state for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hybridsim.errors import nearest
+from hybridsim.model.parts.inputs import HeldInput
+
+
+def remedy_for_parameter(model: Any, name: str, others: tuple[str, ...] = ()) -> str:
+    """Return the remedy for a name that is not a parameter, nor one of the `others`, which are also allowed.
+
+    The remedy is the way in which the quantity of that name can be set, the argument of a law to change, or similar
+    names.
+    """
+    names = [parameter.name for parameter in model.parameters]
+    for contact in model.contacts:
+        if name not in contact.law.parameters:
+            continue
+        argument = contact.arguments.get(name, contact.law.parameters[name])
+        if argument is not None and argument.text in names:
+            return f"contact {contact.name} has '{name} = {argument.text}'; change '{argument.text}'"
+        text = "its default" if argument is None else argument.text
+        return (
+            f"'{name}' is an argument of the law of contact {contact.name} with the value {text}; declare a "
+            f'parameter, {name} = {text} under [parameters], and write law = {{ ..., {name} = "{name}" }}'
+        )
+    for part in (*model.states, *model.discrete):
+        if name == part.name:
+            kind = "a held input" if isinstance(part, HeldInput) else "a state"
+            return (
+                f"'{name}' is {kind}; set its initial value, with --x0 {name}=VALUE on the command line and "
+                f"with x0={{'{name}': value}} in Python"
+            )
+    for signal in model.inputs:
+        if name == signal.name:
+            return f"'{name}' is an input of kind '{signal.kind}'; change it in the model"
+    return nearest(name, [*names, *others], kind="parameters and states" if others else "parameters")
+
+
+def remedy_for_state(model: Any, name: str) -> str:
+    """Return the remedy for a name that is not a state: the way to set a parameter, similar names, or all names."""
+    if name in [parameter.name for parameter in model.parameters]:
+        return (
+            f"'{name}' is a parameter; set it with -p {name}=VALUE on the command line and with "
+            f"params={{'{name}': value}} in Python"
+        )
+    states = [state.name for state in model.states]
+    discrete = {d.name: "held input" if isinstance(d, HeldInput) else "discrete" for d in model.discrete}
+    remedy = nearest(name, [*states, *discrete], kind="states")
+    if "did you mean" in remedy or not states or len(states) > 12:
+        return remedy
+    listed = "".join(f"; {d} ({kind})" for d, kind in discrete.items())
+    return f"known states, in this order: {', '.join(states)}{listed}"
