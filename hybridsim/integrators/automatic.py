@@ -35,7 +35,7 @@ class Choice(NamedTuple):
 def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float], rtol: float) -> Choice:
     """Choose an integrator for a model with given initial values and tolerance.
 
-    The closed form is chosen for linear modes if it runs in compiled code, a stiff method if stability would
+    The closed form is chosen for linear modes if the model has no monitors, a stiff method if stability would
     limit the step of an explicit one, and an explicit method otherwise. Stiffness is detected at the start,
     from the eigenvalues of the Jacobian. Stiffness that begins later is detected during the run, see
     `successor_of`.
@@ -46,10 +46,9 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
     is_small = system.n + system.guard_count <= _SMALL and span[1] >= span[0]
     is_monitored, rest = bool(model.monitors or model.inputs), ""
     if is_small and what_is_not_linear(system) is None and is_linear_beside_corners(system):
-        if not is_monitored:
+        if not model.monitors:
             return Choice("exact", "its modes are linear in the states")
-        what = "monitors" if model.monitors else "inputs"
-        rest = f" (exact was not chosen because the model has {what})"
+        rest = " (exact was not chosen, because with monitors it computes Taylor series and not closed forms)"
     steps = _steps_for_stability(system, x0, z0, span)
     in_python = is_monitored or system.has_corners or span[1] < span[0]
     if steps > _MANY or (steps > _MANY_IN_PYTHON and in_python and _is_apart(system, x0, z0, span[0])):

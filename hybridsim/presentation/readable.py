@@ -1,4 +1,4 @@
-"""This module defines results that show the same text in notebooks as in `print`."""
+"""This module defines objects that show the same text in notebooks as in `print`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from html import escape
 
 
 class Readable:
-    """A result whose `repr` is a text of several lines, which notebooks show with aligned columns."""
+    """An object whose `repr` is a text of several lines, which notebooks show with aligned columns."""
 
     def _repr_html_(self) -> str:
         return f"<pre>{escape(repr(self))}</pre>"

@@ -2,15 +2,36 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from hybridsim.calls import refusing
-from hybridsim.errors import UsageError
+from hybridsim.errors import UsageError, printable
+from hybridsim.model import Model
+from hybridsim.presentation.readable import Readable, aligned
 from hybridsim.simulator.position import Position
+from hybridsim.simulator.read_only import ReadOnly
 
 
-class CurrentState:
+class CurrentState(Readable):
     """The present time, states, modes, inputs and outputs; see `hybridsim.simulator.simulator.Simulator`."""
 
+    model: Model
+    _settings: dict[str, Any]
     _position: Position | None
+
+    def __repr__(self) -> str:
+        position, integrator = self._position, self._settings["integrator"]
+        if position is None:
+            return f"Simulator of {self.model.name} by {integrator}: not started"
+        ended = f"; the run has {position.ended}" if position.ended else ""
+        rows = {
+            "state": [f"{name} = {value:.9g}" for name, value in self.state.items()],
+            "inputs": [f"{name} = {value:.9g}" for name, value in self.inputs.items()],
+            "modes": [f"{name} {mode}" for name, mode in self.modes.items()],
+        }
+        head = f"Simulator of {self.model.name} by {position.run.method.name}: at t = {self.t:.9g}{ended}"
+        table = aligned([(title, ", ".join(values)) for title, values in rows.items() if values], "  ")
+        return printable("\n".join([head, *table]))
 
     @property
     def _current(self) -> Position:
@@ -25,21 +46,26 @@ class CurrentState:
 
     @property
     def state(self) -> dict[str, float]:
-        """The present states by name."""
+        """The present states by name; this dict is read-only."""
         position = self._current
-        return dict(zip(position.run.system.names, position.x.tolist(), strict=True))
+        states = dict(zip(position.run.system.names, position.x.tolist(), strict=True))
+        return ReadOnly(states, "sim.state", "use sim.start(t0, x0={name: value}) to begin with other values")
 
     @property
     def modes(self) -> dict[str, str]:
-        """The present mode of each component, by name."""
+        """The present mode of each component, by name; this dict is read-only."""
         system, z = self._current.run.system, self._current.z
-        return {a.name: a.modes[m] for a, m in zip(system.declared, z.tolist(), strict=False)}
+        modes = {a.name: a.modes[m] for a, m in zip(system.declared, z.tolist(), strict=False)}
+        return ReadOnly(modes, "sim.modes", "use sim.start(t0, z0={name: mode}) to begin in other modes")
 
     @property
     def inputs(self) -> dict[str, float]:
-        """The present values of the held inputs."""
+        """The present values of the held inputs; this dict is read-only."""
         position = self._current
-        return {name: float(position.discrete[k]) for name, k in position.held_indices.items()}
+        inputs = {name: float(position.discrete[k]) for name, k in position.held_indices.items()}
+        return ReadOnly(
+            inputs, "sim.inputs", "use sim.set({name: value}) or sim.advance(to, inputs={name: value})"
+        )
 
     @property
     def ended(self) -> str:

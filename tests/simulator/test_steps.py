@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
+import pickle
+from copy import deepcopy
+from html import escape
 from typing import Any
 
 import pytest
@@ -171,3 +175,54 @@ def test_wrong_calls_are_refused_and_change_nothing() -> None:
         with pytest.raises(hs.UsageError, match=message):
             call()
         assert (sim.t, sim.state) == (1.0, before)
+
+
+@pytest.mark.parametrize(
+    ("change", "parts"),
+    [
+        (lambda sim: sim.state.__setitem__("x", 1), ("sim.state['x']", "set to 1", "x0={name: value}")),
+        (lambda sim: sim.state.update(x=1), ("sim.state", "cannot be changed", "sim.start(")),
+        (lambda sim: sim.modes.__setitem__("f", "slip+"), ("sim.modes['f']", "'slip+'", "z0={name: mode}")),
+        (lambda sim: sim.inputs.__setitem__("F", 3.0), ("sim.inputs['F']", "3.0", "sim.advance(to, inputs=")),
+        (lambda sim: sim.inputs.__delitem__("F"), ("sim.inputs['F']", "deleted", "sim.set(")),
+        (lambda sim: sim.state.__ior__({"x": 1}), ("sim.state",)),
+        (lambda sim: sim.state.pop("x"), ("sim.state",)),
+    ],
+)
+def test_what_is_read_cannot_be_assigned(change: Any, parts: tuple[str, ...]) -> None:
+    sim = block()
+    sim.start(0.0)
+    with pytest.raises(hs.UsageError) as caught:
+        change(sim)
+    assert all(part in str(caught.value) for part in parts)
+
+
+def test_what_is_read_is_a_dict_and_its_copies_are_ordinary_ones() -> None:
+    sim = block()
+    sim.start(0.0)
+    assert sim.state == {"x": 0.0, "v": 0.0} and json.loads(json.dumps(sim.state)) == sim.state
+    for copy in (
+        sim.state.copy(),
+        deepcopy(sim.state),
+        pickle.loads(pickle.dumps(sim.state)),
+        sim.state | {},
+    ):
+        assert type(copy) is dict
+        copy["x"] = 1.0
+    assert sim.state["x"] == 0.0
+
+
+def test_a_simulator_shows_where_it_is() -> None:
+    """Below the limit of 20 N the block rests; above it, (30 - 20)/2 = 5 m/s^2 act for 0.5 s."""
+    sim = block("auto")
+    assert repr(sim) == "Simulator of block by auto: not started"
+    sim = block()
+    sim.start(0.0)
+    sim.advance(0.5, {"F": 30.0})
+    assert repr(sim).splitlines() == [
+        "Simulator of block by exact: at t = 0.5",
+        "  state   x = 0.625, v = 2.5",
+        "  inputs  F = 30",
+        "  modes   f slip+",
+    ]
+    assert sim._repr_html_() == f"<pre>{escape(repr(sim))}</pre>"
