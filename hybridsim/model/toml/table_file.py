@@ -15,9 +15,9 @@ MAX_BYTES = 64_000_000
 def read_columns(path: Path, columns: Sequence[str | int]) -> tuple[tuple[float, ...], ...]:
     """Return two columns of a CSV file as numbers.
 
-    The separator is a comma, a semicolon or a tab. Empty lines and lines that start with # are skipped. The first line
-    contains names if a column is selected by name, or if none of the columns selected by index has a number there.
-    Other columns are ignored.
+    The separator is a comma, a semicolon or a tab. Numbers have a decimal point; a decimal comma is an error. Empty
+    lines and lines that start with # are skipped. The first line contains names if a column is selected by name, or if
+    none of the columns selected by index has a number there. Other columns are ignored.
 
     Parameters
     ----------
@@ -26,7 +26,8 @@ def read_columns(path: Path, columns: Sequence[str | int]) -> tuple[tuple[float,
     Raises
     ------
     ModelError
-        For a missing file or column, or a cell that is not a number, with file and line.
+        For a missing file or column, a cell that is not a number, or commas that may be decimal ones, with file and
+        line.
     """
     rows = _rows(path)
     head = [cell.strip() for cell in rows[0][1]] if rows else []
@@ -34,6 +35,7 @@ def read_columns(path: Path, columns: Sequence[str | int]) -> tuple[tuple[float,
     if len(rows) < (2 if names else 1):
         remedy = "write time and value in each row"
         raise ModelError("the table has no rows of numbers", place=Place(str(path)), remedy=remedy)
+    _refuse_decimal_commas(rows, names, path)
     indices = [_index(column, names, len(head), path) for column in columns]
     found: list[tuple[float, ...]] = []
     for index in indices:
@@ -46,6 +48,36 @@ def _are_names(head: list[str], columns: Sequence[str | int]) -> bool:
     if any(isinstance(column, str) for column in columns):
         return not all(map(_is_number, head))
     return not any(0 <= column < len(head) and _is_number(head[column]) for column in map(int, columns))
+
+
+def _refuse_decimal_commas(rows: list[tuple[int, list[str]]], names: list[str] | None, path: Path) -> None:
+    """Raise an error for rows whose commas may be decimal commas and not separators.
+
+    Such a row has more numbers than the first line has cells, or the first line has no names and each number of two or more
+    columns has its digits after the comma in the next cell.
+    """
+    remedy = "write numbers with a decimal point; separate columns by commas, semicolons or tabs"
+    head = rows[0][1]
+    for line, row in rows:
+        if any(map(_is_number, row[len(head) :])):
+            what = f"the row has {len(row)} cells, but the first line of the table has {len(head)}"
+            raise ModelError(what, place=Place(str(path), line), remedy=remedy)
+    in_halves = names is None and len(head) >= 4 and len(head) % 2 == 0
+    if in_halves and all(map(_is_split, (row for _, row in rows))):
+        what = f"the row '{','.join(head)}' has {len(head)} whole numbers, or {len(head) // 2} with decimal commas"
+        raise ModelError(
+            what,
+            place=Place(str(path), rows[0][0]),
+            remedy=f"{remedy}; if the numbers are whole, write the names of the columns in the first line",
+        )
+
+
+def _is_split(row: list[str]) -> bool:
+    """Return whether each second cell of a row has only digits, and the cell before it a whole number."""
+    cells = [cell.strip() for cell in row]
+    return all(cell.isdecimal() for cell in cells[1::2]) and all(
+        cell.removeprefix("-").removeprefix("+").isdecimal() for cell in cells[::2]
+    )
 
 
 def _rows(path: Path) -> list[tuple[int, list[str]]]:
@@ -71,7 +103,11 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
     ]
     if not content_lines:
         return []
-    separator = max(",;\t", key=content_lines[0][1].count)
+    first, last = content_lines[0][1], content_lines[-1][1]
+    in_both = [
+        separator for separator in ";\t" if separator in first and separator in last
+    ]  # numbers have none
+    separator = in_both[0] if in_both else max(",;\t", key=first.count)
     rows = csv.reader((line for _, line in content_lines), delimiter=separator)
     try:
         return [(n, row) for (n, _), row in zip(content_lines, rows, strict=True)]
@@ -109,9 +145,10 @@ def _cell(row: list[str], index: int, line: int, path: Path) -> float:
     text = row[index].strip() if index < len(row) else ""
     if not _is_number(text):
         what = f"'{text}' is not a number" if text else f"column {index} is empty"
-        raise ModelError(
-            what, place=Place(str(path), line), remedy="write a number in both columns of every row"
-        )
+        remedy = "write a number in both columns of every row"
+        if _is_number(text.replace(",", ".")):
+            remedy = f"write a decimal point: {text.replace(',', '.')}"
+        raise ModelError(what, place=Place(str(path), line), remedy=remedy)
     return float(text)
 
 

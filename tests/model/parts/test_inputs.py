@@ -66,6 +66,12 @@ def test_the_first_row_is_data_whatever_stands_in_other_columns(
     assert hs.simulate(driven, (0, 2), integrator="taylor").y[0, -1] == pytest.approx(8.5, rel=1e-12)
 
 
+def test_columns_of_whole_numbers_need_names(tmp_path: Path) -> None:
+    """Without names the four columns are refused, since they may be two columns with decimal commas."""
+    model = load(tmp_path, TABLE, "t,u,n,m\n0,0,1,5\n1,3,2,5\n")
+    assert (model.inputs[0].times, model.inputs[0].values) == ((0.0, 1.0), (0.0, 3.0))
+
+
 @pytest.mark.parametrize(
     ("more", "table", "message"),
     [
@@ -77,6 +83,20 @@ def test_the_first_row_is_data_whatever_stands_in_other_columns(
         ("", "0,1\n", "1 points"),
         ("", "0,1\n1,x\n", "road.csv:2: 'x' is not a number"),
         ("", "0,1\n1\n", "road.csv:2: column 1 is empty"),
+        ("", "0,0;1,5\n0,5;2,5\n", "road.csv:1: '0,0' is not a number"),
+        ("columns = [0, 2]\n", "0,0;1,5\n0,5;2,5\n", "column 2 does not exist"),
+        ("", "t\ta\n0,0\t1,5\n", "write a decimal point: 0.0"),
+        (
+            "",
+            "t,a\n0,0,1,5\n0,5,2,5\n",
+            "road.csv:2: the row has 4 cells, but the first line of the table has 2",
+        ),
+        ("", "0,1\n# a comment\n0,5,2\n", "road.csv:3: the row has 3 cells"),
+        (
+            "",
+            "0,0,1,5\n1,0,-2,5\n",
+            "road.csv:1: the row '0,0,1,5' has 4 whole numbers, or 2 with decimal commas",
+        ),
         ("", "0\n1\n", "column 1 does not exist"),
         ("", "0,1\n1,nan\n", "'values[1]' cannot be nan"),
         ("", "0,1\n2,1\n1,1\n", "the times decrease from 2.0 to 1.0"),
