@@ -53,8 +53,8 @@ def _are_names(head: list[str], columns: Sequence[str | int]) -> bool:
 def _refuse_decimal_commas(rows: list[tuple[int, list[str]]], names: list[str] | None, path: Path) -> None:
     """Raise an error for rows whose commas may be decimal commas and not separators.
 
-    Such a row has more numbers than the first line has cells, or the first line has no names and each number of two or more
-    columns has its digits after the comma in the next cell.
+    Such a row has more numbers than the first line has cells. Or the first line has no names, and each second cell may
+    contain the digits after the comma of the number in the cell before it.
     """
     remedy = "write numbers with a decimal point; separate columns by commas, semicolons or tabs"
     head = rows[0][1]

@@ -83,7 +83,7 @@ def test_columns_of_whole_numbers_need_names(tmp_path: Path) -> None:
         ("", "0,1\n", "1 points"),
         ("", "0,1\n1,x\n", "road.csv:2: 'x' is not a number"),
         ("", "0,1\n1\n", "road.csv:2: column 1 is empty"),
-        ("", "0,0;1,5\n0,5;2,5\n", "road.csv:1: '0,0' is not a number"),
+        ("", "0,0;1,5\n0,5;2,5\n", "road.csv:2: '0,5' is not a number"),
         ("columns = [0, 2]\n", "0,0;1,5\n0,5;2,5\n", "column 2 does not exist"),
         ("", "t\ta\n0,0\t1,5\n", "write a decimal point: 0.0"),
         (
