@@ -182,8 +182,9 @@ def _strip(axis: Axes, solution: Solution, window: Window) -> None:
     handles = [Patch(color=colours[name], label=style.literal(name)) for name in colours if name in seen]
     axis.legend(
         handles=handles,
-        loc="center left",
-        bbox_to_anchor=(1.005, 0.5),
+        loc="lower left",  # it grows upwards, away from the labels of the time axis
+        bbox_to_anchor=(1.005, 0.0),
+        borderaxespad=0.3,
         frameon=False,
         fontsize=9,
         handlelength=1.2,

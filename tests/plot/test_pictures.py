@@ -37,6 +37,23 @@ def test_time_history_draws_the_states_and_outputs() -> None:
     assert {text.get_text() for text in history.modes.get_legend().get_texts()} == {"slip+", "slip-", "stick"}
 
 
+@pytest.mark.parametrize("count", [3, 4, 7])
+def test_the_legend_of_modes_covers_no_label_of_the_time_axis(count: int) -> None:
+    """Also if it is higher than the strip, and the last label stands at the end of the axis."""
+    whole = oscillator(3)
+    names = [f"mode{k}" for k in range(count)]
+    times = np.linspace(whole.t[0], whole.t[-1], count + 1)
+    intervals = tuple(FakeInterval(n, a, b) for n, a, b in zip(names, times[:-1], times[1:], strict=True))
+    component = hs.Component("c", [hs.Mode(name) for name in names], initial=names[0])
+    model = replace(oscillator_model(), components=[component])
+    solution = replace(whole, model=model, modes={"c": intervals})
+    strip = time_history(solution, t_span=(0, times[-1])).modes
+    strip.set_xticks([times[-1]], ["a long label"])
+    strip.figure.draw_without_rendering()
+    (label,) = strip.get_xticklabels()
+    assert not strip.get_legend().get_window_extent().overlaps(label.get_window_extent())
+
+
 def test_outputs_are_drawn_beside_many_states() -> None:
     states = [hs.State(f"x{k}", float(k), "0") for k in range(6)]
     model = hs.Model("many", states, outputs=[hs.Output("total", "x0 + x5")])
