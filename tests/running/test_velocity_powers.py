@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import log, sqrt
 
 import pytest
 
 import hybridsim as hs
+from hybridsim.model.checks.doubtful import warnings_of
 
 LOCATING = ("auto", "exact", "taylor", "dop853", "tsit5", "rodas5p", "scipy-rk45", "scipy-lsoda", "cvode-bdf")
 
@@ -42,10 +44,27 @@ def test_a_law_is_refused_where_stick_is_decided_by_derivatives(integrator: str)
     with pytest.raises(hs.UsageError) as caught:
         hs.simulate(braked("c*v**1.5"), (0.0, 3.0), integrator=integrator)
     text = str(caught.value)
-    assert text.startswith("braked.toml:10: ") and "cannot run model 'braked': 'v**1.5'" in text
+    assert text.startswith("braked.toml:5: ") and "cannot run model 'braked': 'v**1.5'" in text
     assert (
         "zero velocity of contact f" in text and "(v**2 + b**2)**0.75 - b**1.5" in text and "moreau" in text
     )
+
+
+@pytest.mark.parametrize(
+    ("written", "remedy"),
+    [
+        ("sqrt(abs(v))", "replace the power by (v**2 + b**2)**0.25 - b**0.5 with a small speed b"),
+        ("v**p", "replace the power by (v**2 + b**2)**0.75 - b**1.5 with a small speed b"),
+    ],
+)
+def test_a_law_is_named_once_by_its_own_line_and_text(written: str, remedy: str) -> None:
+    """Both directions of slip contain the power, with the velocity of the contact inserted."""
+    model = braked(f"c*{written}")
+    contact = replace(model.contacts[0], velocity="v - 0.25*c", arguments={"c": 2})
+    changed = replace(model, contacts=[contact], parameters={"c": 0.5})
+    (caution,) = warnings_of(changed)
+    assert caution.message.startswith(f"'{written}' in slip of the law own has no Taylor series")
+    assert str(caution).startswith("braked.toml:5: ") and remedy in caution.remedy
 
 
 @pytest.mark.parametrize(

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from hybridsim.errors import Place
-from hybridsim.expr import Expression
+from hybridsim.expr import Expression, parse, substitute
 from hybridsim.expr.grammar import WHOLE_POWERS, is_name
+from hybridsim.expr.rebuild import with_names
 from hybridsim.expr.write import write
+from hybridsim.model.laws.law import SPEED
 from hybridsim.model.meanings import Family, Meanings
 from hybridsim.model.parts.component import Component
+from hybridsim.model.parts.contact import Contact
 from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.one_sided import names_of, number_of
 
@@ -26,6 +29,8 @@ class VelocityPower:
     ----------
     text, where : source text, and the rate or force that contains it.
     contact : contact whose velocity it depends on.
+    exponent : its exponent, if it is constant.
+    is_force : whether it occurs in the slip force of the contact.
     is_signed : the base changes its sign with the velocity without a condition, so the power is undefined in one slip
         mode.
     remedy : the same power, smoothed over a small speed.
@@ -34,6 +39,8 @@ class VelocityPower:
     text: str
     where: str
     contact: str
+    exponent: float | None
+    is_force: bool
     is_signed: bool
     remedy: str
     place: Place | None
@@ -59,7 +66,39 @@ def velocity_powers(model: Model) -> tuple[VelocityPower, ...]:
     if not found:
         return ()
     meanings, candidates = found
-    return tuple(_judged(candidates, meanings, model.parameter_values()))
+    powers = _judged(candidates, meanings, model.parameter_values())
+    contacts = {contact.name: contact for contact in model.contacts}
+    # both directions of slip have the same text in the law
+    return tuple(dict.fromkeys(_as_written(power, contacts[power.contact], meanings) for power in powers))
+
+
+def _as_written(power: VelocityPower, contact: Contact, meanings: Meanings) -> VelocityPower:
+    """Return a power of a slip force with the text and the place that it has in the law of the contact."""
+    law, speeds = contact.law, (contact.velocity, substitute(parse(f"-{SPEED}"), {SPEED: contact.velocity}))
+    values = {name: value.tree for name, value in contact.values().items()}
+    parts = {"slip": law.slip, "slip_backward": law.slip_backward} | {
+        f"definition {name}": expr for name, expr in law.definitions.items()
+    }
+    for title, expr in parts.items():
+        if expr is None or not power.is_force:
+            continue
+        for node in ast.walk(expr.tree):
+            if not isinstance(node, ast.Call | ast.BinOp):
+                continue
+            texts = {
+                write(meanings.written_out(with_names(node, values | {SPEED: speed.tree})))
+                for speed in speeds
+            }
+            if power.text in texts:
+                base = node.args[0] if isinstance(node, ast.Call) else node.left
+                return replace(
+                    power,
+                    text=write(node),
+                    where=f"{title} of the law {law.name}",
+                    remedy=_rounded(base, power.exponent, True),
+                    place=expr.place or law.place or power.place,
+                )
+    return power
 
 
 def _candidates(model: Model) -> tuple[Meanings, tuple[_Candidate, ...]] | None:
@@ -132,11 +171,11 @@ def _judged(
             if _vanishes(one.base, family, numbers, meanings):
                 is_signed = not (one.is_force or one.is_conditional or is_whole)
                 is_signed = is_signed and meanings.family(one.base)[0] == family
-                if is_whole:
-                    remedy = f"write the exponent as the number {power:g}"
-                else:
-                    remedy = _rounded(write(one.base), power, one.is_force)
-                yield VelocityPower(write(one.node), one.where, contact, is_signed, remedy, one.place)
+                remedy = _rounded(one.base, power, one.is_force)
+                text = write(one.node)
+                yield VelocityPower(
+                    text, one.where, contact, power, one.is_force, is_signed, remedy, one.place
+                )
                 break
 
 
@@ -167,12 +206,17 @@ def _vanishes(node: ast.expr, family: Family, numbers: Mapping[str, float], mean
     return all(below(part) or number_of(part, numbers, meanings.lookup) == 0.0 for part in parts)
 
 
-def _rounded(base: str, power: float | None, is_force: bool) -> str:
-    """Return the remedy: replace the power by a smooth function that contains a small speed b."""
-    if power is None or power < 0.0 or not is_name(base):
+def _rounded(base: ast.expr, power: float | None, is_force: bool) -> str:
+    """Return the remedy: a whole number as exponent, or a smooth function that contains a small speed b."""
+    if power is not None and power == round(power):
+        return f"write the exponent as the number {power:g}"
+    if is_force and isinstance(base, ast.Call) and write(base.func) == "abs":
+        base = base.args[0]  # the square in the smooth function makes it superfluous
+    name = write(base)
+    if power is None or power < 0.0 or not is_name(name):
         return (
             "use a smooth function with a small speed b, such as (v**2 + b**2)**0.75 - b**1.5 for abs(v)**1.5"
         )
     if is_force:
-        return f"replace the power by ({base}**2 + b**2)**{power / 2:g} - b**{power:g} with a small speed b"
-    return f"replace the power by {base}*({base}**2 + b**2)**{(power - 1) / 2:g} with a small speed b"
+        return f"replace the power by ({name}**2 + b**2)**{power / 2:g} - b**{power:g} with a small speed b"
+    return f"replace the power by {name}*({name}**2 + b**2)**{(power - 1) / 2:g} with a small speed b"
