@@ -215,3 +215,8 @@ def test_auto_takes_the_closed_form_for_linear_models_with_tables() -> None:
     sol = hs.simulate(model, (0, 2))
     assert "with exact, chosen because its modes are linear in the states" in sol.message
     assert sol(2.0) == pytest.approx([7 / 6, 1.5], rel=1e-14)
+    smooth = replace(
+        model, inputs=[hs.Input("F", "table", times=[0, 1], values=[0, 1], interpolation="cubic")]
+    )
+    text = hs.simulate(smooth, (0, 2)).message
+    assert "with dop853" in text and "exact was not chosen, because it reaches only about ten digits" in text

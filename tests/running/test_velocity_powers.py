@@ -99,7 +99,7 @@ def test_a_large_whole_exponent_under_a_name_is_to_be_written_out(base: str) -> 
 
 def test_a_default_of_a_law_is_a_number() -> None:
     model = braked("c*v**p")
-    with pytest.raises(hs.UsageError, match=r"'v\*\*1.5'"):
+    with pytest.raises(hs.UsageError, match=r"'v\*\*p' in slip of the law own.*\n.*b\*\*1.5"):
         hs.simulate(model, (0.0, 0.1), integrator="scipy-rk45")
 
 
