@@ -15,7 +15,6 @@ from hybridsim.engine.system.system import System
 from hybridsim.engine.system.user_functions.code import PythonCode
 from hybridsim.integrators.contract import Integrator
 from hybridsim.integrators.rosenbrock.step import linearise
-from hybridsim.model import Model
 
 _SMALL = 24  # largest number of states and guards with small tables of closed forms
 _TIGHT = 1e-10  # rtol below which series of high order are fastest
@@ -36,7 +35,7 @@ class Choice(NamedTuple):
 def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float], rtol: float) -> Choice:
     """Choose an integrator for a model with given initial values and tolerance.
 
-    The closed form is chosen for linear modes without monitors and cubic tables, a stiff method if stability would
+    The closed form is chosen for linear modes if it runs in compiled code, a stiff method if stability would
     limit the step of an explicit one, and an explicit method otherwise. Stiffness is detected at the start,
     from the eigenvalues of the Jacobian. Stiffness that begins later is detected during the run, see
     `successor_of`.
@@ -47,10 +46,10 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
     is_small = system.n + system.guard_count <= _SMALL and span[1] >= span[0]
     is_monitored, rest = bool(model.monitors or model.inputs), ""
     if is_small and what_is_not_linear(system) is None and is_linear_beside_corners(system):
-        obstacle = _weakness_of_exact(model)
-        if not obstacle:
+        if not is_monitored:
             return Choice("exact", "its modes are linear in the states")
-        rest = f" (exact was not chosen, because {obstacle})"
+        what = "monitors" if model.monitors else "inputs"
+        rest = f" (the model has {what}, with which exact may be slower: name integrator='exact' to try it)"
     steps = _steps_for_stability(system, x0, z0, span)
     in_python = is_monitored or system.has_corners or span[1] < span[0]
     if steps > _MANY or (steps > _MANY_IN_PYTHON and in_python and _is_apart(system, x0, z0, span[0])):
@@ -63,15 +62,6 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
     if rtol < _TIGHT:
         return Choice("taylor", f"its modes are smooth and the tolerance is tight{rest}")
     return Choice("dop853", f"its modes are smooth and not stiff at the start{rest}")
-
-
-def _weakness_of_exact(model: Model) -> str:
-    """Return why the closed form is not the best choice for a model with linear modes, or nothing."""
-    if model.monitors:
-        return "with monitors it computes Taylor series and not closed forms"
-    if any(signal.interpolation == "cubic" for signal in model.inputs):
-        return "it reaches only about ten digits with a cubic table"
-    return ""
 
 
 def _for_functions(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float]) -> Choice:
