@@ -167,6 +167,9 @@ def _by_blocks(
         ]
     else:
         blocks = [found(c) for c in clusters]
+    if not _condition(clusters, blocks) <= CONDITION:
+        clusters = _equal_combined(clusters, values)
+        blocks = [found(c) for c in clusters]
     while not _condition(clusters, blocks) <= CONDITION and not (len(clusters) == 1 and clusters[0].folded):
         clusters = _combined(clusters, values)
         blocks = [found(c) for c in clusters]
@@ -206,6 +209,24 @@ def _columns(clusters: list[_Cluster], blocks: list[_Block]) -> np.ndarray:
 def _condition(clusters: list[_Cluster], blocks: list[_Block]) -> float:
     basis = _columns(clusters, blocks)
     return float(np.linalg.cond(basis)) if basis.shape[0] == basis.shape[1] else np.inf
+
+
+def _equal_combined(clusters: list[_Cluster], values: np.ndarray) -> list[_Cluster]:
+    """Merge clusters of the same eigenvalue, pair by pair, because no Schur form separates them.
+
+    The polynomials of inputs have the eigenvalue 0 once for each coefficient.
+    """
+    while True:
+        first: dict[complex, int] = {}
+        for i, cluster in enumerate(clusters):
+            j = first.setdefault(complex(values[cluster.members[0]]), i)
+            if j < i:
+                break
+        else:
+            return clusters
+        a, b = cluster, clusters[j]
+        joined = _Cluster(a.members + b.members, a.folded or b.folded)
+        clusters = [*(c for k, c in enumerate(clusters) if k not in (i, j)), joined]
 
 
 def _combined(clusters: list[_Cluster], values: np.ndarray) -> list[_Cluster]:

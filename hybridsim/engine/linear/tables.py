@@ -24,7 +24,7 @@ from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
 
 _MAX_CACHED = 64  # most tables per structure, one for each set of parameter values
-_MAX_BYTES = 1 << 28  # most bytes of all these tables except the last
+_MAX_BYTES = 1 << 26  # most bytes of all these tables except the last
 
 
 _lock = SharedLock()

@@ -8,6 +8,7 @@ from typing import Any
 import mpmath
 import numpy as np
 import pytest
+import scipy.linalg
 from reference.random_models import matrix
 
 from hybridsim.engine.linear.modal import Modal, modal
@@ -219,3 +220,27 @@ def test_a_coupling_that_is_nothing_over_the_time_at_hand_is_not_blown_up(apart:
     A = np.array([[0.0, 1.0], [-apart, 0.0]])
     expected, _ = exponential(A, np.array([0.0, 1.0]), 1.0)
     assert by_blocks(modal(A, 1.0), np.array([0.0, 1.0]), 1.0) == pytest.approx(expected, rel=2e-14)
+
+
+def test_many_inputs_are_separated_by_few_factorisations(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The cubic pieces of 12 inputs push a mass on a spring: 48 coefficients with the eigenvalue 0, and one pair."""
+    A = np.zeros((50, 50))
+    A[0, 1], A[1, 0] = 1.0, -4.0
+    for first in range(2, 50, 4):
+        A[1, first] = 1.0
+        for place in range(first, first + 3):
+            A[place, place + 1] = 1.0
+    made: list[int] = []
+    schur = scipy.linalg.schur
+
+    def counted(matrix: np.ndarray, *arguments: Any, **options: Any) -> Any:
+        made.append(len(matrix))
+        return schur(matrix, *arguments, **options)
+
+    monkeypatch.setattr(scipy.linalg, "schur", counted)
+    form = modal(A)
+    assert len(made) <= 4
+    blocks = np.zeros(len(form.values), dtype=np.int64)
+    for place, end in enumerate(form.ends):
+        blocks[place] = end
+    assert sorted(np.unique(blocks, return_counts=True)[1].tolist()) == [1, 48]
