@@ -24,6 +24,7 @@ _OF_BINS = 0.5  # part of the size that the ranges may take; the first and last 
 _BASE64 = 4 / 3
 _TRIAL = 400  # steps that show how many samples a step needs
 _PARTS = 16  # of a step, for the ranges
+_FINE = 8000  # parts of a whole run, beyond which its steps are not divided
 _CHUNK = 20_000
 
 
@@ -48,8 +49,9 @@ def curves_of(solution: Solution, size: int) -> dict[str, Any]:
     steps, point = sampler.steps, _BASE64 * (8 + 4 * len(names))
     most = int(size / point)
     ranges = None
-    if 2 * 4 * (len(steps) - 1) <= most:
-        parts = [sampler.along(steps, most)]
+    divided = int(np.clip(_FINE // len(steps), 1, 4))  # parts of each step
+    if 2 * divided * len(steps) <= most:
+        parts = [sampler.along(steps, most, divided)]
         low, high = _extent([values for _, values in parts])
     else:
         bin_size = _BASE64 * 8 * len(names)

@@ -111,7 +111,7 @@ def planes(data: Mapping[str, Any]) -> str:
     heading = "Phase plot and friction loop" if len(pictures) > 1 else "Phase plot"
     return (
         f'<section aria-labelledby="h-planes"><h2 id="h-planes">{heading}</h2>\n'
-        '<p class="hint">The range of time is that of the curves above.</p>\n'
+        '<p class="hint">The range of time is that of the curves, without parts of which the page has no details.</p>\n'
         f'<div class="pair">{"".join(pictures)}</div></section>'
     )
 

@@ -215,7 +215,7 @@ const showCursor = () => {
   const range = `${timeText(view.a)} to ${timeText(view.b)}${unit}`;
   $("line").hidden = !isSeen();
   $("line").style.left = `${xOf(cursor, chart.clientWidth)}px`;
-  $("range").textContent = cursor === null ? range : `t = ${timeText(cursor)}${unit}, in ${range}`;
+  $("range").textContent = !isSeen() ? range : `t = ${timeText(cursor)}${unit}, in ${range}`;
   for (const row of rows) row.value.textContent = cursor === null ? "" : row.text(cursor);
   planes.forEach(plane => plane.point());
 };

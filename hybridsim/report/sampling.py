@@ -28,7 +28,8 @@ class Sampler:
         self._after, self._before = ("+", "-") if is_forward else ("-", "+")
         times = self._trajectory.own_times
         self.steps: Array = np.union1d(times, np.linspace(times.min(), times.max(), _LEAST_KNOTS))
-        self._events = self._trajectory.instants
+        # inputs may jump at the ends of segments, without an event
+        self._breaks = np.concatenate([self._trajectory.instants, *self._trajectory.frame[:2]])
         self._sizes = self._estimated_sizes()
 
     def values(self, times: Array, is_after: bool = True) -> Array:
@@ -53,7 +54,8 @@ class Sampler:
     ) -> tuple[Array, Array]:
         """Return times (k,) and values (n, k) between the first and last of some ascending knots.
 
-        The knots have to contain all events between them. At an event there are two entries, before and after it.
+        The knots have to contain all events and jumps of inputs between them. At each of these there are two entries,
+        before and after it.
         Each interval between knots is divided into equal parts, whose middles are sampled, too. Parts whose middles
         deviate from the straight line are halved, unless there would be more than about `most` samples.
         """
@@ -66,7 +68,7 @@ class Sampler:
         ends, at_ends = knots[1:], self.values(knots[1:], is_after=False)
         at_b = np.append(at_a[:, 1:], at_ends[:, -1:], axis=1)
         at_b[:, parts - 1 :: parts] = at_ends
-        is_break = np.isin(ends, self._events)
+        is_break = np.isin(ends, self._breaks)
         is_break[-1] = True
         times, values = [a, middle, ends[is_break]], [at_a, at_middle, at_ends[:, is_break]]
         ranks = np.repeat(

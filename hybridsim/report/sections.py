@@ -22,6 +22,7 @@ from hybridsim.solution import Solution
 from hybridsim.solution.event import counted_kind
 
 _LONGEST = 400_000  # characters of the text of a model; a longer one, with tables of data, is left out
+_DRAWN = 0.7  # size of the drawing, so that its text is legible on small screens
 _COSTS = {
     "steps": "steps",
     "rejected": "rejected steps",
@@ -71,8 +72,7 @@ def summary(solution: Solution) -> str:
     counted = ", ".join(counted_kind(kind, n) for kind, n in kinds.items() if kind != "corner")
     facts = {
         "Time": f"{solution.t_start:.9g} to {solution.t_end:.9g} {unit}".rstrip(),
-        "Integrator": solution.integrator
-        + (f", chosen because {solution.chosen_because}" if solution.chosen_because else ""),
+        "Integrator": solution.integrator,
         "Events": counted or ("none" if kinds or solution._run.save != "nothing" else "not stored"),
         "Cost": f"{stats['steps']} steps, {stats['rhs_evaluations']} evaluations, {stats['wall_time']:.3g} s",
         "Result": solution.message,
@@ -85,23 +85,32 @@ def drawing(solution: Solution) -> str:
     """Return the mechanism at the end of the run as SVG in the colours of the page, or nothing without a drawing."""
     if not solution.model.drawing or solution._run.save in ("events", "nothing") or len(solution.t) < 2:
         return ""
-    svg = re.sub(r"<metadata>.*?</metadata>", "", as_svg(mechanism(solution)), flags=re.DOTALL)
+    axes = mechanism(solution)
+    axes.set_title("", loc="left")
+    if legend := axes.get_legend():
+        legend.remove()
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    width, height = figure.get_size_inches().tolist()
+    figure.set_size_inches(_DRAWN * width, _DRAWN * height)
+    svg = re.sub(r"<metadata>.*?</metadata>", "", as_svg(figure), flags=re.DOTALL)
     svg = re.sub(r'(<svg[^>]*?) width="[^"]*" height="[^"]*"', r"\1", svg, count=1)
     for number, colour in enumerate(LIGHT.colours):
         svg = svg.replace(colour, f"var(--drawing-{number})")
-    label = f"The mechanism at t = {solution.t_end:.6g}"
-    svg = svg.replace("<svg ", f'<svg role="img" aria-label="{escape(label)}" ', 1)
-    return f'<section class="drawing" aria-labelledby="h-drawing"><h2 id="h-drawing">Mechanism</h2>\n{svg}</section>'
+    when = f"at t = {solution.t_end:.6g} {time_unit(solution.model)}".rstrip()
+    svg = svg.replace("<svg ", f'<svg role="img" aria-label="The mechanism {escape(when)}" ', 1)
+    heading = f'<h2 id="h-drawing">Mechanism {escape(when)}</h2>'
+    return f'<section class="drawing" aria-labelledby="h-drawing">{heading}\n{svg}</section>'
 
 
 def cost(solution: Solution) -> str:
     """Return the cost of a run as a table."""
+    stats = solution.stats
+    names = [*(name for name in _COSTS if name in stats), *(name for name in stats if name not in _COSTS)]
     rows = "\n".join(
         f'<tr><th scope="row">{escape(_COSTS.get(name, name.replace("_", " ")))}</th>'
-        f"<td>{value:.4g}</td></tr>"
-        if isinstance(value, float)
-        else f'<tr><th scope="row">{escape(_COSTS.get(name, name.replace("_", " ")))}</th><td>{value}</td></tr>'
-        for name, value in solution.stats.items()
+        f"<td>{format(stats[name], '.4g' if isinstance(stats[name], float) else 'd')}</td></tr>"
+        for name in names
     )
     return f'<section aria-labelledby="h-cost"><h2 id="h-cost">Cost</h2>\n<table class="cost">{rows}</table></section>'
 

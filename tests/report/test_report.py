@@ -114,7 +114,7 @@ def test_the_page_shows_what_the_run_is(page: ParsedPage, rubbing: hs.Solution) 
     for part in (rubbing.message, "27 transitions", "x' = v   from 0 m", f"hybridsim {hs.__version__}"):
         assert part in text
     svg = next(attributes for attributes, _ in page.all("svg"))
-    assert svg["role"] == "img" and svg["aria-label"] == "The mechanism at t = 0.1"
+    assert svg["role"] == "img" and svg["aria-label"] == "The mechanism at t = 0.1 s"
     assert [a["data-name"] for _, a, _ in page.elements if a.get("class") == "curve"] == [
         "x",
         "v",
@@ -156,6 +156,16 @@ def test_the_curves_are_the_run_on_both_sides_of_each_event(tmp_path: Path) -> N
     for i, name in enumerate(sol.names):
         exact = np.where(is_first, sol(t, side="-")[i], sol(t)[i])
         assert np.array_equal(values[name], exact.astype("f4"))
+
+
+def test_a_jump_of_an_input_is_upright(tmp_path: Path) -> None:
+    """A table that holds each value jumps from 0 to 2 at t = 1, where nothing else happens."""
+    table = hs.Input("u", "table", times=[0, 1], values=[0, 2], interpolation="previous")
+    model = hs.Model("m", states=[hs.State("x", 0, "u")], inputs=[table], outputs={"y": "u"})
+    curves = page_of(hs.simulate(model, (0, 2)), tmp_path).data["curves"]
+    y = [quantity["name"] for quantity in curves["quantities"]].index("y")
+    t, values = (unpacked(packed) for packed in (curves["parts"][0]["t"], curves["parts"][0]["values"][y]))
+    assert values.tolist() == [0.0] * int((t < 1).sum() + 1) + [2.0] * int((t > 1).sum() + 1)
 
 
 def test_lines_between_the_samples_are_the_curve(tmp_path: Path) -> None:
