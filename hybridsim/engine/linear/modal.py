@@ -212,10 +212,7 @@ def _condition(clusters: list[_Cluster], blocks: list[_Block]) -> float:
 
 
 def _equal_combined(clusters: list[_Cluster], values: np.ndarray) -> list[_Cluster]:
-    """Merge clusters of the same eigenvalue, pair by pair, because no Schur form separates them.
-
-    The polynomials of inputs have the eigenvalue 0 once for each coefficient.
-    """
+    """Merge clusters of the same eigenvalue, such as 0 for inputs: no Schur form separates them."""
     while True:
         first: dict[complex, int] = {}
         for i, cluster in enumerate(clusters):
@@ -224,8 +221,7 @@ def _equal_combined(clusters: list[_Cluster], values: np.ndarray) -> list[_Clust
                 break
         else:
             return clusters
-        a, b = cluster, clusters[j]
-        joined = _Cluster(a.members + b.members, a.folded or b.folded)
+        joined = _Cluster(cluster.members + clusters[j].members, cluster.folded or clusters[j].folded)
         clusters = [*(c for k, c in enumerate(clusters) if k not in (i, j)), joined]
 
 
