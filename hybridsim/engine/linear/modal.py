@@ -212,7 +212,7 @@ def _condition(clusters: list[_Cluster], blocks: list[_Block]) -> float:
 
 
 def _equal_combined(clusters: list[_Cluster], values: np.ndarray) -> list[_Cluster]:
-    """Merge clusters of the same eigenvalue, such as 0 for inputs: no Schur form separates them."""
+    """Merge clusters of the same eigenvalue, which no Schur form separates."""
     while True:
         first: dict[complex, int] = {}
         for i, cluster in enumerate(clusters):

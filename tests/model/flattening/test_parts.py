@@ -260,7 +260,7 @@ def test_an_error_of_a_value_names_the_copy(folder: Path) -> None:
         ("[use.a]\nmodel = 'spring.toml'\nrepeat = 3\nconnect.u = 'a[k].x'", "'k' cannot be used in an index", 4),
         ("[use.a]\nmodel = 'spring.toml'\nconnect.u = 'a[1].x'", "there is no repeated part 'a'", 3),
         ("[use.a]\nmodel = 'spring.toml'\nrepeat = 2\nconnect.u = 'a[1]'", "'a[1]' is a part and has no value", 4),
-        ("[use.a]\nmodel = 'spring.toml'\nrepeat = 2\nconnect.u = 'a.b[1].x'", "an index can follow only the name of a part", 4),
+        ("[use.a]\nmodel = 'spring.toml'\nrepeat = 2\nconnect.u = 'a.b[1].x'", "can follow only the name of a part", 4),
         ("[use.a]\nmodel = 'spring.toml'\nconnect.u = '(1).real'", "access to attributes", 3),
         ("[use.a]\nmodel = 'spring.toml'\nconnect.u = 't.__class__'", "reserved word 't'", 3),
         ("[use.a]\nmodel = 'spring.toml'\nconnect.u = 'a.__class__'", "is not allowed", 3),
