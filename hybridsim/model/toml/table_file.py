@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -13,7 +14,7 @@ MAX_BYTES = 64_000_000
 
 
 def read_columns(path: Path, columns: Sequence[str | int]) -> tuple[tuple[float, ...], ...]:
-    """Return two columns of a CSV file as numbers.
+    """Return two columns of a CSV file as numbers: times, which may not decrease, and values.
 
     The separator is a comma, a semicolon or a tab. Numbers have a decimal point; a decimal comma is an error. Empty
     lines and lines that start with # are skipped. The first line contains names if a column is selected by name, or if
@@ -26,8 +27,8 @@ def read_columns(path: Path, columns: Sequence[str | int]) -> tuple[tuple[float,
     Raises
     ------
     ModelError
-        For a missing file or column, a cell that is not a number, or commas that may be decimal ones, with file and
-        line.
+        For a missing file or column, a cell that is not a finite number, times that decrease, or commas that may be
+        decimal ones, with file and line.
     """
     rows = _rows(path)
     head = [cell.strip() for cell in rows[0][1]] if rows else []
@@ -37,10 +38,14 @@ def read_columns(path: Path, columns: Sequence[str | int]) -> tuple[tuple[float,
         raise ModelError("the table has no rows of numbers", place=Place(str(path)), remedy=remedy)
     _refuse_decimal_commas(rows, names, path)
     indices = [_index(column, names, len(head), path) for column in columns]
-    found: list[tuple[float, ...]] = []
-    for index in indices:
-        found.append(tuple(_cell(row, index, line, path) for line, row in rows[1 if names else 0 :]))
-    return tuple(found)
+    body = rows[1 if names else 0 :]
+    found = tuple(tuple(_cell(row, index, line, path) for line, row in body) for index in indices)
+    times = found[0]
+    for (line, _), before, after in zip(body[1:], times, times[1:], strict=True):
+        if after < before:
+            what = f"the times decrease from {before!r} to {after!r}"
+            raise ModelError(what, place=Place(str(path), line), remedy="sort the table by time")
+    return found
 
 
 def _are_names(head: list[str], columns: Sequence[str | int]) -> bool:
@@ -149,6 +154,10 @@ def _cell(row: list[str], index: int, line: int, path: Path) -> float:
         if _is_number(text.replace(",", ".")):
             remedy = f"write a decimal point: {text.replace(',', '.')}"
         raise ModelError(what, place=Place(str(path), line), remedy=remedy)
+    if not math.isfinite(float(text)):
+        raise ModelError(
+            f"'{text}' is not a finite number", place=Place(str(path), line), remedy="remove the row"
+        )
     return float(text)
 
 
@@ -157,4 +166,4 @@ def _is_number(text: str) -> bool:
         float(text)
     except ValueError:
         return False
-    return True
+    return "_" not in text  # Python reads 1_0 as 10
