@@ -66,7 +66,7 @@ def test_keywords_that_are_the_same() -> None:
 
 @pytest.mark.parametrize("keyword", ["params", "z0", "first_step"])
 def test_what_a_mechanical_system_does_not_take(keyword: str) -> None:
-    with pytest.raises(hs.UsageError, match=f"a MechanicalSystem does not support {keyword}\n"):
+    with pytest.raises(hs.UsageError, match=f"a MechanicalSystem does not support `{keyword}`\n"):
         hs.simulate(hs.two_blocks_on_belt(), (0, 0.01), **{keyword: {}})
 
 

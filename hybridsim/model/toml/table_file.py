@@ -41,7 +41,7 @@ def read_columns(path: Path, columns: Sequence[str | int]) -> tuple[tuple[float,
     body = rows[1 if names else 0 :]
     found = tuple(tuple(_cell(row, index, line, path) for line, row in body) for index in indices)
     times = found[0]
-    for (line, _), before, after in zip(body[1:], times, times[1:], strict=True):
+    for (line, _), before, after in zip(body[1:], times[:-1], times[1:], strict=True):
         if after < before:
             what = f"the times decrease from {before!r} to {after!r}"
             raise ModelError(what, place=Place(str(path), line), remedy="sort the table by time")
