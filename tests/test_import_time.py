@@ -33,3 +33,10 @@ def test_light_commands_are_light(argv: list[str]) -> None:
 
 def test_loading_a_model_is_light() -> None:
     assert loaded_after("import hybridsim as hs\nhs.load('dfcs').parameter_values()") == []
+
+
+def test_the_picture_of_a_run_loads_no_analysis() -> None:
+    """Comparisons, sweeps and steady states are a hundred modules, which the warm command would wait for."""
+    code = "import sys, hybridsim.plot\nprint(*[m for m in sys.modules if m.startswith('hybridsim.analysis')])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []

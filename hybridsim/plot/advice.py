@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.patches import Patch
 
-from hybridsim.analysis import Advice
-from hybridsim.analysis.advise.ladder import NOT_ADEQUATE, Step, duration
 from hybridsim.errors import UsageError
 from hybridsim.plot import style
 from hybridsim.plot.sweep_readings import label_parameter, positions
+
+if TYPE_CHECKING:
+    from hybridsim.analysis import Advice
+    from hybridsim.analysis.advise.ladder import Step
 
 # Range of the error axis: at least _NEAR and at most _FAR times the tolerance on both sides, with a margin
 # factor.
@@ -46,6 +49,8 @@ def advice(found: Advice, axes: Axes | None = None) -> Axes:
 
 
 def _ladder(found: Advice, axes: Axes) -> None:
+    from hybridsim.analysis.advise.ladder import NOT_ADEQUATE, duration
+
     steps = [step for step in found.ladder if step.name != "full model"]
     low, high = _window([step.error for step in steps if step.value is not None], found.tol)
     axes.set_xscale("log")

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from matplotlib.axes import Axes
 
-from hybridsim.analysis import Branch
 from hybridsim.model.checks.units import label_of, units_of
 from hybridsim.plot import style
 from hybridsim.plot.scale import label_axis
+
+if TYPE_CHECKING:
+    from hybridsim.analysis import Branch
 
 _MARKERS = {"fold": "o", "branch point": "P", "period doubling": "s", "torus": "D", "sequence": "|"}
 _TITLES = {"sequence": "sequence of modes changes"}

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
 from matplotlib.colors import to_hex, to_rgb
 from matplotlib.lines import Line2D
 
-from hybridsim.analysis.compare.rows import Row
 from hybridsim.plot import style
+
+if TYPE_CHECKING:
+    from hybridsim.analysis.compare.rows import Row
 
 SIZE = 6.5
 PALE = 0.35

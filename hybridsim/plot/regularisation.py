@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from matplotlib.axes import Axes
 from matplotlib.ticker import EngFormatter, LogLocator, NullFormatter
 
-from hybridsim.analysis import Comparison
-from hybridsim.analysis.compare.regularised import exponent_text, exponents
-from hybridsim.analysis.compare.rows import Row
 from hybridsim.plot import style
 from hybridsim.plot.lines import draw_line, looks
 from hybridsim.plot.work_precision import handles, headline, verdict_of
+
+if TYPE_CHECKING:
+    from hybridsim.analysis import Comparison
+    from hybridsim.analysis.compare.rows import Row
 
 
 def regularisation(comparison: Comparison) -> tuple[Axes, Axes]:
@@ -18,6 +21,8 @@ def regularisation(comparison: Comparison) -> tuple[Axes, Axes]:
 
     The legend gives the exponents of error and work (evaluations) as v0 falls. Horizontal lines are the set-valued law.
     """
+    from hybridsim.analysis.compare.regularised import exponent_text, exponents
+
     figure = style.figure(12.5, 5.0)
     style.put_title(figure, headline(comparison), size=10)
     errors, times = figure.subplots(1, 2)
@@ -63,4 +68,5 @@ def _error(row: Row) -> float:
 
 
 def _time(row: Row) -> float:
+
     return row.cost.wall_time if row.cost else 0.0

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
 
-from hybridsim.analysis import SuiteComparison
 from hybridsim.plot import style
 from hybridsim.plot.lines import looks
 from hybridsim.plot.work_precision import draw_panel, handles
+
+if TYPE_CHECKING:
+    from hybridsim.analysis import SuiteComparison
 
 _COLUMNS = 3
 _MARKER = 4.5

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 
-from hybridsim.analysis import Sweep
 from hybridsim.arguments import known_name
 from hybridsim.errors import UsageError
 from hybridsim.plot import style
@@ -22,6 +23,9 @@ from hybridsim.plot.sweep_readings import (
     setting,
     title_of,
 )
+
+if TYPE_CHECKING:
+    from hybridsim.analysis import Sweep
 
 _MARKED_POINTS = 30  # points of a line up to which each is marked
 _DOT = 5.0  # size of the items of an array, for the first line

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
-from hybridsim.analysis import Sweep
 from hybridsim.errors import UsageError
 from hybridsim.plot import style
 from hybridsim.plot.scale import label_axis
@@ -23,6 +23,9 @@ from hybridsim.plot.sweep_readings import (
     range_of,
     title_of,
 )
+
+if TYPE_CHECKING:
+    from hybridsim.analysis import Sweep
 
 _COLUMNS = 3
 _WIDTH, _HEIGHT, _MORE = 4.6, 3.4, 0.5  # inches of a map with its colour bar, and of the title

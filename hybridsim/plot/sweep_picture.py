@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from matplotlib.axes import Axes
 
-from hybridsim.analysis import Sweep
 from hybridsim.plot.sweep_lines import sweep_lines
 from hybridsim.plot.sweep_map import sweep_map
+
+if TYPE_CHECKING:
+    from hybridsim.analysis import Sweep
 
 
 def sweep(result: Sweep, *names: str, over: str | None = None) -> tuple[Axes, ...]:

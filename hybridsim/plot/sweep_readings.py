@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axis import Axis
 
-from hybridsim.analysis import Sweep
 from hybridsim.errors import UsageError
 from hybridsim.plot.scale import label_axis
 from hybridsim.plot.style import literal
+
+if TYPE_CHECKING:
+    from hybridsim.analysis import Sweep
 
 _MAX_PANELS = 6  # panels that fit on a page
 _RATHER = (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -11,11 +12,13 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import EngFormatter, FixedLocator, LogLocator, NullFormatter
 
-from hybridsim.analysis import Comparison
-from hybridsim.analysis.compare.rows import QUANTITIES, Row
 from hybridsim.errors import UsageError
 from hybridsim.plot import style
 from hybridsim.plot.lines import PALE, SIZE, Look, draw_line, looks
+
+if TYPE_CHECKING:
+    from hybridsim.analysis import Comparison
+    from hybridsim.analysis.compare.rows import Row
 
 _MOST_TICKS = 5  # across a panel
 _TITLES = {
@@ -146,6 +149,8 @@ def handles(
     rows: Iterable[Row], comparisons: Sequence[Comparison], chosen: dict[str, Look], size: float = SIZE
 ) -> list[Artist]:
     """Return the legend entries of the lines, and of the hollow, half filled and grey marks that occur."""
+    from hybridsim.analysis.compare.rows import QUANTITIES
+
     rows = list(rows)
     found: list[Artist] = []
     for label, look in chosen.items():
