@@ -37,6 +37,8 @@ def test_loading_a_model_is_light() -> None:
 
 def test_the_picture_of_a_run_loads_no_analysis() -> None:
     """Comparisons, sweeps and steady states are a hundred modules, which the warm command would wait for."""
-    code = "import sys, hybridsim.plot\nprint(*[m for m in sys.modules if m.startswith('hybridsim.analysis')])"
+    code = (
+        "import sys, hybridsim.plot\nprint(*[m for m in sys.modules if m.startswith('hybridsim.analysis')])"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
