@@ -29,11 +29,15 @@ _HISTORIES = """<section aria-labelledby="h-curves" id="histories">
 </div>
 <p class="hint" id="note" hidden>This range has more steps than the page can hold. The curves show the least and
 the largest value in short intervals. The first and the last part of the run have all details.</p>
-<p class="hint" id="keys">Drag across the curves to zoom in, and double-click to see the whole run. With the keyboard:
-left and right arrows move, up and down arrows zoom, Home shows the whole run, and Shift with left or right moves the
+{columns}<p class="hint" id="keys">Drag across the curves to zoom in, and double-click to see the whole run.
+With the keyboard: left and right arrows move, up and down arrows zoom, Home shows the whole run, and Shift with left or right moves the
 cursor.</p>
 <p class="hidden" id="spoken" aria-live="polite"></p>
 </section>"""
+
+_COLUMNS = """<p class="hint">The run has more intervals of modes than the page can hold. Each strip of modes has 4096 columns
+of equal time, and a column shows the modes that occur in it in equal parts.</p>
+"""
 
 _EVENTS = """<section aria-labelledby="h-events" id="events">
 <h2 id="h-events">Events</h2>
@@ -77,8 +81,9 @@ def histories(data: Mapping[str, Any]) -> str:
         f'<label><input type="checkbox"{" checked" if q["shown"] else ""}> {escape(label_of(q))}</label>'
         for q in quantities
     )
+    columns = "" if all(component["is_exact"] for component in data["modes"]) else _COLUMNS
     choice = f'<details><summary>Choose quantities</summary><div id="boxes">{boxes}</div></details>'
-    return _HISTORIES.format(choice=choice if boxes else "", rows="\n".join(rows))
+    return _HISTORIES.format(choice=choice if boxes else "", rows="\n".join(rows), columns=columns)
 
 
 def _strip(k: int, component: Mapping[str, Any]) -> str:

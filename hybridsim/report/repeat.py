@@ -61,7 +61,7 @@ class Settings:
         return True
 
     def _start_values(self) -> dict[str, float]:
-        """Return the start values of the run that the named model does not have."""
+        """Return the start values of the run that differ from those of the named model."""
         model = load(self.name) if self.is_packaged else self._solution.model
         if self.is_packaged and self.params:
             model = model.with_(**self.params)

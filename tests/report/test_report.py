@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-import hybridsim.report
+import hybridsim.report.events
 from report.parsed_page import ParsedPage, unpacked
 
 FOLDER = Path(hybridsim.report.__file__).parent
@@ -210,6 +210,17 @@ def test_a_run_with_very_many_events_fits(tmp_path: Path) -> None:
     assert len(low) >= 2048 and np.allclose(low, 0, atol=1e-6) and np.allclose(high, 1, atol=1e-6)
     first, last = (unpacked(part["t"]) for part in data["curves"]["parts"])
     assert first[0] == 0 and last[-1] == 100_002 and len(first) > 1000 < len(last)
+
+
+def test_a_page_with_columns_of_modes_says_so(
+    rubbing: hs.Solution, page: ParsedPage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Modes of more intervals than a page holds are shown in columns, which look like intervals when zoomed in."""
+    monkeypatch.setattr(hybridsim.report.events, "MOST_INTERVALS", 3)
+    short = page_of(rubbing, tmp_path)
+    assert not short.data["modes"][0]["is_exact"] and page.data["modes"][0]["is_exact"]
+    said = [any("4096 columns" in text for _, text in one.all("p")) for one in (short, page)]
+    assert said == [True, False]
 
 
 # -- other runs -------------------------------------------------------------------------------------------------

@@ -63,7 +63,7 @@ class Example:
 
 
 def example(result: Atlas, scene: Scene) -> Example | None:
-    """Return the example of a scene, or None without a correct method or without a visible difference."""
+    """Return the example of a scene, or None if no method is correct or no difference is visible."""
     by_name = {one.name: one for one in result.configurations}
     trusted = [
         by_name[name]
