@@ -30,13 +30,13 @@ _HISTORIES = """<section aria-labelledby="h-curves" id="histories">
 <p class="hint" id="note" hidden>This range has more steps than the page can hold. The curves show the least and
 the largest value in short intervals. The first and the last part of the run have all details.</p>
 {columns}<p class="hint" id="keys">Drag across the curves to zoom in, and double-click to see the whole run.
-With the keyboard: left and right arrows move, up and down arrows zoom, Home shows the whole run, and Shift with left or right moves the
-cursor.</p>
+With the keyboard: left and right arrows move, up and down arrows zoom, Home shows the whole run, and Shift with left
+or right moves the cursor.</p>
 <p class="hidden" id="spoken" aria-live="polite"></p>
 </section>"""
 
-_COLUMNS = """<p class="hint">The run has more intervals of modes than the page can hold. Each strip of modes has 4096 columns
-of equal time, and a column shows the modes that occur in it in equal parts.</p>
+_COLUMNS = """<p class="hint">The run has more intervals of modes than the page can hold. Each strip of modes
+has 4096 columns of equal time, and a column shows the modes that occur in it in equal parts.</p>
 """
 
 _EVENTS = """<section aria-labelledby="h-events" id="events">
