@@ -20,7 +20,6 @@ from hybridsim.analysis.steady.motion import (
     GrowsWithoutBound,
     Motion,
     Point,
-    point_at_end,
 )
 from hybridsim.analysis.steady.result import SteadyState
 from hybridsim.analysis.steady.scales import rounding_of
@@ -30,9 +29,9 @@ from hybridsim.analysis.steady.settling import (
     died_out,
     forced_passings,
     free_passings,
-    relative,
 )
 from hybridsim.analysis.steady.shooting import Orbit, followed_closely, shoot
+from hybridsim.analysis.steady.shortest_period import with_shortest_period
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.analysis.variations.sizes import ranges
 from hybridsim.arguments import cannot_be
@@ -333,7 +332,9 @@ class _Search:
         return Orbit(passings.last, period, multiple, passings.residual(multiple))
 
     def _periodic(self, orbit: Orbit) -> SteadyState:
-        orbit = self._shortest(orbit)
+        steps = orbit.steps
+        orbit = with_shortest_period(self.motion, orbit, self.scale, self.period is not None, self.tol)
+        self.newton_steps += orbit.steps - steps
         if self._rests(orbit):
             message = f"equilibrium: all motion is rounding; residual {orbit.residual:.1e}"
             return _found(
@@ -355,18 +356,6 @@ class _Search:
         low, high = ranges(solution)
         rounding = rounding_of(self.motion.coupled_sizes(orbit.start), self.motion.rtol)
         return bool((high - low <= rounding).all())
-
-    def _shortest(self, orbit: Orbit) -> Orbit:
-        """Return the orbit with its shortest period, if the found period is a multiple of it."""
-        for divisor in range(1, orbit.multiple):
-            if orbit.multiple % divisor:
-                continue
-            period = orbit.period * divisor / orbit.multiple
-            end = point_at_end(self.motion.run(orbit.start, period))
-            change = relative(end.values - orbit.start.values, self.scale)
-            if end.z == orbit.start.z and change <= max(self.tol, 10.0 * orbit.residual):
-                return replace(orbit, period=period, multiple=divisor, residual=change)
-        return orbit
 
     def _other(self, passings: Passings) -> SteadyState:
         """Classify a motion that does not repeat by its largest Lyapunov exponent."""
