@@ -150,11 +150,11 @@ class Input(Declared):
             raise self._fault(
                 f"`file` and {what} cannot be combined", "use `file` for an input of kind 'table'"
             )
-        columns = (0, 1) if self.columns is None else self.columns
-        pair = columns if isinstance(columns, list | tuple) else ()
-        if len(pair) != 2 or not all(isinstance(c, str | int) and not isinstance(c, bool) for c in pair):
-            raise self._fault(f"`columns` cannot be {columns!r}", "use two names or indices, [time, value]")
-        times, values = read_columns(Path(path_text(self.file)), pair)
+        pair: object = self.columns
+        is_pair = isinstance(pair, list | tuple) and len(pair) == 2
+        if pair is not None and not (is_pair and all(type(c) in (str, int) for c in self.columns or ())):
+            raise self._fault(f"`columns` cannot be {pair!r}", "use two names or indices, [time, value]")
+        times, values = read_columns(Path(path_text(self.file)), self.columns)
         for name, entry in {"times": times, "values": values, "file": None, "columns": None}.items():
             object.__setattr__(self, name, entry)
 

@@ -53,9 +53,9 @@ def _from_file(table: Table, folder: Path) -> dict[str, tuple[float, ...]]:
     for key in _NUMBERS:
         if key in table.data:
             table.fail(f"'file' and '{key}' cannot be combined", f"remove 'file' or '{key}'", key)
-    columns = table.data.get("columns", [0, 1])
-    good = isinstance(columns, list) and len(columns) == 2
-    if not good or not all(isinstance(column, (str, int)) for column in columns):
+    columns = table.data.get("columns")
+    is_pair = isinstance(columns, list) and len(columns) == 2
+    if columns is not None and not (is_pair and all(isinstance(column, (str, int)) for column in columns)):
         table.fail(f"'columns' cannot be {columns!r}", "use two names or indices, [time, value]", "columns")
         return {}
     path = folder / table.text("file")

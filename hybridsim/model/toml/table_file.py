@@ -13,7 +13,7 @@ from hybridsim.errors import ModelError, Place, nearest
 MAX_BYTES = 64_000_000
 
 
-def read_columns(path: Path, columns: Sequence[str | int]) -> tuple[tuple[float, ...], ...]:
+def read_columns(path: Path, columns: Sequence[str | int] | None) -> tuple[tuple[float, ...], ...]:
     """Return two columns of a CSV file as numbers: times, which may not decrease, and values.
 
     The separator is a comma, a semicolon or a tab. Numbers have a decimal point; a decimal comma is an error. Empty
@@ -22,7 +22,7 @@ def read_columns(path: Path, columns: Sequence[str | int]) -> tuple[tuple[float,
 
     Parameters
     ----------
-    columns : name, or index from 0, of each selected column.
+    columns : name, or index from 0, of each selected column; None for a file with two columns of numbers.
 
     Raises
     ------
@@ -32,13 +32,22 @@ def read_columns(path: Path, columns: Sequence[str | int]) -> tuple[tuple[float,
     """
     rows = _rows(path)
     head = [cell.strip() for cell in rows[0][1]] if rows else []
+    has_choice, columns = columns is not None, columns or (0, 1)
     names = head if _are_names(head, columns) else None
     if len(rows) < (2 if names else 1):
         remedy = "write time and value in each row"
         raise ModelError("the table has no rows of numbers", place=Place(str(path)), remedy=remedy)
     _refuse_decimal_commas(rows, names, path)
-    indices = [_index(column, names, len(head), path) for column in columns]
     body = rows[1 if names else 0 :]
+    numeric = [k for k, cell in enumerate(body[0][1]) if _is_number(cell.strip())]
+    if not has_choice and len(numeric) > 2:
+        which = ", ".join(names[k] if names and k < len(names) else str(k) for k in numeric)
+        raise ModelError(
+            f"the table has {len(numeric)} columns of numbers: {which}",
+            place=Place(str(path), body[0][0]),
+            remedy="choose the times and the values with `columns`",
+        )
+    indices = [_index(column, names, len(head), path) for column in columns]
     found = tuple(tuple(_cell(row, index, line, path) for line, row in body) for index in indices)
     times = found[0]
     for (line, _), before, after in zip(body[1:], times[:-1], times[1:], strict=True):

@@ -68,7 +68,7 @@ def test_the_first_row_is_data_whatever_stands_in_other_columns(
 
 def test_columns_of_whole_numbers_need_names(tmp_path: Path) -> None:
     """Without names the four columns are refused, since they may be two columns with decimal commas."""
-    model = load(tmp_path, TABLE, "t,u,n,m\n0,0,1,5\n1,3,2,5\n")
+    model = load(tmp_path, TABLE + 'columns = ["t", "u"]', "t,u,n,m\n0,0,1,5\n1,3,2,5\n")
     assert (model.inputs[0].times, model.inputs[0].values) == ((0.0, 1.0), (0.0, 3.0))
 
 
@@ -98,6 +98,12 @@ def test_columns_of_whole_numbers_need_names(tmp_path: Path) -> None:
             "road.csv:1: the row '0,0,1,5' has 4 whole numbers, or 2 with decimal commas",
         ),
         ("", "0\n1\n", "column 1 does not exist"),
+        (
+            "",
+            "time,temp,force\n0,20,0\n1,20,5\n",
+            "road.csv:2: the table has 3 columns of numbers: time, temp, force",
+        ),
+        ("", "# a comment\n0;20;0.5\n1;20;5\n", "road.csv:2: the table has 3 columns of numbers: 0, 1, 2"),
         ("", "0,1\n1,nan\n", "road.csv:2: 'nan' is not a finite number"),
         ("", "0,1\n# a comment\n1e400,1\n", "road.csv:3: '1e400' is not a finite number"),
         ("", "0,1\n1_0,1\n", "road.csv:2: '1_0' is not a number"),
