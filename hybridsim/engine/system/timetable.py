@@ -48,15 +48,21 @@ class Timetable:
             self._schedules.append((times, start, period, count))
 
     def mark_done(self, done: Instant | Appointment) -> None:
-        """Mark an instant as done, so that times within rounding of it are not due again."""
-        self.settled = done if isinstance(done, Instant) else done.first or done.instant
+        """Mark an instant as done, so that times within rounding of it are not due again.
+
+        An instant within rounding of the last one changes nothing, because times were merged with the last one.
+        """
+        if isinstance(done, Appointment):
+            self.settled = done.first or done.instant
+        elif not self._is_settled(done):
+            self.settled = done
 
     def due_at_start(self, start: Instant) -> tuple[int, ...]:
         """Return the schedules that are due at the start of the run, such as a clock with zero offset."""
         return tuple(
             k
             for k in range(len(self._schedules))
-            if (first := self._first(k)) is not None and abs(first.minus(start)) <= self._slack(start)
+            if (first := self._first(k)) is not None and self._are_equal(first, start)
             for _ in range(self._count(k, start))
         )
 
@@ -78,16 +84,13 @@ class Timetable:
         if not found:
             return self.step_end
         nearest = min(found, key=lambda f: abs(f[0].minus(after)))[0]
-        slack = self._slack(nearest)
-        together = [k for time, k in found if abs(time.minus(nearest)) <= slack]
-        latest = max(
-            (t for t, _ in found if abs(t.minus(nearest)) <= slack), key=lambda t: abs(t.minus(after))
-        )
-        if abs(self._end.minus(nearest)) <= slack:
+        merged = [(time, k) for time, k in found if self._are_equal(time, nearest)]
+        latest = max((time for time, _ in merged), key=lambda t: abs(t.minus(after)))
+        if self._are_equal(self._end, nearest):
             latest = self._end
         elif (self._end.minus(nearest) < 0.0) == forward:
             return self.step_end
-        due = sorted(k for k in together if k >= 0)
+        due = sorted(k for _, k in merged if k >= 0)
         return Appointment(
             latest, tuple(k for k in due for _ in range(self._count(k, nearest))), first=nearest
         )
@@ -113,12 +116,12 @@ class Timetable:
 
     def _count(self, k: int, instant: Instant) -> int:
         """Return how many open times of a schedule equal an instant within rounding; 1 for a clock."""
-        times, slack = self._schedules[k][0], self._slack(instant)
+        times, wide = self._schedules[k][0], 2.0 * self._slack(instant)
         if not times:
             return 1
-        first, last = bisect_left(times, instant.plus(-slack)), bisect_right(times, instant.plus(slack))
+        first, last = bisect_left(times, instant.plus(-wide)), bisect_right(times, instant.plus(wide))
         return sum(
-            abs(time.minus(instant)) <= slack and not self._is_settled(time) for time in times[first:last]
+            self._are_equal(time, instant) and not self._is_settled(time) for time in times[first:last]
         )
 
     def _slack(self, near: Instant) -> float:
@@ -148,5 +151,8 @@ class Timetable:
 
     def _is_settled(self, instant: Instant) -> bool:
         """Return whether an instant is within rounding of the last completed scheduled time."""
-        settled = self.settled
-        return settled is not None and abs(instant.minus(settled)) <= self._slack(settled)
+        return self.settled is not None and self._are_equal(instant, self.settled)
+
+    def _are_equal(self, one: Instant, other: Instant) -> bool:
+        """Return whether two instants are equal within rounding, by the larger one of their rounding errors."""
+        return abs(one.minus(other)) <= max(self._slack(one), self._slack(other))

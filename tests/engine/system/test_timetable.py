@@ -8,7 +8,7 @@ from fractions import Fraction
 from types import SimpleNamespace
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 import hybridsim as hs
@@ -193,6 +193,33 @@ def test_a_run_counts_times_that_are_two_roundings_apart(
     options = {"step": 0.25} if integrator == "rk4-dichotomy" else {}
     sol = hs.simulate(model, (start, start + 2.0), integrator=integrator, **options)
     assert sol.output("n", start + 2.0) == 3 and sol.output("m", start + 2.0) == len(others)
+
+
+@settings(max_examples=60)
+@given(
+    st.sampled_from([(0.0, 1.0), (-3.0, -2.0), (1e6, 1e6 + 1.0), (0.5, 1.0)]),
+    st.lists(st.integers(0, 10), min_size=1, max_size=5),
+    st.lists(st.integers(-3, 12), max_size=4, unique=True),
+)
+@example((-3.0, -2.0), [2], [0])
+@example((0.0, 1.0), [2, 4], [0, 1])
+def test_a_run_in_steps_counts_each_time_once(
+    span: tuple[float, float], row: list[int], stops: list[int]
+) -> None:
+    """The steps end beside the times, in front of a power of two, and behind it."""
+    start, middle = span
+    ulp = math.ulp(middle)
+    model = Model(
+        "row",
+        states=(State("x", 0, "1"),),
+        discrete=(Discrete("n", 0),),
+        schedules=(Schedule("s", times=[middle + k * ulp for k in row], reset={"n": "+= 1"}),),
+    )
+    sim = hs.Simulator(model, integrator="exact")
+    sim.start(start)
+    for stop in [*(middle + k * ulp for k in sorted(stops)), middle + 1.0]:
+        sim.advance(stop)
+    assert sim.output("n") == len(row)
 
 
 def test_the_knot_of_an_input_joins_a_tick() -> None:
