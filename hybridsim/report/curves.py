@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from hybridsim.model import Model
 from hybridsim.model.checks.units import units_of
 from hybridsim.plot.scale import scaled_unit
-from hybridsim.report.embedded import array
+from hybridsim.report.embedded import array, numbers
 from hybridsim.report.sampling import Sampler
 from hybridsim.solution import Solution
 from hybridsim.solution.run_trajectory import relative_velocity
@@ -57,7 +57,7 @@ def curves_of(solution: Solution, size: int) -> dict[str, Any]:
         bin_size = _BASE64 * 8 * len(names)
         bins = int(np.clip(_OF_BINS * size / bin_size, _LEAST_BINS, _MOST_BINS))
         lows, highs = ranges_in(sampler, bins)
-        ranges = {"low": [array(row, "f4") for row in lows], "high": [array(row, "f4") for row in highs]}
+        ranges = {"low": [numbers(row) for row in lows], "high": [numbers(row) for row in highs]}
         low, high = _extent([lows, highs])
         share = max(int((size - bins * bin_size) / point / 2), 64)
         usual = [
@@ -68,7 +68,7 @@ def curves_of(solution: Solution, size: int) -> dict[str, Any]:
     return {
         "quantities": _described(solution, names, low, high),
         "ranges": ranges,
-        "parts": [{"t": array(t, "f8"), "values": [array(row, "f4") for row in values]} for t, values in parts],
+        "parts": [{"t": array(t, "f8"), "values": [numbers(row) for row in values]} for t, values in parts],
     }  # fmt: skip
 
 

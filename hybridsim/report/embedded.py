@@ -18,6 +18,15 @@ def array(values: Any, kind: str) -> dict[str, str]:
     return {"kind": kind, "bytes": b64encode(data.tobytes()).decode("ascii")}
 
 
+def numbers(values: Any) -> dict[str, str]:
+    """Return an array of numbers in single precision, or in double precision if that does not hold their size."""
+    data = np.asarray(values, dtype=float)
+    sizes = np.abs(data[np.isfinite(data) & (data != 0.0)])
+    limits = np.finfo(np.float32)
+    is_single = not sizes.size or (sizes.min() >= limits.tiny and sizes.max() <= limits.max)
+    return array(data, "f4" if is_single else "f8")
+
+
 def indices(values: Any) -> dict[str, str]:
     """Return an array of indices in the smallest unsigned type."""
     found = np.asarray(values, dtype=np.int64)

@@ -8,7 +8,7 @@ import numpy as np
 
 from hybridsim.errors import UsageError
 from hybridsim.presentation.colours import INK, mode_colours
-from hybridsim.report.embedded import array, indices
+from hybridsim.report.embedded import array, indices, numbers
 from hybridsim.solution import Event, Solution
 
 MOST_EVENTS = 120_000  # a report has the first and the last half of more events than this
@@ -63,7 +63,7 @@ def _states(solution: Solution, events: list[Event]) -> list[dict[str, Any]] | N
     if (len(before) + jumps.sum()) * len(events) * 16 / 3 > _STATES_SIZE:
         return None
     return [
-        {"before": array(x, "f4"), "after": array(y, "f4") if jumps[i] else None}
+        {"before": numbers(x), "after": numbers(y) if jumps[i] else None}
         for i, (x, y) in enumerate(zip(before, after, strict=True))
     ]
 

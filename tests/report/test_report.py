@@ -223,6 +223,22 @@ def test_a_page_with_columns_of_modes_says_so(
     assert said == [True, False]
 
 
+def test_states_beyond_single_precision_are_stored(tmp_path: Path) -> None:
+    """x = 1e39 (1 + t) is doubled at t = 0.5, and y = 1e-60 is constant."""
+    model = hs.Model(
+        "large",
+        states=[hs.State("x", 1e39, "1e39"), hs.State("y", 1e-60, "0")],
+        schedules=[hs.Schedule("s", times=[0.5], reset={"x": "2*x"})],
+    )
+    data = page_of(hs.simulate(model, (0, 1)), tmp_path).data
+    (part,) = data["curves"]["parts"]
+    assert (
+        unpacked(part["values"][0])[-1] == pytest.approx(3.5e39) and unpacked(part["values"][1])[0] == 1e-60
+    )
+    x = data["events"]["states"][0]
+    assert (unpacked(x["before"])[0], unpacked(x["after"])[0]) == pytest.approx((1.5e39, 3e39))
+
+
 # -- other runs -------------------------------------------------------------------------------------------------
 
 

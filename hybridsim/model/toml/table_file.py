@@ -61,7 +61,8 @@ def _are_names(head: list[str], columns: Sequence[str | int]) -> bool:
     """Return whether the first line contains column names."""
     if any(isinstance(column, str) for column in columns):
         return not all(map(_is_number, head))
-    return not any(0 <= column < len(head) and _is_number(head[column]) for column in map(int, columns))
+    cells = (head[column] for column in map(int, columns) if 0 <= column < len(head))
+    return not any(_is_number(cell.replace(",", "").replace("_", "")) for cell in cells)  # 0,5 is no name
 
 
 def _refuse_decimal_commas(rows: list[tuple[int, list[str]]], names: list[str] | None, path: Path) -> None:

@@ -180,7 +180,7 @@ class _Reader:
     def _number(self) -> Fraction:
         sign = -1 if self._take("-") else 1
         kind, text = self._tokens[self._at] if self._at < len(self._tokens) else ("", "")
-        if kind != "number" or float(text) > MAX_POWER:
-            raise _NotAUnit(text)
+        if kind != "number" or "e" in text.lower() or float(text) > MAX_POWER:
+            raise _NotAUnit(text)  # 1e-99999999 would take minutes as a fraction
         self._at += 1
         return sign * Fraction(text).limit_denominator(1000)

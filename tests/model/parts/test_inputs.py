@@ -83,7 +83,7 @@ def test_columns_of_whole_numbers_need_names(tmp_path: Path) -> None:
         ("", "0,1\n", "1 points"),
         ("", "0,1\n1,x\n", "road.csv:2: 'x' is not a number"),
         ("", "0,1\n1\n", "road.csv:2: column 1 is empty"),
-        ("", "0,0;1,5\n0,5;2,5\n", "road.csv:2: '0,5' is not a number"),
+        ("", "0,0;1,5\n0,5;2,5\n", "road.csv:1: '0,0' is not a number"),
         ("columns = [0, 2]\n", "0,0;1,5\n0,5;2,5\n", "column 2 does not exist"),
         ("", "t\ta\n0,0\t1,5\n", "write a decimal point: 0.0"),
         (
@@ -107,6 +107,9 @@ def test_columns_of_whole_numbers_need_names(tmp_path: Path) -> None:
         ("", "0,1\n1,nan\n", "road.csv:2: 'nan' is not a finite number"),
         ("", "0,1\n# a comment\n1e400,1\n", "road.csv:3: '1e400' is not a finite number"),
         ("", "0,1\n1_0,1\n", "road.csv:2: '1_0' is not a number"),
+        ("", "0,5;1,5\n1;2\n2;3\n", "road.csv:1: '0,5' is not a number"),
+        ("", "1_0;2_0\n11;2\n12;3\n", "road.csv:1: '1_0' is not a number"),
+        ("", "0,0,1,25E-3\n0,5,1,50E-3\n", "road.csv:1: the table has 4 columns of numbers"),
         ("", "0,1\n\n2,1\n1,1\n", "road.csv:4: the times decrease from 2.0 to 1.0"),
         ("", "0,1\n1,1\n1,2\n1,3\n", "occurs more than once"),
         ('interpolation = "cubic"', "0,1\n1,1\n1,2\n", "occurs more than once"),

@@ -91,6 +91,7 @@ def test_a_text_is_a_unit(text: str, expected: Unit) -> None:
         "0 m",
         "widgets",
         "m^1e999999999",
+        "m^1e-99999999",
         "(" * 5000 + "m" + ")" * 5000,
         "1e999 m",
     ],
