@@ -84,13 +84,13 @@ class Timetable:
         if not found:
             return self.step_end
         nearest = min(found, key=lambda f: abs(f[0].minus(after)))[0]
-        merged = [(time, k) for time, k in found if self._are_equal(time, nearest)]
-        latest = max((time for time, _ in merged), key=lambda t: abs(t.minus(after)))
+        together = [(time, k) for time, k in found if self._are_equal(time, nearest)]
+        latest = max((time for time, _ in together), key=lambda t: abs(t.minus(after)))
         if self._are_equal(self._end, nearest):
             latest = self._end
         elif (self._end.minus(nearest) < 0.0) == forward:
             return self.step_end
-        due = sorted(k for _, k in merged if k >= 0)
+        due = sorted(k for _, k in together if k >= 0)
         return Appointment(
             latest, tuple(k for k in due for _ in range(self._count(k, nearest))), first=nearest
         )
