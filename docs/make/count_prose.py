@@ -43,7 +43,7 @@ PHRASES = {
 }
 # A full stop after these does not end a sentence.
 ABBREVIATION = re.compile(r"\b(e\.g|i\.e|et al|Fig|Eq|vs|cf|No|pp?)\.$")
-END = re.compile(r"[.!?][)\"'*”]*(?=\s+[(\"'“*]*[A-Z0-9])")
+END = re.compile(r"[.!?][)\"'*”]*(?=\s+[(\"'“*]*([A-Z0-9]|hybridsim\b))")
 
 
 @dataclass
