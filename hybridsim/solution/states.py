@@ -112,6 +112,17 @@ class States:
         values = self._trajectory.values(name, *self._within(as_times(requested), side))
         return values[0] if np.ndim(requested) == 0 else values
 
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Return a quantity by name at the times t, (m,), as `output` does; ``sol["t"]`` are the times.
+
+        An unknown name raises `UsageError`, with similar names.
+        """
+        return self.t if name == "t" else self.output(name)
+
+    def __contains__(self, name: object) -> bool:
+        """Return whether ``sol[name]`` exists."""
+        return name == "t" or name in self.names or name in self.quantities
+
     def _outside(self, times: np.ndarray) -> np.ndarray | None:
         """Return a mask of the times that are NaN or outside the stored run, or None if there are none."""
         low, high = self.t_start, self.t_end
