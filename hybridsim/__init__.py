@@ -90,6 +90,9 @@ _HOME = {
 # Former names of `Solution`, which give a warning.
 _FORMER = dict.fromkeys(("MechanicalSolution", "SteppedSolution"), "hybridsim.mechanics.deprecated")
 
+# Packages that are used by their name, as in `hs.plot.save(...)`; each loads its libraries when it is first used.
+_PACKAGES = ("plot",)
+
 __all__ = ["__version__", *_HOME]
 
 
@@ -110,6 +113,8 @@ def __getattr__(name: str) -> Any:
         what = f"hybridsim.{name} is deprecated; version 0.2 removes it. Use hybridsim.Solution"
         warn(what, DeprecationWarning, stacklevel=2)
         return getattr(import_module(_FORMER[name]), name)
+    if name in _PACKAGES:
+        return import_module(f"hybridsim.{name}")
     if name not in _HOME:
         raise AttributeError(f"module 'hybridsim' has no attribute {name!r}")
     value = globals()[name] = getattr(import_module(_HOME[name]), name)
@@ -117,7 +122,7 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted(__all__)
+    return sorted([*__all__, *_PACKAGES])
 
 
 sys.modules[__name__].__class__ = _Package

@@ -1,5 +1,6 @@
 """What type checkers see of the package: the same names, imported at once."""
 
+from hybridsim import plot as plot
 from hybridsim.analysis import Advice as Advice
 from hybridsim.analysis import Branch as Branch
 from hybridsim.analysis import Comparison as Comparison

@@ -28,7 +28,7 @@ LIBRARIES = {
     "llvmlite": {"engine.native"},
     "sksundae": {"integrators"},
     "scipy": {"engine.system", "engine.linear", "integrators", "mechanics", "analysis", "testing", "studies"},
-    "pandas": {"presentation", "solution"},
+    "pandas": {"presentation", "solution", "analysis"},
     "xarray": {"presentation", "solution", "analysis"},
     "numpy": set(FLOORS)
     - {"errors", "files", "calls", "forks", "expr", "model", "engine.lowering", "simulate", "cli"},

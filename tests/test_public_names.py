@@ -26,7 +26,7 @@ def test_the_stub_lists_the_same_names() -> None:
         if isinstance(node, ast.ImportFrom)
         for alias in node.names
     }
-    assert listed == hybridsim._HOME | hybridsim._FORMER
+    assert listed == hybridsim._HOME | hybridsim._FORMER | dict.fromkeys(hybridsim._PACKAGES, "hybridsim")
 
 
 def test_a_function_is_not_hidden_by_the_module_of_its_name() -> None:
@@ -41,7 +41,7 @@ def test_unknown_name() -> None:
 
 def test_completion_offers_public_names_only() -> None:
     """`dir` of the package and of a model, which shells and notebooks complete from."""
-    assert dir(hybridsim) == sorted(hybridsim.__all__)
+    assert dir(hybridsim) == sorted([*hybridsim.__all__, "plot"])
     offered = {name for name in dir(hybridsim.load("dfcs")) if not name.startswith("_")}
     assert {"states", "with_", "regularized", "to_toml", "validate"} <= offered
     assert not offered & {"once", "structure", "place", "components_of", "with_values_of", "error"}

@@ -4,6 +4,8 @@ from hybridsim.plot.advice import advice
 from hybridsim.plot.branch import branch
 from hybridsim.plot.drawing.animation import animate
 from hybridsim.plot.drawing.mechanism import mechanism
+from hybridsim.plot.eigenvalues import eigenvalues
+from hybridsim.plot.event_slopes import event_slopes
 from hybridsim.plot.friction_law import friction_law
 from hybridsim.plot.friction_loop import friction_loop
 from hybridsim.plot.phase_portrait import phase_portrait
@@ -21,6 +23,8 @@ __all__ = [
     "advice",
     "animate",
     "branch",
+    "eigenvalues",
+    "event_slopes",
     "friction_law",
     "friction_loop",
     "mechanism",

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import bisect
-from collections.abc import Callable, Mapping, Sequence
+import itertools
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +14,7 @@ from numpy.typing import NDArray
 
 from hybridsim.engine.system.period import forcing_period
 from hybridsim.errors import UsageError, nearest
-from hybridsim.mechanics.declaration.system import MechanicalSystem
+from hybridsim.mechanics.declaration.system import Harmonic, MechanicalSystem
 from hybridsim.model.checks.units import units_of
 from hybridsim.solution import Solution
 
@@ -21,6 +23,7 @@ from hybridsim.solution import Solution
 _POINTS, _LEAST = 6_000, 9
 # If there are more periods than a picture can resolve, only the last few are drawn, without the transient.
 _MAX_PERIODS, _LAST_PERIODS = 24, 4
+CUTS = ("transition", "monitor", "scheduled")  # kinds of events at which a curve may jump or bend
 _MAX_EVENTS, _LAST_EVENTS = 300, 24  # the same for events of a motion without a period
 # A number of periods that differs from a whole one by this fraction is whole, because an end such as 100T is
 # rounded.
@@ -45,17 +48,22 @@ class Window:
     note: str = ""
 
 
-def refuse_arrays(solution: Any) -> None:
-    """Raise an error for objects that are not solutions, and for solutions of a `MechanicalSystem`."""
+def require_run(solution: Any) -> None:
+    """Raise an error for objects that are not solutions."""
     if not hasattr(solution, "model"):
         raise UsageError(
             f"{type(solution).__name__} {getattr(solution, 'name', '')}".rstrip() + " cannot be drawn",
             remedy="use the result of a run: hs.simulate(model, (t0, t1))",
         )
+
+
+def refuse_arrays(solution: Any) -> None:
+    """Raise an error for objects that are not solutions, and for solutions of a `MechanicalSystem`."""
+    require_run(solution)
     if isinstance(solution.model, MechanicalSystem):
         raise UsageError(
             f"{type(solution).__name__} of {solution.model.name} cannot be drawn by this function",
-            remedy="simulate system.to_model() and draw that, or draw columns of sol.to_pandas() with its plot()",
+            remedy="draw its time history with sol.plot(), or simulate system.to_model() and draw that",
         )
 
 
@@ -70,7 +78,7 @@ def window_of(solution: Solution, t_span: tuple[float, float] | None) -> Window:
                 remedy=f"the run covers t = {start:g} to {end:g}",
             )
         return Window(max(t0, start), min(t1, end))
-    period = forcing_period(solution.model)
+    period = _period(solution.model)
     if period is None:
         return _last_events(solution, start, end)
     if end - start <= _MAX_PERIODS * period:
@@ -82,9 +90,26 @@ def window_of(solution: Solution, t_span: tuple[float, float] | None) -> Window:
     )
 
 
+def _period(model: Any) -> float | None:
+    """Return the period of the forcing, or None if there is no single one."""
+    if not isinstance(model, MechanicalSystem):
+        return forcing_period(model)
+    signals = [*itertools.chain(*model.forcing.values()), *(contact.base for contact in model.contacts)]
+    rates = {abs(signal.omega) for signal in signals if isinstance(signal, Harmonic) and signal.omega}
+    return 2.0 * math.pi / rates.pop() if len(rates) == 1 else None
+
+
+def event_times(solution: Solution, kinds: Collection[str]) -> NDArray[np.float64]:
+    """Return the times of the events of given kinds; those of a `MechanicalSystem` are read as arrays."""
+    if isinstance(solution.model, MechanicalSystem):
+        parts = solution.modes if "transition" in kinds else ()
+        return np.concatenate([[], *(solution.event_times(part) for part in parts)])
+    return np.array([event.t for event in solution.events if event.kind in kinds])
+
+
 def _last_events(solution: Solution, start: float, end: float) -> Window:
     """Return the whole run, or its last events if very many events are spread over it."""
-    times = np.array([event.t for event in solution.events if event.kind == "transition"])
+    times = event_times(solution, ["transition"])
     if len(times) <= _MAX_EVENTS:
         return Window(start, end)
     first = end - (end - start) * _LAST_EVENTS / len(times)
@@ -100,9 +125,16 @@ def _short(periods: float) -> str:
     return f"{whole}" if abs(periods - whole) < _WHOLE * periods else f"{periods:.1f}"
 
 
+def known_units(solution: Solution) -> dict[str, str]:
+    """Return the units of states and other quantities by name; a `MechanicalSystem` declares none."""
+    if isinstance(solution.model, MechanicalSystem):
+        return dict.fromkeys(solution.names, "")
+    return units_of(solution.model)
+
+
 def unit_of(solution: Solution, name: str) -> str:
     """Return the unit of a quantity, or an empty text if none is declared."""
-    units = units_of(solution.model)
+    units = known_units(solution)
     if name not in units:
         try:
             solution.output(name, solution.t_start)
@@ -122,7 +154,8 @@ def extent(smooth_parts: Sequence[SmoothPart], name: str) -> tuple[float, float]
 
 def smooth_parts_of(solution: Solution, names: Sequence[str], window: Window) -> list[SmoothPart]:
     """Return the smooth parts of a window in order of time, split at the events."""
-    inner = {e.t for e in solution.events if e.kind != "near-grazing" and window.t0 < e.t < window.t1}
+    times = event_times(solution, CUTS)
+    inner = set(times[(times > window.t0) & (times < window.t1)].tolist())
     cuts = np.array([window.t0, *sorted(inner), window.t1])
     lengths = np.diff(cuts)
     counts = np.maximum(_LEAST, np.ceil(_POINTS * lengths / lengths.sum())).astype(int)
@@ -144,7 +177,7 @@ def smooth_parts_of(solution: Solution, names: Sequence[str], window: Window) ->
 
 
 def _evaluate(solution: Solution, name: str, t: NDArray[np.float64], side: str) -> NDArray[np.float64]:
-    for i, state in enumerate(solution.model.states):
+    for i, state in enumerate(getattr(solution.model, "states", ())):
         if state.name == name:
             return np.asarray(solution(t, side=side)[i])
     return np.asarray(solution.output(name, t, side=side))

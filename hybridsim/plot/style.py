@@ -16,6 +16,7 @@ from hybridsim.errors import UsageError
 from hybridsim.files import whole_file
 from hybridsim.presentation.colours import INK as INK
 from hybridsim.presentation.colours import PALETTE as PALETTE
+from hybridsim.presentation.colours import colours_of as colours_of
 from hybridsim.presentation.colours import mode_colours as mode_colours
 
 GREY = "#9a9a9a"
@@ -79,6 +80,13 @@ def save(picture: Any, path: str | Path, dpi: float = _DPI) -> Path:
     with whole_file(path) as partly:
         Path(partly).write_bytes(drawn.getvalue())
     return path
+
+
+def as_png(picture: Any) -> bytes:
+    """Return a picture as the bytes of a PNG file, for notebooks."""
+    drawn = BytesIO()
+    _figure_of(picture).savefig(drawn, dpi=_DPI, format="png")
+    return drawn.getvalue()
 
 
 def as_svg(picture: Any) -> str:

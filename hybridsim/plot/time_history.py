@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,23 +12,27 @@ from matplotlib.collections import PolyCollection
 from matplotlib.patches import Patch
 
 from hybridsim.errors import UsageError
-from hybridsim.model import Model
-from hybridsim.model.checks.units import time_unit, units_of
+from hybridsim.mechanics.declaration.system import MechanicalSystem
+from hybridsim.model.checks.units import time_unit
 from hybridsim.plot import style
 from hybridsim.plot.scale import label_axis
 from hybridsim.plot.smooth_parts import (
+    CUTS,
     SmoothPart,
     Window,
+    event_times,
     extent,
-    refuse_arrays,
+    known_units,
+    require_run,
     smooth_parts_of,
     unit_of,
     window_of,
 )
 from hybridsim.presentation.mode_strip import bars_of
-from hybridsim.solution import Event, Solution
+from hybridsim.solution import Solution
 
 _MOST_QUANTITIES = 4  # the default number of quantities, and of outputs
+_MOST_COMPONENTS = 16  # rows of the strip of modes
 _MOST_MARKS = 150  # event lines; more would merge into a grey area
 _VISIBLE = 1e-3  # of the range: a smaller jump is invisible
 _HAIRLINE = 1.2  # points: the least width of a mode in a strip
@@ -42,6 +45,10 @@ class TimeHistoryAxes:
 
     quantities: tuple[Axes, ...]
     modes: Axes | None
+
+    def _repr_png_(self) -> bytes:
+        """Return the picture, which a notebook shows at the end of a cell."""
+        return style.as_png(self)
 
     def __iter__(self) -> Iterator[Axes]:
         yield from self.quantities
@@ -58,7 +65,8 @@ def time_history(
 ) -> TimeHistoryAxes:
     """Draw quantities over time, one below the other, and the modes of all components under them.
 
-    A jump (of a state at a reset, of an output at a change of mode) is dashed; thin lines mark the events.
+    A jump (of a state at a reset, of an output at a change of mode) is dashed; thin lines mark the events. Of more
+    than 16 components, as in a large `MechanicalSystem`, the strip shows the modes of the first 16.
 
     Parameters
     ----------
@@ -66,35 +74,45 @@ def time_history(
     t_span : part of the run; by default all, or the last few of very many periods (the title says so).
     axes : one per quantity, and one more if the model has components; by default a new figure.
     """
-    refuse_arrays(solution)
+    require_run(solution)
     model = solution.model
-    names = _unasked(model) if quantities is None else list(quantities)
+    names = _unasked(solution) if quantities is None else list(quantities)
     units = [unit_of(solution, name) for name in names]
     window = window_of(solution, t_span)
     smooth_parts = smooth_parts_of(solution, names, window)
-    history = _axes(len(names), len(solution.modes), axes)
-    events = [e for e in solution.events if window.t0 <= e.t <= window.t1 and e.kind != "near-grazing"]
+    components = list(solution.modes)[:_MOST_COMPONENTS]
+    history = _axes(len(names), len(components), axes)
+    marks = _marks_in(solution, window)
     for axis, name, unit in zip(history.quantities, names, units):
         _draw(axis, smooth_parts, name)
-        _mark(axis, events)
+        _mark(axis, marks)
         style.dress(axis)
         label_axis(axis.yaxis, name, unit, *extent(smooth_parts, name))
         axis.set_xlim(window.t0, window.t1)
     if history.modes is not None:
-        _strip(history.modes, solution, window)
+        _strip(history.modes, solution, components, window)
     *upper, lowest = history
     for axis in upper:
         axis.tick_params(labelbottom=False)
-    label_axis(lowest.xaxis, "t", time_unit(model), window.t0, window.t1)
-    style.head([*upper, lowest][0], model.title or model.name, window.note)
+    second = "" if isinstance(model, MechanicalSystem) else time_unit(model)
+    label_axis(lowest.xaxis, "t", second, window.t0, window.t1)
+    hidden = len(solution.modes) - len(components)
+    note = f"the modes of {hidden} other components are not shown" if hidden else ""
+    style.head([*upper, lowest][0], model.title or model.name, window.note, note)
     return history
 
 
-def _unasked(model: Model) -> list[str]:
+def _unasked(solution: Solution) -> list[str]:
     """Return the quantities that are drawn by default: the first declared states, and the outputs."""
-    names = list(units_of(model))[:_MOST_QUANTITIES]
-    outputs = [output.name for output in model.outputs][:_MOST_QUANTITIES]
+    names = list(known_units(solution))[:_MOST_QUANTITIES]
+    outputs = [output.name for output in getattr(solution.model, "outputs", ())][:_MOST_QUANTITIES]
     return list(dict.fromkeys([*names, *outputs]))
+
+
+def _marks_in(solution: Solution, window: Window) -> dict[str, np.ndarray]:
+    """Return the times of the events in a window by kind; a near-grazing changes nothing and is left out."""
+    found = {kind: event_times(solution, [kind]) for kind in CUTS}
+    return {kind: times[(window.t0 <= times) & (times <= window.t1)] for kind, times in found.items()}
 
 
 def _axes(quantities: int, components: int, axes: Sequence[Axes] | None) -> TimeHistoryAxes:
@@ -132,14 +150,14 @@ def _draw(axis: Axes, smooth_parts: Sequence[SmoothPart], name: str) -> None:
         axis.plot(jump_t, jump_y, color=style.INK, linewidth=0.8, linestyle=(0, (3, 2)))
 
 
-def _mark(axis: Axes, events: Sequence[Event]) -> None:
+def _mark(axis: Axes, marks: Mapping[str, np.ndarray]) -> None:
     """Draw a thin line at each event, unless there are too many, and a triangle at the top for monitors."""
-    kinds = Counter(event.kind for event in events)
-    for event in events:
-        if kinds[event.kind] <= _MOST_MARKS:
-            axis.axvline(event.t, color=style.MARK, linewidth=0.6, zorder=0.9)
-    monitors = [event.t for event in events if event.kind == "monitor"]
-    if monitors and len(monitors) <= _MOST_MARKS:
+    for times in marks.values():
+        if len(times) <= _MOST_MARKS:
+            for t in times.tolist():
+                axis.axvline(t, color=style.MARK, linewidth=0.6, zorder=0.9)
+    monitors = marks["monitor"].tolist()
+    if 0 < len(monitors) <= _MOST_MARKS:
         at_top = axis.get_xaxis_transform()
         axis.plot(
             monitors,
@@ -152,10 +170,13 @@ def _mark(axis: Axes, events: Sequence[Event]) -> None:
         )
 
 
-def _strip(axis: Axes, solution: Solution, window: Window) -> None:
+def _strip(axis: Axes, solution: Solution, components: Sequence[str], window: Window) -> None:
     """Draw one row per component with its modes as colours; the legend names the modes that occur."""
-    colours = style.mode_colours(solution.components)
-    components = list(solution.modes)
+    if isinstance(solution.model, MechanicalSystem):
+        intervals = itertools.chain.from_iterable(solution.modes[name] for name in components)
+        colours = style.colours_of(dict.fromkeys(interval.mode for interval in intervals), set())
+    else:
+        colours = style.mode_colours(solution.components)
     seen: set[str] = set()
     is_shared = False
     columns = _columns(axis)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 
 from hybridsim.model.parts.component import Component
 
@@ -19,7 +19,12 @@ _RESERVED = {
 def mode_colours(components: Collection[Component]) -> dict[str, str]:
     """Return a colour for each mode: by its name, black if it holds a surface, or from the rest of the palette."""
     held = {component.surface.hold for component in components if component.surface}
-    names = dict.fromkeys(mode.name for component in components for mode in component.modes)
+    return colours_of(dict.fromkeys(mode.name for component in components for mode in component.modes), held)
+
+
+def colours_of(names: Iterable[str], held: Collection[str]) -> dict[str, str]:
+    """Return a colour for each name of a mode; `held` are the names of modes that hold a surface."""
+    names = list(names)
     colours = {name: _RESERVED.get(name, INK) for name in names if name in _RESERVED or name in held}
     free = [colour for colour in PALETTE if colour not in colours.values()] or PALETTE
     others = [name for name in names if name not in colours]

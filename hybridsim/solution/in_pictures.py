@@ -1,4 +1,4 @@
-"""This module animates a run and writes its report, as a part of `Solution`."""
+"""This module draws and animates a run and writes its report, as a part of `Solution`."""
 
 from __future__ import annotations
 
@@ -6,13 +6,44 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from hybridsim.calls import refusing
 from hybridsim.solution.files.in_tables import InTables
 
 
 class InPictures(InTables):
-    """The animation and the report of a run, as a part of `Solution`."""
+    """The picture, the animation and the report of a run, as a part of `Solution`."""
+
+    @refusing
+    def plot(self, *quantities: str, t_span: tuple[float, float] | None = None) -> Any:
+        """Draw quantities over time, and the modes under them; see `hybridsim.plot.time_history`.
+
+        Parameters
+        ----------
+        *quantities : names of states, outputs, forces and inputs; by default the first four states, and the first four
+            outputs.
+        t_span : part of the run; by default all, or the last few of very many periods.
+
+        Returns
+        -------
+        TimeHistoryAxes
+            The axes. A notebook shows them, and ``hs.plot.save(sol.plot(), "run.png")`` writes them to a file.
+
+        Raises
+        ------
+        UsageError
+            For an unknown quantity, a part outside the run, or a run without states between its start and end.
+
+        Examples
+        --------
+        >>> import hybridsim as hs
+        >>> picture = hs.simulate("dfcs", (0, 0.1)).plot("x", "f")
+        >>> [axes.get_ylabel() for axes in picture.quantities]
+        ['x [µm]', 'f [N]']
+        """
+        # The plot package is a layer above this one, so it is imported only on demand.
+        return import_module("hybridsim.plot").time_history(self, quantities or None, t_span=t_span)
 
     @refusing
     def animate(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -75,6 +76,14 @@ class Comparison(Readable):
     warnings: tuple[str, ...] = ()
     second_reference: str = ""
     difference: Errors | None = None
+
+    def plot(self) -> Any:
+        """Draw error against cost, one panel for each kind of error; see `hybridsim.plot.work_precision`.
+
+        It returns the axes; ``hybridsim.plot.save`` writes them to a file.
+        """
+        # The plot package is a layer above this one, so it is imported only on demand.
+        return import_module("hybridsim.plot").work_precision(self)
 
     def __repr__(self) -> str:
         return self.table()

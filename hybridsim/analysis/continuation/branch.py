@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from importlib import import_module
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -112,6 +114,15 @@ class Branch(Readable):
     def amplitude(self, name: str) -> np.ndarray:
         """Return (max - min)/2 of a quantity on each orbit (K,)."""
         return np.array([p.steady.amplitude[name] for p in self.points])
+
+    def plot(self, name: str | None = None) -> Any:
+        """Draw the amplitude of a quantity, by default of the first state, over the parameter.
+
+        Unstable orbits are dashed, and bifurcations are marked; see `hybridsim.plot.branch`. It returns the axes;
+        ``hybridsim.plot.save`` writes them to a file. An unknown name raises `UsageError`.
+        """
+        # The plot package is a layer above this one, so it is imported only on demand.
+        return import_module("hybridsim.plot").branch(self, name)
 
     def __repr__(self) -> str:
         values = self.parameter

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from importlib import import_module
 from os import PathLike
 from typing import Any
 
@@ -55,6 +56,14 @@ class Linearization(Readable):
     x: np.ndarray
     is_equilibrium: bool
     admissible: bool
+
+    def plot(self) -> Any:
+        """Draw the eigenvalues in the complex plane, in rad per unit of t; see `hybridsim.plot.eigenvalues`.
+
+        It returns the axes; ``hybridsim.plot.save`` writes them to a file.
+        """
+        # The plot package is a layer above this one, so it is imported only on demand.
+        return import_module("hybridsim.plot").eigenvalues(self)
 
     def __repr__(self) -> str:
         remarks = [] if self.is_equilibrium else ["not an equilibrium"]

@@ -175,6 +175,14 @@ class SteadyState(Readable, Measures):
         record["grazing"] = None if self.grazing is None else self.grazing._asdict()
         return record
 
+    def plot(self, *quantities: str) -> Any:
+        """Draw quantities over the period, and the modes under them; see `hybridsim.plot.time_history`.
+
+        Without names it draws the first four states, and the first four outputs. It returns the axes;
+        ``hybridsim.plot.save`` writes them to a file. A motion without a stored run raises `UsageError`.
+        """
+        return self.solution.plot(*quantities)
+
     def __repr__(self) -> str:
         lines = [f"Steady state of {self.model.name}: {self.message}"]
         if self.success:

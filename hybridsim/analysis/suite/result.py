@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -69,6 +70,14 @@ class SuiteComparison(Readable):
     repeat: int
     budget: float
     seconds: float
+
+    def plot(self) -> Any:
+        """Draw a small chart of error against cost for each scene; see `hybridsim.plot.suite_page`.
+
+        It returns the axes; ``hybridsim.plot.save`` writes them to a file.
+        """
+        # The plot package is a layer above this one, so it is imported only on demand.
+        return import_module("hybridsim.plot").suite_page(self)
 
     def __repr__(self) -> str:
         return self.table()

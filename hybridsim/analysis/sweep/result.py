@@ -24,7 +24,9 @@ from hybridsim.presentation.readable import Readable, aligned
 from hybridsim.presentation.tables import library
 
 if TYPE_CHECKING:
+    import pandas as pd
     import xarray as xr
+
 _SHOWN = 5  # number of statuses that are shown
 
 
@@ -154,6 +156,17 @@ class Sweep(Readable):
     def to_json(self, path: str | Path | None = None) -> str:
         """Return all results as JSON text, with versions, machine and model hash; write it if a path is given."""
         return json_record(self.to_dict(), path)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return a data frame with one row per point: the axes, the results and the status, as in `columns`.
+
+        ``attrs`` holds the name and title of the model, the measure, and the units by name. Without pandas it raises
+        `UsageError`.
+        """
+        frame = library("pandas").DataFrame(self.columns())
+        about = {"model": self.model.name, "title": self.model.title, "measure": self.measure}
+        frame.attrs = {**about, "units": dict(self.units)}
+        return frame
 
     def to_xarray(self) -> xr.Dataset:
         """Return an xarray data set over the axes, with the results, their units and the status."""

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 
@@ -58,6 +60,16 @@ class Sensitivities(Readable):
     times_by_start: np.ndarray
     times_by_parameter: np.ndarray
     warnings: tuple[str, ...] = ()
+
+    def plot(self, *names: str) -> Any:
+        """Draw the derivatives of the event times, dt/dp, over these times; see `hybridsim.plot.event_slopes`.
+
+        The names are parameters, or states for the initial values; by default the first six parameters. It returns the
+        axes; ``hybridsim.plot.save`` writes them to a file. A run without events, or an unknown name, raises
+        `UsageError`.
+        """
+        # The plot package is a layer above this one, so it is imported only on demand.
+        return import_module("hybridsim.plot").event_slopes(self, names)
 
     def __repr__(self) -> str:
         columns = [f"d/d{name}(0)" for name in self.states] + [f"d/d{name}" for name in self.parameters]

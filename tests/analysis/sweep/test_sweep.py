@@ -239,6 +239,19 @@ def test_labelled_arrays() -> None:
     assert listed["value"].dims == ("point",) and listed["omega"].values.tolist() == [3.0, 4.0]
 
 
+def test_data_frame() -> None:
+    """One row for each point, in the order of the grid: the second axis runs fastest."""
+    found = hs.sweep("dfcs", {"F0": [1, 2], "omega": [3, 4, 5]}, _load)
+    frame = found.to_pandas()
+    assert list(frame.columns) == ["F0", "omega", "value", "status"]
+    assert frame["F0"].tolist() == frame["value"].tolist() == [1.0, 1.0, 1.0, 2.0, 2.0, 2.0]
+    assert frame["omega"].tolist() == [3.0, 4.0, 5.0] * 2 and set(frame["status"]) == {"ok"}
+    assert frame.attrs["units"]["omega"] == "rad/s" and frame.attrs["model"] == "dfcs"
+    failed = by_threads().to_pandas()
+    assert failed["x"].isna().sum() == 3 and failed["status"].str.startswith("RuntimeError").sum() == 3
+    assert list(failed.columns) == ["F0", "omega", "x", "state[0]", "state[1]", "events", "status"]
+
+
 @pytest.mark.parametrize(
     "given, message",
     [
