@@ -45,19 +45,20 @@ def event_slopes(
     chosen = [known_name(name, list(known), "the sensitivities have no", "names") for name in names]
     chosen = chosen or list(result.parameters or result.states)[:_MOST]
     if axes is None:
-        axes = style.figure(7.2, 1.6 * len(chosen) + 0.9).subplots(
-            len(chosen), 1, sharex=True, squeeze=False
-        )[:, 0]
-    if len(axes) != len(chosen):
+        figure = style.figure(7.2, 1.6 * len(chosen) + 0.9)
+        panels = tuple(figure.subplots(len(chosen), 1, sharex=True, squeeze=False)[:, 0])
+    else:
+        panels = tuple(axes)
+    if len(panels) != len(chosen):
         raise UsageError(
-            f"{len(axes)} axes were passed for {len(chosen)} names", remedy="use one axes per name"
+            f"{len(panels)} axes were passed for {len(chosen)} names", remedy="use one axes per name"
         )
-    for panel, name in zip(axes, chosen, strict=True):
+    for panel, name in zip(panels, chosen, strict=True):
         panel.vlines(result.times, 0.0, slopes[name], color=style.PALETTE[0], linewidth=0.9)
         panel.plot(result.times, slopes[name], "o", color=style.PALETTE[0], markersize=3)
         panel.axhline(0.0, color=style.GREY, linewidth=0.8)
         style.dress(panel)
         panel.set_ylabel(style.literal(f"dt/d{name}" if name in result.parameters else f"dt/d{name}(0)"))
-    axes[-1].set_xlabel("t of the event")
-    style.head(axes[0], f"how {len(result.times)} event times change")
-    return tuple(axes)
+    panels[-1].set_xlabel("t of the event")
+    style.head(panels[0], f"how {len(result.times)} event times change")
+    return panels

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import bisect
-import itertools
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -94,7 +93,8 @@ def _period(model: Any) -> float | None:
     """Return the period of the forcing, or None if there is no single one."""
     if not isinstance(model, MechanicalSystem):
         return forcing_period(model)
-    signals = [*itertools.chain(*model.forcing.values()), *(contact.base for contact in model.contacts)]
+    signals = [signal for terms in model.forcing.values() for signal in terms]
+    signals += [contact.base for contact in model.contacts]
     rates = {abs(signal.omega) for signal in signals if isinstance(signal, Harmonic) and signal.omega}
     return 2.0 * math.pi / rates.pop() if len(rates) == 1 else None
 

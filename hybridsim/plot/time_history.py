@@ -173,8 +173,8 @@ def _mark(axis: Axes, marks: Mapping[str, np.ndarray]) -> None:
 def _strip(axis: Axes, solution: Solution, components: Sequence[str], window: Window) -> None:
     """Draw one row per component with its modes as colours; the legend names the modes that occur."""
     if isinstance(solution.model, MechanicalSystem):
-        intervals = itertools.chain.from_iterable(solution.modes[name] for name in components)
-        colours = style.colours_of(dict.fromkeys(interval.mode for interval in intervals), set())
+        occurring = dict.fromkeys(interval.mode for name in components for interval in solution.modes[name])
+        colours = style.colours_of(occurring, set())
     else:
         colours = style.mode_colours(solution.components)
     seen: set[str] = set()
