@@ -17,6 +17,14 @@ from typing import Any
 from hybridsim.errors import UsageError
 
 _TRIALS = 100  # attempts to find an unused name with 64 random bits
+_NO_SPACE = "free some disk space, or use another path"
+_REMEDIES = {
+    errno.ENOSPC: _NO_SPACE,
+    errno.EDQUOT: _NO_SPACE,
+    errno.EISDIR: "add a file name to the path",
+    errno.ENOENT: "create the folder first, or use another path",
+    errno.EACCES: "permit writing to the file and its folder, or use another path",
+}
 _LETTERS = 100  # leading characters of the name that a temporary name copies; file systems allow 255 bytes
 
 
@@ -146,9 +154,8 @@ def write_text(path: str | PathLike[str], text: str) -> None:
 def cannot_write(path: str | PathLike[str], fault: OSError) -> UsageError:
     """Return the error for a file that cannot be written, with the reason from the operating system."""
     why = fault.strerror or str(fault)
-    return UsageError(
-        f"{os.fspath(path)} cannot be written: {why}", remedy="free some disk space, or use another path"
-    )
+    remedy = _REMEDIES.get(fault.errno or 0, "use another path")
+    return UsageError(f"{os.fspath(path)} cannot be written: {why}", remedy=remedy)
 
 
 def path_text(path: object) -> str:

@@ -119,6 +119,16 @@ def test_a_file_that_may_only_be_read_is_refused(tmp_path: Path, monkeypatch: py
 
 
 @needs_posix
+def test_a_path_that_is_a_folder_or_has_none_says_what_to_do(tmp_path: Path) -> None:
+    """A full disk is not the reason, so freeing space is no remedy."""
+    (tmp_path / "r.html").mkdir()
+    for path, remedy in (("r.html", "add a file name"), ("none/r.html", "create the folder first")):
+        with pytest.raises(hs.UsageError, match="cannot be written") as caught:
+            hs.simulate("free-decay", (0, 0.1)).report(tmp_path / path)
+        assert remedy in str(caught.value) and "disk space" not in str(caught.value)
+
+
+@needs_posix
 def test_a_link_is_written_through(tmp_path: Path) -> None:
     (tmp_path / "real.csv").write_text("old")
     (tmp_path / "link.csv").symlink_to("real.csv")

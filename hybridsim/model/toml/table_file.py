@@ -27,8 +27,8 @@ def read_columns(path: Path, columns: Sequence[str | int] | None) -> tuple[tuple
     Raises
     ------
     ModelError
-        For a missing file or column, a cell that is not a finite number, times that decrease, or commas that may be
-        decimal ones, with file and line.
+        For a missing file or column, a cell that is not a finite number, times that decrease, columns separated by
+        spaces, or commas that may be decimal ones, with file and line.
     """
     rows = _rows(path)
     head = [cell.strip() for cell in rows[0][1]] if rows else []
@@ -38,6 +38,7 @@ def read_columns(path: Path, columns: Sequence[str | int] | None) -> tuple[tuple
         remedy = "write time and value in each row"
         raise ModelError("the table has no rows of numbers", place=Place(str(path)), remedy=remedy)
     _refuse_decimal_commas(rows, names, path)
+    _refuse_spaces(rows, path)
     body = rows[1 if names else 0 :]
     numeric = [k for k, cell in enumerate(body[0][1]) if _is_number(cell.strip())]
     if not has_choice and len(numeric) > 2:
@@ -47,7 +48,7 @@ def read_columns(path: Path, columns: Sequence[str | int] | None) -> tuple[tuple
             place=Place(str(path), body[0][0]),
             remedy="choose the times and the values with `columns`",
         )
-    indices = [_index(column, names, len(head), path) for column in columns]
+    indices = [_index(column, names, len(head), Place(str(path), rows[0][0])) for column in columns]
     found = tuple(tuple(_cell(row, index, line, path) for line, row in body) for index in indices)
     times = found[0]
     for (line, _), before, after in zip(body[1:], times[:-1], times[1:], strict=True):
@@ -84,6 +85,18 @@ def _refuse_decimal_commas(rows: list[tuple[int, list[str]]], names: list[str] |
             what,
             place=Place(str(path), rows[0][0]),
             remedy=f"{remedy}; if the numbers are whole, write the names of the columns in the first line",
+        )
+
+
+def _refuse_spaces(rows: list[tuple[int, list[str]]], path: Path) -> None:
+    """Raise an error for a table whose columns are separated by spaces alone."""
+    line, last = rows[-1]
+    cells = last[0].split() if len(last) == 1 else []
+    if len(cells) > 1 and all(map(_is_number, cells)):
+        raise ModelError(
+            f"spaces separate the columns of the row '{last[0].strip()}'",
+            place=Place(str(path), line),
+            remedy="separate columns by commas, semicolons or tabs",
         )
 
 
@@ -133,8 +146,8 @@ def _rows(path: Path) -> list[tuple[int, list[str]]]:
         ) from None
 
 
-def _index(column: str | int, names: list[str] | None, width: int, path: Path) -> int:
-    place = Place(str(path), 1)
+def _index(column: str | int, names: list[str] | None, width: int, place: Place) -> int:
+    """Return the index of a column; `place` is the first line of the table."""
     if isinstance(column, int):
         if not 0 <= column < width:
             raise ModelError(
