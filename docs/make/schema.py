@@ -42,6 +42,7 @@ def short(value: Schema, whole: Schema) -> Schema:
 TEXT, NUMBER, FLAG = {"type": "string"}, {"type": "number"}, {"type": "boolean"}
 EXPRESSION = {"type": ["number", "string"]}
 EXPRESSIONS = {"type": "object", "additionalProperties": EXPRESSION}
+DIRECTION = {"enum": ["up", "down", "both"]}
 NUMBERS = {"type": "array", "items": NUMBER}
 UNIT = said("the unit, for labels and for the check of units", TEXT)
 START = said("the initial value", EXPRESSION)
@@ -67,6 +68,7 @@ GUARD = table(
         "expr": said("what stays at or above zero while the mode lasts", EXPRESSION),
         "then": said("choices; the first whose condition holds is taken", {"anyOf": [TEXT, CHOICE, CHOICES]}),
         "fatal": said("stop the run with this message", TEXT),
+        "direction": said("fire only where it crosses zero in this direction", DIRECTION),
     },
     ("expr",),
 )  # fmt: skip
@@ -151,7 +153,7 @@ IMPACT = table(
 MONITOR = table(
     {
         "expr": said("the scalar to watch", EXPRESSION),
-        "direction": {"enum": ["up", "down", "both"]},
+        "direction": DIRECTION,
         "action": {"enum": ["record", "terminate", "reset"]},
         "reset": EXPRESSIONS,
     },

@@ -108,6 +108,11 @@ def _form(scope: Scope, law: FrictionLaw, what: str) -> None:
         for name in (*mode.der, *resets):
             if name not in states:
                 scope.unknown(law, f"{what}, mode {mode.name}: the law has no state", name, states, "states")
+        if any(guard.direction for guard in mode.guards):
+            message = f"{what}, mode {mode.name}: a guard of a law cannot have a direction"
+            scope.fail(
+                law, message, "remove `direction`; the guard fires as soon as its expression is negative"
+            )
         for name in mode.set:
             if name != FORCE:
                 message = f"{what}, mode {mode.name} sets '{name}'"

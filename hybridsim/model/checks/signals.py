@@ -7,8 +7,9 @@ import math
 from hybridsim.errors import nearest
 from hybridsim.model.checks.automata import check_reset
 from hybridsim.model.checks.scope import Scope
+from hybridsim.model.parts.component import DIRECTIONS
 from hybridsim.model.parts.inputs import INTERPOLATIONS, KINDS, OPTIONAL, REQUIRED, SHAPES, Input
-from hybridsim.model.parts.monitor import ACTIONS, DIRECTIONS, Monitor
+from hybridsim.model.parts.monitor import ACTIONS, Monitor
 from hybridsim.model.parts.schedule import Schedule
 
 

@@ -10,6 +10,8 @@ from hybridsim.expr import Expression
 from hybridsim.model.parts.declared import Declared, as_tuple
 from hybridsim.model.parts.frozen_map import FrozenMap
 
+DIRECTIONS = ("up", "down", "both")
+
 
 @dataclass(frozen=True)
 class Choice(Declared):
@@ -60,6 +62,10 @@ class Guard(Declared):
     fatal : str, optional
         A message instead of choices: the run ends with status ``inconsistent`` when the guard would become
         negative.
+    direction : str, optional
+        "up" (from below zero), "down" (from above) or "both": the guard fires only at such a crossing of zero, and its
+        expression may have any sign when the mode begins. A jump of the state across zero is a crossing. By default
+        the guard fires as soon as its expression is negative.
     place : Place, optional
         Place of the declaration, for error messages.
 
@@ -74,9 +80,11 @@ class Guard(Declared):
     expr: Expression
     then: tuple[Choice, ...] = ()
     fatal: str | None = None
+    direction: str | None = None
 
     def __post_init__(self) -> None:
         self._texts("name", "fatal")
+        self._texts("direction", known=DIRECTIONS)
         self._expressions("expr", functions=True)
         choices = tuple(
             Choice(choice, place=self.place) if isinstance(choice, str) else choice

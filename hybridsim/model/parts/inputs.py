@@ -202,3 +202,11 @@ class HeldInput(Discrete):
     place : Place, optional
         Place of the declaration, for error messages.
     """
+
+
+def held_as_discrete(
+    inputs: tuple[Input, ...], discrete: tuple[Discrete, ...]
+) -> dict[str, tuple[Declared, ...]]:
+    """Return inputs and discrete states, with inputs of kind "held" among the latter, as the engine computes them."""
+    held = tuple(declared.as_held() for declared in inputs if declared.kind == "held")
+    return {"inputs": tuple(i for i in inputs if i.kind != "held"), "discrete": (*discrete, *held)}

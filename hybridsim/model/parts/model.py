@@ -17,8 +17,9 @@ from hybridsim.model.parts.changes import changed_value, require_known
 from hybridsim.model.parts.component import Component, Corner
 from hybridsim.model.parts.contact import Contact
 from hybridsim.model.parts.declared import Declared
+from hybridsim.model.parts.guard_direction import without_directions
 from hybridsim.model.parts.impact import Impact
-from hybridsim.model.parts.inputs import Input
+from hybridsim.model.parts.inputs import Input, held_as_discrete
 from hybridsim.model.parts.monitor import Monitor
 from hybridsim.model.parts.quantities import Discrete, Output, Parameter, State
 from hybridsim.model.parts.remedies import remedy_for_parameter, remedy_for_state
@@ -153,19 +154,16 @@ class Model(Declared):
             remedy = "use a dict of names and expressions, or a list of pairs"
             raise self._fault(f"`definitions` cannot be {self.definitions!r}", remedy) from None
         object.__setattr__(self, "definitions", definitions)
-        self._hold_inputs()
+        self._put(held_as_discrete(self.inputs, self.discrete))
         if self.use:
-            for field, parts in flattened(self).items():
-                object.__setattr__(self, field, parts)
-            object.__setattr__(self, "use", ())
-        object.__setattr__(self, "states", tuple(self._with_those_of_laws()))
+            self._put({**flattened(self), "use": ()})
+        self._put(without_directions(self.components, self.definitions))
+        self._put({"states": tuple(self._with_those_of_laws())})
 
-    def _hold_inputs(self) -> None:
-        """Move inputs of kind "held" to the discrete states, because the engine computes them as such."""
-        held = [declared for declared in self.inputs if declared.kind == "held"]
-        if held:
-            object.__setattr__(self, "inputs", tuple(i for i in self.inputs if i.kind != "held"))
-            object.__setattr__(self, "discrete", (*self.discrete, *(i.as_held() for i in held)))
+    def _put(self, fields: Mapping[str, Any]) -> None:
+        """Replace declared parts by those that the engine computes."""
+        for field, parts in fields.items():
+            object.__setattr__(self, field, parts)
 
     def _with_those_of_laws(self) -> Iterable[State]:
         """Yield the states with their current values, including the states that laws of contacts add."""

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from hybridsim.expr import Expression
+from hybridsim.model.parts.component import DIRECTIONS
 from hybridsim.model.parts.declared import Declared
 from hybridsim.model.parts.frozen_map import FrozenMap
 
-DIRECTIONS = ("up", "down", "both")
 ACTIONS = ("record", "terminate", "reset")
 
 

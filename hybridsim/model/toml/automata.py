@@ -52,7 +52,7 @@ def read_mode(name: str, table: Table) -> Mode:
 
 
 def _guard(name: str, table: Table) -> Guard:
-    table.only("expr", "then", "fatal")
+    table.only("expr", "then", "fatal", "direction")
     expr = table.required("expr", 'write expr = "EXPRESSION", which is >= 0 while the mode lasts')
     transitions = table.data.get("then", [])
     then = []
@@ -62,7 +62,8 @@ def _guard(name: str, table: Table) -> Guard:
         if part is not None:
             then.append(_choice(part))
     fatal = table.text("fatal") if "fatal" in table.data else None
-    return Guard(name, expr, tuple(then), fatal, place=table.place)
+    direction = table.text("direction") if "direction" in table.data else None
+    return Guard(name, expr, tuple(then), fatal, direction, place=table.place)
 
 
 def _choice(table: Table) -> Choice:

@@ -11,6 +11,7 @@ from hybridsim.testing.catalogue import (
     contacts,
     corners,
     curved_gaps,
+    elements,
     events,
     impacts,
     instants,
@@ -66,6 +67,7 @@ SCENES: tuple[Scene, ...] = with_stories(
             stiffness,
             stability,
             sensitivity,
+            elements,
         )
         for scene in part.scenes()
     )

@@ -1,0 +1,56 @@
+"""Scenes of guards with a direction, and of elements that are declared in one line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from hybridsim.testing.checks import at_times, equals
+from hybridsim.testing.scene import END, Check, Scene, Truth, needs
+
+
+def scenes() -> tuple[Scene, ...]:
+    """Return all scenes of this file."""
+    return (_directions(),)
+
+
+def _transitions(component: str, expected: Sequence[tuple[float, str]], within: float = 1e-3) -> Check:
+    """Return a check that a component changes its mode at the expected times, roughly, and at no others."""
+
+    def check(solution: Any) -> list[str]:
+        found = [(event.t, event.target) for event in solution.events if event.component == component]
+        if [mode for _, mode in found] != [mode for _, mode in expected]:
+            return [f"{component} goes to {[mode for _, mode in found]} {at_times([t for t, _ in found])}"]
+        wrong = [(t, due) for (t, _), (due, _) in zip(found, expected, strict=True) if abs(t - due) > within]
+        return [f"a transition of {component} is at t = {t!r} instead of {due!r}" for t, due in wrong]
+
+    return check
+
+
+def _directions() -> Scene:
+    """Return the scene of x = sin(t), whose values 1/2 and 0 are passed in both directions."""
+    opens, closes = 5 * math.pi / 6, 13 * math.pi / 6
+    gate = ((opens, "open"), (closes, "closed"), (opens + 2 * math.pi, "open"))
+    zeros = tuple((k * math.pi, "on") for k in (1, 2, 3))
+    time_open = closes - opens + 10.0 - (opens + 2 * math.pi)
+    return Scene(
+        "guards-with-directions",
+        "guard-directions",
+        (0.0, 10.0),
+        Truth(
+            None,
+            (
+                (4.0, (math.sin(4.0), math.cos(4.0), 4.0 - opens)),
+                (END, (math.sin(10.0), math.cos(10.0), time_open)),
+            ),
+            checks=(
+                ("", _transitions("gate", gate)),
+                ("", _transitions("counter", zeros)),
+                ("", equals(10.0, n=3.0)),
+            ),
+        ),
+        needs("transitions"),
+        unit=2 * math.pi,
+        tol_x=1e-7,
+    )
