@@ -69,8 +69,8 @@ class SwitchingSurface(Declared):
 
     Examples
     --------
-    >>> SwitchingSurface("u", "x + 2*v").component().modes[0].guards
-    (Guard(name='side', expr=Expression(text='x + 2*v'), then=(), fatal=None),)
+    >>> SwitchingSurface("u", "x + 2*v").component().modes[0].guards[0].expr
+    Expression(text='x + 2*v')
     """
 
     name: str
