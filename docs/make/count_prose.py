@@ -36,7 +36,8 @@ PHRASES = {
     "loaded down": r"\bloaded down\b",
     "in distinction from": r"\bin distinction from\b",
     "stops to be": r"\bstop(s|ped)? to be\b",
-    "is no": r"(?<!there )(?<!there may )\b(is|are|was|were|be) no\b(?! (longer|more|less|other|better|worse|greater|larger|smaller))",
+    "is no": r"(?<!there )(?<!there may )\b(is|are|was|were|be) no\b"
+    r"(?! (longer|more|less|other|better|worse|greater|larger|smaller))",
     "says, knows": r"\b(says|tells|asks|knows|sees|owes|forgets)\b",
     "What ... at the start": r"^(What|Who|Whoever|Where)\b(?!.*\?$)",
     "-isation": r"\b(regular|linear|discret|optim|initial|normal|synchron)is(e|ed|es|ing|ation)\b",
