@@ -264,11 +264,10 @@ def tables_of(
 ) -> tuple[LinearTables, deque[Any]] | None:
     """Return tables of some combinations of modes, and reusable scratch arrays for them.
 
-    The tables are made once for each set of parameter values and each order of magnitude of the horizon, the
-    longest possible segment. The scratch arrays serve all tables of one shape. Return None if there are no
+    The tables are made once for each set of parameter values and each horizon, the order of magnitude of the longest
+    possible segment. The scratch arrays serve all tables of one shape. Return None if there are no
     tables.
     """
-    horizon = horizon_class(horizon)
     last = system.tables.get(horizon)
     if last is not None and last[0] is modes:  # the values of a system's parameters do not change
         return last[1]

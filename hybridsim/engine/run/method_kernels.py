@@ -14,6 +14,7 @@ from hybridsim.engine.linear.tables import no_tables
 from hybridsim.engine.record.blocks import SegmentBlock
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.known_times import KnownTimes
 from hybridsim.engine.system.per_structure import spare_scratch
 from hybridsim.engine.system.programs.mode_tables import Tapes
 from hybridsim.engine.system.system import System
@@ -89,6 +90,10 @@ class MethodKernels(ABC):
         jumps: np.ndarray,
     ) -> SegmentBlock:
         """Return the segments of a call as one block; `last_steps` contains the last step of each."""
+
+    def part_of(self, known: KnownTimes) -> KnownTimes:
+        """Return the known times that one call can pass: these, or the first of them."""
+        return known
 
     def tables(
         self, tapes: Tapes, state: HybridState, origin: Instant, target: Instant

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 
 MAX_KNOWN_TIMES = 512  # known times of one block: enough that making the block costs little beside them
 MAX_KINDS = 32  # combinations of schedules that are due at one time
+START = 4  # index of a piece's start among its numbers
+_RATIO = 4.0  # of the lengths of pieces that belong to different orders of magnitude
+_APART = 0.1  # exponent that puts common lengths, as 1 or 1/4, away from the limits of the orders
 _CLEAR = 4.0  # times farther apart than this many roundings of a time are certainly two, and nearer than one are one
 
 
@@ -33,6 +36,8 @@ class KnownTimes(NamedTuple):
     kinds : (m,), indices of the schedules that are due, see `TimesAhead.due`.
     polynomials : (m + 1, S, 6), the pieces of the inputs up to each of the times, and after the last one: four
         coefficients and the start.
+    lengths : (m + 1,), the order of magnitude of the shortest piece up to each of the times, and after the last one;
+        infinite if all inputs are constant there.
     due : the schedules of each kind.
     target, appointment : the next known time after these, or the end of the run and None.
     """
@@ -40,6 +45,7 @@ class KnownTimes(NamedTuple):
     instants: np.ndarray
     kinds: np.ndarray
     polynomials: np.ndarray
+    lengths: np.ndarray
     due: list[tuple[int, ...]]
     target: Instant
     appointment: Appointment | None
@@ -62,13 +68,31 @@ class KnownTimes(NamedTuple):
             instants=self.instants[:m],
             kinds=self.kinds[:m],
             polynomials=self.polynomials[: m + 1],
+            lengths=self.lengths[: m + 1],
             target=target,
+        )
+
+    def of_like_lengths(self) -> KnownTimes:
+        """Return the known times up to the first at which pieces of another order of magnitude begin."""
+        m = int(np.argmax(self.lengths != self.lengths[0]))
+        if m == 0:
+            return self
+        return self._replace(
+            instants=self.instants[:m],
+            kinds=self.kinds[:m],
+            polynomials=self.polynomials[: m + 1],
+            lengths=self.lengths[:m],
+            target=self.instant(m - 1),
+            appointment=None,
         )
 
     def since(self, first: int) -> KnownTimes:
         """Return the known times from a given number on."""
         return self._replace(
-            instants=self.instants[first:], kinds=self.kinds[first:], polynomials=self.polynomials[first:]
+            instants=self.instants[first:],
+            kinds=self.kinds[first:],
+            polynomials=self.polynomials[first:],
+            lengths=self.lengths[first:],
         )
 
 
@@ -159,15 +183,16 @@ class TimesAhead:
             kinds.append(kind)
         m = len(kinds)
         instants = times[last[:m]]
-        polynomials = np.empty((m + 1, len(signals), 6))
-        for i, (_, rows) in enumerate(ahead):
-            polynomials[0, i] = rows[0]
-            polynomials[1:, i] = rows[np.cumsum(sources == -1 - i)[last[:m]]]
+        polynomials, lengths = np.empty((m + 1, len(signals), 6)), np.full(m + 1, np.inf)
+        for i, (knots, rows) in enumerate(ahead):
+            numbers = np.concatenate([[0], np.cumsum(sources == -1 - i)[last[:m]]])
+            polynomials[:, i] = rows[numbers]
+            lengths = np.minimum(lengths, _lengths(knots, rows)[numbers])
         until = Instant(*instants[-1].tolist()) if m else origin
         appointment = self.timetable.next(until, True)
         target = appointment.instant if appointment else self.end
         return KnownTimes(
-            instants, np.array(kinds, dtype=np.int64), polynomials, self.due, target, appointment
+            instants, np.array(kinds, dtype=np.int64), polynomials, lengths, self.due, target, appointment
         )
 
     def _kind_at(self, members: list[int]) -> int | None:
@@ -191,6 +216,15 @@ def what_surfaces_read(system: System) -> tuple[bool, bool]:
                     reading |= {row[4], row[4] + 1} if row[0] in PAIRED else {row[4]}
         found.append(bool(reading.intersection(tape["surfaces"])))
     return found[0], found[1]
+
+
+def _lengths(knots: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Return the order of magnitude of the length of each piece, infinite for a constant or unlimited piece."""
+    found = np.full(len(rows), np.inf)
+    varying = np.flatnonzero(rows[: len(knots), 1:START].any(axis=1))
+    length = _minus(knots[varying], rows[varying, START:])
+    found[varying] = _RATIO ** np.ceil(np.log2(length) / np.log2(_RATIO) - _APART)
+    return found
 
 
 def _minus(a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 
 from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.linear.closed_form_block import ClosedFormBlock
-from hybridsim.engine.linear.tables import LinearTables, tables_of
+from hybridsim.engine.linear.tables import LinearTables, horizon_class, tables_of
 from hybridsim.engine.native.constants import BOUND_TERMS
 from hybridsim.engine.native.simd_products import vector_of
 from hybridsim.engine.native.struct_pack import packed
@@ -19,6 +19,7 @@ from hybridsim.engine.record.array_forms import check_modes
 from hybridsim.engine.record.checkpoint import damaged
 from hybridsim.engine.run.method_kernels import MethodKernels
 from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.known_times import KnownTimes
 from hybridsim.engine.system.programs.mode_tables import Tapes, tape_cache_of
 from hybridsim.engine.system.system import System
 from hybridsim.integrators.closed_form.segments import ClosedFormArrays, ClosedFormRows, closed_form_loop
@@ -36,18 +37,31 @@ class ClosedFormKernels(MethodKernels):
     def __init__(self, system: System, longest: float) -> None:
         super().__init__(system, longest)
         self.horizon = self._reach = 0.0  # longest segment that was possible so far
+        self._piece = math.inf  # length of the pieces of inputs in the next call
         # as in `ClosedFormArrays.hints` after the last call
         self.hints = np.zeros((0, system.guard_count))
         self.tape_cache = tape_cache_of(system)
         self.columns = 0  # number of modal coordinates
         self.lin: LinearTables
 
+    def part_of(self, known: KnownTimes) -> KnownTimes:
+        """Return the known times up to the first much longer or shorter piece of an input.
+
+        Tables for long segments would be inaccurate in a short piece. Its coefficients are large, and in a long
+        segment they would have large effects. A state has an error relative to these.
+        """
+        self._piece = float(known.lengths[0])
+        return known.of_like_lengths()
+
     def tables(
         self, tapes: Tapes, state: HybridState, origin: Instant, target: Instant
     ) -> tuple[Any, deque[Any]] | None:
         """Return the tables of the modes so far, and reusable arrays for tables of this shape."""
         self._reach = max(self.horizon, min(target.minus(origin), self.longest))
-        found = tables_of(self.system, tapes.modes, state.p, self._reach)
+        horizon = horizon_class(self._reach)
+        if self._piece < math.inf:
+            self._reach = horizon = self._piece
+        found = tables_of(self.system, tapes.modes, state.p, horizon)
         if found is None:
             self.horizon = self._reach
             return None

@@ -24,12 +24,11 @@ from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.series.layout import SIGNAL_SLOTS
 from hybridsim.engine.system.instant import phase_of, two_sum
-from hybridsim.engine.system.known_times import MAX_KINDS, MAX_KNOWN_TIMES, KnownTimes
+from hybridsim.engine.system.known_times import MAX_KINDS, MAX_KNOWN_TIMES, START, KnownTimes
 from hybridsim.engine.system.system import System
 
 # Indices of the integers of a loop, `LoopCall.int_slots`; two of them count what is committed, the last the known times
 ORIGIN_AT, PHASES_AT, SIGNALS_AT, STEPS, SEGMENTS, KNOWN = range(6)
-START = 4  # index of a piece's start among its numbers
 NO_RESET = -1
 
 
