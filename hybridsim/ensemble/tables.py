@@ -10,10 +10,10 @@ from hybridsim.engine.linear.matrix_template import template_of
 from hybridsim.engine.linear.tables import (
     LinearTables,
     atoms_of,
-    horizon_class,
     of_matrices,
     usable_modes,
 )
+from hybridsim.engine.linear.units import horizon_class
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.system.system import System
 

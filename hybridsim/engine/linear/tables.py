@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import deque
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -11,8 +10,8 @@ import numpy as np
 
 from hybridsim.engine.linear.guards import guard_series, modal_guards
 from hybridsim.engine.linear.matrix_template import MatrixTemplate, template_of
-from hybridsim.engine.linear.modal import modals
 from hybridsim.engine.linear.table_rows import leave_out, write_bases, write_lengths
+from hybridsim.engine.linear.units import scaled_modals, units_of
 from hybridsim.engine.native.array_layout import ArrayLayout
 from hybridsim.engine.native.constants import BOUND_TERMS
 from hybridsim.engine.native.kernels import ENABLED, Precompiled
@@ -164,7 +163,12 @@ class Made(NamedTuple):
 
 
 def linear_tables(
-    system: System, met: np.ndarray, p: np.ndarray, horizon: float, begun: Made | None = None
+    system: System,
+    met: np.ndarray,
+    p: np.ndarray,
+    horizon: float,
+    begun: Made | None = None,
+    in_pieces: bool = False,
 ) -> Made | None:
     """Return tables of the combinations of modes entered so far; `horizon` is the length of a segment.
 
@@ -182,7 +186,8 @@ def linear_tables(
         same = zip((begun.flows, begun.guards, *former), (A[:first], guards[:first], *atoms), strict=True)
         if not all(np.array_equal(one, other) for one, other in same):
             begun = None
-    return Made(*of_matrices(atoms, A, guards, usable, system.n, horizon, begun), A, guards)
+    units = units_of(atoms, A, system.n, horizon) if in_pieces else None
+    return Made(*of_matrices(atoms, A, guards, usable, system.n, horizon, begun, units), A, guards)
 
 
 _leave_out, _guard_series, _modal_guards, _write_bases, _write_lengths = map(
@@ -211,21 +216,22 @@ def of_matrices(
     n: int,
     horizon: float,
     begun: Made | None = None,
+    units: np.ndarray | None = None,
 ) -> tuple[LinearTables, _Rows]:
     """Return tables with one row per combination of modes, and their memory.
 
     atoms: the fields that describe functions of time. A (K, m, m), guards (K, G, m), usable (K,): see `leave_out`.
-    begun: tables with the first rows.
+    begun: tables with the first rows. units (K, m): see `units_of`.
     """
     count, surfaces, size = guards.shape
     first, least = (0, 0) if begun is None else (len(begun.flows), begun.rows.form[-1])
-    flows = modals(A[first:], horizon, BOUND_TERMS, multiple=LANES // 2, least=least)
+    flows = scaled_modals(A[first:], units if units is None else units[first:], horizon, least)
     widest = flows.values.shape[1]
     if begun is not None and widest == least:
         rows = begun.rows.gone_on_with(first, count)
     else:
         if first:
-            first, flows = 0, modals(A, horizon, BOUND_TERMS, multiple=LANES // 2)
+            first, flows = 0, scaled_modals(A, units, horizon)
             widest = flows.values.shape[1]
         kinds, _, _, _, sources, _, factors, _ = atoms
         rows = _Rows(((len(kinds), len(sources), factors.shape[1]), surfaces, n, size, widest), count)
@@ -254,29 +260,24 @@ def of_matrices(
     return rows.first(count), rows
 
 
-def horizon_class(horizon: float) -> float:
-    """Return the order of magnitude of a segment length, for which tables are computed."""
-    return 16.0 ** math.ceil(math.log(horizon, 16.0)) if horizon > 0.0 else math.inf
-
-
 def tables_of(
-    system: System, modes: np.ndarray, p: np.ndarray, horizon: float
+    system: System, modes: np.ndarray, p: np.ndarray, horizon: float, in_pieces: bool
 ) -> tuple[LinearTables, deque[Any]] | None:
     """Return tables of some combinations of modes, and reusable scratch arrays for them.
 
     The tables are made once for each set of parameter values and each horizon, the order of magnitude of the longest
-    possible segment. The scratch arrays serve all tables of one shape. Return None if there are no
-    tables.
+    possible segment. in_pieces: whether it is the length of the pieces of inputs. The scratch arrays serve all tables
+    of one shape. Return None if there are no tables.
     """
-    last = system.tables.get(horizon)
+    last = system.tables.get((horizon, in_pieces))
     if last is not None and last[0] is modes:  # the values of a system's parameters do not change
         return last[1]
-    made = _made(system, modes, p, horizon, None if last is None else last[2])
+    made = _made(system, modes, p, horizon, None if last is None else last[2], in_pieces)
     found = None
     if made is not None:
         tables = made.tables
         found = tables, spare_scratch(system, len(tables.kinds), len(tables.factors), tables.values.shape)
-    system.tables[horizon] = (modes, found, made)
+    system.tables[horizon, in_pieces] = (modes, found, made)
     return found
 
 
@@ -284,13 +285,13 @@ cached_tables = per_structure(lambda system: dict[bytes, Made]())  # by paramete
 
 
 def _made(
-    system: System, modes: np.ndarray, p: np.ndarray, horizon: float, begun: Made | None
+    system: System, modes: np.ndarray, p: np.ndarray, horizon: float, begun: Made | None, in_pieces: bool
 ) -> Made | None:
     cached = cached_tables(system)
-    key = p[: system.layout.parameters].tobytes() + modes.tobytes() + np.float64(horizon).tobytes()
+    key = p[: system.layout.parameters].tobytes() + modes.tobytes() + np.array([horizon, in_pieces]).tobytes()
     found = cached.get(key)
     if found is None:
-        found = linear_tables(system, modes, p, horizon, begun)
+        found = linear_tables(system, modes, p, horizon, begun, in_pieces)
         if found is None:
             return None
         with _lock:

@@ -32,8 +32,6 @@ from hybridsim.engine.record.checkpoint import damaged
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.trajectory import Trajectory
 from hybridsim.engine.run.event_loop import (
-    AT_TARGET,
-    FULL,
     MIN_STEPS_IN_PART,
     LoopCall,
     LoopModel,
@@ -185,10 +183,7 @@ class CompiledLoop:
         kernels, tape_cache = self.kernels, self.tape_cache
         tape_cache.surround(state.z)
         tapes = tape_cache.tapes  # read once, because another thread may replace them
-        known = all_known = None
-        if self.times_ahead is not None:
-            all_known = self.times_ahead.after(origin).up_to(target)
-            known = kernels.part_of(all_known)
+        known = self.times_ahead and kernels.part_of(self.times_ahead.after(origin).up_to(target))
         found = kernels.tables(tapes, state, origin, target)
         if found is None:
             return None
@@ -227,7 +222,6 @@ class CompiledLoop:
         code = _event_loop(model, call, arrays.as_packed, arrays.work, record, opaque(own), opaque(rows))
         seconds = perf_counter() - began
         if known is not None:
-            code = FULL if code == AT_TARGET and known is not all_known else code
             call.known.kinds[0] = -1  # another run with these arrays may have no known times ahead
         if lin is NOT_LINEAR:
             tape_cache.look()

@@ -137,12 +137,12 @@ class KernelRun:
     @property
     def is_at_target(self) -> bool:
         """Return whether the call reached its target."""
-        return self.code == AT_TARGET
+        return self.code == AT_TARGET and not (self.known and self.known.is_part)
 
     @property
     def is_full(self) -> bool:
-        """Return whether the call ended because its arrays were full."""
-        return self.code == FULL
+        """Return whether the next call goes on, because arrays were full or the known times were a part."""
+        return self.code == FULL or (self.code == AT_TARGET and not self.is_at_target)
 
     @property
     def instants(self) -> np.ndarray:

@@ -39,6 +39,7 @@ class KnownTimes(NamedTuple):
     lengths : (m + 1,), the order of magnitude of the shortest piece up to each of the times, and after the last one;
         infinite if all inputs are constant there.
     due : the schedules of each kind.
+    is_part : whether the target is the last of these times, and the run goes on from there.
     target, appointment : the next known time after these, or the end of the run and None.
     """
 
@@ -49,6 +50,7 @@ class KnownTimes(NamedTuple):
     due: list[tuple[int, ...]]
     target: Instant
     appointment: Appointment | None
+    is_part: bool = False
 
     @property
     def first(self) -> Instant:
@@ -84,6 +86,7 @@ class KnownTimes(NamedTuple):
             lengths=self.lengths[:m],
             target=self.instant(m - 1),
             appointment=None,
+            is_part=True,
         )
 
     def since(self, first: int) -> KnownTimes:

@@ -205,7 +205,7 @@ class System:
         numbers = {**model.discrete_values(), **constant_inputs(model), **self.values} if model.inputs else {}
         self.signals = tuple(Signal(i, numbers) for i in model.inputs)
         self.starts: dict[tuple[Any, ...], Any] = {}  # cache of `hybridsim.engine.events.start`
-        self.tables: dict[float, Any] = {}  # cache of `hybridsim.engine.linear.tables`
+        self.tables: dict[tuple[float, bool], Any] = {}  # cache of `hybridsim.engine.linear.tables`
         self.opposed: set[tuple[Any, ...]] = (
             set()
         )  # starts accepted by `hybridsim.engine.events.dissipation_check`

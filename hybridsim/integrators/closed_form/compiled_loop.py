@@ -11,7 +11,8 @@ import numpy as np
 
 from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.linear.closed_form_block import ClosedFormBlock
-from hybridsim.engine.linear.tables import LinearTables, horizon_class, tables_of
+from hybridsim.engine.linear.tables import LinearTables, tables_of
+from hybridsim.engine.linear.units import horizon_class
 from hybridsim.engine.native.constants import BOUND_TERMS
 from hybridsim.engine.native.simd_products import vector_of
 from hybridsim.engine.native.struct_pack import packed
@@ -61,7 +62,7 @@ class ClosedFormKernels(MethodKernels):
         horizon = horizon_class(self._reach)
         if self._piece < math.inf:
             self._reach = horizon = self._piece
-        found = tables_of(self.system, tapes.modes, state.p, horizon)
+        found = tables_of(self.system, tapes.modes, state.p, horizon, self._piece < math.inf)
         if found is None:
             self.horizon = self._reach
             return None
