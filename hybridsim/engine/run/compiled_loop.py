@@ -183,7 +183,7 @@ class CompiledLoop:
         kernels, tape_cache = self.kernels, self.tape_cache
         tape_cache.surround(state.z)
         tapes = tape_cache.tapes  # read once, because another thread may replace them
-        known = self.times_ahead and kernels.part_of(self.times_ahead.after(origin).up_to(target))
+        known = kernels.part_of(self.times_ahead.after(origin).up_to(target)) if self.times_ahead else None
         found = kernels.tables(tapes, state, origin, target)
         if found is None:
             return None

@@ -58,7 +58,7 @@ def test_a_mass_on_a_spring_follows_a_table(turn: float, length: float, interpol
     for end in (times[-1], 100 * times[-1]):
         states = hs.simulate(model, (0, end), integrator="exact")(times)
         true = motion(times, turn / length, interpolation)
-        assert (abs(states.T - true) <= 2e-13 * abs(true).max(axis=0)).all()
+        assert (abs(states.T - true) <= 1e-12 * abs(true).max(axis=0)).all()
 
 
 def test_pieces_of_very_different_lengths_follow_one_another() -> None:
@@ -78,5 +78,5 @@ def test_a_storey_on_friction_follows_a_cubic_record() -> None:
     sol = hs.simulate(model, (0, 20), integrator="exact")
     events = [event.t for event in sol.events if event.t <= 6.0]
     assert len(events) > 15
-    assert events == pytest.approx([t for t, _ in true.events], abs=2e-12)
-    assert pytest.approx(true.states, abs=1e-13) == sol(true.knots).T
+    assert events == pytest.approx([t for t, _ in true.events], abs=5e-13)
+    assert pytest.approx(true.states, abs=5e-13) == sol(true.knots).T
