@@ -168,7 +168,7 @@ def linear_tables(
     p: np.ndarray,
     horizon: float,
     begun: Made | None = None,
-    in_pieces: bool = False,
+    is_scaled: bool = False,
 ) -> Made | None:
     """Return tables of the combinations of modes entered so far; `horizon` is the length of a segment.
 
@@ -186,7 +186,7 @@ def linear_tables(
         same = zip((begun.flows, begun.guards, *former), (A[:first], guards[:first], *atoms), strict=True)
         if not all(np.array_equal(one, other) for one, other in same):
             begun = None
-    units = units_of(atoms, A, system.n, horizon) if in_pieces else None
+    units = units_of(atoms, A, system.n, horizon) if is_scaled else None
     return Made(*of_matrices(atoms, A, guards, usable, system.n, horizon, begun, units), A, guards)
 
 
@@ -261,23 +261,23 @@ def of_matrices(
 
 
 def tables_of(
-    system: System, modes: np.ndarray, p: np.ndarray, horizon: float, in_pieces: bool
+    system: System, modes: np.ndarray, p: np.ndarray, horizon: float, is_scaled: bool
 ) -> tuple[LinearTables, deque[Any]] | None:
     """Return tables of some combinations of modes, and reusable scratch arrays for them.
 
     The tables are made once for each set of parameter values and each horizon, the order of magnitude of the longest
-    possible segment. in_pieces: whether it is the length of the pieces of inputs. The scratch arrays serve all tables
+    possible segment. is_scaled: whether units have the length of pieces of inputs. The scratch arrays serve all tables
     of one shape. Return None if there are no tables.
     """
-    last = system.tables.get((horizon, in_pieces))
+    last = system.tables.get((horizon, is_scaled))
     if last is not None and last[0] is modes:  # the values of a system's parameters do not change
         return last[1]
-    made = _made(system, modes, p, horizon, None if last is None else last[2], in_pieces)
+    made = _made(system, modes, p, horizon, None if last is None else last[2], is_scaled)
     found = None
     if made is not None:
         tables = made.tables
         found = tables, spare_scratch(system, len(tables.kinds), len(tables.factors), tables.values.shape)
-    system.tables[horizon, in_pieces] = (modes, found, made)
+    system.tables[horizon, is_scaled] = (modes, found, made)
     return found
 
 
@@ -285,13 +285,13 @@ cached_tables = per_structure(lambda system: dict[bytes, Made]())  # by paramete
 
 
 def _made(
-    system: System, modes: np.ndarray, p: np.ndarray, horizon: float, begun: Made | None, in_pieces: bool
+    system: System, modes: np.ndarray, p: np.ndarray, horizon: float, begun: Made | None, is_scaled: bool
 ) -> Made | None:
     cached = cached_tables(system)
-    key = p[: system.layout.parameters].tobytes() + modes.tobytes() + np.array([horizon, in_pieces]).tobytes()
+    key = p[: system.layout.parameters].tobytes() + modes.tobytes() + np.array([horizon, is_scaled]).tobytes()
     found = cached.get(key)
     if found is None:
-        found = linear_tables(system, modes, p, horizon, begun, in_pieces)
+        found = linear_tables(system, modes, p, horizon, begun, is_scaled)
         if found is None:
             return None
         with _lock:

@@ -58,14 +58,14 @@ def _powers_of_time(
     sources: np.ndarray,
     weights: np.ndarray,
     factors: np.ndarray,
-    places: np.ndarray,
+    angles: np.ndarray,
 ) -> np.ndarray:
     """Return the power of time in the unit of each monomial: -2 for the second derivative of an input."""
     powers = np.zeros(2 * len(kinds) + 1, dtype=np.int64)
     for a, kind in enumerate(kinds):
         if kind == TIME:
             powers[2 * a] = 1
-        elif kind == VALUE and sources[term_start[a]] >= places[1]:
-            slot = (sources[term_start[a]] - places[1]) % SIGNAL_SLOTS
+        elif kind == VALUE and sources[term_start[a]] >= angles[1]:
+            slot = (sources[term_start[a]] - angles[1]) % SIGNAL_SLOTS
             powers[2 * a] = -slot if slot < START else slot == START
     return np.asarray(powers[factors].sum(axis=1))
