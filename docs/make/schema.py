@@ -100,10 +100,14 @@ LIMIT = said(
 COMPONENT = table(
     {"modes": MODES, "initial": INITIAL, "surface": SURFACE_OF_COMPONENT, "limit": LIMIT}, ("modes",)
 )
+CSV = said("a CSV beside the model", TEXT)
 POINTS = table(
-    {"at": NUMBERS, "values": NUMBERS, "over": said("the argument; the speed v if not given", TEXT)},
-    ("at", "values"),
-)
+    {
+        "at": NUMBERS, "values": NUMBERS, "file": CSV, "columns": {"type": "array"},
+        "over": said("the argument; the speed v if not given", TEXT),
+        "interpolation": {"enum": ["cubic", "linear"]},
+    }
+) | {"anyOf": [{"required": ["at", "values"]}, {"required": ["file"]}]}  # fmt: skip
 NAMES = {"type": "array", "items": {"anyOf": [TEXT, EXPRESSIONS]}}
 LAW = table(
     {
@@ -118,17 +122,21 @@ LAW = table(
         "definitions": EXPRESSIONS,
         "modes": MODES, "initial": INITIAL,
         "copies": said("the parameter that says how many copies act in parallel", TEXT),
-        "tables": named(POINTS, "functions given by points, monotone cubics between them"),
+        "tables": named(POINTS, "functions given by points"),
     }
 )  # fmt: skip
 NAMED_LAW = {
     "type": "object", "properties": {"name": TEXT}, "required": ["name"], "additionalProperties": EXPRESSION,
 }  # fmt: skip
+LAW_OF_FILE = {
+    "type": "object", "properties": {"file": said("a file with one law", TEXT)}, "required": ["file"],
+    "additionalProperties": EXPRESSION,
+}  # fmt: skip
 CONTACT = table(
     {
         "velocity": said("the relative velocity", EXPRESSION),
         "normal": said("the normal load", EXPRESSION),
-        "law": said("the law's name, with its arguments", {"anyOf": [TEXT, NAMED_LAW]}),
+        "law": said("the law's name or file, with its arguments", {"anyOf": [TEXT, NAMED_LAW, LAW_OF_FILE]}),
         "opens": said("whether it lifts off where the load would be negative", FLAG),
         "start": said("initial values of the law's states", EXPRESSIONS),
         "nominal": said("usual sizes of the law's states", {"type": "object", "additionalProperties": NUMBER}),
@@ -185,7 +193,7 @@ CHIRP = {
 CONNECTED = {"kind": {"const": "connected"}, "unit": UNIT}
 HELD = {"kind": {"const": "held"}, "value": said("until it is set from outside", EXPRESSION), "unit": UNIT}
 POINTS_IN_TIME = {
-    "kind": {"const": "table"}, "times": NUMBERS, "values": NUMBERS, "file": said("a CSV beside the model", TEXT),
+    "kind": {"const": "table"}, "times": NUMBERS, "values": NUMBERS, "file": CSV,
     "columns": {"type": "array"}, "interpolation": {"enum": ["linear", "cubic", "previous"]}, "unit": UNIT,
 }  # fmt: skip
 INPUT = {"oneOf": [table(keys, ("kind",)) for keys in (WAVE, CHIRP, POINTS_IN_TIME, HELD, CONNECTED)]}

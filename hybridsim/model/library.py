@@ -87,9 +87,7 @@ def loaded(name_or_path: str | os.PathLike[str]) -> Model:
     before = _state_of(path)
     model = Model.from_toml(read_text(Path(path)), path)
     state = (*before, *_state_of(*model._part_files))
-    # a table may lie in a file of its own, which may change alone
-    tables = any(signal.kind == "table" for signal in model.inputs)
-    if all(state) and not tables and time.time_ns() - max(file[2] for file in state) > _MIN_AGE:
+    if all(state) and time.time_ns() - max(file[2] for file in state) > _MIN_AGE:
         if len(_loaded) >= _MAX_LOADED:
             _loaded.clear()
         _loaded[text] = path, state, model
@@ -160,13 +158,13 @@ def list_laws() -> tuple[str, ...]:
 
 
 @refusing
-def load_law(name: str) -> FrictionLaw:
-    """Load a packaged friction law by name, for use in a `Contact`.
+def load_law(name_or_path: str | os.PathLike[str]) -> FrictionLaw:
+    """Load a friction law, packaged or in a file of its own, for use in a `Contact`.
 
     Parameters
     ----------
-    name : str
-        Name of the law.
+    name_or_path : str or path
+        Name of a packaged law, or the path of a ``.toml`` file with one law.
 
     Returns
     -------
@@ -176,9 +174,9 @@ def load_law(name: str) -> FrictionLaw:
     Raises
     ------
     ModelError
-        For an unknown name; the message lists similar names.
+        For an unknown name (similar names are listed), and for a file that is missing or has errors.
     UsageError
-        If the name is not a string.
+        If it is neither a name nor a path.
 
     Examples
     --------
@@ -186,29 +184,40 @@ def load_law(name: str) -> FrictionLaw:
     >>> hs.load_law("coulomb").is_set_valued
     True
     """
-    if not isinstance(name, str):
-        raise UsageError(f"The law cannot be {name!r}", remedy="use the name of a law (a string)")
-    return _packaged_law(name)
+    if not isinstance(name_or_path, str | os.PathLike):
+        raise UsageError(f"The law cannot be {name_or_path!r}", remedy="use the name of a law, or a path")
+    path = os.fspath(name_or_path)
+    if not isinstance(name_or_path, str) or _is_path(path):
+        return law_of_text(read_text(Path(path)), path)[0]
+    return _packaged_law(path)
 
 
 @lru_cache(maxsize=64)
 def _packaged_law(name: str) -> FrictionLaw:
-    from hybridsim.model.toml.laws import read_laws
-    from hybridsim.model.toml.read import open_text
-
     if name not in list_laws():
         known = nearest(name, list_laws(), kind="laws")
         raise ModelError(
             f"there is no law '{name}'",
-            remedy=f"{known}; for your own law pass the FrictionLaw object",
+            remedy=f"{known}; for your own law pass the FrictionLaw object, or the path of a .toml file",
         )
     path = models_folder() / "laws" / f"{name}.toml"
-    root = open_text(read_text(path), str(path), "the law")
+    return law_of_text(read_text(path), str(path))[0]
+
+
+def law_of_text(text: str, path: str) -> tuple[FrictionLaw, list[str]]:
+    """Return the only law in the text of a file, and all files that it was read from."""
+    from hybridsim.model.toml.laws import read_laws
+    from hybridsim.model.toml.read import open_text
+
+    root = open_text(text, path, "the file of a law")
     root.only("schema", "look", "laws")
-    laws = read_laws(root)
+    laws = read_laws(root, Path(path).parent)
+    if not root.source.errors and len(laws) != 1:
+        names = f": {', '.join(laws)}" if laws else ""
+        root.fail(f"it declares {len(laws)} laws{names}", "declare one law, [laws.NAME], in each file")
     if root.source.errors:
-        raise ModelError.collect(root.source.errors, str(path))
-    return laws[name]
+        raise ModelError.collect(root.source.errors, path)
+    return next(iter(laws.values())), [path, *root.source.files]
 
 
 def models_folder() -> Path:

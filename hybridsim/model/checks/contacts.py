@@ -10,7 +10,7 @@ from hybridsim.model.parts.contact import Contact
 # Keys of a law in TOML, which a parameter of a law cannot be called.
 _KEYS = (
     "name", "slip", "stick", "slip_backward", "stick_backward", "force", "states", "definitions", "modes", "initial",
-    "copies", "tables", "parameters", "title", "source",
+    "copies", "tables", "parameters", "title", "source", "file",
 )  # fmt: skip
 _TAKEN = {
     SPEED: "the speed",

@@ -1,14 +1,16 @@
-"""This module defines functions of one argument by points, with monotone cubic interpolation."""
+"""This module defines functions of one argument by points, with linear or monotone cubic interpolation."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 from hybridsim.expr import Expression, parse, substitute
 from hybridsim.model.parts.component import Choice, Corner, Guard, Mode
 from hybridsim.model.parts.declared import Declared
 
 _SPEED = parse("v")
+INTERPOLATIONS = ("cubic", "linear")
 Piece = tuple[float, float, float, float, float]
 """Left end of the piece, and the coefficients of 1, d, d**2, d**3, with d the distance from the left end."""
 
@@ -17,7 +19,8 @@ Piece = tuple[float, float, float, float, float]
 class LawTable(Declared):
     """A table of a friction law: ``values`` at increasing arguments ``at``, constant beyond both ends.
 
-    The interpolation is a monotone piecewise cubic with continuous slope.
+    The cubic interpolation is monotone between the points and has a continuous slope. With linear interpolation, a
+    force that is linear in its other quantities stays linear between the points, so that ``exact`` can integrate it.
 
     Parameters
     ----------
@@ -29,6 +32,8 @@ class LawTable(Declared):
         Values (k,) at the arguments.
     over : str or float, optional
         The argument, an expression of the names of the law; the default is the speed v.
+    interpolation : str, optional
+        "cubic" or "linear".
     place : Place, optional
         Place of the declaration, for error messages.
 
@@ -46,9 +51,14 @@ class LawTable(Declared):
     at: tuple[float, ...]
     values: tuple[float, ...]
     over: Expression = _SPEED
+    interpolation: str = "cubic"
 
     def __post_init__(self) -> None:
         self._texts("name")
+        self._texts("interpolation", known=INTERPOLATIONS)
+        if self.interpolation not in INTERPOLATIONS:
+            remedy = f"use {' or '.join(map(repr, INTERPOLATIONS))}"
+            raise self._fault(f"`interpolation` cannot be {self.interpolation!r}", remedy)
         self._numbers("at", "values")
         self._expressions("over")
         if len(self.at) != len(self.values):
@@ -75,7 +85,10 @@ class LawTable(Declared):
         return c[0] + d * (c[1] + d * (c[2] + d * c[3]))
 
     def pieces(self) -> list[Piece]:
-        """Return the cubics between the points, from left to right."""
+        """Return the polynomials between the points, from left to right."""
+        if self.interpolation == "linear":
+            points = list(zip(self.at, self.values, strict=True))
+            return [(x, y, (y1 - y) / (x1 - x), 0.0, 0.0) for (x, y), (x1, y1) in pairwise(points)]
         slopes, found = self._slopes(), []
         for k, x in enumerate(self.at[:-1]):
             h, first, last = self.at[k + 1] - x, slopes[k], slopes[k + 1]
@@ -118,7 +131,8 @@ class LawTable(Declared):
             texts.append(repr(self.values[0]))
         for x, *c in self.pieces():
             d = f"(a - ({x!r}))"
-            texts.append(f"{c[0]!r} + {d}*({c[1]!r} + {d}*({c[2]!r} + {d}*({c[3]!r})))")
+            curved = "" if self.interpolation == "linear" else f" + {d}*({c[2]!r} + {d}*({c[3]!r}))"
+            texts.append(f"{c[0]!r} + {d}*({c[1]!r}{curved})")
         texts.append(repr(self.values[-1]))
         ends = self.at[len(self.at) + 1 - len(texts) :]
         modes = []

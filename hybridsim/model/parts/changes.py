@@ -1,14 +1,19 @@
-"""This module checks the changes of values in a copy of a model."""
+"""This module computes the parts of a copy of a model that has other values or other friction laws."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from numbers import Real
-from typing import Any
+from typing import Any, TypeVar
 
-from hybridsim.errors import ExpressionError, Place, UsageError
+from hybridsim.errors import ExpressionError, Place, UsageError, nearest
 from hybridsim.expr import Expression, parse
+from hybridsim.model.laws.law import FrictionLaw
+from hybridsim.model.parts.contact import Contact
+from hybridsim.model.parts.quantities import Discrete, State
+
+Part = TypeVar("Part", State, Discrete)
 
 
 def changed_value(changes: Mapping[str, Any], name: str) -> Expression:
@@ -34,3 +39,86 @@ def require_known(
             raise UsageError(f"{kind} {name} cannot be {value!r}", remedy="use a number or an expression")
         if name not in allowed:
             raise UsageError(f"the model '{model}' has no {kind} '{name}'", remedy=remedy(name))
+
+
+def with_starts(parts: Iterable[Part], changes: Mapping[str, Any]) -> tuple[Part, ...]:
+    """Return (discrete) states with the changed initial values."""
+    return tuple(
+        replace(part, start=changed_value(changes, part.name)) if part.name in changes else part
+        for part in parts
+    )
+
+
+def started(
+    contact: Contact, changes: Mapping[str, Any], states_of: Callable[[Contact], Iterable[State]]
+) -> Contact:
+    """Return the contact with new initial values for the states of its friction law."""
+    own = {name for name in changes if name.startswith(contact.variable(""))}
+    if not (own and contact.law.states):
+        return contact
+    own &= {state.name for state in states_of(contact)}
+    start = {name.removeprefix(contact.variable("")): parse(changes[name]) for name in sorted(own)}
+    return replace(contact, start={**contact.start, **start})
+
+
+def with_law(
+    model: Any,
+    name: str,
+    law: FrictionLaw | str,
+    given: Mapping[str, Any],
+    states_of: Callable[[Contact], Iterable[State]],
+) -> Any:
+    """Return the copy of a model in which a contact has another friction law (see `Model.with_law`)."""
+    found = {contact.name: contact for contact in model.contacts}
+    if name not in found:
+        remedy = nearest(str(name), found, kind="contacts")
+        raise UsageError(f"the model '{model.name}' has no contact {name!r}", remedy=remedy)
+    changed = _with_law(found[name], law, given)
+    gone = {s.name for s in states_of(found[name])} - {s.name for s in states_of(changed)}
+    copy = replace(
+        model,
+        contacts=tuple(changed if contact.name == name else contact for contact in model.contacts),
+        states=tuple(state for state in model.states if state.name not in gone),
+    )
+    vars(copy)["connected_units"] = model.connected_units
+    return copy.validate()
+
+
+def _with_law(contact: Contact, law: FrictionLaw | str, given: Mapping[str, Any]) -> Contact:
+    fresh = Contact(contact.name, contact.velocity, contact.normal, law)  # type: ignore[arg-type]  # loads a name
+    law, title = fresh.law, f"contact {contact.name}"
+    for name in given:
+        if name not in law.parameters:
+            remedy = nearest(name, law.parameters, kind="parameters of the law")
+            raise UsageError(f"{title}: the law '{law.name}' has no parameter '{name}'", remedy=remedy)
+    former = {name: value for name, value in contact.law.parameters.items() if value is not None}
+    arguments = {}
+    for name, default in law.parameters.items():
+        if name in given:
+            arguments[name] = changed_value(given, name)
+        elif name in contact.arguments:
+            arguments[name] = contact.arguments[name]
+        elif default is None and name in former:
+            arguments[name] = contact.values()[name]
+    missing = [name for name, value in law.parameters.items() if value is None and name not in arguments]
+    if missing:
+        values = ", ".join(f"{name}=..." for name in missing)
+        raise UsageError(
+            f"{title}: the law '{law.name}' needs a value for {', '.join(map(repr, missing))}",
+            remedy=f"pass {values}; the contact has {_listed(contact)}",
+        )
+    states = {state.name for state in law.states}
+
+    def kept(sizes: Mapping[str, Any]) -> dict[str, Any]:
+        return {own: size for own, size in sizes.items() if {own, own.rstrip("0123456789")} & states}
+
+    return replace(
+        contact, law=law, arguments=arguments, start=kept(contact.start), nominal=kept(contact.nominal)
+    )
+
+
+def _listed(contact: Contact) -> str:
+    """Return the law of a contact and the values of its parameters as text."""
+    values = contact.values()
+    given = [f"{name} = {values[name].text}" for name in contact.law.parameters]
+    return f"the law '{contact.law.name}' with {', '.join(given) or 'no parameters'}"

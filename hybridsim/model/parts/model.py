@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 from typing import Any, ClassVar
 
@@ -12,8 +12,9 @@ from hybridsim.expr import Expression, evaluate, parse, resolve
 from hybridsim.expr.evaluate import dependency_order
 from hybridsim.files import path_text
 from hybridsim.model.flattening.flatten import flattened
+from hybridsim.model.laws.law import FrictionLaw
 from hybridsim.model.laws.law_with_states import ContactState
-from hybridsim.model.parts.changes import changed_value, require_known
+from hybridsim.model.parts.changes import changed_value, require_known, started, with_law, with_starts
 from hybridsim.model.parts.component import Component, Corner
 from hybridsim.model.parts.contact import Contact
 from hybridsim.model.parts.declared import Declared
@@ -253,15 +254,26 @@ class Model(Declared):
         """Return a copy with changed initial values of (discrete) states: ``model.with_start(x=0.1)``."""
         names = [*(part.name for part in self.states), *(part.name for part in self.discrete)]
         require_known(changes, names, "state", self.name, partial(remedy_for_state, self))
-        contacts = tuple(self._started(contact, changes) for contact in self.contacts)
+        contacts = tuple(started(contact, changes, self._brought_by) for contact in self.contacts)
+        states, discrete = with_starts(self.states, changes), with_starts(self.discrete, changes)
+        return self._valued(states=states, discrete=discrete, contacts=contacts)
 
-        def changed(parts: Iterable[Any]) -> tuple[Any, ...]:
-            return tuple(
-                replace(part, start=changed_value(changes, part.name)) if part.name in changes else part
-                for part in parts
-            )
+    def with_law(self, contact: str, law: FrictionLaw | str, /, **parameters: Any) -> Model:
+        """Return a checked copy with another law in a contact: ``model.with_law("f", "stribeck", v_s=0.1)``.
 
-        return self._valued(states=changed(self.states), discrete=changed(self.discrete), contacts=contacts)
+        A parameter that is not passed keeps the value that the contact gives it now. Otherwise it has its default.
+
+        Parameters
+        ----------
+        contact : str
+            Name of the contact.
+        law : FrictionLaw or str
+            A `FrictionLaw`, the name of a packaged law, or the path of a file with a law.
+        **parameters : str or float
+            Values of parameters of the law, numbers or expressions of the model's names.
+        """
+        changed: Model = with_law(self, contact, law, parameters, self._brought_by)
+        return changed
 
     def with_values_of(self, other: Model) -> Model:
         """Return a copy with the values of another model with the same parameters and states."""
@@ -298,15 +310,6 @@ class Model(Declared):
         if name not in self._unnumbered:
             self._unnumbered[name] = make()
         return self._unnumbered[name]
-
-    def _started(self, contact: Contact, changes: Mapping[str, Any]) -> Contact:
-        """Return the contact with new initial values for the states of its friction law."""
-        own = {name for name in changes if name.startswith(contact.variable(""))}
-        if not (own and contact.law.states):
-            return contact
-        own &= {state.name for state in self._brought_by(contact)}
-        start = {name.removeprefix(contact.variable("")): parse(changes[name]) for name in sorted(own)}
-        return replace(contact, start={**contact.start, **start})
 
     def _brought_by(self, contact: Contact) -> tuple[State, ...]:
         return contact.states(self._never_negative_names(), partial(self._load_rate, contact))
@@ -515,9 +518,6 @@ class Model(Declared):
 
 
 def _content(model: Model) -> tuple[object, ...]:
-    parts = (
-        model.states, model.parameters, model.discrete, model.components, model.contacts, model.surfaces, model.inputs,
-        model.monitors, model.schedules, model.outputs, model.definitions, model.impacts, model.drawing,
-    )  # fmt: skip
-    texts = (model.title, model.source, model.description, model.look, model.duration)
-    return (model.name, *parts, *texts, model.flow)
+    return tuple(
+        getattr(model, field.name) for field in fields(model) if field.compare and field.name != "path"
+    )

@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from hybridsim.errors import ModelError, nearest
+from hybridsim.errors import nearest
 from hybridsim.model.parts.inputs import KINDS, OPTIONAL, REQUIRED, Input
 from hybridsim.model.toml.table import Table
-from hybridsim.model.toml.table_file import read_columns
+from hybridsim.model.toml.table_file import numbers_from_file
 
 _TEXTS = ("shape", "interpolation", "unit")
 _NUMBERS = ("times", "values")
@@ -27,7 +27,7 @@ def read_inputs(root: Table, folder: Path) -> Iterable[Input]:
         extra = ("file", "columns") if kind == "table" else ()
         table.only("kind", *known, *extra)
         if "file" in table.data:
-            numbers = _from_file(table, folder)
+            numbers = numbers_from_file(table, folder, _NUMBERS, "times")
         else:
             for key in REQUIRED[kind]:
                 table.require(key, f"an input of kind '{kind}' needs {', '.join(REQUIRED[kind])}")
@@ -47,26 +47,3 @@ def _numbers(table: Table, key: str) -> tuple[float, ...]:
             table.fail(f"'{key}' contains {value!r}", "use a list of numbers", key, index)
             return ()
     return tuple(float(value) for value in numbers)
-
-
-def _from_file(table: Table, folder: Path) -> dict[str, tuple[float, ...]]:
-    for key in _NUMBERS:
-        if key in table.data:
-            table.fail(f"'file' and '{key}' cannot be combined", f"remove 'file' or '{key}'", key)
-    columns = table.data.get("columns")
-    is_pair = isinstance(columns, list) and len(columns) == 2
-    if columns is not None and not (is_pair and all(isinstance(column, (str, int)) for column in columns)):
-        table.fail(f"'columns' cannot be {columns!r}", "use two names or indices, [time, value]", "columns")
-        return {}
-    path = folder / table.text("file")
-    try:
-        times, values = read_columns(path, columns)
-    except ModelError as fault:
-        where = fault.place.prefix if fault.place else ""
-        table.fail(
-            where + fault.message,
-            f"{fault.remedy}; paths are relative to the folder {folder.resolve()}",
-            "file",
-        )
-        return {}
-    return {"times": times, "values": values}

@@ -3,42 +3,46 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
-from hybridsim.errors import UsageError, nearest
+from hybridsim.errors import ModelError, UsageError, nearest
 from hybridsim.expr import Expression, parse
 from hybridsim.model.laws.law import SPEED, FrictionLaw
 from hybridsim.model.laws.law_table import LawTable
 from hybridsim.model.parts.quantities import State
 from hybridsim.model.toml.automata import read_mode
 from hybridsim.model.toml.table import Table
+from hybridsim.model.toml.table_file import numbers_from_file
 
 KEYS = (
     "slip", "stick", "slip_backward", "stick_backward", "force", "states", "definitions", "modes", "initial", "copies",
     "tables", "parameters", "title", "source",
 )  # fmt: skip
-_OWN = ("name", *KEYS)
+_OWN = ("name", "file", *KEYS)
 _BRINGS = ("slip", "stick", "force")
+_POINTS = ("at", "values")
 
 
-def read_laws(root: Table) -> dict[str, FrictionLaw]:
-    """Return the laws that the file declares, by name."""
+def read_laws(root: Table, folder: Path) -> dict[str, FrictionLaw]:
+    """Return the laws that the file declares, by name; paths of tables are relative to ``folder``."""
     found = {}
     for name, table in root.entries("laws", "law"):
         table.only(*KEYS)
-        law = _law(name, table, {})
+        law = _law(name, table, {}, folder)
         if law is not None:
             found[name] = law
     return found
 
 
 def read_law_of_contact(
-    contact: Table, laws: dict[str, FrictionLaw]
+    contact: Table, laws: dict[str, FrictionLaw], folder: Path
 ) -> tuple[FrictionLaw, dict[str, Expression]] | None:
     """Return the law and the arguments of a contact, or None after reporting an unknown law.
 
-    ``law = { name = "coulomb", mu = "mu" }`` refers to a law of the file or the package. With ``slip`` and ``stick``,
-    or with ``force``, the table declares the law itself, and every other key is a parameter with its value.
+    ``law = { name = "coulomb", mu = "mu" }`` refers to a law of the file or the package, and
+    ``law = { file = "pad.toml", mu = "mu" }`` to the law in a file of its own. With ``slip`` and ``stick``, or with
+    ``force``, the table declares the law itself, and every other key is a parameter with its value.
     """
     if not contact.require("law", 'write law = { name = "coulomb", mu = 0.5 }'):
         return None
@@ -46,9 +50,12 @@ def read_law_of_contact(
     if table is None:
         return None
     arguments = {key: table.parsed(value, key) for key, value in table.data.items() if key not in _OWN}
+    if "file" in table.data:
+        own = _of_file(table, folder)
+        return None if own is None else (own, arguments)
     name = table.text("name")
     if any(key in table.data for key in _BRINGS):
-        own = _law(name or str(contact.path[-1]), table, arguments)
+        own = _law(name or str(contact.path[-1]), table, arguments, folder)
         return None if own is None else (own, arguments)
     for key in KEYS:
         if key in table.data:
@@ -72,7 +79,32 @@ def _packaged(name: str) -> FrictionLaw | None:
     return load_law(name) if name in list_laws() else None
 
 
-def _law(name: str, table: Table, arguments: dict[str, Expression]) -> FrictionLaw | None:
+def _of_file(table: Table, folder: Path) -> FrictionLaw | None:
+    """Return the law in the file that a contact refers to, or None after reporting its errors."""
+    from hybridsim.model.library import law_of_text, read_text
+
+    for key in _OWN:
+        if key != "file" and key in table.data:
+            table.fail(f"'{key}' and 'file' cannot be combined", f"remove '{key}' or 'file'", key)
+    errors, path = len(table.source.errors), folder / table.text("file")
+    if len(table.source.errors) > errors:
+        return None  # no text
+    try:
+        text = read_text(path)
+    except ModelError as fault:
+        where = fault.place.prefix if fault.place else ""
+        table.fail(where + fault.message, f"paths are relative to the folder {folder.resolve()}", "file")
+        return None
+    try:
+        law, files = law_of_text(text, str(path))
+    except ModelError as fault:
+        table.source.errors.extend(fault.errors)
+        return None
+    table.source.files.extend(files)
+    return law
+
+
+def _law(name: str, table: Table, arguments: dict[str, Expression], folder: Path) -> FrictionLaw | None:
     declared: Any = table.data.get("parameters", {})
     parameters: dict[str, Expression | None] = {}
     if isinstance(declared, list):
@@ -109,7 +141,7 @@ def _law(name: str, table: Table, arguments: dict[str, Expression]) -> FrictionL
             modes=tuple(read_mode(mode, part) for mode, part in modes.items()),
             initial=texts.get("initial", marked[0] if marked else None),
             copies=texts.get("copies"),
-            tables=tuple(_tables(table)),
+            tables=tuple(_tables(table, folder)),
             place=table.place,
         )
     except UsageError as fault:
@@ -125,14 +157,21 @@ def _states(law: Table) -> Iterator[State]:
         yield State(name, start, der, table.text("unit"), table.real("nominal"), place=table.place)
 
 
-def _tables(law: Table) -> Iterator[LawTable]:
+def _tables(law: Table, folder: Path) -> Iterator[LawTable]:
     for name, table in law.entries("tables", f"{law.kind}, table"):
-        table.only("at", "values", "over")
-        for key in ("at", "values"):
-            table.require(key, f"write {key} = [0, ...]")
+        table.only(*_POINTS, "over", "interpolation", "file", "columns")
+        if "file" in table.data:
+            numbers = numbers_from_file(table, folder, _POINTS, "arguments")
+            if not numbers:
+                continue
+        else:
+            for key in _POINTS:
+                table.require(key, f"write {key} = [0, ...]")
+            numbers = {key: table.numbers(key) for key in _POINTS}
         over = table.expression("over") or parse(SPEED)
+        way = table.text("interpolation", "cubic")
         try:
-            yield LawTable(name, table.numbers("at"), table.numbers("values"), over, place=table.place)
+            yield LawTable(name, **numbers, over=over, interpolation=way, place=table.place)
         except UsageError as fault:
             table.fail(fault.message.partition(": ")[2], fault.remedy or "")
 

@@ -105,6 +105,7 @@ def _model(text: str, path: str | None, files: PartFiles) -> Model:
         model = _declared(root, name, files)
     except ModelError as fault:
         errors.extend(fault.errors)
+    files.others.extend(root.source.files)
     if errors:
         raise ModelError.collect(errors, root.source.file or f"model {name}")
     return model
@@ -121,7 +122,7 @@ def _declared(root: Table, name: str, files: PartFiles) -> Model:
     root.only_in(*KEYS, others=loose, remedy="write the line [parameters] above them, if they are parameters")
     if root.data.get("schema", SCHEMA) != SCHEMA:
         root.fail(f"unknown schema {root.data['schema']!r}", f"write schema = {SCHEMA}", "schema")
-    laws = read_laws(root)
+    laws = read_laws(root, folder)
     uses = tuple(read_uses(root, folder, files))
     return Model(
         name=name,
@@ -130,7 +131,7 @@ def _declared(root: Table, name: str, files: PartFiles) -> Model:
         parameters=tuple(_parameters(root)),
         discrete=tuple(_discrete(root)),
         components=tuple(read_components(root)),
-        contacts=tuple(_contacts(root, laws)),
+        contacts=tuple(_contacts(root, laws, folder)),
         surfaces=tuple(_surfaces(root)),
         impacts=tuple(_impacts(root)),
         inputs=tuple(read_inputs(root, folder)),
@@ -171,7 +172,7 @@ def _discrete(root: Table) -> Iterable[Discrete]:
         yield Discrete(name, start, table.text("unit"), place=table.place)
 
 
-def _contacts(root: Table, laws: dict[str, FrictionLaw]) -> Iterable[Contact]:
+def _contacts(root: Table, laws: dict[str, FrictionLaw], folder: Path) -> Iterable[Contact]:
     for name, table in root.entries("contacts", "contact"):
         name_of_law = table.data.get("law")
         numbers = [key for key, value in table.data.items() if type(value) in (int, float)]
@@ -182,7 +183,7 @@ def _contacts(root: Table, laws: dict[str, FrictionLaw]) -> Iterable[Contact]:
         )
         velocity = table.required("velocity", 'write velocity = "EXPRESSION", the relative velocity')
         normal = table.required("normal", 'write normal = "EXPRESSION", the normal load')
-        law = read_law_of_contact(table, laws)
+        law = read_law_of_contact(table, laws, folder)
         if law is not None:
             yield Contact(
                 name,

@@ -16,12 +16,13 @@ _ZERO = parse(0)
 
 @dataclass
 class Source:
-    """The text of a TOML file, the positions of its keys, and the errors found so far."""
+    """The text of a TOML file, the positions of its keys, and the errors and further files found so far."""
 
     file: str | None
     lines: list[str]
     positions: Mapping[Path, tuple[int, int]]
     errors: list[ModelError] = field(default_factory=list)
+    files: list[str] = field(default_factory=list)  # further files that the text refers to
 
     def place(self, path: Path) -> Place:
         """Return the place of a key, or of the nearest enclosing table with a known line."""

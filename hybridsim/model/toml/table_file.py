@@ -1,4 +1,4 @@
-"""This module reads two columns of a CSV file as the table of an input."""
+"""This module reads two columns of a CSV file as the table of an input or of a friction law."""
 
 from __future__ import annotations
 
@@ -8,13 +8,46 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from hybridsim.errors import ModelError, Place, nearest
+from hybridsim.model.toml.table import Table
 
 # Limit of the file size; a table with a million rows has about 40 MB.
 MAX_BYTES = 64_000_000
 
 
-def read_columns(path: Path, columns: Sequence[str | int] | None) -> tuple[tuple[float, ...], ...]:
-    """Return two columns of a CSV file as numbers: times, which may not decrease, and values.
+def numbers_from_file(
+    table: Table, folder: Path, keys: tuple[str, str], what: str
+) -> dict[str, tuple[float, ...]]:
+    """Return the numbers of a table with the keys ``file`` and ``columns``, under the two given keys.
+
+    Parameters
+    ----------
+    what : the word for the numbers of the first column.
+    """
+    for key in keys:
+        if key in table.data:
+            table.fail(f"'file' and '{key}' cannot be combined", f"remove 'file' or '{key}'", key)
+    columns = table.data.get("columns")
+    is_pair = isinstance(columns, list) and len(columns) == 2
+    if columns is not None and not (is_pair and all(isinstance(column, (str, int)) for column in columns)):
+        remedy = f"use two names or indices, [{what}, values]"
+        table.fail(f"'columns' cannot be {columns!r}", remedy, "columns")
+        return {}
+    path = folder / table.text("file")
+    try:
+        found = read_columns(path, columns, what)
+    except ModelError as fault:
+        where = fault.place.prefix if fault.place else ""
+        remedy = f"{fault.remedy}; paths are relative to the folder {folder.resolve()}"
+        table.fail(where + fault.message, remedy, "file")
+        return {}
+    table.source.files.append(str(path))
+    return dict(zip(keys, found, strict=True))
+
+
+def read_columns(
+    path: Path, columns: Sequence[str | int] | None, what: str = "times"
+) -> tuple[tuple[float, ...], ...]:
+    """Return two columns of a CSV file as numbers: times (or arguments), which may not decrease, and values.
 
     The separator is a comma, a semicolon or a tab. Numbers have a decimal point; a decimal comma is an error. Empty
     lines and lines that start with # are skipped. The first line contains names if a column is selected by name, or if
@@ -23,6 +56,7 @@ def read_columns(path: Path, columns: Sequence[str | int] | None) -> tuple[tuple
     Parameters
     ----------
     columns : name, or index from 0, of each selected column; None for a file with two columns of numbers.
+    what : the word for the numbers of the first column.
 
     Raises
     ------
@@ -35,7 +69,7 @@ def read_columns(path: Path, columns: Sequence[str | int] | None) -> tuple[tuple
     has_choice, columns = columns is not None, columns or (0, 1)
     names = head if _are_names(head, columns) else None
     if len(rows) < (2 if names else 1):
-        remedy = "write time and value in each row"
+        remedy = f"write {what} in the first column and values in the second"
         raise ModelError("the table has no rows of numbers", place=Place(str(path)), remedy=remedy)
     _refuse_decimal_commas(rows, names, path)
     _refuse_spaces(rows, path)
@@ -46,15 +80,15 @@ def read_columns(path: Path, columns: Sequence[str | int] | None) -> tuple[tuple
         raise ModelError(
             f"the table has {len(numeric)} columns of numbers: {which}",
             place=Place(str(path), body[0][0]),
-            remedy="choose the times and the values with `columns`",
+            remedy=f"choose the {what} and the values with `columns`",
         )
     indices = [_index(column, names, len(head), Place(str(path), rows[0][0])) for column in columns]
     found = tuple(tuple(_cell(row, index, line, path) for line, row in body) for index in indices)
-    times = found[0]
-    for (line, _), before, after in zip(body[1:], times[:-1], times[1:], strict=True):
+    first = found[0]
+    for (line, _), before, after in zip(body[1:], first[:-1], first[1:], strict=True):
         if after < before:
-            what = f"the times decrease from {before!r} to {after!r}"
-            raise ModelError(what, place=Place(str(path), line), remedy="sort the table by time")
+            message = f"the {what} decrease from {before!r} to {after!r}"
+            raise ModelError(message, place=Place(str(path), line), remedy=f"sort the rows by the {what}")
     return found
 
 

@@ -31,12 +31,13 @@ class PartFiles:
     def __init__(self, build: Callable[[str, str, PartFiles], Model], path: str | None) -> None:
         self._build = build
         self._models: dict[str, Model | None] = {}
+        self.others: list[str] = []  # files of laws and tables
         self._open = [] if path is None else [path]
 
     @property
     def files(self) -> tuple[str, ...]:
-        """The files that were read."""
-        return tuple(self._models)
+        """The files that were read beside that of the model itself."""
+        return (*self._models, *self.others)
 
     def model(self, table: Table, folder: Path) -> Model | None:
         """Return the model of a part, or None after reporting why it cannot be read."""

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from hybridsim.expr import Expression
 from hybridsim.expr.grammar import MAX_INTEGER
 from hybridsim.model.laws.law import FrictionLaw
+from hybridsim.model.laws.law_table import LawTable
 from hybridsim.model.laws.law_with_states import ContactState
 from hybridsim.model.parts.component import Component, Guard
 from hybridsim.model.parts.contact import Contact
@@ -106,9 +107,14 @@ def _law(law: FrictionLaw) -> dict[str, Any]:
         "parameters": parameters,
         **_fields(law, *fields),
         "states": {state.name: _state(state) for state in law.states},
-        "tables": {table.name: _fields(table, "at", "values", "over") for table in law.tables},
+        "tables": {table.name: _table(table) for table in law.tables},
         "modes": {mode.name: _mode(mode) for mode in law.modes},
     }
+
+
+def _table(table: LawTable) -> dict[str, Any]:
+    way = {} if table.interpolation == "cubic" else _fields(table, "interpolation")
+    return {**_fields(table, "at", "values", "over"), **way}
 
 
 def _contact(contact: Contact, laws: Mapping[str, FrictionLaw]) -> dict[str, Any]:

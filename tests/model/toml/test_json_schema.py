@@ -73,7 +73,7 @@ def test_it_knows_the_keys_that_the_reader_knows(monkeypatch: pytest.MonkeyPatch
         if "[states" in text:
             hs.Model.from_toml(text, str(file))  # not `load`, which reads a file once
         else:
-            read_laws(open_text(text, None, "laws"))
+            read_laws(open_text(text, None, "laws"), file.parent)
     for text in SHOWN:
         hs.Model.from_toml(text)
     hs.Model.from_toml(EVERYTHING)
