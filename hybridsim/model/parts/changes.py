@@ -65,7 +65,7 @@ def with_law(
     model: Any,
     name: str,
     law: FrictionLaw | str,
-    given: Mapping[str, Any],
+    passed: Mapping[str, Any],
     states_of: Callable[[Contact], Iterable[State]],
 ) -> Any:
     """Return the copy of a model in which a contact has another friction law (see `Model.with_law`)."""
@@ -73,7 +73,7 @@ def with_law(
     if name not in found:
         remedy = nearest(str(name), found, kind="contacts")
         raise UsageError(f"the model '{model.name}' has no contact {name!r}", remedy=remedy)
-    changed = _with_law(found[name], law, given)
+    changed = _with_law(found[name], law, passed)
     gone = {s.name for s in states_of(found[name])} - {s.name for s in states_of(changed)}
     copy = replace(
         model,
@@ -84,18 +84,18 @@ def with_law(
     return copy.validate()
 
 
-def _with_law(contact: Contact, law: FrictionLaw | str, given: Mapping[str, Any]) -> Contact:
+def _with_law(contact: Contact, law: FrictionLaw | str, passed: Mapping[str, Any]) -> Contact:
     fresh = Contact(contact.name, contact.velocity, contact.normal, law)  # type: ignore[arg-type]  # loads a name
     law, title = fresh.law, f"contact {contact.name}"
-    for name in given:
+    for name in passed:
         if name not in law.parameters:
             remedy = nearest(name, law.parameters, kind="parameters of the law")
             raise UsageError(f"{title}: the law '{law.name}' has no parameter '{name}'", remedy=remedy)
     former = {name: value for name, value in contact.law.parameters.items() if value is not None}
     arguments = {}
     for name, default in law.parameters.items():
-        if name in given:
-            arguments[name] = changed_value(given, name)
+        if name in passed:
+            arguments[name] = changed_value(passed, name)
         elif name in contact.arguments:
             arguments[name] = contact.arguments[name]
         elif default is None and name in former:
@@ -109,16 +109,20 @@ def _with_law(contact: Contact, law: FrictionLaw | str, given: Mapping[str, Any]
         )
     states = {state.name for state in law.states}
 
-    def kept(sizes: Mapping[str, Any]) -> dict[str, Any]:
+    def of_its_states(sizes: Mapping[str, Any]) -> dict[str, Any]:
         return {own: size for own, size in sizes.items() if {own, own.rstrip("0123456789")} & states}
 
     return replace(
-        contact, law=law, arguments=arguments, start=kept(contact.start), nominal=kept(contact.nominal)
+        contact,
+        law=law,
+        arguments=arguments,
+        start=of_its_states(contact.start),
+        nominal=of_its_states(contact.nominal),
     )
 
 
 def _listed(contact: Contact) -> str:
     """Return the law of a contact and the values of its parameters as text."""
     values = contact.values()
-    given = [f"{name} = {values[name].text}" for name in contact.law.parameters]
-    return f"the law '{contact.law.name}' with {', '.join(given) or 'no parameters'}"
+    values_text = [f"{name} = {values[name].text}" for name in contact.law.parameters]
+    return f"the law '{contact.law.name}' with {', '.join(values_text) or 'no parameters'}"
