@@ -6,6 +6,7 @@ from hybridsim.analysis.compare.comparison import Comparison
 from hybridsim.analysis.compare.lines import Series
 from hybridsim.analysis.continuation import Branch, continuation
 from hybridsim.analysis.equilibria import Equilibrium, Linearization, equilibria, linearize
+from hybridsim.analysis.fit import Fit, Record, Unknown, fit
 from hybridsim.analysis.steady import SteadyState, steady_state
 from hybridsim.analysis.suite import SuiteComparison, compare_suite
 from hybridsim.analysis.sweep import Sweep, bifurcation, frequency_response, sweep
@@ -16,18 +17,22 @@ __all__ = [
     "Branch",
     "Comparison",
     "Equilibrium",
+    "Fit",
     "Linearization",
+    "Record",
     "Sensitivities",
     "Series",
     "SteadyState",
     "SuiteComparison",
     "Sweep",
+    "Unknown",
     "advise",
     "bifurcation",
     "compare",
     "compare_suite",
     "continuation",
     "equilibria",
+    "fit",
     "frequency_response",
     "linearize",
     "sensitivities",

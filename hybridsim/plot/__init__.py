@@ -6,6 +6,7 @@ from hybridsim.plot.drawing.animation import animate
 from hybridsim.plot.drawing.mechanism import mechanism
 from hybridsim.plot.eigenvalues import eigenvalues
 from hybridsim.plot.event_slopes import event_slopes
+from hybridsim.plot.fit import fit
 from hybridsim.plot.friction_law import friction_law
 from hybridsim.plot.friction_loop import friction_loop
 from hybridsim.plot.phase_portrait import phase_portrait
@@ -25,6 +26,7 @@ __all__ = [
     "branch",
     "eigenvalues",
     "event_slopes",
+    "fit",
     "friction_law",
     "friction_loop",
     "mechanism",

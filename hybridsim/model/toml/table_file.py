@@ -92,6 +92,24 @@ def read_columns(
     return found
 
 
+def column_names(path: Path) -> list[str]:
+    """Return the names in the first line of a CSV file.
+
+    Raises
+    ------
+    ModelError
+        For a file that cannot be read, or a first line without names.
+    """
+    rows = _rows(path)
+    head = [cell.strip() for cell in rows[0][1]] if rows else []
+    if not head or any(map(_is_number, head)):
+        place = Place(str(path), rows[0][0] if rows else 1)
+        raise ModelError(
+            "the first line has no names of columns", place=place, remedy="write a first line such as t,x,v"
+        )
+    return head
+
+
 def _are_names(head: list[str], columns: Sequence[str | int]) -> bool:
     """Return whether the first line contains column names."""
     if any(isinstance(column, str) for column in columns):

@@ -1,0 +1,183 @@
+"""This module fits unknowns of a model to records by nonlinear least squares."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from scipy.stats import qmc
+
+from hybridsim.analysis.fit.record import records_of
+from hybridsim.analysis.fit.residuals import Residuals
+from hybridsim.analysis.fit.result import Fit
+from hybridsim.analysis.fit.search import Search
+from hybridsim.analysis.fit.summary import summed_up
+from hybridsim.analysis.fit.unknown import Unknown, unknowns_of
+from hybridsim.analysis.keyword_options import refuse_unknown
+from hybridsim.analysis.progress import Progress
+from hybridsim.arguments import cannot_be, chosen_model, number, whole_number
+from hybridsim.calls import refusing
+from hybridsim.errors import SimulationError, UsageError, nearest
+from hybridsim.model import Model
+from hybridsim.simulate import simulate
+
+_LOSSES = ("linear", "soft_l1", "huber", "cauchy")
+_SEED = 0  # of the Latin hypercube
+_PASSES = 4  # of the estimate of the noise of several quantities
+_SETTLED = 0.01  # relative change of this estimate
+
+
+@refusing
+def fit(
+    model: Model | str,
+    records: Any,
+    unknowns: Mapping[str, Any],
+    *,
+    noise: Mapping[str, float] | None = None,
+    loss: str = "linear",
+    starts: int = 1,
+    max_evaluations: int = 200,
+    progress: Progress | None = None,
+    **options: Any,
+) -> Fit:
+    """Fit parameters and start values of a model to measured quantities.
+
+    The sum over all samples of rho(((measured - simulated)/noise)^2) is minimised by the trust-region method of
+    `scipy.optimize.least_squares`. Its derivatives are central differences of event-driven runs, whose events move
+    smoothly with the unknowns. If a change of the unknowns changes the sequence of events, the sum has a kink there.
+    Then a fit can end in a local minimum: use more `starts`.
+
+    Parameters
+    ----------
+    model : Model, str or path
+        The model. An unknown gain or offset of a sensor is a parameter of an output of the model.
+    records : Record, mapping, path, DataFrame, or a sequence of these
+        The measurements; see `Record`. One experiment is one record. All records share the unknowns.
+    unknowns : mapping of str to (float, float) or Unknown
+        Bounds by the name of a parameter, or of a start value: ``x(0)``. `Unknown` sets more than bounds.
+    noise : mapping of str to float, optional
+        Standard deviation of each quantity. By default each quantity has constant noise, which is estimated from
+        the residuals.
+    loss : str, optional
+        The function rho of SciPy, "linear", "soft_l1", "huber" or "cauchy". The last three bound the effect of samples
+        that are far off.
+    starts : int, optional
+        Number of first guesses: the guess of the unknowns, and points of a Latin hypercube between the bounds.
+        The best result counts.
+    max_evaluations : int, optional
+        Largest number of steps from each start.
+    progress : callable, optional
+        Called as progress(done, total, text) before each step.
+    **options : Any
+        Options of `simulate`, such as ``integrator`` or ``rtol``.
+
+    Returns
+    -------
+    Fit
+        Values, errors, residuals and warnings.
+
+    Raises
+    ------
+    UsageError
+        For a record, an unknown or an option that does not fit the model.
+    SimulationError
+        If the run of a record stops early from every first guess.
+
+    Examples
+    --------
+    >>> import numpy as np, hybridsim as hs
+    >>> t = np.linspace(0, 0.5, 40)
+    >>> x = hs.simulate("free-decay", (0, 0.5), params={"mu": 0.3}).output("x", t)
+    >>> found = hs.fit("free-decay", {"t": t, "x": x}, {"mu": (0.05, 0.9)})
+    >>> abs(found.values["mu"] - 0.3) < 1e-6
+    True
+    """
+    model = chosen_model(model, None).validate()
+    refuse_unknown([simulate], options)
+    for name in ("t_eval", "save", "params", "x0", "progress"):
+        if name in options:
+            raise UsageError(f"a fit sets {name!r} itself", remedy="describe the experiment by hs.Record")
+    if loss not in _LOSSES:
+        raise UsageError(f"`loss` is {loss!r}", remedy=f"use one of {', '.join(_LOSSES)}")
+    starts = whole_number(starts, "starts", 1, 10_000)
+    most = whole_number(max_evaluations, "max_evaluations", 1, 1_000_000)
+    checked = unknowns_of(model, unknowns)
+    chosen = records_of(records)
+    residuals = Residuals(model, chosen, checked, options)
+    if len(residuals.measured) <= len(checked):
+        raise UsageError(
+            f"there are {len(residuals.measured)} samples for {len(checked)} unknowns",
+            remedy="use more samples than unknowns",
+        )
+    for record in chosen:  # a record of unknown quantities is refused before the first long run
+        record.require_quantities(model, _quantities(residuals, record))
+    stated = _noise_of(noise, residuals)
+    guesses = _guesses(checked, starts)
+    spread = {
+        name: float(np.std(residuals.measured[residuals.quantity == name])) or 1.0 for name in residuals.names
+    }
+    search = Search(residuals, loss, most, progress, len(guesses))
+    results = [found for guess in guesses if (found := search.best_from(guess, stated or spread)) is not None]
+    if not results:
+        failed = residuals.failure
+        raise SimulationError(
+            "the runs of the records stop early from every first guess"
+            + (f": {failed.message}" if failed is not None else ""),
+            remedy="use other guesses or narrower bounds",
+        )
+    best = min(results, key=lambda result: float(result.cost))
+    sizes = stated or search.noise_of(best)
+    for _ in range(_PASSES if not stated and len(spread) > 1 else 0):
+        best = search.best_from(best.x, sizes) or best
+        before, sizes = sizes, search.noise_of(best)
+        if all(abs(sizes[name] - before[name]) <= _SETTLED * before[name] for name in sizes):
+            break
+    return summed_up(model, residuals, checked, best, sizes, is_stated=bool(stated), options=options)
+
+
+def _quantities(residuals: Residuals, record: Any) -> tuple[str, ...]:
+    """Return the names of all quantities of the model, from a run without length."""
+    start = record.t0 if record.t0 is not None else float(record.t[0])
+    empty = simulate(residuals.model, (start, start), params=dict(record.params), x0=dict(record.x0))
+    return (*empty.names, *empty.quantities)
+
+
+def _noise_of(noise: Any, residuals: Residuals) -> dict[str, float] | None:
+    if noise is None:
+        return None
+    remedy = "use a dict with the standard deviation of each measured quantity"
+    if not isinstance(noise, Mapping):
+        raise cannot_be("noise", noise, remedy)
+    for name in noise:
+        if name not in residuals.names:
+            raise UsageError(
+                f"`noise` contains {name!r}, which no record has",
+                remedy=nearest(str(name), residuals.names, kind="quantities"),
+            )
+    missing = [name for name in residuals.names if name not in noise]
+    if missing:
+        raise UsageError(f"`noise` lacks {', '.join(missing)}", remedy=remedy)
+    found = {name: number(value, f"noise of {name}") for name, value in noise.items()}
+    for name, value in found.items():
+        if not (value > 0.0 and math.isfinite(value)):
+            raise UsageError(f"the noise of {name} is {value!r}", remedy="use a positive number")
+    return found
+
+
+def _guesses(unknowns: Mapping[str, Unknown], starts: int) -> list[np.ndarray]:
+    """Return first guesses as coordinates: the guess of each unknown, then a Latin hypercube between the bounds."""
+    first = np.array([u.coordinate(float(u.guess or 0.0)) for u in unknowns.values()])
+    if starts == 1:
+        return [first]
+    for name, unknown in unknowns.items():
+        if not unknown.is_bounded:
+            raise UsageError(
+                f"{name} has no finite bounds, which more than one start needs",
+                remedy="give both bounds, or starts=1",
+            )
+    low = np.array([u.coordinate(u.low) for u in unknowns.values()])
+    high = np.array([u.coordinate(u.high) for u in unknowns.values()])
+    points = qmc.LatinHypercube(len(first), seed=_SEED).random(starts - 1)
+    return [first, *(low + points * (high - low))]

@@ -1,0 +1,143 @@
+"""This module defines a record of a fit: measured quantities over time, and what holds for this experiment only."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hybridsim.arguments import as_real, cannot_be
+from hybridsim.errors import UsageError, nearest
+from hybridsim.model import Model
+from hybridsim.model.toml.table_file import column_names, read_columns
+
+
+@dataclass(frozen=True)
+class Record:
+    """A measurement: times, and values of states, outputs or other quantities of a model at these times.
+
+    Parameters
+    ----------
+    data : mapping of str to sequence of float, path or DataFrame
+        The column ``t`` contains increasing times (k,), in the unit of the model's time. Each other column (k,)
+        has the name and unit of a quantity of the model. NaN marks a missing sample. A path names a CSV file whose
+        first line contains the names.
+    quantities : mapping of str to str, optional
+        Quantity of the model by column, if the names differ; other columns are then ignored.
+    params : mapping of str to str or float, optional
+        Parameters that this experiment had, such as the speed of a belt.
+    x0 : mapping of str to float, optional
+        Start values of this experiment.
+    t0 : float, optional
+        Time at which the run starts; the default is the first time of the record.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> record = hs.Record({"t": [0, 0.1, 0.2], "x": [1.0, 0.9, 0.7]}, params={"N": 20})
+    >>> record.t.shape
+    (3,)
+    """
+
+    data: Any
+    quantities: Mapping[str, str] | None = None
+    params: Mapping[str, Any] = field(default_factory=dict)
+    x0: Mapping[str, float] = field(default_factory=dict)
+    t0: float | None = None
+
+    def __post_init__(self) -> None:
+        columns = _columns(self.data, self.quantities)
+        if "t" not in columns:
+            raise UsageError(
+                f"the record has no column 't'; it has {', '.join(columns) or 'no columns'}",
+                remedy="name the column of times t",
+            )
+        t = columns.pop("t")
+        if len(t) < 2 or not np.isfinite(t).all() or not (np.diff(t) > 0.0).all():
+            raise UsageError(
+                "the times of the record do not increase", remedy="sort the record by time, without repeats"
+            )
+        start = float(t[0]) if self.t0 is None else float(self.t0)
+        if start > t[0]:
+            raise UsageError(
+                f"t0 is {start!r}, after the first time {float(t[0])!r} of the record",
+                remedy="use an earlier t0",
+            )
+        if self.quantities is not None:
+            for name in self.quantities:
+                if name not in columns:
+                    raise UsageError(
+                        f"the record has no column {name!r}",
+                        remedy=nearest(str(name), columns, kind="columns"),
+                    )
+            columns = {quantity: columns[name] for name, quantity in self.quantities.items()}
+        if not columns:
+            raise UsageError(
+                "the record has times but no measured quantity", remedy="add a column for each quantity"
+            )
+        for name, values in columns.items():
+            if len(values) != len(t):
+                raise UsageError(
+                    f"column {name!r} has {len(values)} values, but there are {len(t)} times",
+                    remedy="use one value for each time, and NaN for a missing one",
+                )
+            if np.isinf(values).any():
+                raise UsageError(
+                    f"column {name!r} contains an infinite value", remedy="use NaN for a missing value"
+                )
+        for name, value in (("t", t), ("t0", start), ("columns", columns)):
+            object.__setattr__(self, name, value)
+
+    t: np.ndarray = field(init=False, repr=False)
+    columns: dict[str, np.ndarray] = field(init=False, repr=False)
+
+    def require_quantities(self, model: Model, known: tuple[str, ...]) -> None:
+        """Raise an error for a column that is not a quantity of the model."""
+        for name in self.columns:
+            if name not in known:
+                raise UsageError(
+                    f"model {model.name} has no quantity {name!r}, which is a column of a record",
+                    remedy=f"{nearest(name, known, kind='quantities')}; "
+                    "hs.Record(data, quantities={column: quantity}) selects and renames columns",
+                )
+
+
+def records_of(records: Any) -> tuple[Record, ...]:
+    """Return the records; one alone may be given without a list, as data or as a path."""
+    if isinstance(records, list | tuple):
+        if not records:
+            raise cannot_be("records", records, "use at least one record")
+        return tuple(one if isinstance(one, Record) else Record(one) for one in records)
+    return (records if isinstance(records, Record) else Record(records),)
+
+
+def _columns(data: Any, renamed: Mapping[str, str] | None) -> dict[str, np.ndarray]:
+    if isinstance(data, str | PathLike):
+        path = Path(data)
+        names = ["t", *(name for name in column_names(path) if name != "t")]
+        columns = [name for name in names if renamed is None or name == "t" or name in renamed]
+        return dict(zip(columns, map(np.array, read_columns(path, columns)), strict=True))
+    if not hasattr(data, "keys") or not hasattr(data, "__getitem__"):
+        raise cannot_be("data", data, "use a dict of columns, a DataFrame or the path of a CSV file")
+    names = list(data.keys())  # a DataFrame has keys, too
+    return {
+        str(name): _numbers(data[name], str(name))
+        for name in names
+        if renamed is None or name in {"t", *renamed}
+    }
+
+
+def _numbers(column: Any, name: str) -> np.ndarray:
+    """Return real numbers (k,); None and NaN become NaN."""
+    values = [math.nan if value is None else as_real(value) for value in column]
+    if None in values:
+        raise UsageError(
+            f"column {name!r} contains a value that is not a number",
+            remedy="use numbers, and NaN for missing ones",
+        )
+    return np.array(values, dtype=float)

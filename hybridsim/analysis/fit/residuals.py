@@ -1,0 +1,147 @@
+"""This module computes differences between measured and simulated quantities, and their derivatives by the unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hybridsim.analysis.fit.record import Record
+from hybridsim.analysis.fit.unknown import Unknown, start_of
+from hybridsim.model import Model
+from hybridsim.simulate import simulate
+from hybridsim.solution import Solution
+
+_STEP = 1e-4  # of an unknown's size: difference quotients have errors of about 1e-8, and of 1e4 times rtol
+_COARSE = 2e-2  # the same, to move jumps over samples
+_JUMP = 1e-6  # of a quantity's deviation: smaller differences of the sides of an event are no jump
+
+
+class Residuals:
+    """The differences between measured and simulated quantities of all records, as a function of the unknowns.
+
+    Parameters
+    ----------
+    model, records, unknowns : as in `fit`, checked.
+    settings : options of `simulate`.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        records: tuple[Record, ...],
+        unknowns: Mapping[str, Unknown],
+        settings: Mapping[str, Any],
+    ) -> None:
+        self.model, self.records, self.unknowns, self._settings = model, records, unknowns, dict(settings)
+        self._starts = {start_of(s.name): s.name for s in model.states}
+        self.runs = 0
+        self.failure: Solution | None = None  # the last run that did not reach the end of its record
+        self.present = [np.isfinite(values) for record in records for values in record.columns.values()]
+        self.measured = np.concatenate(
+            [values[np.isfinite(values)] for record in records for values in record.columns.values()]
+        )
+        self.quantity = np.concatenate(
+            [np.full(np.isfinite(v).sum(), name) for record in records for name, v in record.columns.items()]
+        )
+        self._scale = np.array([self._size(name, unknown) for name, unknown in unknowns.items()])
+
+    def _size(self, name: str, unknown: Unknown) -> float:
+        """Return the size of an unknown's coordinate; an unknown that is zero has the size of its bounds, or 1."""
+        if unknown.log:
+            return 1.0
+        guess = abs(unknown.guess or 0.0)
+        spread = unknown.high - unknown.low if unknown.is_bounded else 0.0
+        return guess or spread or 1.0
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the measured quantities."""
+        return tuple(dict.fromkeys(str(name) for name in self.quantity))
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """Sizes (n,) of the coordinates of the unknowns."""
+        return self._scale
+
+    def values(self, coordinates: np.ndarray) -> dict[str, float]:
+        """Return the values of the unknowns by name."""
+        pairs = zip(self.unknowns.items(), coordinates, strict=True)
+        return {name: unknown.value(coordinate) for (name, unknown), coordinate in pairs}
+
+    def solution(self, record: Record, values: Mapping[str, float]) -> Solution:
+        """Simulate the experiment of a record with the given values of the unknowns."""
+        self.runs += 1
+        starts = {self._starts[name]: value for name, value in values.items() if name in self._starts}
+        params = {name: value for name, value in values.items() if name not in self._starts}
+        begin = record.t[0] if record.t0 is None else record.t0
+        return simulate(
+            self.model,
+            (float(begin), float(record.t[-1])),
+            params={**record.params, **params},
+            x0={**record.x0, **starts},
+            **self._settings,
+        )
+
+    def predicted(self, coordinates: np.ndarray) -> np.ndarray:
+        """Return the simulated value (m,) of each sample; NaN after the end of a run that stopped early."""
+        values, found, k = self.values(coordinates), [], 0
+        for record in self.records:
+            solution = self.solution(record, values)
+            reached = record.t <= solution.t_end
+            if not reached.all():
+                self.failure = solution
+            for name in record.columns:
+                column = np.full(len(record.t), np.nan)
+                column[reached] = solution.output(name, record.t[reached])
+                found.append(column[self.present[k]])
+                k += 1
+        return np.concatenate(found)
+
+    def has_jumps(self, coordinates: np.ndarray) -> bool:
+        """Return whether a measured quantity jumps in a run, as a friction force does."""
+        values = self.values(coordinates)
+        for record in self.records:
+            solution = self.solution(record, values)
+            times = np.unique([event.t for event in solution.events])
+            for name in record.columns if len(times) else ():
+                jumps = np.abs(solution.output(name, times, "+") - solution.output(name, times, "-"))
+                if jumps.max() > _JUMP * float(np.std(self.measured[self.quantity == name])):
+                    return True
+        return False
+
+    def slopes(self, coordinates: np.ndarray, base: np.ndarray, is_coarse: bool = False) -> np.ndarray:
+        """Return the derivatives (m, n) of `predicted` by the coordinates, by central differences.
+
+        A sample that a jump of its quantity passes on one side has the difference of the other side. Coarse
+        differences include these jumps: their mean over neighbouring samples shows how the jumps move.
+
+        base : `predicted` at the coordinates.
+        """
+        found = np.empty((len(base), len(coordinates)))
+        for k, unknown in enumerate(self.unknowns.values()):
+            step = (_COARSE if is_coarse else _STEP) * self._scale[k]
+            one_sided = []
+            for move in (step, -step):
+                moved = coordinates.copy()
+                moved[k] += move
+                ends = unknown.coordinate(unknown.low), unknown.coordinate(unknown.high)
+                if ends[0] <= moved[k] <= ends[1]:
+                    one_sided.append((self.predicted(moved) - base) / move)
+            found[:, k] = _central(one_sided, is_coarse)
+        return found
+
+
+def _central(one_sided: list[np.ndarray], is_coarse: bool) -> np.ndarray:
+    """Return the mean of the derivatives on two sides, and the smaller one where fine ones differ grossly."""
+    one_sided = [each for each in one_sided if np.isfinite(each).all()] or [
+        np.full_like(one_sided[0], np.nan)
+    ]
+    if len(one_sided) == 1:
+        return one_sided[0]
+    up, down = one_sided
+    if is_coarse:
+        return 0.5 * (up + down)
+    differ = np.abs(up - down) > 0.5 * (np.abs(up) + np.abs(down))
+    return np.where(differ, np.where(np.abs(up) < np.abs(down), up, down), 0.5 * (up + down))
