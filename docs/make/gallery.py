@@ -20,14 +20,21 @@ ANIMATIONS = DOCS / "images" / "animations"
 MOST_BYTES = 400_000  # of an animation
 PERIODS = 20  # of a scene that does not say how long it runs
 
-# what is drawn of a scene, where its run over time is not what shows it
+# What is drawn of a scene, where the first states and outputs over the whole run do not show it best.
 PICTURES: dict[str, Callable[[hs.Solution], Any]] = {
+    "base-isolation": lambda sol: time_history(sol, ["x", "d", "f", "acc"]),
+    "belt": lambda sol: time_history(sol, ["x", "v", "f"]),
     "blade-damper": lambda sol: friction_loop(sol, "f", "x", t_span=(0.9, 1.0)),
-    "buck-converter": lambda sol: time_history(sol, ["v", "i", "ramp", "control"], t_span=(17.6e-3, 20e-3)),
+    "buck-converter": lambda sol: time_history(sol, ["v", "i", ["ramp", "control"]], t_span=(17.6e-3, 20e-3)),
     "chua": lambda sol: phase_portrait(sol, "x", "y"),
     "feeny-moon": lambda sol: phase_portrait(sol, t_span=(50, 150)),
+    "mode-coupling": lambda sol: time_history(sol, ["x", "y", "f"], t_span=(150, 200)),
     "relay-spiral": lambda sol: phase_portrait(sol, "x", "y"),
+    "sampled-servo": lambda sol: time_history(sol, ["x", "v", ["u", "f"]]),
     "sliding-circle": lambda sol: phase_portrait(sol, "x", "y"),
+    "static-kinetic": lambda sol: time_history(sol, ["e", "v", "f"]),
+    "valve-stiction": lambda sol: time_history(sol, ["x", "f", "p"]),
+    "water-tanks": lambda sol: time_history(sol, [["x1", "x2"]]),
 }
 
 # The part of a run that is animated, with further settings; all others with a drawing have a picture only.
@@ -72,7 +79,7 @@ def main(names: list[str], with_pictures: bool) -> None:
             continue
         solution = run(info.name)
         if with_pictures:
-            save(PICTURES.get(info.name, time_history)(solution), FOLDER / f"{info.name}.png")
+            save(PICTURES.get(info.name, time_history)(solution), FOLDER / f"{info.name}.svg")
         if info.name in MOVES:
             path = solution.animate(
                 ANIMATIONS / f"{info.name}.gif", **{"quantities": [], "fps": 12} | MOVES[info.name]
@@ -101,7 +108,7 @@ def section(model: hs.Model) -> str:
         f"{' '.join(model.look.split())}\n\n"
         f"*{' '.join(model.source.split()).rstrip('.')}.*\n\n"
         f"{moves}"
-        f"![{model.name}](../images/scenes/{model.name}.png)\n"
+        f"![{model.name}](../images/scenes/{model.name}.svg)\n"
     )
 
 

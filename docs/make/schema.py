@@ -49,7 +49,8 @@ START = said("the initial value", EXPRESSION)
 NOMINAL = said("the usual size; the absolute tolerance follows it", NUMBER)
 
 STATE = table(
-    {"start": START, "der": said("its rate", EXPRESSION), "unit": UNIT, "nominal": NOMINAL}, ("start", "der")
+    {"start": START, "der": said("its rate", EXPRESSION), "unit": UNIT, "nominal": NOMINAL, "title": TEXT},
+    ("start", "der"),
 )
 STATE_OF_LAW = table(
     {"start": START, "der": said("its rate", EXPRESSION), "unit": UNIT, "nominal": NOMINAL}, ("der",)
@@ -198,7 +199,12 @@ POINTS_IN_TIME = {
 }  # fmt: skip
 INPUT = {"oneOf": [table(keys, ("kind",)) for keys in (WAVE, CHIRP, POINTS_IN_TIME, HELD, CONNECTED)]}
 OUTPUT = table(
-    {"expr": EXPRESSION, "unit": UNIT, "modes": said('"component.mode" = the expression there', EXPRESSIONS)},
+    {
+        "expr": EXPRESSION,
+        "unit": UNIT,
+        "modes": said('"component.mode" = the expression there', EXPRESSIONS),
+        "title": TEXT,
+    },
     ("expr",),
 )
 PARAMETER = table({"value": EXPRESSION, "unit": UNIT, "title": TEXT}, ("value",))
@@ -227,7 +233,7 @@ def shape(kind: str) -> Schema:
     )
 
 
-DISCRETE = table({"start": START, "unit": UNIT}, ("start",))
+DISCRETE = table({"start": START, "unit": UNIT, "title": TEXT}, ("start",))
 
 # a value for all copies of a part, one for each copy, or a table of the names of an inner part
 VALUES = {

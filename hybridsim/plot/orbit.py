@@ -12,14 +12,15 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from hybridsim.plot import style
-from hybridsim.plot.scale import label_axis
-from hybridsim.plot.smooth_parts import SmoothPart, extent, smooth_parts_of, unit_of, window_of
+from hybridsim.plot.scale import label_axis, shared_powers
+from hybridsim.plot.smooth_parts import SmoothPart, extent, smooth_parts_of, title_of, unit_of, window_of
 from hybridsim.solution import Solution
 
 Points = NDArray[np.float64]
 
 _HELD, _FREE = 3.0, 1.2  # line widths if a surface holds (stick), and otherwise
 _DOT = 5.0  # size of an interval that stays at a point
+_SLIM = 4.0  # ratio of two extents beyond which one scale would flatten the curve
 _VISIBLE = 1e-3  # of the range: a smaller part is a point, a smaller jump is not drawn
 
 
@@ -39,8 +40,7 @@ def draw_orbit(
         axes = style.figure(6.2, 4.6).subplots()
     concerned = _concerned(solution, {across, up})
     smooth_parts = [
-        replace(smooth_part, modes={c: m for c, m in smooth_part.modes.items() if c in concerned})
-        for smooth_part in smooth_parts
+        replace(smooth_part, modes=_modes_of(smooth_part.modes, concerned)) for smooth_part in smooth_parts
     ]
     colours = style.mode_colours(solution.components)
     surfaces = {c.name: c.surface.hold for c in solution.components if c.surface}
@@ -67,8 +67,15 @@ def draw_orbit(
     )
     axes.autoscale_view()
     style.dress(axes)
+    for mode, parts in lines.items():
+        longest = max(parts, key=lambda points: float(np.hypot(*np.diff(points / least, axis=0).T).sum()))
+        style.point_along(axes, longest[:, 0], longest[:, 1], colours.get(mode, style.INK))
+    powers = shared_powers({name: (unit, *span) for name, unit, span in zip((across, up), units, spans)})
     for axis, name, unit, span in zip((axes.xaxis, axes.yaxis), (across, up), units, spans):
-        label_axis(axis, name, unit, *span)
+        title = title_of(solution.model, name)
+        label_axis(axis, name, unit, *span, title=title, power=powers.get(name))
+    if units[0] == units[1]:
+        _equal_scales(axes, spans)
     is_one_of_several = len(concerned) == 1 < len(solution.components)
     handles = [
         Line2D(
@@ -92,11 +99,27 @@ def draw_orbit(
     return axes
 
 
+def _equal_scales(axes: Axes, spans: Sequence[tuple[float, float]]) -> None:
+    """Draw both axes in one scale, so that a circle is round, unless one extent is far smaller."""
+    wide, high = (high - low for low, high in spans)
+    if wide > 0 and high > 0 and 1 / _SLIM < wide / high < _SLIM:
+        axes.set_aspect("equal", adjustable="datalim")
+
+
 def _concerned(solution: Solution, drawn: set[str]) -> list[str]:
     """Return the components that affect the drawn quantities, or all components if there are none."""
     forces = [contact.name for contact in solution.model.contacts if contact.name in drawn]
     moved = [contact.name for contact in solution.model.contacts if drawn & contact.velocity.names]
     return forces or moved or [component.name for component in solution.components]
+
+
+def _modes_of(modes: Mapping[str, str], concerned: Sequence[str]) -> dict[str, str]:
+    """Return the modes of some components; a contact that is open has no other mode."""
+    return {
+        name: "open" if modes.get(f"{name}_N") == "open" else mode
+        for name, mode in modes.items()
+        if name in concerned
+    }
 
 
 def _stretches(

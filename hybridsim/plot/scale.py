@@ -5,16 +5,21 @@ from __future__ import annotations
 import itertools
 import math
 import re
-from collections.abc import Sequence
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
 
-from matplotlib.axis import Axis
+from matplotlib.axis import Axis, YAxis
 from matplotlib.ticker import Formatter
 
-from hybridsim.plot.style import literal
+from hybridsim.plot.symbols import label_of, unit_text
 
 _PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 # Units that take a prefix at their start: "m" and "m/s" do; "kg" (which has one) and "1/s" do not.
 _TAKES_PREFIX = re.compile(r"(m|s|N|V|A|W|J|Pa|Hz|rad|g|C|F|H|K|Nm|N m)(?![A-Za-z])")
+
+_LEAST, _MOST = -2.0, 5.0  # digits before the point that a shared prefix may give a quantity
+_ALONG_Y = 20  # letters of a title along a vertical axis
+_PREFIX_COST = 0.4  # digits: 0.5 m and 1 m are in metres
 
 
 class Scaled(Formatter):
@@ -40,14 +45,52 @@ class Scaled(Formatter):
         return f"{value / self.factor:.6g}".replace("-", "\N{MINUS SIGN}")
 
 
-def label_axis(axis: Axis, name: str, unit: str, low: float, high: float) -> None:
-    """Label an axis "name [unit]" with a prefix, or a power of ten, that suits values from low to high."""
-    power, prefixed = scaled_unit(unit, low, high)
-    text = literal(prefixed)
+def label_axis(
+    axis: Axis, name: str, unit: str, low: float, high: float, *, title: str = "", power: int | None = None
+) -> None:
+    """Label an axis "title name [unit]" with a prefix, or a power of ten, that suits values from low to high.
+
+    A `power` that was chosen for several axes (`shared_powers`) replaces the one that suits this axis.
+    """
+    power, prefixed = scaled_unit(unit, low, high) if power is None else (power, _prefixed(unit, power))
+    text = unit_text(prefixed)
     if power and prefixed == unit:  # the unit takes no prefix
         text = f"$10^{{{power}}}$ {text}".rstrip()
-    axis.set_label_text(f"{literal(name)} [{text}]" if text else literal(name))
+    words, symbol = label_of(name, title)
+    symbol = f"{symbol} [{text}]".strip() if text else symbol
+    if isinstance(axis, YAxis) and words:
+        words = "\n".join(textwrap.wrap(words, _ALONG_Y)) + "\n"
+    axis.set_label_text(f"{words} {symbol}".replace("\n ", "\n").strip(), fontsize=9)
     axis.set_major_formatter(Scaled(10.0**power))
+
+
+def shared_powers(quantities: Mapping[str, tuple[str, float, float]]) -> dict[str, int]:
+    """Return one power of ten for all quantities of one base unit, such as m and m/s, where it suits them all.
+
+    `quantities` has the unit and the least and the largest value of each name. A quantity without an entry in the
+    result has a power of its own.
+    """
+    groups: dict[str, dict[str, float]] = {}
+    for name, (unit, low, high) in quantities.items():
+        base, size = _TAKES_PREFIX.match(unit), max(abs(low), abs(high))
+        if base and size > 0 and math.isfinite(size):
+            groups.setdefault(base[1], {})[name] = math.log10(size)
+    powers: dict[str, int] = {}
+    for sizes in groups.values():
+        best = min(_PREFIXES, key=lambda power: (_misfit(power, sizes.values()), abs(power)))
+        if len(sizes) > 1 and all(_LEAST <= size - best < _MOST for size in sizes.values()):
+            powers |= dict.fromkeys(sizes, best)
+    return powers
+
+
+def _misfit(power: int, sizes: Iterable[float]) -> float:
+    """Return by how many digits numbers leave the range from 1 to 1000; a prefix counts a little."""
+    over = (max(power - size, size - power - 3, 0.0) for size in sizes)
+    return round(sum(over) + (_PREFIX_COST if power else 0.0), 9)
+
+
+def _prefixed(unit: str, power: int) -> str:
+    return f"{_PREFIXES[power]}{unit}" if _TAKES_PREFIX.match(unit) else unit
 
 
 def scaled_unit(unit: str, low: float, high: float) -> tuple[int, str]:
@@ -64,5 +107,5 @@ def with_prefix(value: float, unit: str) -> str:
     """Return a positive quantity as text, with a prefix if its unit takes one, such as "50 mm"."""
     power = min(max(3 * math.floor(math.log10(value) / 3 + 1e-9), -12), 9)
     if power and _TAKES_PREFIX.match(unit):
-        return f"{value / 10.0**power:g} {_PREFIXES[power]}{unit}"
-    return f"{value:g} {unit}"
+        return f"{value / 10.0**power:g} {_PREFIXES[power]}{unit_text(unit)}"
+    return f"{value:g} {unit_text(unit)}"

@@ -85,7 +85,7 @@ def window_of(solution: Solution, t_span: tuple[float, float] | None) -> Window:
     return Window(
         end - _LAST_PERIODS * period,
         end,
-        f"the last {_LAST_PERIODS} periods of {_short((end - start) / period)}",
+        f"the last {_LAST_PERIODS} of {_whole((end - start) / period)} periods",
     )
 
 
@@ -119,10 +119,19 @@ def _last_events(solution: Solution, start: float, end: float) -> Window:
     return Window(first, end, f"the last {count} of {len(times)} events")
 
 
-def _short(periods: float) -> str:
-    """Return a number of periods as text, with one decimal unless it is a whole number."""
-    whole = round(periods)
-    return f"{whole}" if abs(periods - whole) < _WHOLE * periods else f"{periods:.1f}"
+def _whole(periods: float) -> int:
+    """Return a number of periods without its fraction."""
+    return math.floor(periods * (1 + _WHOLE))
+
+
+def title_of(model: Any, name: str) -> str:
+    """Return the title of a state or output, or "friction force" of a contact, or an empty text."""
+    if isinstance(model, MechanicalSystem):
+        return ""
+    found = {state.name: state.title for state in model.states}
+    found |= {output.name: output.title for output in model.outputs if not found.get(output.name)}
+    found |= {discrete.name: discrete.title for discrete in model.discrete}
+    return found.get(name) or ("friction force" if any(one.name == name for one in model.contacts) else "")
 
 
 def known_units(solution: Solution) -> dict[str, str]:

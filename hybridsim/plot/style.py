@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
+import re
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib import rc_context
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
+from numpy.typing import NDArray
 
 from hybridsim.errors import UsageError
 from hybridsim.files import whole_file
@@ -19,12 +24,18 @@ from hybridsim.presentation.colours import PALETTE as PALETTE
 from hybridsim.presentation.colours import colours_of as colours_of
 from hybridsim.presentation.colours import mode_colours as mode_colours
 
-GREY = "#9a9a9a"
+GREY = "#9a9a9a"  # of frames and ticks; too pale for text
+TEXT_GREY = "#666666"  # of text beside the data: its contrast with white is 5.7
 MARK = "#c4c4c4"
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">", "p")
 SUFFIXES = (".png", ".pdf", ".svg")
+WIDTH = 7.3  # inches of a wide picture: 700 pixels of a page, which shows it unshrunk
 _DPI = 150
+_PAD, _ROW = 6.0, 13.0  # points: above axes, and of a row of a legend
+_HANDLE = 4  # letters: the width of a legend's handle
 _LETTERS = 13.0  # of a title per inch: the default font at 10 points has about 14, fewer if they are wide
+# Text of an SVG remains text, and equal pictures are equal files.
+_SVG = {"svg.fonttype": "none", "svg.hashsalt": "hybridsim"}
 
 
 def dress(axes: Axes) -> None:
@@ -41,14 +52,52 @@ def literal(text: str) -> str:
     return text.replace("$", r"\$")
 
 
-def head(axes: Axes, *parts: str) -> None:
-    """Set the title of axes: each part begins a new line and is wrapped at the width of the axes."""
-    whole, left = _figure_of(axes), axes.get_position().x0
+def head(axes: Axes, *parts: str, above: float = 0.0) -> None:
+    """Set the title of axes: each part begins a new line and is wrapped at the width of the axes.
+
+    `above` is the height in points of a legend between the axes and the title.
+    """
+    whole, left = figure_of(axes), axes.get_position().x0
     beside = [other.get_position().x0 for other in whole.axes]
     right = min((x0 for x0 in beside if x0 > axes.get_position().x1), default=1.0)
     width = max(20, round(whole.get_figwidth() * (right - left) * _LETTERS))
     lines = [line for part in parts for line in textwrap.wrap(part, width)]
-    axes.set_title(literal("\n".join(lines)), fontsize=10, loc="left")
+    axes.set_title(literal("\n".join(lines)), fontsize=10, loc="left", pad=_PAD + above)
+
+
+def point_along(axes: Axes, x: NDArray[np.float64], y: NDArray[np.float64], colour: str) -> None:
+    """Draw an arrow head halfway along a curve, in its direction."""
+    wide, high = (float(np.ptp(limits)) or 1.0 for limits in (axes.get_xlim(), axes.get_ylim()))
+    lengths = np.hypot(np.diff(x) / wide, np.diff(y) / high)
+    if lengths.size == 0 or not lengths.sum() > 0:
+        return
+    k = int(np.searchsorted(np.cumsum(lengths), lengths.sum() / 2))
+    while k + 1 < len(lengths) and lengths[k] == 0:
+        k += 1
+    axes.annotate(
+        "", (x[k + 1], y[k + 1]), (x[k], y[k]),
+        arrowprops={"arrowstyle": "-|>", "color": colour, "mutation_scale": 13, "shrinkA": 0, "shrinkB": 0},
+    )  # fmt: skip
+
+
+def legend_above(axes: Axes, handles: Sequence[Artist]) -> float:
+    """Name curves or colours above axes, in as many rows as their width requires; return the height in points."""
+    texts = [re.sub(r"\\mathregular|[${}_]", "", str(handle.get_label())) for handle in handles]
+    widths = [len(text) + _HANDLE for text in texts] or [1]
+    width = figure_of(axes).get_figwidth() * axes.get_position().width * _LETTERS
+    columns = len(widths) if sum(widths) <= width else max(1, int(width / max(widths)))
+    axes.legend(
+        handles=handles,
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        ncols=columns,
+        borderaxespad=0.1,
+        frameon=False,
+        fontsize=9,
+        handlelength=1.2,
+        columnspacing=1.2,
+    )
+    return _PAD + _ROW * math.ceil(len(handles) / columns)
 
 
 def figure(width: float, height: float) -> Figure:
@@ -75,32 +124,44 @@ def save(picture: Any, path: str | Path, dpi: float = _DPI) -> Path:
         raise UsageError(
             f"{path}: unsupported file type {path.suffix!r}", remedy=f"use {', '.join(SUFFIXES)}"
         )
-    drawn = BytesIO()  # drawn in memory, because some formats hide why a file cannot be written
-    _figure_of(picture).savefig(drawn, dpi=dpi, format=path.suffix[1:].lower())
+    kind, drawn = (
+        path.suffix[1:].lower(),
+        BytesIO(),
+    )  # in memory: some formats hide why a file cannot be written
+    metadata: Any = {"Date": None, "Creator": None} if kind == "svg" else None
+    with rc_context(_SVG):
+        figure_of(picture).savefig(drawn, dpi=dpi, format=kind, metadata=metadata)
+    text = _short_numbers(drawn.getvalue()) if kind == "svg" else drawn.getvalue()
     with whole_file(path) as partly:
-        Path(partly).write_bytes(drawn.getvalue())
+        Path(partly).write_bytes(text)
     return path
 
 
 def as_png(picture: Any) -> bytes:
     """Return a picture as the bytes of a PNG file, for notebooks."""
     drawn = BytesIO()
-    _figure_of(picture).savefig(drawn, dpi=_DPI, format="png")
+    figure_of(picture).savefig(drawn, dpi=_DPI, format="png")
     return drawn.getvalue()
+
+
+def _short_numbers(svg: bytes) -> bytes:
+    """Return an SVG whose coordinates have two decimals, a hundredth of a point."""
+    return re.sub(rb' (?:d|x|y)="[^"]*"', lambda found: re.sub(rb"(\d\.\d\d)\d+", rb"\1", found[0]), svg)
 
 
 def as_svg(picture: Any) -> str:
     """Return a picture as an SVG element, with its text as text, for a page of HTML."""
     drawn = BytesIO()
-    with rc_context({"svg.fonttype": "none", "svg.hashsalt": "hybridsim"}):
-        _figure_of(picture).savefig(
+    with rc_context(_SVG):
+        figure_of(picture).savefig(
             drawn, format="svg", transparent=True, metadata={"Date": None, "Creator": None}
         )
     text = drawn.getvalue().decode("utf-8")
     return text[text.index("<svg") :]
 
 
-def _figure_of(picture: Any) -> Figure:
+def figure_of(picture: Any) -> Figure:
+    """Return the figure that contains axes, or several axes."""
     if isinstance(picture, Figure | SubFigure):
         return picture.figure if isinstance(picture, SubFigure) else picture
     if hasattr(picture, "get_figure"):
@@ -108,5 +169,5 @@ def _figure_of(picture: Any) -> Figure:
     if isinstance(picture, Iterable):
         for part in picture:
             if part is not None:
-                return _figure_of(part)
+                return figure_of(part)
     raise UsageError(f"{type(picture).__name__} is not a picture", remedy="use a figure or axes")

@@ -11,6 +11,7 @@ from matplotlib.axis import Axis
 from hybridsim.errors import UsageError
 from hybridsim.plot.scale import label_axis
 from hybridsim.plot.style import literal
+from hybridsim.plot.symbols import symbol_of, unit_text
 
 if TYPE_CHECKING:
     from hybridsim.analysis import Sweep
@@ -98,13 +99,13 @@ def label_parameter(axis: Axis, result: Sweep, name: str) -> None:
         label_axis(axis, name, result.units.get(name, ""), *range_of(values))
     else:
         axis.set_ticks(np.arange(len(values)), [literal(str(value)) for value in values])
-        axis.set_label_text(literal(name))
+        axis.set_label_text(symbol_of(name))
 
 
 def setting(result: Sweep, name: str, value: object) -> str:
     """Return a parameter with one value as text, such as "N = 40 N"."""
-    number = f"{value:.6g}" if isinstance(value, float) else str(value)
-    return literal(f"{name} = {number} {result.units.get(name, '')}".rstrip())
+    number = f"{value:.6g}" if isinstance(value, float) else literal(str(value))
+    return f"{symbol_of(name)} = {number} {unit_text(result.units.get(name, ''))}".rstrip()
 
 
 def title_of(result: Sweep) -> str:

@@ -5,17 +5,17 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
-from matplotlib.patches import Patch
+from matplotlib.lines import Line2D
 
 from hybridsim.errors import UsageError
 from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.model.checks.units import time_unit
 from hybridsim.plot import style
-from hybridsim.plot.scale import label_axis
+from hybridsim.plot.scale import label_axis, shared_powers
 from hybridsim.plot.smooth_parts import (
     CUTS,
     SmoothPart,
@@ -25,18 +25,22 @@ from hybridsim.plot.smooth_parts import (
     known_units,
     require_run,
     smooth_parts_of,
+    title_of,
     unit_of,
     window_of,
 )
-from hybridsim.presentation.mode_strip import bars_of
+from hybridsim.plot.strip import changing_components, draw_strip
+from hybridsim.plot.symbols import symbol_of
 from hybridsim.solution import Solution
 
 _MOST_QUANTITIES = 4  # the default number of quantities, and of outputs
 _MOST_COMPONENTS = 16  # rows of the strip of modes
 _MOST_MARKS = 150  # event lines; more would merge into a grey area
 _VISIBLE = 1e-3  # of the range: a smaller jump is invisible
-_HAIRLINE = 1.2  # points: the least width of a mode in a strip
-_ROW, _STRIP = 1.75, 0.34  # inches
+_OVERLAID = 3  # quantities of one unit that share a panel
+_ROW, _STRIP, _AROUND = 1.45, 0.3, 0.95  # inches
+# Curves of one panel: the palette without the colours of slip, which the strip of modes uses.
+_CURVES, _DASHES = (style.INK, *style.PALETTE[2:5], style.PALETTE[5]), ("-", "--", ":")
 
 
 @dataclass(frozen=True)
@@ -58,7 +62,7 @@ class TimeHistoryAxes:
 
 def time_history(
     solution: Solution,
-    quantities: Sequence[str] | None = None,
+    quantities: Sequence[str | Sequence[str]] | None = None,
     *,
     t_span: tuple[float, float] | None = None,
     axes: Sequence[Axes] | None = None,
@@ -70,43 +74,91 @@ def time_history(
 
     Parameters
     ----------
-    quantities : names of states and outputs; by default the first four of both, and the first four outputs.
+    quantities : names of states and outputs; a list of names is drawn in one panel. The default is the first four
+        of both; three or more of them with one unit share a panel.
     t_span : part of the run; by default all, or the last few of very many periods (the title says so).
-    axes : one per quantity, and one more if the model has components; by default a new figure.
+    axes : one per panel, and one more if a component has several modes; by default a new figure.
     """
     require_run(solution)
     model = solution.model
-    names = _unasked(solution) if quantities is None else list(quantities)
-    units = [unit_of(solution, name) for name in names]
+    panels = _unasked(solution) if quantities is None else [_names(one) for one in quantities]
+    names = list(dict.fromkeys(name for panel in panels for name in panel))
+    units = {name: unit_of(solution, name) for name in names}
     window = window_of(solution, t_span)
     smooth_parts = smooth_parts_of(solution, names, window)
-    components = list(solution.modes)[:_MOST_COMPONENTS]
-    history = _axes(len(names), len(components), axes)
+    changing = changing_components(solution)
+    components = changing[:_MOST_COMPONENTS]
+    history = _axes(len(panels), len(components), axes)
     marks = _marks_in(solution, window)
-    for axis, name, unit in zip(history.quantities, names, units):
-        _draw(axis, smooth_parts, name)
+    extents = {name: extent(smooth_parts, name) for name in names}
+    powers = shared_powers({name: (units[name], *extents[name]) for name in names})
+    above = 0.0
+    for axis, panel in zip(history.quantities, panels, strict=True):
+        for name, (colour, dashes) in zip(panel, _looks(len(panel)), strict=False):
+            _draw(axis, smooth_parts, name, colour, dashes)
         _mark(axis, marks)
         style.dress(axis)
-        label_axis(axis.yaxis, name, unit, *extent(smooth_parts, name))
+        low, high = zip(*(extents[name] for name in panel), strict=True)
+        label_axis(
+            axis.yaxis, panel[0], units[panel[0]], min(low), max(high), title=title_of(model, panel[0]),
+            power=powers.get(panel[0]),
+        )  # fmt: skip
+        if len(panel) > 1:
+            height = _name_curves(axis, model, panel, units[panel[0]])
+            above = height if axis is history.quantities[0] else above
         axis.set_xlim(window.t0, window.t1)
     if history.modes is not None:
-        _strip(history.modes, solution, components, window)
+        draw_strip(history.modes, solution, components, window)
     *upper, lowest = history
     for axis in upper:
         axis.tick_params(labelbottom=False)
     second = "" if isinstance(model, MechanicalSystem) else time_unit(model)
-    label_axis(lowest.xaxis, "t", second, window.t0, window.t1)
-    hidden = len(solution.modes) - len(components)
+    label_axis(lowest.xaxis, "t", second, window.t0, window.t1, title="time")
+    hidden = len(changing) - len(components)
     note = f"the modes of {hidden} other components are not shown" if hidden else ""
-    style.head([*upper, lowest][0], model.title or model.name, window.note, note)
+    style.head([*upper, lowest][0], model.title or model.name, window.note, note, above=above)
     return history
 
 
-def _unasked(solution: Solution) -> list[str]:
-    """Return the quantities that are drawn by default: the first declared states, and the outputs."""
-    names = list(known_units(solution))[:_MOST_QUANTITIES]
+def _names(panel: str | Sequence[str]) -> list[str]:
+    return [panel] if isinstance(panel, str) else list(panel)
+
+
+def _unasked(solution: Solution) -> list[list[str]]:
+    """Return the quantities that are drawn by default: the first declared states and outputs, and their panels."""
+    units = known_units(solution)
+    names = list(units)[:_MOST_QUANTITIES]
     outputs = [output.name for output in getattr(solution.model, "outputs", ())][:_MOST_QUANTITIES]
-    return list(dict.fromkeys([*names, *outputs]))
+    names = list(dict.fromkeys([*names, *outputs]))
+    panels: list[list[str]] = []
+    for name in names:
+        alike = [other for other in names if units[name] and units.get(other) == units[name]]
+        if len(alike) < _OVERLAID:
+            panels.append([name])
+        elif name == alike[0]:
+            panels.append(alike)
+    return panels
+
+
+def _looks(count: int) -> list[tuple[str, Any]]:
+    """Return colours and dashes of the curves of a panel; black if there is one, and no colours of slip."""
+    if count == 1:
+        return [(style.INK, "-")]
+    return [(_CURVES[k % len(_CURVES)], _DASHES[k // len(_CURVES) % len(_DASHES)]) for k in range(count)]
+
+
+def _name_curves(axis: Axes, model: Any, panel: Sequence[str], unit: str) -> float:
+    """Write the symbols of several curves above their panel, and what their titles share beside it."""
+    words = [title_of(model, name).split() for name in panel]
+    shared = " ".join(w[0] for w in itertools.takewhile(lambda w: len(set(w)) == 1, zip(*words)))
+    label = axis.yaxis.get_label_text()
+    bracket = label[label.rindex("[") :] if unit else ""
+    axis.yaxis.set_label_text("\n".join(filter(None, (shared, bracket))))
+    handles = [
+        Line2D([], [], color=colour, linestyle=dashes, label=symbol_of(name))
+        for name, (colour, dashes) in zip(panel, _looks(len(panel)), strict=True)
+    ]
+    return style.legend_above(axis, handles)
 
 
 def _marks_in(solution: Solution, window: Window) -> dict[str, np.ndarray]:
@@ -125,14 +177,14 @@ def _axes(quantities: int, components: int, axes: Sequence[Axes] | None) -> Time
             )
         return TimeHistoryAxes(all_axes[:quantities], all_axes[quantities] if components else None)
     heights = [_ROW] * quantities + [0.1 + _STRIP * components] * bool(components)
-    figure = style.figure(9.0, 0.7 + sum(heights))
+    figure = style.figure(style.WIDTH, _AROUND + sum(heights))
     grid = figure.subplots(count, 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": heights})
     made = tuple(grid[:, 0])
     figure.align_ylabels(made)
     return TimeHistoryAxes(made[:quantities], made[quantities] if components else None)
 
 
-def _draw(axis: Axes, smooth_parts: Sequence[SmoothPart], name: str) -> None:
+def _draw(axis: Axes, smooth_parts: Sequence[SmoothPart], name: str, colour: str, dashes: Any) -> None:
     """Draw a curve as one line that is interrupted at jumps; the jumps are a second, dashed line."""
     low, high = extent(smooth_parts, name)
     t, y, jump_t, jump_y = [smooth_parts[0].t], [smooth_parts[0].values[name]], [], []
@@ -145,9 +197,16 @@ def _draw(axis: Axes, smooth_parts: Sequence[SmoothPart], name: str) -> None:
             jump_y += [left, right, np.nan]
         t.append(after.t)
         y.append(after.values[name])
-    axis.plot(np.concatenate(t), np.concatenate(y), color=style.INK, linewidth=1.2, solid_joinstyle="round")
+    axis.plot(
+        np.concatenate(t),
+        np.concatenate(y),
+        color=colour,
+        linestyle=dashes,
+        linewidth=1.2,
+        solid_joinstyle="round",
+    )
     if jump_t:
-        axis.plot(jump_t, jump_y, color=style.INK, linewidth=0.8, linestyle=(0, (3, 2)))
+        axis.plot(jump_t, jump_y, color=colour, linewidth=0.8, linestyle=(0, (3, 2)))
 
 
 def _mark(axis: Axes, marks: Mapping[str, np.ndarray]) -> None:
@@ -168,55 +227,3 @@ def _mark(axis: Axes, marks: Mapping[str, np.ndarray]) -> None:
             transform=at_top,
             clip_on=False,
         )
-
-
-def _strip(axis: Axes, solution: Solution, components: Sequence[str], window: Window) -> None:
-    """Draw one row per component with its modes as colours; the legend names the modes that occur."""
-    if isinstance(solution.model, MechanicalSystem):
-        occurring = dict.fromkeys(interval.mode for name in components for interval in solution.modes[name])
-        colours = style.colours_of(occurring, set())
-    else:
-        colours = style.mode_colours(solution.components)
-    seen: set[str] = set()
-    is_shared = False
-    columns = _columns(axis)
-    for row, component in enumerate(components):
-        bars, shares = bars_of(solution.modes[component], window.t0, window.t1, columns)
-        is_shared = is_shared or shares
-        seen |= {bar.mode for bar in bars}
-        corners = [
-            [
-                (x, row + 0.38 - 0.76 * y)
-                for x, y in zip((b.start, b.end, b.end, b.start), (b.low, b.low, b.high, b.high))
-            ]
-            for b in bars
-        ]
-        faces = [colours[bar.mode] for bar in bars]
-        axis.add_collection(PolyCollection(corners, facecolors=faces, linewidths=0))
-    axis.set_ylim(len(components) - 0.5, -0.5)
-    axis.set_yticks(range(len(components)), [style.literal(name) for name in components])
-    axis.tick_params(axis="y", length=0, labelsize=9)
-    axis.tick_params(axis="x", color=style.GREY, labelsize=9)
-    axis.spines[["top", "right", "left"]].set_visible(False)
-    axis.spines["bottom"].set_color(style.GREY)
-    axis.set_xlim(window.t0, window.t1)
-    handles = [Patch(color=colours[name], label=style.literal(name)) for name in colours if name in seen]
-    axis.legend(
-        handles=handles,
-        loc="lower left",  # it grows upwards, away from the labels of the time axis
-        bbox_to_anchor=(1.005, 0.0),
-        borderaxespad=0.3,
-        frameon=False,
-        fontsize=9,
-        handlelength=1.2,
-        title="a divided column:\nseveral short modes" if is_shared else None,
-        title_fontsize=8,
-        alignment="left",
-    )
-
-
-def _columns(axis: Axes) -> int:
-    """Return the number of lines of the least visible width that fit into a strip."""
-    whole = axis.get_figure(root=True)
-    assert whole is not None
-    return max(20, int(72 * whole.get_figwidth() * axis.get_position().width / _HAIRLINE))

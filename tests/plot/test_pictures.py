@@ -29,8 +29,12 @@ def drawn(axes) -> np.ndarray:
 def test_time_history_draws_the_states_and_outputs() -> None:
     solution = oscillator(3)
     history = time_history(solution)
-    assert [axes.get_ylabel() for axes in history.quantities] == ["x [µm]", "v [mm/s]", "f [N]"]
-    assert history.modes.get_xlabel() == "t [ms]"
+    assert [axes.get_ylabel() for axes in history.quantities] == [
+        "x [mm]",
+        "v [mm/s]",
+        "friction force\nf [N]",
+    ]
+    assert history.modes.get_xlabel() == "time t [ms]"
     for i, axes in enumerate(history.quantities[:2]):
         t, y = drawn(axes).T
         assert y == pytest.approx(solution(t)[i], nan_ok=True)
@@ -58,13 +62,69 @@ def test_outputs_are_drawn_beside_many_states() -> None:
     states = [hs.State(f"x{k}", float(k), "0") for k in range(6)]
     model = hs.Model("many", states, outputs=[hs.Output("total", "x0 + x5")])
     history = time_history(hs.simulate(model, (0.0, 1.0)))
-    assert [axes.get_ylabel() for axes in history.quantities] == ["x0", "x1", "x2", "x3", "total"]
+    assert [axes.get_ylabel() for axes in history.quantities] == [
+        *(rf"x$_{{\mathregular{{{k}}}}}$" for k in range(4)),
+        "total",
+    ]
+
+
+def test_titles_of_states_and_outputs_stand_on_the_axes() -> None:
+    states = [hs.State("theta", 1, "w", "rad", title="angle"), hs.State("w", 0, "-theta", "rad/s")]
+    outputs = [hs.Output("a", "-theta", "rad/s^2", title="angular acceleration")]
+    sol = hs.simulate(hs.Model("swing", states, outputs=outputs), (0.0, 1.0))
+    labels = [axes.get_ylabel() for axes in time_history(sol).quantities]
+    assert labels == ["angle\nθ [rad]", "w [rad/s]", "angular acceleration\na [rad/s²]"]
+    assert phase_portrait(sol).get_xlabel() == "angle θ [rad]"
+
+
+def test_quantities_of_one_unit_share_a_panel_if_they_are_three() -> None:
+    units = {"w1": "rad/s", "w2": "rad/s", "u": "", "w3": "rad/s"}
+    states = [
+        hs.State(name, k, "0", unit, title=f"speed of disc {k}")
+        for k, (name, unit) in enumerate(units.items())
+    ]
+    shared, alone = time_history(hs.simulate(hs.Model("discs", states), (0.0, 1.0))).quantities
+    assert [drawn_at.get_ydata()[0] for drawn_at in shared.get_lines()[:3]] == [0, 1, 3]
+    assert len({line.get_color() for line in shared.get_lines()[:3]}) == 3
+    assert shared.get_ylabel() == "speed of disc\n[rad/s]" and alone.get_ylabel() == "speed of disc 2\nu"
+    whole = shared.figure
+    whole.draw_without_rendering()
+    title = next(text for text in shared.findobj(Text) if text.get_text() == "discs")
+    assert not shared.get_legend().get_window_extent().overlaps(title.get_window_extent())
+    apart = time_history(hs.simulate(hs.Model("discs", states), (0.0, 1.0)), ["w1", ["w2", "w3"]])
+    assert len(apart.quantities) == 2
+
+
+def test_equal_units_have_equal_scales_in_a_phase_portrait() -> None:
+    circle = [hs.State("x", 1, "y"), hs.State("y", 0, "-x")]
+    assert phase_portrait(hs.simulate(hs.Model("circle", circle), (0, 7))).get_aspect() == 1.0
+    flat = [hs.State("x", 1, "100*y"), hs.State("y", 0, "-x/100")]
+    assert phase_portrait(hs.simulate(hs.Model("flat", flat), (0, 7))).get_aspect() == "auto"
+    assert phase_portrait(oscillator(2)).get_aspect() == "auto"
+
+
+def test_a_component_with_one_mode_has_no_strip() -> None:
+    sol = hs.simulate("gear-rattle", (0, 1))
+    assert all(len(component.modes) == 1 for component in sol.components)
+    assert time_history(sol).modes is None
+
+
+def test_modes_of_one_colour_are_told_apart_by_their_components() -> None:
+    """Two surfaces that hold in modes of different names are black in both."""
+    whole = oscillator(2)
+    spans = {"f": FakeInterval("held", 0.0, whole.t_end), "g": FakeInterval("locked", 0.0, whole.t_end)}
+    whole = replace(whole, modes={name: (span,) for name, span in spans.items()})
+    colours = {"held": "#222222", "locked": "#222222"}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("hybridsim.plot.style.mode_colours", lambda components: colours)
+        legend = time_history(whole, ["x"]).modes.get_legend()
+    assert [text.get_text() for text in legend.get_texts()] == ["held (f)", "locked (g)"]
 
 
 def test_long_runs_show_their_last_periods_and_say_so() -> None:
     axes = time_history(oscillator(100)).quantities[0]
     assert axes.get_xlim() == pytest.approx((96 * PERIOD, 100 * PERIOD))
-    assert axes.get_title(loc="left") == "Dry friction oscillator\nthe last 4 periods of 100"
+    assert axes.get_title(loc="left") == "Dry friction oscillator\nthe last 4 of 100 periods"
     assert len(drawn(axes)) < 10_000
     whole = time_history(oscillator(100), t_span=(0, 1)).quantities[0]
     assert whole.get_xlim() == (0, 1)
@@ -80,7 +140,7 @@ def test_titles_stay_within_the_picture(draw: Callable, periods: float) -> None:
     axes = picture.quantities[0] if draw is time_history else picture
     title = axes.get_title(loc="left")
     assert title.replace("\n", " ").startswith(model.title)
-    assert ("the last 4 periods of" in title) == (periods > 24)
+    assert ("the last 4 of" in title) == (periods > 24)
     figure = axes.get_figure(root=True)
     figure.draw_without_rendering()
     (text,) = (one for one in axes.findobj(Text) if one.get_text() == title)
@@ -134,17 +194,30 @@ def test_phase_portrait_sets_stick_apart() -> None:
     dots = [line for line in axes.get_lines() if line.get_marker() == "o"]
     assert len(dots) == 1 and dots[0].get_color() == "#222222"
     assert np.all(dots[0].get_ydata() == 0)
-    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [µm]", "v [mm/s]")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [mm]", "v [mm/s]")
 
 
 def test_friction_loop_is_thick_in_stick_and_dashed_in_jumps() -> None:
     axes = friction_loop(oscillator(100))
-    assert axes.get_ylabel() == "f [N]"
+    assert axes.get_ylabel() == "friction force\nf [N]"
     widths = {
         round(float(c.get_linewidth()[0]), 1) for c in axes.collections if isinstance(c, LineCollection)
     }
     assert widths == {1.2, 3.0, 0.9}
     assert [t.get_text() for t in axes.get_legend().get_texts()] == ["slip+", "slip-", "stick", "jump"]
+
+
+def test_an_open_contact_has_its_own_colour_in_an_orbit() -> None:
+    axes = phase_portrait(hs.simulate("feeny-moon", (0, 40)))
+    assert "f: open" in [text.get_text() for text in axes.get_legend().get_texts()]
+
+
+def test_arrows_show_the_direction_of_an_orbit() -> None:
+    circle = [hs.State("x", 1, "y"), hs.State("y", 0, "-x")]  # clockwise
+    axes = phase_portrait(hs.simulate(hs.Model("circle", circle), (0, 3)))
+    (arrow,) = (text for text in axes.texts if text.arrow_patch)
+    (x0, y0), (x1, y1) = arrow.get_position(), arrow.xy
+    assert x0 * y1 - x1 * y0 < 0
 
 
 def test_axes_of_the_caller_are_used() -> None:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 from matplotlib.figure import Figure
 
-from hybridsim.plot.scale import Scaled, label_axis
+from hybridsim.plot.scale import Scaled, label_axis, shared_powers
+from hybridsim.plot.symbols import label_of, symbol_of, unit_text
 
 
 @pytest.mark.parametrize(
@@ -38,3 +39,50 @@ def test_ticks_have_the_decimals_they_need() -> None:
     assert Scaled(1.0).format_ticks([1.4300, 1.4325, 1.4350]) == ["1.4300", "1.4325", "1.4350"]
     assert Scaled(1e-6).format_ticks([-4e-4, 0, 4e-4]) == ["\N{MINUS SIGN}400", "0", "400"]
     assert Scaled(1.0).format_ticks([]) == []
+
+
+@pytest.mark.parametrize(
+    "quantities, powers",
+    [
+        ({"x": ("m", -4e-4, 4e-4), "v": ("m/s", 0, 0.2), "f": ("N", -20, 20)}, {"x": -3, "v": -3}),
+        ({"x1": ("m", 0, 0.5), "x2": ("m", 0, 1.0)}, {"x1": 0, "x2": 0}),
+        ({"x": ("m", 0, 1.0), "z": ("m", 0, 1e-6)}, {}),  # six digits apart: one prefix suits none of both
+        ({"x": ("m", 0, 0), "v": ("m/s", 0, 1)}, {}),
+    ],
+)
+def test_quantities_of_one_base_unit_share_a_prefix(quantities: dict, powers: dict) -> None:
+    assert {name: p for name, p in shared_powers(quantities).items() if name in powers} == powers
+    assert set(shared_powers(quantities)) == set(powers)
+
+
+@pytest.mark.parametrize(
+    "name, symbol",
+    [
+        ("theta", "θ"), ("x", "x"), ("x1", r"x$_{\mathregular{1}}$"), ("w_bit", r"w$_{\mathregular{bit}}$"),
+        ("omega_0", r"ω$_{\mathregular{0}}$"), ("v_rel_2", r"v$_{\mathregular{rel,2}}$"),
+        ("twist", "twist"), ("stick_fraction", "stick_fraction"), ("left.x", "left.x"),
+    ],
+)  # fmt: skip
+def test_symbols(name: str, symbol: str) -> None:
+    assert symbol_of(name) == symbol
+
+
+def test_a_title_replaces_a_name_that_is_no_symbol() -> None:
+    assert label_of("torque", "torque on the bit") == ("torque on the bit", "")
+    assert label_of("theta", "angle") == ("angle", "θ")
+    assert label_of("torque", "") == ("", "torque")
+
+
+@pytest.mark.parametrize(
+    "unit, text",
+    [
+        ("m/s^2", "m/s²"),
+        ("us", "µs"),
+        ("N m", "N m"),
+        ("m*s**-1", "m·s⁻¹"),
+        ("degC", "°C"),
+        ("rad/s", "rad/s"),
+    ],
+)
+def test_units_have_raised_exponents(unit: str, text: str) -> None:
+    assert unit_text(unit) == text

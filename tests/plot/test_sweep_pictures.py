@@ -34,7 +34,7 @@ def test_lines_over_one_parameter() -> None:
     found = swept(omega=OMEGA)
     panels = found.plot()
     assert [axes.get_ylabel() for axes in panels] == ["a [mm]", "|z|", "all"]
-    assert panels[-1].get_xlabel() == "omega [rad/s]"
+    assert panels[-1].get_xlabel() == "ω [rad/s]"
     x, y = panels[0].lines[0].get_data()
     assert list(x) == sorted(OMEGA) and y[1] == found["a"][2]
     dots = panels[2].lines[0].get_xydata()
@@ -69,7 +69,7 @@ def test_lines_of_two_parameters_say_where_there_is_nothing() -> None:
 def test_a_bifurcation_diagram_is_dots_over_the_parameter() -> None:
     found = hs.bifurcation("dfcs", "F0", [22, 30], settle=20, samples=4)
     (panel,) = found.plot("x")
-    assert panel.get_xlabel() == "F0 [N]" and panel.get_ylabel().startswith("x [")
+    assert panel.get_xlabel() == r"F$_{\mathregular{0}}$ [N]" and panel.get_ylabel().startswith("x [")
     upward = panel.get_lines()[0]
     assert sorted(set(upward.get_xdata())) == [22.0, 30.0] and len(upward.get_xdata()) == 8
 
@@ -84,7 +84,7 @@ def test_many_lines_are_named_in_part() -> None:
 def test_a_map(tmp_path: Path) -> None:
     found = swept(N=N, omega=OMEGA)
     panels = found.plot()
-    assert [axes.get_xlabel() for axes in panels] == ["omega [rad/s]"] * 2
+    assert [axes.get_xlabel() for axes in panels] == ["ω [rad/s]"] * 2
     (mesh,) = panels[0].collections
     drawn = mesh.get_array()
     assert drawn.mask.sum() == 1 and drawn.mask[0, 3]
@@ -101,7 +101,7 @@ def test_texts_as_values_of_a_parameter() -> None:
     (panel,) = sweep_lines(found, "a", over="omega")
     assert [tick.get_text() for tick in panel.get_xticklabels()] == ["sqrt(k/m)", "400.0"]
     (panel,) = sweep_map(found, "a")
-    assert panel.get_xlabel() == "omega"
+    assert panel.get_xlabel() == "ω"
 
 
 @pytest.mark.parametrize(

@@ -68,6 +68,8 @@ class State(Declared):
         Unit, for labels and the check of units; it does not affect computations.
     nominal : float, optional
         Typical size in this unit, which sets the default of the absolute tolerance. The default is ``|x0|`` or 1.
+    title : str, optional
+        What it is, for labels of axes, such as "displacement".
     place : Place, optional
         Place of the declaration, for error messages.
 
@@ -84,9 +86,10 @@ class State(Declared):
     der: Expression
     unit: str = ""
     nominal: float | None = None
+    title: str = ""
 
     def __post_init__(self) -> None:
-        self._texts("name", "unit")
+        self._texts("name", "unit", "title")
         self._expressions("start", "der")
         if self.nominal is not None:
             object.__setattr__(self, "nominal", self._real("nominal", self.nominal))
@@ -104,6 +107,8 @@ class Discrete(Declared):
         Initial value, an expression of parameters.
     unit : str, optional
         Unit, for labels and the check of units.
+    title : str, optional
+        What it is, for labels of axes, such as "displacement".
     place : Place, optional
         Place of the declaration, for error messages.
 
@@ -118,9 +123,10 @@ class Discrete(Declared):
     name: str
     start: Expression
     unit: str = ""
+    title: str = ""
 
     def __post_init__(self) -> None:
-        self._texts("name", "unit")
+        self._texts("name", "unit", "title")
         self._expressions("start")
 
 
@@ -138,6 +144,8 @@ class Output(Declared):
         Unit, for labels and the check of units.
     modes : mapping of str to str or float, optional
         Expressions that replace ``expr`` in a mode, by ``"component.mode"``; if several apply, the last one is used.
+    title : str, optional
+        What it is, for labels of axes, such as "displacement".
     place : Place, optional
         Place of the declaration, for error messages.
 
@@ -153,8 +161,9 @@ class Output(Declared):
     expr: Expression
     unit: str = ""
     modes: Mapping[str, Expression] = field(default_factory=FrozenMap)
+    title: str = ""
 
     def __post_init__(self) -> None:
-        self._texts("name", "unit")
+        self._texts("name", "unit", "title")
         self._expressions("expr", functions=True)
         self._maps("modes")

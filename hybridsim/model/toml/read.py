@@ -159,17 +159,18 @@ def _parameters(root: Table) -> Iterable[Parameter]:
 
 def _states(root: Table) -> Iterable[State]:
     for name, table in root.entries("states", "state"):
-        table.only("start", "der", "unit", "nominal")
+        table.only("start", "der", "unit", "nominal", "title")
         start = table.required("start", "write start = NUMBER, the initial value")
         der = table.required("der", 'write der = "EXPRESSION"; modes may replace it by their own der')
-        yield State(name, start, der, table.text("unit"), table.real("nominal"), place=table.place)
+        nominal, title = table.real("nominal"), table.text("title")
+        yield State(name, start, der, table.text("unit"), nominal, title, place=table.place)
 
 
 def _discrete(root: Table) -> Iterable[Discrete]:
     for name, table in root.entries("discrete", "discrete state", "start"):
-        table.only("start", "unit")
+        table.only("start", "unit", "title")
         start = table.required("start", "write start = NUMBER, the initial value")
-        yield Discrete(name, start, table.text("unit"), place=table.place)
+        yield Discrete(name, start, table.text("unit"), table.text("title"), place=table.place)
 
 
 def _contacts(root: Table, laws: dict[str, FrictionLaw], folder: Path) -> Iterable[Contact]:
@@ -263,6 +264,7 @@ def _clocks(root: Table) -> Iterable[Schedule]:
 
 def _outputs(root: Table) -> Iterable[Output]:
     for name, table in root.entries("outputs", "output", "expr"):
-        table.only("expr", "unit", "modes")
+        table.only("expr", "unit", "modes", "title")
         expr = table.required("expr", 'write expr = "EXPRESSION", the value of the output')
-        yield Output(name, expr, table.text("unit"), table.expressions("modes"), place=table.place)
+        modes, title = table.expressions("modes"), table.text("title")
+        yield Output(name, expr, table.text("unit"), modes, title, place=table.place)

@@ -44,7 +44,11 @@ def _document(model: Model) -> dict[str, Any]:
         "states": {s.name: _state(s) for s in model.states if not isinstance(s, ContactState)},
         "discrete": _short(
             "start",
-            {d.name: _fields(d, "start", "unit") for d in model.discrete if not isinstance(d, HeldInput)},
+            {
+                d.name: _fields(d, "start", "unit", "title")
+                for d in model.discrete
+                if not isinstance(d, HeldInput)
+            },
         ),
         "definitions": dict(model.definitions),
         "inputs": {signal.name: _input(signal) for signal in model.inputs}
@@ -56,7 +60,9 @@ def _document(model: Model) -> dict[str, Any]:
         "components": {component.name: _component(component) for component in model.components},
         "monitors": {monitor.name: _monitor(monitor) for monitor in model.monitors},
         "schedules": {schedule.name: _schedule(schedule) for schedule in model.schedules},
-        "outputs": _short("expr", {o.name: _fields(o, "expr", "unit", "modes") for o in model.outputs}),
+        "outputs": _short(
+            "expr", {o.name: _fields(o, "expr", "unit", "modes", "title") for o in model.outputs}
+        ),
         "drawing": {shape.name: _shape(shape) for shape in model.drawing},
     }
 
@@ -91,7 +97,7 @@ def _shape(shape: Shape) -> dict[str, Any]:
 
 
 def _state(state: State) -> dict[str, Any]:
-    return _fields(state, "start", "unit", "nominal", "der")
+    return _fields(state, "start", "unit", "nominal", "title", "der")
 
 
 def _law(law: FrictionLaw) -> dict[str, Any]:
