@@ -56,11 +56,11 @@ def label_axis(
     text = unit_text(prefixed)
     if power and prefixed == unit:  # the unit takes no prefix
         text = f"$10^{{{power}}}$ {text}".rstrip()
-    words, symbol = label_of(name, title)
+    heading, symbol = label_of(name, title)
     symbol = f"{symbol} [{text}]".strip() if text else symbol
-    if isinstance(axis, YAxis) and words:
-        words = "\n".join(textwrap.wrap(words, _ALONG_Y)) + "\n"
-    axis.set_label_text(f"{words} {symbol}".replace("\n ", "\n").strip(), fontsize=9)
+    if isinstance(axis, YAxis) and heading:
+        heading = "\n".join(textwrap.wrap(heading, _ALONG_Y)) + "\n"
+    axis.set_label_text(f"{heading} {symbol}".replace("\n ", "\n").strip(), fontsize=9)
     axis.set_major_formatter(Scaled(10.0**power))
 
 

@@ -18,7 +18,7 @@ _UNITS = {"us": "µs", "um": "µm", "degC": "°C", "deg": "°", "ohm": "Ω", "Oh
 
 
 def label_of(name: str, title: str) -> tuple[str, str]:
-    """Return the words and the symbol of a quantity on an axis; a title replaces a name that is no symbol."""
+    """Return the title and the symbol of a quantity on an axis; a title replaces a name that is no symbol."""
     if title and _SYMBOL.fullmatch(name) is None:
         return literal(title), ""
     return literal(title), symbol_of(name)

@@ -149,8 +149,8 @@ def _looks(count: int) -> list[tuple[str, Any]]:
 
 def _name_curves(axis: Axes, model: Any, panel: Sequence[str], unit: str) -> float:
     """Write the symbols of several curves above their panel, and what their titles share beside it."""
-    words = [title_of(model, name).split() for name in panel]
-    shared = " ".join(w[0] for w in itertools.takewhile(lambda w: len(set(w)) == 1, zip(*words)))
+    titles = [title_of(model, name).split() for name in panel]
+    shared = " ".join(w[0] for w in itertools.takewhile(lambda w: len(set(w)) == 1, zip(*titles)))
     label = axis.yaxis.get_label_text()
     bracket = label[label.rindex("[") :] if unit else ""
     axis.yaxis.set_label_text("\n".join(filter(None, (shared, bracket))))
