@@ -50,6 +50,8 @@ def test_the_lines_of_the_readme_run(tmp_path: Path) -> None:
         ("tutorials/first-stick-slip.md", 6),
         ("tutorials/compare-integrators.md", 2),
         ("tutorials/limit-cycle.md", 7),
+        ("tutorials/cheat-sheet.md", 7),
+        ("tutorials/coming-from.md", 2),
     ],
 )
 def test_a_page_prints_what_it_says(page: str, fewest: int, tmp_path: Path) -> None:
