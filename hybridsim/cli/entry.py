@@ -28,6 +28,7 @@ from hybridsim.cli import (
     check,
     compare,
     fit,
+    explain_status,
     integrators,
     models,
     report,
@@ -96,6 +97,7 @@ COMMANDS: tuple[ModuleType, ...] = (
     models,
     schema,
     integrators,
+    explain_status,
     cache,
 )
 

@@ -82,7 +82,7 @@ CASES = {
     "models": ["models"],
     "integrators": ["integrators", "cvode-bdf"],
 }
-WITHOUT_JSON = {"cache", "schema"}  # the schema is JSON by itself
+WITHOUT_JSON = {"cache", "explain-status", "schema"}  # the schema is JSON by itself
 FAULTY = {
     "run": ["run", "dfsc"],
     "resume": ["resume", "none.hsol"],

@@ -190,6 +190,7 @@ LINES = {
     "models": [],
     "schema": [],
     "integrators": [],
+    "explain_status": [],
     "cache": ["path"],
 }
 
@@ -198,10 +199,12 @@ LINES = {
 def test_out_of_memory_names_options_that_the_command_has(
     command: str, hybridsim: Callable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    known = set(re.findall(r"--[a-z][a-z0-9-]*", hybridsim(command, "--help").out))
+    known = set(re.findall(r"--[a-z][a-z0-9-]*", hybridsim(command.replace("_", "-"), "--help").out))
     monkeypatch.setattr(f"hybridsim.cli.{command}.execute", raising(MemoryError()))
-    found = hybridsim(command, *LINES[command])
+    found = hybridsim(command.replace("_", "-"), *LINES[command])
     assert found.code == 1 and found.err.startswith("hybridsim: out of memory")
     named = set(re.findall(r"--[a-z][a-z0-9-]*", found.err))
     assert named <= known
-    assert bool(named) == (command not in ("check", "models", "schema", "integrators", "cache"))
+    assert bool(named) == (
+        command not in ("check", "models", "schema", "integrators", "explain_status", "cache")
+    )

@@ -46,7 +46,7 @@ from hybridsim.mechanics.series_loop.mechanical_arrays import Built
 from hybridsim.mechanics.series_loop.steps import step_length_kernel
 
 STATUS = {
-    DONE: "finished", INCONSISTENT: "inconsistent", NONUNIQUE: "nonunique", CASCADE: "cascade", LOST: "failed",
+    DONE: "finished", INCONSISTENT: "inconsistent", NONUNIQUE: "nonunique", CASCADE: "cascade", LOST: "step-failure",
     LIMITED: "limit",
 }  # fmt: skip
 _SERIES_DOUBLES = 1 << 20  # doubles for the series of one call
