@@ -22,13 +22,15 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["_build", "examples", "studies/rivals", "**/.ipynb_checkpoints"]
+exclude_patterns = ["_build", "_templates", "examples", "studies/rivals", "**/.ipynb_checkpoints"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 
 myst_enable_extensions = ["deflist", "colon_fence"]
 myst_heading_anchors = 3
 
-autosummary_generate = True
+autosummary_generate = True  # writes a page for each name of reference/api.md into the folder reference/api
+templates_path = ["_templates"]
+default_role = "py:obj"  # names in single quotes of docstrings are links
 autodoc_typehints = "none"
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False

@@ -59,9 +59,9 @@ MOVES: dict[str, dict[str, Any]] = {
 
 HEAD = """# Gallery
 
-Every model that comes with the package: `hybridsim run NAME` runs one over its own duration, `hybridsim check NAME`
-says where it is from and what to look at, `hs.load("NAME")` gives it to Python. Tests hold them against closed forms,
-balances and matrix exponentials. The page and its pictures are made by `docs/make/gallery.py`.
+This page shows every model of the package. `hybridsim run NAME` runs a model over its own duration, `hybridsim check
+NAME` prints its source and description, and `hs.load("NAME")` loads it in Python. Tests compare the models with
+closed forms, balances and matrix exponentials. `docs/make/gallery.py` makes the page and its pictures.
 
 Many files also contain a [drawing](../how-to/draw-a-mechanism.md). `hybridsim run NAME --animate NAME.gif` animates it.
 Contacts have the colours of their modes.

@@ -24,16 +24,21 @@ from hybridsim.testing.suite import Outcome, outcome
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "conformance.md"
 INTRODUCTION = """# What each integrator gets right
 
-Every integrator runs scenes of `hybridsim.testing` whose answer is known: a closed form, or 30 digits and more from a
-computation that shares no code with the package. [The atlas](../atlas/index.md) tells of each of them. This page is
-written by `python -m conformance.table` in `tests/`.
+Every integrator runs scenes of `hybridsim.testing` with known answers. An answer is a closed form, or a computation
+with 30 digits or more that shares no code with the package. [The atlas](../atlas/index.md) describes each scene.
+`python -m conformance.table` in `tests/` writes this page.
 
-A scene is *right* when every event is found, in the right mode and order, none is invented, what is held is exact
-bit for bit, and the errors fall with the tolerance (1e-6, 1e-9, 1e-12; a study is cut short where runs get long) or,
-for a fixed-step method, with its step. The two numbers are the largest error of an event time, in units of the
-scene's own time, and of a state, relative to its largest value, at the last setting of the study. A method may
-*lack* a capability that a scene needs: it says so, with the reason below, and refuses such a model where that can be
-seen from the model.
+A scene is *right* under these conditions:
+
+- Every event is found, in the right mode and order, and there are no additional events.
+- Held quantities are exact bit for bit.
+- The errors decrease with the tolerance (1e-6, 1e-9, 1e-12), or with the step of a fixed-step method. A study ends
+  early if runs get long.
+
+The two numbers are errors at the last setting of the study. The first is the largest error of an event time, in units
+of the scene's own time. The second is the largest error of a state, relative to its largest value. A method may
+*lack* a capability that a scene needs. It then refuses such a model, if the model shows the need. The reasons are
+listed below.
 """
 
 
@@ -50,9 +55,9 @@ def cell(result: Outcome) -> str:
 NATIVE = """
 ## SciPy's own event finding
 
-The same solvers with `events="native"`: one call of `solve_ivp` with terminal events for each smooth stretch, called
-anew after each event, directions given, and steps bounded by a tenth of the forcing's period where there is one. What
-follows an event is decided as with all others. Scenes that all of them get right as above are left out.
+The same solvers run with `events="native"`. Each smooth stretch is one call of `solve_ivp` with terminal events and
+directions. A tenth of the forcing's period, if there is one, limits the steps. The mode after an event is decided as
+for all others. Scenes that all of them get right are left out.
 """
 
 
@@ -119,17 +124,17 @@ def page(names: Sequence[str]) -> str:
             for capability, reason in one.lacks.items()
         ),
     )
-    parts = [INTRODUCTION, "## Scenes\n", table, "\n## What is lacking\n", lacking]
+    parts = [INTRODUCTION, "## Scenes\n", table, "\n## Missing capabilities\n", lacking]
     faults = [
         (r.integrator, r.scene, " ".join(r.reasons[0].split()).replace("|", "/"))
         for r in results.values()
         if r.failed
     ]
     if faults:
-        parts += ["\n## What is wrong\n", rows(("integrator", "scene", "what"), faults)]
+        parts += ["\n## Wrong results\n", rows(("integrator", "scene", "what"), faults)]
     parts += native(names)
     sources = ((case, fact["name"], fact["source"]) for case, fact in CASES.items())
-    parts += ["\n## Where the scenes come from\n", rows(("case", "what it is", "source"), sources)]
+    parts += ["\n## Sources of the scenes\n", rows(("case", "what it is", "source"), sources)]
     return "\n".join(parts) + "\n"
 
 
