@@ -121,7 +121,7 @@ class Measures:
 
     @property
     def peak(self) -> ByName:
-        """max |q| of each quantity, from its dense output."""
+        """Largest absolute value of each quantity, from its dense output."""
         return self._each(lambda q: max(abs(self._extreme(q, 0)), abs(self._extreme(q, 1))))
 
     @property
