@@ -114,6 +114,8 @@ class OneStepStepper(ABC):
                     break
                 self.h = _SHORTER * h
             self.flow.counters.rejected += 1
+            if last and h <= SMALLEST * math.ulp(self.bound):  # a repetition would have the same length
+                raise Collapsed(f"the step size fell to {h:.3g}")
         self.here = end
         return Step(start.s, s, start.x, end.x, self.dense(start, end, trial))
 

@@ -11,6 +11,8 @@ import numpy as np
 from hybridsim.engine.native.kernels import call, kernel
 from hybridsim.engine.series.interpreter import advance
 
+_SMALLEST_NORMAL = 2.0**-1022  # of doubles; the reciprocals of smaller numbers may overflow
+
 
 @dataclass(frozen=True)
 class RosenbrockTableau:
@@ -124,11 +126,20 @@ def rosenbrock_attempt(
     """Try one step of length `h` from (s, x); write its end to `out` and return its scaled error.
 
     tableau: see `RosenbrockTableau`. tolerances: rtol, atol. matrix, pivots, slope: scratch space. stages (s,
-    n): output.
+    n): output. If 1/(gamma h) may overflow, the step is one of Euler's method, whose error is below any rounding.
     """
     gamma, a, c, m, e, nodes, d = tableau
     rtol, atol = tolerances
     n = x.shape[0]
+    if abs(gamma * h) < _SMALLEST_NORMAL:
+        matrix[:], stages[:] = 0.0, 0.0
+        call(flow, s, x, p, z, slope)
+        for i in range(n):
+            matrix[i, i], pivots[i] = math.inf, i  # the limit of the matrix of a step of length zero
+            out[i] = x[i] + h * slope[i]
+            if not abs(out[i]) < math.inf:
+                return math.nan
+        return 0.0
     for i in range(n):
         for j in range(n):
             matrix[i, j] = -jacobian[i, j]

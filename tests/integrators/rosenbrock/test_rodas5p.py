@@ -163,3 +163,19 @@ def test_the_error_follows_the_tolerance_however_stiff(rate: float, rtol: float)
     assert sol.stats["steps"] < 1000
     error = max(np.abs(sol(t) - truth(t)).max() for t in np.linspace(0, 10, 501))
     assert rtol * 1e-4 < error < 100 * rtol
+
+
+@pytest.mark.parametrize("at", [5e-324, 1.5e-323, 1e-310])
+def test_a_step_to_a_denormal_time_ends(at: float) -> None:
+    """The reciprocal of such a step is infinite; x' = -x with x + 1 at the time and at 0.5 has a closed form."""
+    text = f"""schema = 1
+name = "denormal"
+[states]
+x = {{ start = 1, der = "-x" }}
+[schedules.s]
+times = [{at!r}, 0.5]
+reset = {{ x = "x + 1" }}
+"""
+    sol = hs.simulate(hs.Model.from_toml(text), (0, 2), integrator="rodas5p", limits={"seconds": 60})
+    assert (sol.status, len(sol.events)) == ("finished", 2)
+    assert sol(2.0)[0] == pytest.approx(2 * math.exp(-2) + math.exp(-1.5), rel=1e-7)
