@@ -74,6 +74,20 @@ def in_the_way(system: System, record: Trajectory, outcome: Outcome, origin: Ins
     return _steep(system, record, s, x, p, z, rates, first, reach)
 
 
+def name_vanished_load(system: System, record: Trajectory) -> None:
+    """Change the status and the message of a run that stopped where a law divides by a load of zero.
+
+    Near the zero the signs of the load and of the rates of the law are those of roundings, so the run may seem to have
+    no admissible mode, or to have events that accumulate.
+    """
+    if record.status not in ("accumulation", "inconsistent") or not record.segments:
+        return
+    first, last = record.segments[0], record.segments[-1]
+    began, ended = (float(first.origin), first.x[0].tolist()), (float(last.end), last.x[-1].tolist())
+    if load := vanishing_load(system.written, system.names, began, ended):
+        record.status, record.message = "step-failure", f"after t = {ended[0]:.9g}: {load}"
+
+
 def advice_on_sizes(system: System) -> str:
     """Return a remedy if steps become too small because the tolerance is below the rounding error."""
     is_sized = all(state.nominal is not None for state in system.model.states)

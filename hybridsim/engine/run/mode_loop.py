@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridsim.engine.events.backward import cross_backward, has_no_past, held, message_on_direction
 from hybridsim.engine.events.compiled.known_time import has_known_times
-from hybridsim.engine.events.diagnosis import advice_on_sizes, in_the_way
+from hybridsim.engine.events.diagnosis import advice_on_sizes, in_the_way, name_vanished_load
 from hybridsim.engine.events.fatal_guards import is_only_fatal
 from hybridsim.engine.events.input_jumps import surfaces_jump
 from hybridsim.engine.events.monitor_sides import MonitorSides
@@ -129,16 +129,16 @@ class ModeLoop:
         except StepFailure as failure:
             self.record.status = "step-failure"
             why = in_the_way(self.system, self.record, self.outcome, self.origin, self.p)
-            if isinstance(failure, NoHeadway):
-                why = f"{failure.advice}; {why}" if why else failure.advice
-            elif not why and isinstance(failure, Collapsed):
+            if not why and isinstance(failure, Collapsed):
                 why = advice_on_sizes(self.system)
+            reasons = (str(failure), failure.advice if isinstance(failure, NoHeadway) else "", why)
             reached = self.record.segments[-1].end if self.record.segments else self.origin
-            self.record.message = f"after t = {float(reached):.9g}: {failure}" + (f"; {why}" if why else "")
+            self.record.message = f"after t = {float(reached):.9g}: {'; '.join(filter(None, reasons))}"
         except LimitReached as reached:
             self.record.stop_early("limit", str(reached), self.task.t0)
         except KeyboardInterrupt:
             self.record.stop_early("interrupted", "", self.task.t0)
+        name_vanished_load(self.system, self.record)
         if not self.forward and self.record.status in ("backward-nonunique", "step-failure"):
             self.record.message += message_on_direction(self.task.t0, self.task.t1)
         if self.adopted == self.origin:
