@@ -18,10 +18,10 @@ import count_prose
 # in 1000 words, colons in 1000 words, and phrases to replace. A row may only become lower. The aim is 20, 0, 2, 10, 0.
 # fmt: off
 CEILINGS = {
-    "CHANGELOG.md": (16, 0, 7, 23, 22),
-    "CONTRIBUTING.md": (16, 0, 8.5, 12, 13),
+    "CHANGELOG.md": (15, 0, 4, 21, 2),
+    "CONTRIBUTING.md": (12, 0, 0.5, 1, 0),
     "README.md": (13, 0, 1, 8, 0),
-    "docs": (13, 0, 2, 11, 1),
+    "docs": (12, 0, 0.5, 10, 0),
     "docs/atlas": (16.5, 4, 6.5, 26, 52),
     "docs/explanation": (13, 0, 0, 6, 0),
     "docs/how-to": (13, 0, 0.5, 6.5, 0),
