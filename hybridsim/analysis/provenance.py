@@ -15,7 +15,7 @@ _PACKAGES = ("numpy", "scipy", "numba", "scikit-sundae", "sympy", "mpmath")
 
 
 def provenance(model: Model) -> dict[str, Any]:
-    """Return the versions, the machine and the model of a result as plain values for JSON.
+    """Return versions, machine, model, parameters and initial values of a result as plain values for JSON.
 
     The hash covers the model as text with the parameters and initial values of this run. It is None for a
     model of Python functions, which has no text.
@@ -28,6 +28,8 @@ def provenance(model: Model) -> dict[str, Any]:
         "processor": platform.machine(),
         "cpus": os.cpu_count(),
         "model": model.name,
+        "parameters": dict(model.parameter_values()),
+        "start": dict(model.start_values()),
         "model_sha256": None if model.flow else hashlib.sha256(model.to_toml().encode()).hexdigest(),
     }
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from hybridsim.analysis.compare.rows import Row
 
 SIZE = 6.5
-PALE = 0.35
+PALE = 0.5
 
 # colours of regularised forms and of the set-valued law; their integrators differ in dashes
 _SET_VALUED = "set-valued"
@@ -26,17 +26,19 @@ _FORMS = {
     "arctan": style.PALETTE[1],
     "karnopp": style.PALETTE[2],
 }
-# The hue of each family, from Okabe and Ito's palette: published methods, SciPy's explicit methods, other
-# SciPy methods, SUNDIALS, and all others. A name belongs to the first prefix that matches.
+# The hue of each family, from Okabe and Ito's palette. A name belongs to the first prefix that matches.
 _FAMILIES: tuple[tuple[str, tuple[str, ...]], ...] = (
-    (style.INK, ("rk4-",)),
-    (style.PALETTE[1], ("scipy-rk", "scipy-dop")),
-    (style.PALETTE[2], ("scipy-",)),
+    (style.TEXT_GREY, ("rk4-", "moreau")),  # fixed steps
+    (style.PALETTE[1], ("scipy-rk", "scipy-dop")),  # explicit methods of SciPy
+    (style.PALETTE[2], ("scipy-",)),  # its other methods
     (style.PALETTE[3], ("cvode-",)),
-    (style.PALETTE[0], ("",)),
+    (style.INK, ("exact",)),
+    (style.PALETTE[5], ("taylor",)),
+    (style.PALETTE[4], ("rodas",)),
+    (style.PALETTE[0], ("",)),  # explicit Runge-Kutta methods, and all others
 )
 _MARKERS = (*style.MARKERS, "h", "d", "8")
-_DARK, _LIGHT = 0.7, 0.4  # the range of shades of a hue: fractions mixed with black and with white
+_DARKEST = 0.7  # part of a hue that its darkest shade keeps; no shade is paler than the hue
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ class Look:
 def looks(rows: Iterable[Row]) -> dict[str, Look]:
     """Return the style of each label, in the order of the rows of the comparison.
 
-    Methods of one family share a hue and differ in lightness and marker. Several lines of one method (our
+    Methods of one family share a hue and differ in shade and marker. Several lines of one method (our
     events and its own, published and refined) or of one regularised form differ in their dashes.
     """
     rows = list(rows)
@@ -92,9 +94,8 @@ def _shade(hue: str, place: int, count: int) -> str:
     """Return one of `count` shades of a colour; the first shade is the darkest."""
     if count == 1:
         return hue
-    part = place / (count - 1)
-    dark, light = _DARK + (1 - _DARK) * min(2 * part, 1), 1 - _LIGHT * max(2 * part - 1, 0)
-    return to_hex([light * dark * channel + 1 - light for channel in to_rgb(hue)])
+    kept = _DARKEST + (1 - _DARKEST) * place / (count - 1)
+    return to_hex([kept * channel for channel in to_rgb(hue)])
 
 
 def draw_line(
@@ -103,22 +104,29 @@ def draw_line(
 ) -> None:  # fmt: skip
     """Draw the points (time, error) of a line, with the spread of the measured times.
 
-    A point is filled if the modes are right, hollow if they are wrong, and half filled if there are no modes
-    to compare. A cold point was timed only in its first run, which warms up; it is drawn pale, without the
-    line.
+    A point is filled if the modes are right, and half filled if there are no modes to compare. A point with
+    wrong modes is hollow and at the top edge, apart from the errors, because it is another motion. A cold point
+    was timed only in its first run, which warms up; it is drawn pale, without the line.
     """
     if not points:
         return
     cold = cold or [False] * len(points)
-    timed = [point for point, is_cold in zip(points, cold, strict=True) if not is_cold] or points
-    panel.plot(
-        *zip(*timed, strict=True), color=look.colour, linestyle=look.dashes, linewidth=size / 6, zorder=2
-    )
-    for (x, y), (low, high), right, is_cold in zip(points, spreads, verdicts, cold, strict=True):
-        if high > low:
-            panel.plot([low, high], [y, y], color=look.colour, linewidth=size / 2.6, alpha=0.35, zorder=2)
+    judged = list(zip(points, verdicts, cold, strict=True))
+    sound = [point for point, right, _ in judged if right is not False]
+    timed = [point for point, right, is_cold in judged if right is not False and not is_cold] or sound
+    if timed:
         panel.plot(
+            *zip(*timed, strict=True), color=look.colour, linestyle=look.dashes, linewidth=size / 6, zorder=2
+        )
+    for (point, right, is_cold), (low, high) in zip(judged, spreads, strict=True):
+        x, y = point if right is not False else (point[0], 1.0)
+        if high > low and right is not False:
+            panel.plot([low, high], [y, y], color=look.colour, linewidth=size / 6, alpha=0.5, zorder=2)
+        (mark,) = panel.plot(
             x, y, look.marker, color=look.colour, markersize=size, markeredgewidth=size / 5,
             markerfacecolor="white" if right is False else look.colour, markerfacecoloralt="white",
             fillstyle="left" if right is None else "full", alpha=PALE if is_cold else 1.0,
+            transform=panel.get_xaxis_transform() if right is False else panel.transData,
         )  # fmt: skip
+        if right is False:
+            mark.set(clip_on=False, zorder=4)

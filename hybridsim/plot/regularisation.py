@@ -23,7 +23,7 @@ def regularisation(comparison: Comparison) -> tuple[Axes, Axes]:
     """
     from hybridsim.analysis.compare.regularised import exponent_text, exponents
 
-    figure = style.figure(12.5, 5.0)
+    figure = style.figure(style.WIDTH, 4.6)
     style.put_title(figure, headline(comparison), size=10)
     errors, times = figure.subplots(1, 2)
     chosen = looks(comparison.rows)
@@ -38,12 +38,12 @@ def regularisation(comparison: Comparison) -> tuple[Axes, Axes]:
             for row in rows:
                 if not row.form:
                     panel.axhline(quantity(row), color=chosen[label].colour, linestyle=chosen[label].dashes)
-    for panel, title in ((errors, "State error, whole run / amplitude"), (times, "Wall time")):
+    for panel, title in ((errors, "state error, whole run / amplitude"), (times, "wall time")):
         style.dress(panel)
         panel.set_xscale("log")
         panel.set_yscale("log")
-        panel.set_title(title, fontsize=10, loc="left")
-        panel.set_xlabel("$v_0$, in the unit of the velocity", fontsize=9)
+        panel.set_ylabel(title, fontsize=9)
+        panel.set_xlabel("v$_{\\mathregular{0}}$, in the unit of the velocity", fontsize=9)
         panel.yaxis.set_minor_formatter(NullFormatter())
     errors.yaxis.set_major_locator(LogLocator(numticks=9))
     times.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5), numticks=20))
@@ -53,13 +53,10 @@ def regularisation(comparison: Comparison) -> tuple[Axes, Axes]:
     for handle, label in zip(found, chosen, strict=False):
         if label in fitted:
             power, work = map(exponent_text, fitted[label])
-            handle.set_label(f"{handle.get_label()}\nerror ~ $v_0^{{{power}}}$, work ~ $v_0^{{{work}}}$")
+            handle.set_label(f"{handle.get_label()}: error ~ $v_0^{{{power}}}$, work ~ $v_0^{{{work}}}$")
         else:
             handle.set(marker="None")
-    times.legend(
-        handles=found, loc="upper left", bbox_to_anchor=(1.02, 1.0), frameon=False, fontsize=9, handlelength=3,
-        labelspacing=0.7,
-    )  # fmt: skip
+    style.legend_below(figure, found)
     return errors, times
 
 

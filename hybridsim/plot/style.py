@@ -32,7 +32,7 @@ SUFFIXES = (".png", ".pdf", ".svg")
 WIDTH = 7.3  # inches of a wide picture: 700 pixels of a page, which shows it unshrunk
 _DPI = 150
 _PAD, _ROW = 6.0, 13.0  # points: above axes, and of a row of a legend
-_HANDLE = 4  # letters: the width of a legend's handle
+_HANDLE, _LONG_HANDLE = 4, 8  # letters: the width of a legend's handle
 _LETTERS = 13.0  # of a title per inch: the default font at 10 points has about 14, fewer if they are wide
 # Text of an SVG remains text, and equal pictures are equal files.
 _SVG = {"svg.fonttype": "none", "svg.hashsalt": "hybridsim"}
@@ -103,6 +103,24 @@ def legend_above(axes: Axes, handles: Sequence[Artist]) -> float:
 def figure(width: float, height: float) -> Figure:
     """Return a new figure of the given size in inches, without a window or global state."""
     return Figure(figsize=(width, height), layout="constrained")
+
+
+def wrapped(*parts: str) -> str:
+    """Return the title of a whole picture of the usual width: each part begins a new line."""
+    return literal("\n".join(line for part in parts for line in textwrap.wrap(part, round(WIDTH * _LETTERS))))
+
+
+def legend_below(whole: Figure, handles: Sequence[Artist]) -> None:
+    """Name lines below all panels of a figure, in as many columns as its width allows."""
+    longest = max((len(str(handle.get_label())) for handle in handles), default=1) + _LONG_HANDLE
+    whole.legend(
+        handles=handles,
+        loc="outside lower center",
+        ncols=max(1, min(len(handles), int(whole.get_figwidth() * _LETTERS / longest))),
+        frameon=False,
+        fontsize=9,
+        handlelength=3,
+    )
 
 
 def put_title(whole: Figure, text: str, size: float = 11) -> None:

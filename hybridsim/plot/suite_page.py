@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
@@ -12,40 +14,49 @@ from hybridsim.plot.lines import looks
 from hybridsim.plot.work_precision import draw_panel, handles
 
 if TYPE_CHECKING:
-    from hybridsim.analysis import SuiteComparison
+    from hybridsim.analysis import Comparison, SuiteComparison
 
 _COLUMNS = 3
+_HEIGHT, _AROUND = 2.5, 1.9  # inches of a row of panels, and of title and legend
 _MARKER = 4.5
 
 
 def suite_page(suite: SuiteComparison) -> tuple[Axes, ...]:
     """Draw the largest error of the states over the run against the wall time, scene by scene.
 
-    Runs with a wrong sequence of modes are hollow. Dashed lines show SciPy's own event finding, or the
-    refined form of the published method, in the colour of the solid line.
+    Runs with a wrong sequence of modes are hollow and at the top edge. Dashed lines show SciPy's own event
+    finding, or the refined form of the published method, in the colour of the solid line.
     """
     comparisons = [result.comparison for result in suite.results]
     rows = [row for comparison in comparisons for row in comparison.rows]
     columns = min(_COLUMNS, len(comparisons))
     count = math.ceil(len(comparisons) / columns)
-    figure = style.figure(4.3 * columns, 3.3 * count + 1.6)
-    style.put_title(
-        figure, "Largest error of the states over the run / amplitude, against the time of the run"
-    )
+    figure = style.figure(style.WIDTH, _HEIGHT * count + _AROUND)
+    style.put_title(figure, _headline(comparisons), size=10)
     panels = figure.subplots(count, columns, squeeze=False).ravel()
     chosen = looks(rows)
     for panel, result in zip(panels, suite.results, strict=False):
         draw_panel(panel, result.comparison, "state", chosen, _MARKER)
-        panel.set_title(style.literal(result.scene.title), fontsize=10, loc="left")
-        panel.set_xlabel("")
+        panel.set_title(style.literal(result.scene.title), fontsize=9, loc="left", pad=8)
+    for k, panel in enumerate(panels[: len(comparisons)]):
+        panel.set_ylabel("state error / amplitude" if k % columns == 0 else "", fontsize=9)
+        panel.set_xlabel("wall time" if k + columns >= len(comparisons) else "", fontsize=9)
     for panel in panels[len(comparisons) :]:
         panel.remove()
-    figure.legend(
-        handles=handles([row for row in rows if row.errors is not None], comparisons, chosen, _MARKER),
-        loc="outside lower center",
-        ncols=min(4, columns + 1),
-        frameon=False,
-        fontsize=9,
-        handlelength=3.5,
+    style.legend_below(
+        figure, handles([row for row in rows if row.errors is not None], comparisons, chosen, _MARKER)
     )
     return tuple(panels[: len(comparisons)])
+
+
+def _headline(comparisons: Sequence[Comparison]) -> str:
+    """Return which method is the cheapest in the most scenes."""
+    from hybridsim.analysis.compare.table import TARGET, fastest
+
+    firsts = Counter(row.label for one in comparisons if (row := fastest(one.rows)) is not None)
+    if not firsts:
+        return style.wrapped(f"No run reaches an error of {TARGET:.0e} with the right modes")
+    names = [f"{label} in {count}" for label, count in firsts.most_common()]
+    return style.wrapped(
+        f"Cheapest at an error of {TARGET:.0e}, of {len(comparisons)} scenes: {', '.join(names)}"
+    )

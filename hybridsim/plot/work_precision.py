@@ -20,12 +20,14 @@ if TYPE_CHECKING:
     from hybridsim.analysis import Comparison
     from hybridsim.analysis.compare.rows import Row
 
-_MOST_TICKS = 5  # across a panel
+_MOST_TICKS = 4  # across a panel
+_COLUMNS = 2
+_HEIGHT, _AROUND = 3.0, 1.6  # inches of a row of panels, and of title and legend
 _TITLES = {
-    "state": "State error, whole run / amplitude",
-    "state_last_period": "State error, last period / amplitude",
-    "event_time": "Largest event-time error",
-    "graph": "Distance of the graphs",
+    "state": "state error, whole run / amplitude",
+    "state_last_period": "state error, last period / amplitude",
+    "event_time": "largest event-time error",
+    "graph": "distance of the graphs",
 }
 _ZERO = 1e-17  # position of an error of exactly zero, below rounding
 _UNCERTAIN = "#eeeeee"
@@ -35,9 +37,9 @@ def work_precision(comparison: Comparison, axes: Sequence[Axes] | None = None) -
     """Draw error against cost, one panel for each kind of error (`Comparison.quantities`).
 
     The wall time is horizontal and the error vertical; a line joins the settings of one integrator. A run
-    with a wrong sequence of modes is hollow, because its errors compare different motions. Stick erases the
-    memory of errors, so that a wrong run may have a small error at its end; several panels are needed to see
-    this.
+    with a wrong sequence of modes is hollow and at the top edge, because its errors compare different motions.
+    Stick erases the memory of errors, so that a run may have a small error at its end; several panels are
+    needed to see this.
 
     Parameters
     ----------
@@ -45,9 +47,13 @@ def work_precision(comparison: Comparison, axes: Sequence[Axes] | None = None) -
     """
     quantities = comparison.quantities
     if axes is None:
-        figure = style.figure(4.1 * len(quantities) + 1.8, 5.4)
+        rows = math.ceil(len(quantities) / _COLUMNS)
+        figure = style.figure(style.WIDTH, _HEIGHT * rows + _AROUND)
         style.put_title(figure, headline(comparison), size=10)
-        panels = tuple(figure.subplots(1, len(quantities), squeeze=False)[0])
+        every = figure.subplots(rows, min(_COLUMNS, len(quantities)), squeeze=False).ravel()
+        panels = tuple(every[: len(quantities)])
+        for empty in every[len(quantities) :]:
+            empty.set_axis_off()
     else:
         panels = tuple(axes)
     if len(panels) != len(quantities):
@@ -59,23 +65,38 @@ def work_precision(comparison: Comparison, axes: Sequence[Axes] | None = None) -
     for panel, quantity in zip(panels, quantities, strict=True):
         draw_panel(panel, comparison, quantity, chosen)
         per = " / T" if comparison.period and quantity == "event_time" else ""
-        panel.set_title(_TITLES[quantity] + per, fontsize=10, loc="left")
-    panels[-1].legend(
-        handles=handles(comparison.rows, [comparison], chosen),
-        loc="upper left",
-        bbox_to_anchor=(1.02, 1.0),
-        frameon=False,
-        fontsize=9,
-        handlelength=3,
-    )
+        panel.set_ylabel(_TITLES[quantity] + per, fontsize=9)
+        panel.set_xlabel("wall time", fontsize=9)
+    named = handles(comparison.rows, [comparison], chosen)
+    if axes is None:
+        style.legend_below(style.figure_of(panels), named)
+    else:
+        panels[-1].legend(
+            handles=named,
+            loc="upper left",
+            bbox_to_anchor=(1.02, 1.0),
+            frameon=False,
+            fontsize=9,
+            handlelength=3,
+        )
     return panels
 
 
 def headline(comparison: Comparison) -> str:
-    """Return the title of a comparison: model, length of the run and reference."""
+    """Return the title of a comparison: the model with the result, then the length of the run and the reference."""
+    from hybridsim.analysis.compare.table import cheapest
+
     t0, t1 = comparison.t_span
     long = f"{(t1 - t0) / comparison.period:.4g} periods" if comparison.period else f"t = {t0:g} to {t1:g}"
-    return style.literal(f"{comparison.title}, {long}\nReference: {comparison.reference}")
+    parts = [f"{comparison.title}: {cheapest(comparison.rows)}", f"{long}; reference: {comparison.reference}"]
+    lost = [label for label in comparison.labels if not _has_result(comparison.rows, label)]
+    if lost:
+        parts.append(f"no result: {', '.join(lost)}")
+    return style.wrapped(*parts)
+
+
+def _has_result(rows: Iterable[Row], label: str) -> bool:
+    return any(row.label == label and row.errors is not None for row in rows)
 
 
 def draw_panel(
@@ -96,19 +117,20 @@ def draw_panel(
         )
     style.dress(panel)
     if not panel.lines:
-        panel.text(0.5, 0.5, "no run to show", transform=panel.transAxes, ha="center", color=style.GREY)
+        panel.text(0.5, 0.5, "no run to show", transform=panel.transAxes, ha="center", color=style.TEXT_GREY)
         panel.set_xticks([])
         panel.set_yticks([])
         return
     panel.set_xscale("log")
     panel.set_yscale("log")
     floor = comparison.floor(quantity)
+    if not any(line.get_transform() == panel.transData for line in panel.lines):  # all modes are wrong
+        panel.set_ylim(floor or _ZERO, 1.0)
     if floor > 0:
         low, high = panel.get_ylim()
         panel.set_ylim(min(low, floor / 3), high)
         panel.axhspan(min(low, floor / 3), floor, color=_UNCERTAIN, zorder=0)
     label_ticks(panel)
-    panel.set_xlabel("wall time", fontsize=9)
 
 
 def _point(comparison: Comparison, row: Row, quantity: str) -> tuple[float, float] | None:
@@ -154,11 +176,13 @@ def handles(
     rows = list(rows)
     found: list[Artist] = []
     for label, look in chosen.items():
+        if not _has_result(rows, label):
+            continue
         lost = sum(row.label == label and row.errors is None for row in rows)
         found.append(look.handle(style.literal(label) + (f" ({lost} without result)" if lost else ""), size))
     verdicts = {verdict_of(row) for row in rows if row.errors is not None}
     for verdict, fill, text in (
-        (False, "none", "hollow: wrong modes"),
+        (False, "none", "hollow, at the top: wrong modes"),
         (None, "left", "half filled: no modes to judge"),
     ):
         if verdict in verdicts:

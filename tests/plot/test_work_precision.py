@@ -28,17 +28,44 @@ def test_points_stand_where_they_belong_and_wrong_modes_are_hollow() -> None:
     rows = [row for row in result.rows if row.errors is not None]
     assert len(whole) == len(last) == len(events) == len(rows) == 35
     for row, (x, y, filled) in zip(rows, whole):
-        assert (x, y) == (row.cost.wall_time, row.errors.state)
-        assert filled == (row.integrator != "rk4-sign")
+        is_right = row.integrator != "rk4-sign"
+        assert (x, y) == (row.cost.wall_time, row.errors.state if is_right else 1.0)
+        assert filled == is_right
     assert events[0][1] == pytest.approx(rows[0].errors.event_time / PERIOD)
     assert min(y for _, y, _ in events) == pytest.approx(result.uncertainty.event_time / PERIOD)
 
 
-def test_legend_names_every_line_once_and_what_hollow_means() -> None:
-    *_, panel = work_precision(comparison())
-    texts = [text.get_text() for text in panel.get_legend().get_texts()]
-    assert texts[:8] == [*comparison().labels[:7], "third-party (1 without result)"]
-    assert texts[8:] == ["hollow: wrong modes", "reference uncertain"]
+def test_wrong_modes_stand_at_the_top_edge_and_no_line_joins_them() -> None:
+    """In every panel, also where the error of a wrong run is below the uncertainty of the reference."""
+    for panel in work_precision(comparison()):
+        wrong = [line for line in panel.get_lines() if line.get_markerfacecolor() == "white"]
+        assert len(wrong) == 5
+        top = panel.transAxes.transform((0, 1))[1]
+        for line in wrong:
+            assert line.get_transform().transform(line.get_xydata())[0, 1] == pytest.approx(top)
+        lines = [
+            line for line in panel.get_lines() if line.get_marker() == "None" and len(line.get_xdata()) == 5
+        ]
+        assert len(lines) == 6
+
+
+def test_legend_names_every_drawn_line_once_and_what_hollow_means() -> None:
+    panels = work_precision(comparison())
+    (legend,) = panels[0].figure.legends
+    texts = [text.get_text() for text in legend.get_texts()]
+    assert texts[:7] == [*comparison().labels[:7]]
+    assert texts[7:] == ["hollow, at the top: wrong modes", "reference uncertain"]
+    assert "no result: third-party" in panels[0].figure.get_suptitle()
+
+
+def test_the_title_tells_the_cheapest_run() -> None:
+    """Of the fake, scipy-dop853 reaches 1e-6 at 1e-6 times 0.9 in 0.9*10**0.11 s, before all others but wrong ones."""
+    title = work_precision(comparison())[0].figure.get_suptitle().replace("\n", " ")
+    assert "cheapest at 1e-06: scipy-dop853 (rtol 1e-06), 1.16 s" in title
+    none = replace(comparison(), rows=comparison().rows[-6:-1], uncertainty=None)
+    assert "no run reaches 1e-06 with the right modes" in work_precision(none)[
+        0
+    ].figure.get_suptitle().replace("\n", " ")
 
 
 def without(result, *quantities: str):
@@ -54,13 +81,13 @@ def test_there_is_a_panel_for_each_kind_of_error_and_no_other() -> None:
     result = without(comparison(), "state_last_period")
     whole, events = work_precision(result)
     assert len(points(whole)) == len(points(events)) == 35
-    assert events.get_title(loc="left") == "Largest event-time error"
+    assert events.get_ylabel() == "largest event-time error"
     rows = tuple(
         replace(row, errors=replace(row.errors, graph=1e-5)) if row.errors else row for row in result.rows
     )
     *_, graphs = work_precision(replace(result, rows=rows))
-    assert graphs.get_title(loc="left") == "Distance of the graphs"
-    assert {y for _, y, _ in points(graphs)} == {1e-5}
+    assert graphs.get_ylabel() == "distance of the graphs"
+    assert {y for _, y, filled in points(graphs) if filled} == {1e-5}
 
 
 def test_where_nothing_ran_the_chart_says_so() -> None:
@@ -77,6 +104,9 @@ def test_families_share_a_hue_and_every_line_looks_different() -> None:
     assert len({(look.colour, look.marker, look.dashes) for look in chosen.values()}) == len(chosen)
     native, ours = chosen["scipy-rk45, native events"], chosen["scipy-rk45"]
     assert (native.colour, native.marker) == (ours.colour, ours.marker) and native.dashes != ours.dashes
+    families = ("exact", "dop853", "rodas5p", "taylor", "scipy-rk45", "scipy-bdf", "cvode-bdf", "rk4-sign")
+    ours = looks([replace(rows[0], label=name, integrator=name) for name in families])
+    assert len({look.colour for look in ours.values()}) == len(families)
     hues = {name: round(rgb_to_hsv(to_rgb(look.colour))[0], 2) for name, look in chosen.items()}
     assert hues["scipy-rk45"] == hues["scipy-dop853"] != hues["cvode-bdf"] == hues["cvode-adams"]
 
@@ -89,7 +119,9 @@ def test_a_run_without_modes_is_half_filled() -> None:
     *_, panel = work_precision(replace(result, rows=rows))
     marked = [line for line in panel.get_lines() if line.get_marker() != "None"]
     assert {line.get_fillstyle() for line in marked} == {"left"}
-    assert "half filled: no modes to judge" in [text.get_text() for text in panel.get_legend().get_texts()]
+    assert "half filled: no modes to judge" in [
+        text.get_text() for text in panel.figure.legends[0].get_texts()
+    ]
 
 
 def test_an_error_of_zero_is_drawn() -> None:

@@ -14,6 +14,7 @@ from hybridsim.analysis.compare.regularised import exponent_text, exponents
 from hybridsim.analysis.compare.rows import QUANTITIES, Reading, Row
 from hybridsim.analysis.compare.table import (
     aligned_cells,
+    cheapest,
     failure_of,
     milliseconds,
     model_hash,
@@ -262,7 +263,9 @@ def _notes(comparison: Comparison) -> list[str]:
     unit = "periods T" if comparison.period else "the model's unit of time"
     facts = comparison.provenance
     counted = any(row.setting[0] == "steps_per_period" for row in comparison.rows)
+    result = cheapest(comparison.rows)
     return [
+        f"{result[0].upper()}{result[1:]}.",
         "State errors: the largest error of all states, relative to the state's amplitude in the reference.",
         f'Event times are in {unit}. "< u": below the uncertainty u of the reference.',
         *_graph_notes(comparison),

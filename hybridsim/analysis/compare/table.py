@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from hybridsim.analysis.compare.rows import Row
 
+TARGET = 1e-6  # the state error at which the cheapest run is named
 _VERSIONS = ("numpy", "scipy", "numba", "scikit-sundae")
 
 
@@ -29,6 +30,24 @@ def versions(facts: Mapping[str, Any]) -> str:
     packages = ", ".join(f"{name} {facts[name]}" for name in _VERSIONS if facts.get(name))
     machine = f"{facts.get('system')} {facts.get('processor')}, {facts.get('cpus')} CPUs"
     return f"hybridsim {facts.get('hybridsim')}, {facts.get('python')}, {packages}; {machine}"
+
+
+def fastest(rows: Iterable[Row]) -> Row | None:
+    """Return the fastest run with the right modes and a state error of at most `TARGET`."""
+    found = [
+        (row.cost.wall_time, k, row)
+        for k, row in enumerate(rows)
+        if row.errors and row.cost and not row.errors.wrong_modes and row.errors.state <= TARGET
+    ]
+    return min(found)[2] if found else None
+
+
+def cheapest(rows: Iterable[Row]) -> str:
+    """Return the fastest run with the right modes and a state error of at most `TARGET` as text."""
+    row = fastest(rows)
+    if row is None or row.cost is None:
+        return f"no run reaches {TARGET:.0e} with the right modes"
+    return f"cheapest at {TARGET:.0e}: {row.label} ({setting(row)}), {milliseconds(row.cost.wall_time)}"
 
 
 def failure_of(row: Row) -> str:

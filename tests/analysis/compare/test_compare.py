@@ -7,6 +7,7 @@ import hashlib
 import json
 import math
 import time
+from dataclasses import replace
 from functools import cache
 
 import pytest
@@ -179,6 +180,20 @@ def test_table_and_files(tmp_path) -> None:
         "provenance"
     ].keys()
     assert len(content["provenance"]["model_sha256"]) == 64
+    assert content["provenance"]["parameters"] == hs.load("dfcs").parameter_values()
+    assert content["provenance"]["start"] == {"x": 0.0, "v": 0.0}
+
+
+def test_the_table_names_the_cheapest_run_that_is_accurate_and_right() -> None:
+    result = comparison()
+    accurate = [row for row in result.rows if row.errors.state <= 1e-6 and row.errors.sequence.right]
+    first = min(accurate, key=lambda row: row.cost.wall_time)
+    (line,) = (line for line in result.table().splitlines() if line.startswith("Cheapest at 1e-06: "))
+    assert line.startswith(f"Cheapest at 1e-06: {first.label} (rtol {first.setting[1]:.0e}), ")
+    slow = replace(first, cost=replace(first.cost, wall_times=(1e3,)))
+    assert "Cheapest at 1e-06: " in replace(result, rows=(slow,)).table()
+    off = replace(first, errors=replace(first.errors, state=1e-3))
+    assert "No run reaches 1e-06 with the right modes." in replace(result, rows=(off,)).table()
 
 
 def test_progress_counts_to_its_end() -> None:
