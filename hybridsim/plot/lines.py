@@ -94,8 +94,8 @@ def _shade(hue: str, place: int, count: int) -> str:
     """Return one of `count` shades of a colour; the first shade is the darkest."""
     if count == 1:
         return hue
-    kept = _DARKEST + (1 - _DARKEST) * place / (count - 1)
-    return to_hex([kept * channel for channel in to_rgb(hue)])
+    part = _DARKEST + (1 - _DARKEST) * place / (count - 1)
+    return to_hex([part * channel for channel in to_rgb(hue)])
 
 
 def draw_line(
