@@ -25,7 +25,7 @@ CEILINGS = {
     "docs/atlas": (16.5, 4, 6.5, 26, 52),
     "docs/explanation": (13, 0, 0, 6, 0),
     "docs/how-to": (13, 0, 0.5, 6.5, 0),
-    "docs/reference": (10.5, 0, 4.5, 9.5, 11),
+    "docs/reference": (10, 0, 1, 7.5, 0),
     "docs/studies": (20.5, 33, 11.5, 27, 115),
     "docs/tutorials": (9.5, 0, 0, 8.5, 0),
 }
