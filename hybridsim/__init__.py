@@ -21,6 +21,7 @@ _HOME = {
     "Component": "hybridsim.model",
     "Contact": "hybridsim.model",
     "Discrete": "hybridsim.model",
+    "Element": "hybridsim.model",
     "FrictionLaw": "hybridsim.model",
     "LawTable": "hybridsim.model",
     "Guard": "hybridsim.model",

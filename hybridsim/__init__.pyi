@@ -46,6 +46,7 @@ from hybridsim.model import Choice as Choice
 from hybridsim.model import Component as Component
 from hybridsim.model import Contact as Contact
 from hybridsim.model import Discrete as Discrete
+from hybridsim.model import Element as Element
 from hybridsim.model import FrictionLaw as FrictionLaw
 from hybridsim.model import Guard as Guard
 from hybridsim.model import Impact as Impact

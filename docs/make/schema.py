@@ -9,6 +9,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from hybridsim.model.parts.element import KINDS as ELEMENTS
 from hybridsim.model.parts.shape import KINDS
 
 FILE = Path(__file__).parents[2] / "hybridsim" / "model" / "toml" / "model.schema.json"
@@ -198,6 +199,25 @@ POINTS_IN_TIME = {
     "columns": {"type": "array"}, "interpolation": {"enum": ["linear", "cubic", "previous"]}, "unit": UNIT,
 }  # fmt: skip
 INPUT = {"oneOf": [table(keys, ("kind",)) for keys in (WAVE, CHIRP, POINTS_IN_TIME, HELD, CONNECTED)]}
+OF_ELEMENT = {
+    "input": said("what it follows", EXPRESSION), "on": said("level at which the relay switches on", EXPRESSION),
+    "off": said("level at which it switches off, below on", EXPRESSION), "high": said("value while on", EXPRESSION),
+    "low": said("value while off", EXPRESSION), "initial": {"enum": ["on", "off"]}, "lower": EXPRESSION,
+    "upper": EXPRESSION, "width": said("total play", EXPRESSION), "start": START,
+    "step": said("distance of its values", EXPRESSION), "time": said("delay of a table or wave", EXPRESSION),
+    "clock": said("the clock or schedule whose ticks delay the input", TEXT), "ticks": {"type": "integer"},
+}  # fmt: skip
+
+
+def element(kind: str) -> Schema:
+    """An element of one kind."""
+    required, optional = ELEMENTS[kind]
+    return table(
+        {"kind": {"const": kind}, **{key: OF_ELEMENT[key] for key in (*required, *optional)}},
+        ("kind", *required),
+    )
+
+
 OUTPUT = table(
     {
         "expr": EXPRESSION,
@@ -268,6 +288,9 @@ MODEL = {
             "discrete": named(short(EXPRESSION, DISCRETE), "what only resets and ticks change"),
             "definitions": said("named parts of expressions", EXPRESSIONS),
             "inputs": named(INPUT, "known signals of time"),
+            "elements": named(
+                {"oneOf": [element(kind) for kind in ELEMENTS]}, "relays, limits, play, steps and delays"
+            ),
             "laws": said("friction laws", {"type": "object", "additionalProperties": LAW}),
             "contacts": named(CONTACT, "friction contacts; the name is the force"),
             "surfaces": named(short(EXPRESSION, SWITCHING), "switching surfaces; the name is the sign"),

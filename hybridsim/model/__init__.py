@@ -8,6 +8,7 @@ from hybridsim.model.laws.law_table import LawTable
 from hybridsim.model.library import ModelInfo, list_laws, list_models, load, load_law
 from hybridsim.model.parts.component import Choice, Component, Guard, Mode, Surface
 from hybridsim.model.parts.contact import Contact
+from hybridsim.model.parts.element import Element
 from hybridsim.model.parts.frozen_map import FrozenMap
 from hybridsim.model.parts.impact import Impact
 from hybridsim.model.parts.inputs import Input
@@ -24,6 +25,7 @@ __all__ = [
     "Component",
     "Contact",
     "Discrete",
+    "Element",
     "FrictionLaw",
     "FrozenMap",
     "Guard",

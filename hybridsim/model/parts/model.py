@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any, ClassVar
 
@@ -18,7 +18,8 @@ from hybridsim.model.parts.changes import changed_value, require_known, started,
 from hybridsim.model.parts.component import Component, Corner
 from hybridsim.model.parts.contact import Contact
 from hybridsim.model.parts.declared import Declared
-from hybridsim.model.parts.guard_direction import without_directions
+from hybridsim.model.parts.element import Element
+from hybridsim.model.parts.element_forms import written_out
 from hybridsim.model.parts.impact import Impact
 from hybridsim.model.parts.inputs import Input, held_as_discrete
 from hybridsim.model.parts.monitor import Monitor
@@ -44,6 +45,7 @@ _PARTS: dict[str, type[Declared]] = {
     "impacts": Impact,
     "drawing": Shape,
     "use": Use,
+    "elements": Element,
 }
 
 # methods that other parts of the package call; completion does not offer them
@@ -88,10 +90,9 @@ class Model(Declared):
         ``flow`` of a `Mode` replaces it in that mode. Guards, monitors, outputs, conditions and resets are functions
         (t, x, p) that return a number, or constants. Contacts, inputs, definitions and discrete states need
         expressions.
-    surfaces : sequence of SwitchingSurface, optional
-        Switching surfaces, along which the motion may slide.
-    impacts : sequence of Impact, optional
-        Unilateral contacts, whose gaps cannot become negative.
+    surfaces, impacts, elements : sequence, optional
+        `SwitchingSurface` objects (along which the motion may slide), `Impact` objects (unilateral contacts, whose
+        gaps cannot become negative) and `Element` objects (relays and the like, which become other parts at once).
     drawing : sequence of Shape, optional
         Shapes that show the mechanism, for `hybridsim.plot.mechanism` and `Solution.animate`; runs ignore them.
     use : sequence of Use, optional
@@ -132,6 +133,7 @@ class Model(Declared):
     impacts: tuple[Impact, ...] = ()
     drawing: tuple[Shape, ...] = ()
     use: tuple[Use, ...] = ()
+    elements: tuple[Element, ...] = ()
 
     _part_files: ClassVar[tuple[str, ...]] = ()  # files of its parts, if it was read from a file
     connected_units: ClassVar[dict[str, str]] = {}  # units of the inputs of its parts that are connected
@@ -158,7 +160,7 @@ class Model(Declared):
         self._put(held_as_discrete(self.inputs, self.discrete))
         if self.use:
             self._put({**flattened(self), "use": ()})
-        self._put(without_directions(self.components, self.definitions))
+        self._put(written_out(self))
         self._put({"states": tuple(self._with_those_of_laws())})
 
     def _put(self, fields: Mapping[str, Any]) -> None:
@@ -518,6 +520,5 @@ class Model(Declared):
 
 
 def _content(model: Model) -> tuple[object, ...]:
-    return tuple(
-        getattr(model, field.name) for field in fields(model) if field.compare and field.name != "path"
-    )
+    texts = ("name", "definitions", "title", "source", "description", "look", "duration", "flow")
+    return tuple(getattr(model, field) for field in (*_PARTS, *texts))

@@ -20,6 +20,7 @@ from hybridsim.model.parts.schedule import Schedule
 from hybridsim.model.parts.switching import SwitchingSurface
 from hybridsim.model.toml.automata import read_components
 from hybridsim.model.toml.drawing import read_drawing
+from hybridsim.model.toml.elements import read_elements
 from hybridsim.model.toml.inputs import read_inputs
 from hybridsim.model.toml.laws import read_law_of_contact, read_laws
 from hybridsim.model.toml.positions import positions
@@ -30,7 +31,7 @@ SCHEMA = 1
 KEYS = (
     "schema", "name", "title", "source", "description", "look", "duration", "use", "parameters", "states", "discrete",
     "definitions", "inputs", "laws", "contacts", "surfaces", "impacts", "initial", "limit", "modes", "components",
-    "monitors", "schedules", "clocks", "outputs", "drawing",
+    "monitors", "schedules", "clocks", "outputs", "drawing", "elements",
 )  # fmt: skip
 
 
@@ -139,6 +140,7 @@ def _declared(root: Table, name: str, files: PartFiles) -> Model:
         schedules=(*_schedules(root), *_clocks(root)),
         outputs=tuple(_outputs(root)),
         drawing=tuple(read_drawing(root)),
+        elements=tuple(read_elements(root)),
         definitions=tuple(root.expressions("definitions").items()),
         title=root.text("title"),
         source=root.text("source"),
