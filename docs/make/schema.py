@@ -9,7 +9,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from hybridsim.model.parts.element import KINDS as ELEMENTS
+from hybridsim.model.elements.element import KINDS as ELEMENTS
 from hybridsim.model.parts.shape import KINDS
 
 FILE = Path(__file__).parents[2] / "hybridsim" / "model" / "toml" / "model.schema.json"

@@ -34,6 +34,21 @@ _KINDS = {
 _DOTS = "a dot stands between the name of a part and the name of its quantity, such as left.x"
 
 
+# What to write instead of calls that are no functions of expressions.
+_QUANTIZER = (
+    "declare an element of kind 'quantizer', whose value is the multiple of `step` nearest to its `input`"
+)
+_INSTEAD = {
+    "v_rel": "v_rel exists only in results; write the velocity of the contact, or a definition of it",
+    "round": _QUANTIZER,
+    "floor": f"{_QUANTIZER}; floor(x) is that of x - 0.5 with the step 1",
+    "ceil": f"{_QUANTIZER}; ceil(x) is that of x + 0.5 with the step 1",
+    "mod": "mod(t, T) is an input of kind 'wave' and shape 'sawtooth' with the period T, the amplitude T/2 and the "
+    "offset T/2; mod(x, d) is x minus an element of kind 'quantizer' with the input x - d/2 and the step d",
+    "delay": "declare an element of kind 'delay'",
+}
+
+
 class _Checker:
     """Checks one syntax tree: `number` and `truth` check that a node has the right kind of value."""
 
@@ -195,11 +210,7 @@ class _Checker:
         name = node.func.id
         function = FUNCTIONS.get(name)
         if function is None:
-            hint = nearest(name, FUNCTIONS, kind="functions")
-            if name == "v_rel":  # a name of results
-                hint = (
-                    "v_rel exists only in results; write the velocity of the contact, or a definition of it"
-                )
+            hint = _INSTEAD.get(name) or nearest(name, FUNCTIONS, kind="functions")
             raise self.fail(node, f"unknown function '{name}'", hint)
         if node.keywords:
             raise self.fail(node, f"{name}() has no keyword arguments", f"pass {function.arity} by position")

@@ -3,12 +3,12 @@
 Start with `parts` (what one declares), then `toml`, `checks`, `laws` and `smoothing`.
 """
 
+from hybridsim.model.elements.element import Element
 from hybridsim.model.laws.law import FrictionLaw
 from hybridsim.model.laws.law_table import LawTable
 from hybridsim.model.library import ModelInfo, list_laws, list_models, load, load_law
 from hybridsim.model.parts.component import Choice, Component, Guard, Mode, Surface
 from hybridsim.model.parts.contact import Contact
-from hybridsim.model.parts.element import Element
 from hybridsim.model.parts.frozen_map import FrozenMap
 from hybridsim.model.parts.impact import Impact
 from hybridsim.model.parts.inputs import Input

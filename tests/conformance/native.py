@@ -55,6 +55,7 @@ FAILURES: dict[str, tuple[str, dict[str, str]]] = {
     "guards-on-gaps": (CLOSED, {}),
     "starts-at-zeros": (CLOSED, {}),
     "touch-beside-a-sample": (CLOSED, {"scipy-bdf": "", "scipy-lsoda": ""}),
+    "elements-of-loops": ("", {"scipy-bdf": CLOSED, "scipy-lsoda": CLOSED}),
     "sizes-of-sizes": ("", {"scipy-radau": TWO_VALUES}),
     "load-that-ends": (CLOSED, {}),
     "monitors-at-stops": (CLOSED, {}),

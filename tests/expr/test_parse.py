@@ -259,3 +259,18 @@ def test_an_expression_is_frozen() -> None:
     with pytest.raises(AttributeError):
         expr.text = "y"
     assert isinstance(expr, Expression)
+
+
+@pytest.mark.parametrize(
+    ("text", "remedy"),
+    [
+        ("floor(x)", "x - 0.5"),
+        ("round(x)", "'quantizer'"),
+        ("mod(t, 2)", "'sawtooth'"),
+        ("delay(x, 1)", "'delay'"),
+    ],
+)
+def test_a_function_of_other_tools_is_answered_with_the_way_round(text: str, remedy: str) -> None:
+    with pytest.raises(ExpressionError, match="unknown function") as caught:
+        parse(text)
+    assert remedy in (caught.value.remedy or "")

@@ -11,6 +11,8 @@ from hybridsim.errors import ModelError, UsageError
 from hybridsim.expr import Expression, evaluate, parse, resolve
 from hybridsim.expr.evaluate import dependency_order
 from hybridsim.files import path_text
+from hybridsim.model.elements.element import Element
+from hybridsim.model.elements.forms import written_out
 from hybridsim.model.flattening.flatten import flattened
 from hybridsim.model.laws.law import FrictionLaw
 from hybridsim.model.laws.law_with_states import ContactState
@@ -18,8 +20,6 @@ from hybridsim.model.parts.changes import changed_value, require_known, started,
 from hybridsim.model.parts.component import Component, Corner
 from hybridsim.model.parts.contact import Contact
 from hybridsim.model.parts.declared import Declared
-from hybridsim.model.parts.element import Element
-from hybridsim.model.parts.element_forms import written_out
 from hybridsim.model.parts.impact import Impact
 from hybridsim.model.parts.inputs import Input, held_as_discrete
 from hybridsim.model.parts.monitor import Monitor
@@ -90,14 +90,15 @@ class Model(Declared):
         ``flow`` of a `Mode` replaces it in that mode. Guards, monitors, outputs, conditions and resets are functions
         (t, x, p) that return a number, or constants. Contacts, inputs, definitions and discrete states need
         expressions.
-    surfaces, impacts, elements : sequence, optional
-        `SwitchingSurface` objects (along which the motion may slide), `Impact` objects (unilateral contacts, whose
-        gaps cannot become negative) and `Element` objects (relays and the like, which become other parts at once).
+    surfaces, impacts : sequence, optional
+        `SwitchingSurface` objects, along which the motion may slide, and `Impact` objects (unilateral contacts).
     drawing : sequence of Shape, optional
         Shapes that show the mechanism, for `hybridsim.plot.mechanism` and `Solution.animate`; runs ignore them.
     use : sequence of Use, optional
         Other models as parts. Their declarations become declarations of this model, with names such as ``left.x``,
         and ``use`` is empty afterwards.
+    elements : sequence of Element, optional
+        Elements of control loops, which become definitions, components and other parts at once.
     place : Place, optional
         Place of the declaration, for error messages.
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from hybridsim.errors import nearest
-from hybridsim.model.parts.element import KINDS, Element
+from hybridsim.model.elements.element import KINDS, Element
 from hybridsim.model.toml.table import Table
 
 _TEXTS = ("initial", "clock")

@@ -12,7 +12,7 @@ from hybridsim.testing.scene import END, Check, Scene, Truth, needs
 
 def scenes() -> tuple[Scene, ...]:
     """Return all scenes of this file."""
-    return (_directions(),)
+    return _directions(), _elements(), _delays()
 
 
 def _transitions(component: str, expected: Sequence[tuple[float, str]], within: float = 1e-3) -> Check:
@@ -51,6 +51,51 @@ def _directions() -> Scene:
             ),
         ),
         needs("transitions"),
+        unit=2 * math.pi,
+        tol_x=1e-7,
+    )
+
+
+def _elements() -> Scene:
+    """Return the scene of elements that follow x = sin(t), whose integrals until t = 10 are sums over their modes."""
+    end, sixth, three = 10.0, math.pi / 6, 3 * math.pi
+    on = 2 * math.pi  # from 1/2 to -1/2, twice
+    half_wave = 4 * math.sin(sixth / 2) ** 2 + 2 * sixth  # 2 (1 - cos(pi/6)) + (4 pi/6)/2
+    saturated = half_wave + math.cos(three) - math.cos(three + sixth) - 0.5 * (end - three - sixth)
+    moved = math.cos(sixth) - sixth + math.pi / 4 + (math.pi / 4 - 1) - math.pi / 4 + (1 - math.pi / 4)
+    moved += math.pi / 4 + math.cos(three) - math.cos(end) + 0.5 * (end - three)
+    small, large = math.asin(0.25), math.asin(0.75)
+    stepped = math.pi - small - large - 0.5 * (end - three - small)
+    values = (
+        math.sin(end),
+        math.cos(end),
+        2 * on - (end - on),
+        saturated,
+        1 - math.cos(end) - saturated,
+        moved,
+        stepped,
+    )
+    return Scene(
+        "elements-of-loops",
+        "elements",
+        (0.0, end),
+        Truth(None, ((END, values),), checks=(("", equals(end, q_whole=-1.0)),)),
+        needs("transitions"),
+        unit=2 * math.pi,
+        tol_x=1e-7,
+    )
+
+
+def _delays() -> Scene:
+    """Return the scene of delayed signals: on (k, k + 1) the sample is sin(k - 1), and 0 on (0, 1)."""
+    samples = sum(math.sin(k - 1) for k in range(1, 10))
+    states = ((3.0, (math.sin(3.0), math.cos(3.0), math.sin(1.0), 1.0, 0.5)),)
+    return Scene(
+        "delayed-signals",
+        "delays",
+        (0.0, 10.0),
+        Truth(None, (*states, (END, (math.sin(10.0), math.cos(10.0), samples, 0.0, 1.0)))),
+        needs("scheduled"),
         unit=2 * math.pi,
         tol_x=1e-7,
     )

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from hybridsim.errors import ModelError, nearest
 from hybridsim.expr import Expression, evaluate, parse, parse_reset, resolve, substitute
+from hybridsim.model.elements.element import Element
+from hybridsim.model.elements.guard_direction import without_directions
+from hybridsim.model.elements.quantizer_readers import refuse_readers
 from hybridsim.model.parts.component import Choice, Component, Guard, Mode
 from hybridsim.model.parts.declared import Declared
-from hybridsim.model.parts.element import Element
-from hybridsim.model.parts.guard_direction import without_directions
 from hybridsim.model.parts.inputs import HeldInput
 from hybridsim.model.parts.quantities import Discrete
 from hybridsim.model.rate import inlined, rate_along
-
-if TYPE_CHECKING:
-    from hybridsim.model.parts.model import Model
 
 _FORMULAS = {
     "saturation": "min(max(input, lower), upper)",
@@ -29,13 +27,15 @@ _ORDERS = {"relay": ("off", "on"), "saturation": ("lower", "upper"), "deadband":
 _STRIDES = tuple(2**k for k in range(13, 0, -1))
 
 
-def written_out(model: Model) -> dict[str, Any]:
+def written_out(model: Any) -> dict[str, Any]:
     """Return declarations of a model as the engine computes them, without elements and directions of guards."""
     forms = _Forms(model)
     for element in model.elements:
         element.refuse_unless_complete()
         _require_order(model, element)
         forms.add(element)
+    parts = {"definitions": forms.definitions, "components": forms.components, "schedules": forms.schedules}
+    refuse_readers(model, parts, {one.name: one for one in model.elements if one.kind == "quantizer"})
     discrete = sorted(forms.discrete, key=lambda part: isinstance(part, HeldInput))  # as in a file
     return {
         **without_directions(forms.components, forms.definitions),
@@ -46,7 +46,7 @@ def written_out(model: Model) -> dict[str, Any]:
     }
 
 
-def _require_order(model: Model, element: Element) -> None:
+def _require_order(model: Any, element: Element) -> None:
     """Raise an error if the levels of an element, as far as they are numbers, are in the wrong order."""
     if element.kind not in _ORDERS:
         return
@@ -77,7 +77,7 @@ def _form(element: Element, template: str, **names: str) -> Expression:
 class _Forms:
     """The declarations of a model, to which those of its elements are added."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Any) -> None:
         self.model = model
         self.definitions, self.components = [*model.definitions], [*model.components]
         self.discrete, self.schedules, self.inputs = [*model.discrete], [*model.schedules], [*model.inputs]
@@ -225,7 +225,7 @@ class _Forms:
             self.inputs.append(replace(signal, name=element.name, times=times, place=element.place))
 
 
-def _jumping(model: Model) -> dict[str, str]:
+def _jumping(model: Any) -> dict[str, str]:
     """Return the quantities that jump, or whose rate depends on a mode, each with the reason."""
     choices = [choice for part in model.components for m in part.modes for g in m.guards for choice in g.then]
     choices += [part.limit for part in model.components if part.limit]

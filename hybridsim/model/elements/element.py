@@ -41,7 +41,8 @@ class Element(Declared):
         is then moved by the input at that distance. ``start`` is its position at the start. The input is a
         continuous function of states and time.
     quantizer
-        The multiple of ``step`` that is nearest to the input, with an event where it changes.
+        The multiple of ``step`` that is nearest to the input, with an event where it changes. Rates and outputs may
+        use it; guards, resets and contacts may not.
     delay
         The value that the input had some ticks of a schedule or clock before: one of ``ticks`` values in a queue, each
         taken just before a tick. All are ``start`` at first. With ``time`` instead of ``clock`` and ``ticks`` it is
