@@ -87,7 +87,7 @@ class Element(Declared):
     >>> heater = hs.Element("heat", "relay", input="-T", on=-19, off=-21, high=25)
     >>> room = hs.Model("room", states=[hs.State("T", 15, "(5 + heat - T)/2")], elements=[heater])
     >>> [event.target for event in hs.simulate(room, (0, 2)).events]
-    ['on', 'off', 'on', 'off']
+    ['on', 'off', 'on', 'off', 'on']
     """
 
     name: str

@@ -69,8 +69,8 @@ def _require_order(model: Any, element: Element) -> None:
 
 def _form(element: Element, template: str, **names: str) -> Expression:
     """Fill a template with the expressions of an element, and with names."""
-    given = {name: getattr(element, name) for name in element.__dataclass_fields__ if name not in names}
-    parts = {name: value for name, value in given.items() if isinstance(value, Expression)}
+    fields = {name: getattr(element, name) for name in element.__dataclass_fields__ if name not in names}
+    parts = {name: value for name, value in fields.items() if isinstance(value, Expression)}
     return substitute(parse(template, element.place), {**parts, **names})
 
 

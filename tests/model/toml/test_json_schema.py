@@ -112,6 +112,12 @@ jump_below = 0
 up = { guards.g = "x", set = { f = 1 } }
 down = { guards.g = "-x", set = { f = -1 } }
 on = { guards = { up = "1 - f", low = "f + 1" } }
+[elements]
+e1 = { kind = "relay", input = "x", on = 1, off = 0 }
+e2 = { kind = "saturation", input = "x", lower = 0, upper = 1 }
+e3 = { kind = "backlash", input = "x", width = 1 }
+e4 = { kind = "quantizer", input = "x", step = 1 }
+e5 = { kind = "delay", input = "x", clock = "c", ticks = 1 }
 [drawing]
 mass = { kind = "mass", at = [0, 0] }
 pendulum = { kind = "pendulum", at = [0, 0], length = 1, angle = "x" }
