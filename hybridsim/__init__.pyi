@@ -6,6 +6,7 @@ from hybridsim.analysis import Branch as Branch
 from hybridsim.analysis import Comparison as Comparison
 from hybridsim.analysis import Equilibrium as Equilibrium
 from hybridsim.analysis import Fit as Fit
+from hybridsim.analysis import LawComparison as LawComparison
 from hybridsim.analysis import Linearization as Linearization
 from hybridsim.analysis import Record as Record
 from hybridsim.analysis import Sensitivities as Sensitivities
@@ -16,6 +17,7 @@ from hybridsim.analysis import Unknown as Unknown
 from hybridsim.analysis import advise as advise
 from hybridsim.analysis import bifurcation as bifurcation
 from hybridsim.analysis import compare as compare
+from hybridsim.analysis import compare_laws as compare_laws
 from hybridsim.analysis import compare_suite as compare_suite
 from hybridsim.analysis import continuation as continuation
 from hybridsim.analysis import equilibria as equilibria

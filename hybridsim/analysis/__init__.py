@@ -7,6 +7,7 @@ from hybridsim.analysis.compare.lines import Series
 from hybridsim.analysis.continuation import Branch, continuation
 from hybridsim.analysis.equilibria import Equilibrium, Linearization, equilibria, linearize
 from hybridsim.analysis.fit import Fit, Record, Unknown, fit
+from hybridsim.analysis.laws import LawComparison, compare_laws
 from hybridsim.analysis.steady import SteadyState, steady_state
 from hybridsim.analysis.suite import SuiteComparison, compare_suite
 from hybridsim.analysis.sweep import Sweep, bifurcation, frequency_response, sweep
@@ -18,6 +19,7 @@ __all__ = [
     "Comparison",
     "Equilibrium",
     "Fit",
+    "LawComparison",
     "Linearization",
     "Record",
     "Sensitivities",
@@ -29,6 +31,7 @@ __all__ = [
     "advise",
     "bifurcation",
     "compare",
+    "compare_laws",
     "compare_suite",
     "continuation",
     "equilibria",

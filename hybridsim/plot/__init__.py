@@ -9,6 +9,7 @@ from hybridsim.plot.event_slopes import event_slopes
 from hybridsim.plot.fit import fit
 from hybridsim.plot.friction_law import friction_law
 from hybridsim.plot.friction_loop import friction_loop
+from hybridsim.plot.law_comparison import law_comparison
 from hybridsim.plot.phase_portrait import phase_portrait
 from hybridsim.plot.regularisation import regularisation
 from hybridsim.plot.style import save
@@ -29,6 +30,7 @@ __all__ = [
     "fit",
     "friction_law",
     "friction_loop",
+    "law_comparison",
     "mechanism",
     "phase_portrait",
     "regularisation",

@@ -14,14 +14,12 @@ from hybridsim.analysis.compare.reference import find_reference
 from hybridsim.analysis.compare.regularised import regularised_series
 from hybridsim.analysis.compare.timed_runs import Budget, Entry, timed_rows
 from hybridsim.analysis.progress import Progress, Steps
-from hybridsim.arguments import callback, chosen_model, time_span
+from hybridsim.arguments import callback, chosen_model
 from hybridsim.calls import refusing
 from hybridsim.engine.system.period import forcing_period
 from hybridsim.errors import UsageError
 from hybridsim.model import Model
 
-PERIODS = 20  # long enough for the transient of a damped scene, short enough to repeat dozens of runs
-TIME = 10.0  # for a model without a period: a few swings of a mechanism of about 1 Hz
 BUDGET = 120.0  # seconds; the default
 # The share of the budget that each run of a reference may take; there are at most three such runs.
 REFERENCE_SHARE = 1 / 4
@@ -100,7 +98,7 @@ def compare(
     v0 = comparison_request.positives(v0, "v0")
     model = chosen_model(model, params).with_start(**comparison_request.mapping(x0, "x0")).validate()
     period = forcing_period(model)
-    span = _span(t_span, model.duration_value(), period)
+    span = comparison_request.run_span(t_span, model.duration_value(), period)
     if regularized is not None:
         kinds = comparison_request.checked_names(regularized, "regularized")
         names = None if integrators is None else comparison_request.checked_names(integrators, "integrators")
@@ -119,19 +117,3 @@ def compare(
     (rows,) = timed_rows([Entry(case, against, series)], repeat, spending, steps_to_do)
     steps_to_do.finish()
     return case.comparison(against, rows, repeat)
-
-
-def _span(
-    t_span: tuple[float, float] | None, duration: float | None, period: float | None
-) -> tuple[float, float]:
-    if t_span is None:
-        if duration is not None:
-            return 0.0, duration
-        return 0.0, PERIODS * period if period else TIME
-    t0, t1 = time_span(t_span)
-    if not t1 > t0:
-        raise UsageError(
-            f"`t_span` cannot be ({t0:g}, {t1:g})",
-            remedy="use t1 > t0, because comparisons run forward in time",
-        )
-    return t0, t1

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from hybridsim.arguments import cannot_be, is_row, number
+from hybridsim.arguments import cannot_be, is_row, number, time_span
 from hybridsim.errors import UsageError
 
 MOST = 10**6  # for quantities that are counted one by one: periods, samples, repetitions
 MOST_STEPS = 10**9  # per period
+_PERIODS = 20  # long enough for the transient of a damped scene, short enough to repeat dozens of runs
+_TIME = 10.0  # for a model without a period: a few swings of a mechanism of about 1 Hz
 
 
 def positive(value: Any, what: str) -> float:
@@ -79,3 +81,20 @@ def _row(values: Any, what: str, remedy: str = "use a list of numbers") -> Any:
     if not is_row(values):
         raise cannot_be(what, values, remedy)
     return values
+
+
+def run_span(
+    t_span: tuple[float, float] | None, duration: float | None, period: float | None
+) -> tuple[float, float]:
+    """Return the interval of the runs; by default the duration, else some periods of the forcing, else a fixed time."""
+    if t_span is None:
+        if duration is not None:
+            return 0.0, duration
+        return 0.0, _PERIODS * period if period else _TIME
+    t0, t1 = time_span(t_span)
+    if not t1 > t0:
+        raise UsageError(
+            f"`t_span` cannot be ({t0:g}, {t1:g})",
+            remedy="use t1 > t0, because comparisons run forward in time",
+        )
+    return t0, t1

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from itertools import pairwise
 
 from hybridsim.expr import Expression, parse, substitute
@@ -73,6 +75,44 @@ class LawTable(Declared):
                 raise self._fault(
                     f"`at` is not ascending: {second:g} follows {first:g}", "use ascending numbers in `at`"
                 )
+
+    @classmethod
+    def fit(
+        cls,
+        at: Sequence[float],
+        values: Sequence[float],
+        knots: int = 6,
+        *,
+        name: str = "mu",
+        over: Expression | str = _SPEED,
+    ) -> LawTable:
+        """Return the table with linear interpolation that fits measured points best, by least squares.
+
+        Parameters
+        ----------
+        at, values : sequence of float
+            Measured arguments (k,) in any order, and the value (k,) at each.
+        knots : int, optional
+            Number of points of the table. The first and last lie at the ends of the data, and the others where the
+            sum of squares is smallest.
+        name, over : str, optional
+            As of a table.
+
+        Returns
+        -------
+        LawTable
+            The table.
+
+        Examples
+        --------
+        >>> speeds, found = [0, 1, 2, 3, 4, 5], [0.5, 0.4, 0.3, 0.3, 0.3, 0.3]
+        >>> [round(v, 6) for v in LawTable.fit(speeds, found, knots=3).at]
+        [0.0, 2.0, 5.0]
+        """
+        # The analysis package, which may use SciPy, is a layer above this one, so it is imported only on demand.
+        fit = import_module("hybridsim.analysis.laws.fit").piecewise_linear
+        at, values = fit(at, values, knots)
+        return cls(name, at, values, over, "linear")  # type: ignore[arg-type]  # they are converted
 
     def value(self, argument: float) -> float:
         """Return the value of the function at one argument."""

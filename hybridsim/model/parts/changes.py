@@ -124,5 +124,5 @@ def _with_law(contact: Contact, law: FrictionLaw | str, passed: Mapping[str, Any
 def _listed(contact: Contact) -> str:
     """Return the law of a contact and the values of its parameters as text."""
     values = contact.values()
-    values_text = [f"{name} = {values[name].text}" for name in contact.law.parameters]
-    return f"the law '{contact.law.name}' with {', '.join(values_text) or 'no parameters'}"
+    listed = ", ".join(f"{name} = {values[name].text}" for name in contact.law.parameters)
+    return f"the law '{contact.law.name}' with {listed or 'no parameters'}"

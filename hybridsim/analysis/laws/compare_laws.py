@@ -1,0 +1,117 @@
+"""This module runs one model under several friction laws in one contact."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from os import PathLike
+from typing import Any
+
+from hybridsim.analysis.compare.comparison_request import mapping, run_span
+from hybridsim.analysis.keyword_options import refuse_unknown
+from hybridsim.analysis.laws.law_comparison import LawComparison, LawRow
+from hybridsim.arguments import cannot_be, chosen_model, known_name
+from hybridsim.calls import refusing
+from hybridsim.engine.system.period import forcing_period
+from hybridsim.errors import UsageError
+from hybridsim.model import FrictionLaw, Model
+from hybridsim.simulate import simulate
+
+Entry = str | FrictionLaw | tuple[str | FrictionLaw, Mapping[str, Any]]
+_LAWS = "use a list of names, laws, and pairs (law, parameters), such as ['coulomb', ('viscous', {'c': 2})]"
+
+
+@refusing
+def compare_laws(
+    model: Model | str | PathLike[str],
+    laws: Sequence[Entry],
+    t_span: tuple[float, float] | None = None,
+    *,
+    contact: str | None = None,
+    quantity: str | None = None,
+    params: Mapping[str, Any] | None = None,
+    x0: Mapping[str, Any] | None = None,
+    **options: Any,
+) -> LawComparison:
+    """Run a model under several friction laws in one contact, and measure each run.
+
+    A model with periodic forcing is measured over the last period of the run, any other model over the whole run.
+
+    Parameters
+    ----------
+    model : str, path or Model
+        A `Model`, the name of a packaged one, or the path of a ``.toml`` file.
+    laws : sequence of str, FrictionLaw or tuple
+        Laws as in `Model.with_law`, or pairs of a law and its parameters. A parameter that is not given keeps the
+        value that the contact gives it.
+    t_span : tuple of float, optional
+        (t0, t1), t1 > t0; by default as in `compare`.
+    contact : str, optional
+        Name of the contact, if the model has several.
+    quantity : str, optional
+        State or output whose amplitude is measured; by default the first state.
+    params, x0 : mapping of str to float, optional
+        Parameter values and initial values by name, instead of the declared values.
+    **options : object
+        Options of `simulate`, such as ``integrator`` and ``rtol``.
+
+    Returns
+    -------
+    LawComparison
+        One row per law, with its run.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> stribeck = ("stribeck", {"mu_s": 0.6, "mu_k": "mu", "v_s": 0.05})
+    >>> found = hs.compare_laws("dfcs", ["coulomb", stribeck])
+    >>> [row.stops for row in found.rows]
+    [2, 2]
+    """
+    refuse_unknown([simulate], options)
+    model = chosen_model(model, params).with_start(**mapping(x0, "x0")).validate()
+    names = [declared.name for declared in model.contacts]
+    if contact is None:
+        if len(names) != 1:
+            remedy = f"pass `contact`, one of {', '.join(names)}" if names else "use a model with a contact"
+            raise UsageError(f"model {model.name} has {len(names)} contacts", remedy=remedy)
+        contact = names[0]
+    quantities = [*(state.name for state in model.states), *(output.name for output in model.outputs)]
+    if quantity is None:
+        quantity = quantities[0]
+    known_name(quantity, quantities, f"model {model.name} has no quantity", "quantities")
+    models = _models(
+        model, laws, known_name(contact, names, f"model {model.name} has no contact", "contacts")
+    )
+    period = forcing_period(model)
+    t0, t1 = run_span(t_span, model.duration_value(), period)
+    is_last_period = period is not None and t1 - t0 > period
+    if is_last_period:
+        options |= {"save": period}
+    rows = [
+        LawRow(label, changed, simulate(changed, (t0, t1), **options), contact, quantity)
+        for label, changed in models.items()
+    ]
+    measured = (t1 - period, t1) if is_last_period and period is not None else (t0, t1)
+    return LawComparison(model.title or model.name, contact, quantity, measured, tuple(rows))
+
+
+def _models(model: Model, laws: Iterable[Entry], contact: str) -> dict[str, Model]:
+    """Return the model under each law, by different labels."""
+    if isinstance(laws, str | Mapping) or not isinstance(laws, Iterable):
+        raise cannot_be("laws", laws, _LAWS)
+    found: dict[str, Model] = {}
+    for entry in laws:
+        pair = entry if isinstance(entry, tuple) else (entry, {})
+        if len(pair) != 2 or not isinstance(pair[1], Mapping):
+            raise cannot_be("an entry of `laws`", entry, _LAWS)
+        law, values = pair
+        changed = model.with_law(contact, law, **values)
+        label = next(c.law.name for c in changed.contacts if c.name == contact)
+        if label in found and values:
+            label += f" ({', '.join(f'{name}={value}' for name, value in values.items())})"
+        if label in found:
+            raise UsageError(f"`laws` contains '{label}' twice", remedy="pass each law with other parameters")
+        found[label] = changed
+    if not found:
+        raise cannot_be("laws", laws, _LAWS)
+    return found

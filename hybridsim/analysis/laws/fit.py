@@ -1,0 +1,113 @@
+"""This module fits a piecewise linear function to noisy points by least squares, with knots of free position."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import make_lsq_spline
+from scipy.optimize import least_squares
+
+from hybridsim.errors import UsageError
+
+_CANDIDATES = 40  # positions at which a further knot is tried
+_ROUNDS = 10  # most rounds in which each knot is moved to its best place among the others
+_ROUGH, _FINE = 1e-4, 1e-14  # relative tolerances of an optimisation during the search and at its end
+_GAIN = 1e-3  # a smaller relative gain of a round ends the search
+
+
+def piecewise_linear(x: object, y: object, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return knots (count,) and values (count,) of the continuous piecewise linear function of least squares.
+
+    The first and last knot are the ends of the data. The others are inserted one by one where they help most. After
+    each insertion all of them are optimised together. At last each knot is taken out and inserted again, as long as
+    this lowers the sum of squares.
+    """
+    points = _Points(x, y, count)
+    inner = np.zeros(0)
+    for _ in range(count - 2):
+        inner = points.with_one_more(inner)
+    for _ in range(_ROUNDS if count > 2 else 0):
+        before = points.error(inner)
+        for k in range(len(inner)):
+            inner = min(inner, points.with_one_more(np.delete(inner, k)), key=points.error)
+        if points.error(inner) >= (1.0 - _GAIN) * before:
+            break
+    if count > 2:
+        inner = points.optimised(inner, _FINE)
+    values = points.values(inner)
+    assert values is not None  # the search keeps to knots with values
+    return np.concatenate([points.ends[:1], inner, points.ends[1:]]), values
+
+
+class _Points:
+    """The points to fit, and the best values at given inner knots."""
+
+    def __init__(self, x: object, y: object, count: int) -> None:
+        try:
+            first, second = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
+        except (TypeError, ValueError):
+            raise UsageError(
+                "`at` and `values` must be numbers", remedy="use two arrays of numbers"
+            ) from None
+        if first.ndim != 1 or first.shape != second.shape:
+            raise UsageError(
+                f"`at` and `values` have the shapes {first.shape} and {second.shape}",
+                remedy="use two arrays (k,) of equal length",
+            )
+        if not (np.isfinite(first).all() and np.isfinite(second).all()):
+            raise UsageError(
+                "`at` or `values` contains a number that is not finite", remedy="remove these points"
+            )
+        order = np.argsort(first, kind="stable")
+        self.x, self.y = first[order], second[order]
+        places = np.unique(self.x)
+        if (
+            isinstance(count, bool)
+            or not isinstance(count, int | np.integer)
+            or not 2 <= count <= len(places)
+        ):
+            raise UsageError(
+                f"`knots` cannot be {count!r}",
+                remedy=f"use a whole number from 2 to {len(places)}, the number of different arguments",
+            )
+        self.ends = places[[0, -1]]
+        between = np.concatenate([places[1:-1], 0.5 * (places[1:] + places[:-1])])
+        self.candidates = np.unique(
+            np.quantile(between, np.linspace(0.0, 1.0, _CANDIDATES), method="nearest")
+        )
+
+    def values(self, inner: np.ndarray) -> np.ndarray | None:
+        """Return the best values at all knots, or None if the points do not determine them."""
+        (a, b), knots = self.ends, np.sort(inner)
+        try:
+            found: np.ndarray = make_lsq_spline(self.x, self.y, np.array([a, a, *knots, b, b]), k=1).c
+        except (ValueError, np.linalg.LinAlgError):
+            return None
+        return found if np.isfinite(found).all() else None
+
+    def residuals(self, inner: np.ndarray) -> np.ndarray:
+        """Return the residual at each point; it is large where the values are not determined."""
+        values = self.values(inner)
+        if values is None:
+            return np.full(len(self.x), 1e3 * (np.ptp(self.y) or 1.0))
+        knots = np.concatenate([self.ends[:1], np.sort(inner), self.ends[1:]])
+        return np.interp(self.x, knots, values) - self.y
+
+    def error(self, inner: np.ndarray) -> float:
+        """Return the sum of squares."""
+        residuals = self.residuals(inner)
+        return float(residuals @ residuals)
+
+    def with_one_more(self, inner: np.ndarray) -> np.ndarray:
+        """Return the inner knots and one more at its best place, all optimised together."""
+        tried = [np.sort(np.append(inner, one)) for one in self.candidates if one not in inner]
+        best = min(tried, key=self.error)
+        return self.optimised(best, _ROUGH)
+
+    def optimised(self, inner: np.ndarray, tolerance: float) -> np.ndarray:
+        """Return the inner knots after optimisation; each stays between the middles of its neighbours."""
+        middles = np.concatenate([self.ends[:1], 0.5 * (inner[1:] + inner[:-1]), self.ends[1:]])
+        bounds, scale = (middles[:-1], middles[1:]), np.diff(middles)
+        found = least_squares(
+            self.residuals, inner, bounds=bounds, x_scale=scale, xtol=tolerance, ftol=tolerance
+        )
+        return min(inner, found.x, key=self.error)

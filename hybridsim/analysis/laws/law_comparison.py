@@ -1,0 +1,121 @@
+"""This module defines the result of `compare_laws`: one row per law, as a table and as plain values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+from hybridsim.analysis.compare.table import milliseconds
+from hybridsim.analysis.steady.measures import Measures
+from hybridsim.model import Model
+from hybridsim.presentation.readable import Readable, aligned
+from hybridsim.solution import Solution
+
+
+@dataclass(frozen=True)
+class LawRow(Measures):
+    """The run of a model under one law; a measure is None if the run failed or does not have it."""
+
+    label: str
+    model: Model
+    solution: Solution
+    contact: str
+    quantity: str
+
+    @property
+    def amplitude_of_quantity(self) -> float | None:
+        """(max - min)/2 of the quantity of the comparison."""
+        return self.amplitude[self.quantity] if self._has(self.quantity) else None
+
+    @property
+    def stops(self) -> int | None:
+        """Number of intervals of stick; None for a law without stick."""
+        found = self.solution.success and self.contact in self._contacts
+        return int(self.stops_per_period[self.contact]) if found else None
+
+    @property
+    def energy_loss(self) -> float | None:
+        """Work of the friction force, the integral of the force times the relative velocity."""
+        found = self.solution.success and self.contact in self.dissipated
+        return self.dissipated[self.contact] if found else None
+
+    def _has(self, quantity: str) -> bool:
+        return self.solution.success and quantity in self.amplitude
+
+
+@dataclass(frozen=True)
+class LawComparison(Readable):
+    """The motion of one model under several friction laws in one contact.
+
+    Parameters
+    ----------
+    title : str
+        The title of the model.
+    contact, quantity : str
+        The contact that has the laws, and the quantity whose amplitude is measured.
+    t_span : tuple of float
+        The measured interval: the last period of the forcing, or the whole run of a model without a period.
+    rows : tuple of LawRow
+        One row per law with its ``label``, ``model``, ``solution`` and measures.
+
+    Examples
+    --------
+    >>> import hybridsim as hs
+    >>> found = hs.compare_laws("dfcs", ["coulomb", ("coulomb", {"mu": 0.25})])
+    >>> found.labels
+    ('coulomb', 'coulomb (mu=0.25)')
+    """
+
+    title: str
+    contact: str
+    quantity: str
+    t_span: tuple[float, float]
+    rows: tuple[LawRow, ...]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The names of the laws, which differ from each other."""
+        return tuple(row.label for row in self.rows)
+
+    def __repr__(self) -> str:
+        t0, t1 = self.t_span
+        head = ("law", f"amplitude of {self.quantity}", "stops", "energy loss", "wall time")
+        lines = [f"{self.title}: laws of contact {self.contact}, t = {t0:g} to {t1:g}"]
+        lines += aligned([head, *(_cells(row) for row in self.rows)], "  ")
+        failed = [row for row in self.rows if not row.solution.success]
+        return "\n".join([*lines, *(f"{row.label}: {row.solution.message}" for row in failed)])
+
+    def records(self) -> list[dict[str, Any]]:
+        """Return the rows as plain values."""
+        return [
+            {
+                "label": row.label,
+                "status": row.solution.status,
+                "message": row.solution.message,
+                "amplitude": row.amplitude_of_quantity,
+                "stops": row.stops,
+                "energy_loss": row.energy_loss,
+                "wall_time": row.solution.stats["wall_time"],
+            }
+            for row in self.rows
+        ]
+
+    def plot(self) -> Any:
+        """Draw the friction loops and the amplitudes side by side.
+
+        Returns the axes; ``hybridsim.plot.save`` writes them to a file.
+        """
+        # The plot package is a layer above this one, so it is imported only on demand.
+        return import_module("hybridsim.plot").law_comparison(self)
+
+
+def _cells(row: LawRow) -> tuple[str, ...]:
+    amplitude, stops, loss = row.amplitude_of_quantity, row.stops, row.energy_loss
+    return (
+        row.label,
+        "-" if amplitude is None else f"{amplitude:.6g}",
+        "-" if stops is None else str(stops),
+        "-" if loss is None else f"{loss:.6g}",
+        milliseconds(row.solution.stats["wall_time"]) if row.solution.success else row.solution.status,
+    )

@@ -1,0 +1,130 @@
+"""One model under several laws: measures in closed form, what is refused, and what the answer shows."""
+
+from __future__ import annotations
+
+from math import exp
+
+import pytest
+
+import hybridsim as hs
+
+M, G, V = 2.0, 9.81, 2.0
+THICK = hs.FrictionLaw("thick", parameters=["mu"], force="mu*N*v")
+
+
+def block(normal: str = "m*g") -> hs.Model:
+    """A block of mass m that slides on a floor with the velocity V at first."""
+    states = [hs.State("x", 0, "v", nominal=1), hs.State("v", V, "-f/m", nominal=1)]
+    contact = hs.Contact("f", "v", normal, "coulomb", {"mu": 0.3})
+    return hs.Model("block", states, {"m": M, "g": G}, contacts=[contact], title="Block")
+
+
+def test_a_block_that_slides_to_rest() -> None:
+    """Coulomb: the block stops after V**2/(2*mu*g) and loses all its energy. Viscous: x = V/c*(1 - exp(-c*t))."""
+    laws = ["coulomb", ("coulomb", {"mu": 0.15}), THICK]
+    found = hs.compare_laws(block(), laws, (0, 4))
+    assert found.labels == ("coulomb", "coulomb (mu=0.15)", "thick")
+    assert found.t_span == (0, 4)
+    first, second, third = found.rows
+    for row, mu in ((first, 0.3), (second, 0.15)):
+        assert row.amplitude_of_quantity == pytest.approx(V**2 / (2 * mu * G) / 2, rel=1e-9)
+        assert row.energy_loss == pytest.approx(M * V**2 / 2, rel=1e-9)
+        assert row.stops == 1
+    c = 0.3 * G
+    assert third.amplitude_of_quantity == pytest.approx(V / c * (1 - exp(-4 * c)) / 2, rel=1e-6)
+    assert third.energy_loss == pytest.approx(M * V**2 / 2 * (1 - exp(-8 * c)), rel=1e-6)
+    assert third.stops is None
+
+
+def test_a_loop_of_coulombs_law_is_a_rectangle() -> None:
+    """The last period of a forced motion: the loss is 4*mu*N times the amplitude."""
+    model = hs.load("dfcs")
+    values = model.parameter_values()
+    found = hs.compare_laws(model, ["coulomb", ("coulomb", {"mu": "mu/2"})], contact="f", quantity="x")
+    period = 2 * 3.141592653589793 / values["omega"]
+    assert found.t_span[1] - found.t_span[0] == pytest.approx(period, rel=1e-9)
+    assert [row.energy_loss for row in found.rows] == pytest.approx(
+        [
+            4 * mu * values["N"] * row.amplitude_of_quantity
+            for mu, row in zip((0.5, 0.25), found.rows, strict=True)
+        ],
+        rel=1e-6,
+    )
+
+
+def test_values_of_the_call_and_options_of_runs() -> None:
+    found = hs.compare_laws(
+        block(),
+        ["coulomb"],
+        (0, 4),
+        params={"g": 5},
+        x0={"v": 1},
+        quantity="v",
+        integrator="dop853",
+        rtol=1e-9,
+    )
+    (row,) = found.rows
+    assert row.solution.integrator == "dop853"
+    assert row.energy_loss == pytest.approx(M / 2, rel=1e-7)
+    assert row.amplitude_of_quantity == pytest.approx(0.5, rel=1e-7)
+
+
+def test_a_run_that_fails_is_a_row_and_the_others_are_measured() -> None:
+    """The load vanishes at x = 1, which a block with less friction reaches."""
+    found = hs.compare_laws(
+        block("20*(1 - x)"), [("coulomb", {"mu": 0.05}), ("coulomb", {"mu": 0.9})], (0, 3)
+    )
+    weak, strong = found.records()
+    assert weak["status"] != "finished" and "normal load" in weak["message"]
+    assert (weak["amplitude"], weak["stops"], weak["energy_loss"]) == (None, None, None)
+    assert strong["status"] == "finished" and strong["energy_loss"] == pytest.approx(M * V**2 / 2, rel=1e-8)
+    assert "normal load" in repr(found)
+    _, bars = found.plot()
+    assert bars.texts[0].get_text().strip() == "no result"
+
+
+def test_what_the_answer_shows() -> None:
+    found = hs.compare_laws(block(), ["coulomb", THICK], (0, 4))
+    lines = repr(found).splitlines()
+    assert lines[0] == "Block: laws of contact f, t = 0 to 4"
+    assert lines[1].split("  ")[1:] != [] and "amplitude of x" in lines[1] and "energy loss" in lines[1]
+    assert lines[2].split()[:4] == ["coulomb", f"{V**2 / (4 * 0.3 * G):.6g}", "1", "4"]
+    assert lines[3].split()[2] == "-"
+    assert found._repr_html_().startswith("<pre>Block")
+
+
+def test_the_picture_has_a_loop_and_a_bar_for_each_law() -> None:
+    found = hs.compare_laws(block(), ["coulomb", THICK], (0, 4))
+    loops, bars = found.plot()
+    assert len(loops.lines) == len(bars.patches) == 2
+    first, _ = loops.lines
+    assert max(first.get_ydata()) == pytest.approx(0.3 * M * G)
+    assert [bar.get_width() for bar in bars.patches] == [row.amplitude_of_quantity for row in found.rows]
+    assert [label.get_text() for label in bars.get_yticklabels()] == ["coulomb", "thick"]
+    assert [bar.get_facecolor()[:3] for bar in bars.patches] != [bars.patches[0].get_facecolor()[:3]] * 2
+
+
+@pytest.mark.parametrize(
+    ("laws", "options", "message"),
+    [
+        ("coulomb", {}, "`laws` cannot be 'coulomb'"),
+        ([], {}, r"`laws` cannot be \[\]"),
+        ([("coulomb", 3)], {}, "an entry of `laws` cannot be"),
+        (["coulomb", "coulomb"], {}, "`laws` contains 'coulomb' twice"),
+        (["columb"], {}, "there is no law 'columb'"),
+        ([("coulomb", {"nu": 1})], {}, "has no parameter 'nu'"),
+        (["coulomb"], {"contact": "g"}, "model block has no contact 'g'"),
+        (["coulomb"], {"quantity": "y"}, "model block has no quantity 'y'"),
+        (["coulomb"], {"rtl": 1}, "'rtl' is not an option"),
+        (["coulomb"], {"t_span": (1, 0)}, r"`t_span` cannot be \(1, 0\)"),
+    ],
+)
+def test_what_is_refused(laws: object, options: dict[str, object], message: str) -> None:
+    with pytest.raises(hs.HybridsimError, match=message):
+        hs.compare_laws(block(), laws, **options)  # type: ignore[arg-type]  # wrong on purpose
+
+
+def test_a_model_with_several_contacts_needs_the_name_of_one() -> None:
+    with pytest.raises(hs.UsageError, match="2 contacts") as caught:
+        hs.compare_laws(hs.Model("pair", use=[hs.Use("a", block()), hs.Use("b", block())]), ["coulomb"])
+    assert caught.value.remedy == "pass `contact`, one of a.f, b.f"
