@@ -42,6 +42,7 @@ def test_the_lines_of_the_readme_run(tmp_path: Path) -> None:
         ("how-to/choose-an-integrator.md", 5),
         ("how-to/relays.md", 8),
         ("how-to/impacts.md", 8),
+        ("how-to/compare-laws.md", 6),
         ("how-to/draw-a-mechanism.md", 1),
         ("how-to/report-a-run.md", 1),
         ("how-to/measured-input.md", 4),

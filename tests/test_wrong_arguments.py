@@ -230,6 +230,10 @@ CALLS: dict[str, tuple[Callable[[], Callable[..., Any]], Callable[[], dict[str, 
             "budget": 1e4,
         },
     ),
+    "compare_laws": (
+        lambda: hs.compare_laws,
+        lambda: {"model": "dfcs", "laws": ["coulomb"], "t_span": (0, 0.01)},
+    ),
     "compare": (
         lambda: hs.compare,
         lambda: {
@@ -335,6 +339,7 @@ CALLS: dict[str, tuple[Callable[[], Callable[..., Any]], Callable[[], dict[str, 
     "Advice.to_json": (lambda: advised().to_json, dict),
     "Branch.amplitude": (lambda: branch().amplitude, lambda: {"name": "x"}),
     "Model.from_toml": (lambda: hs.Model.from_toml, lambda: {"text": "schema = 1"}),
+    "LawTable.fit": (lambda: hs.LawTable.fit, lambda: {"at": [0, 1, 2], "values": [1, 2, 2], "knots": 2}),
     "Model.regularized": (lambda: hs.load("dfcs").regularized, lambda: {"kind": "tanh", "v0": 0.1}),
 }
 
