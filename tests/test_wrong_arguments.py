@@ -47,7 +47,7 @@ _ALSO = {
 }
 # Made by calls and not by users; errors.
 _RESULTS = {
-    *("Event", "Explanation", "SavedState", "Solution", "SteadyState", "Sweep"),
+    *("Event", "Explanation", "SavedState", "Solution", "SteadyState", "Sweep", "LawComparison"),
     *("Comparison", "SuiteComparison", "Advice", "Branch", "Equilibrium", "Linearization", "Sensitivities"),
     *(
         "HybridsimError",
@@ -61,6 +61,7 @@ _RESULTS = {
 }
 # Of declarations only these methods are for users.
 _METHODS = {
+    "LawTable": {"fit"},
     "Model": {"from_toml", "regularized"},
     "Simulator": {"run", "start", "advance", "set", "output", "restore"},
 }

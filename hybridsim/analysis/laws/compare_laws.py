@@ -9,7 +9,7 @@ from typing import Any
 from hybridsim.analysis.compare.comparison_request import mapping, run_span
 from hybridsim.analysis.keyword_options import refuse_unknown
 from hybridsim.analysis.laws.law_comparison import LawComparison, LawRow
-from hybridsim.arguments import cannot_be, chosen_model, known_name
+from hybridsim.arguments import cannot_be, chosen_model, is_row, known_name
 from hybridsim.calls import refusing
 from hybridsim.engine.system.period import forcing_period
 from hybridsim.errors import UsageError
@@ -97,12 +97,12 @@ def compare_laws(
 
 def _models(model: Model, laws: Iterable[Entry], contact: str) -> dict[str, Model]:
     """Return the model under each law, by different labels."""
-    if isinstance(laws, str | Mapping) or not isinstance(laws, Iterable):
+    if not is_row(laws):
         raise cannot_be("laws", laws, _LAWS)
     found: dict[str, Model] = {}
     for entry in laws:
         pair = entry if isinstance(entry, tuple) else (entry, {})
-        if len(pair) != 2 or not isinstance(pair[1], Mapping):
+        if len(pair) != 2 or not isinstance(pair[0], str | FrictionLaw) or not isinstance(pair[1], Mapping):
             raise cannot_be("an entry of `laws`", entry, _LAWS)
         law, values = pair
         changed = model.with_law(contact, law, **values)

@@ -6,8 +6,10 @@ import numpy as np
 from scipy.interpolate import make_lsq_spline
 from scipy.optimize import least_squares
 
+from hybridsim.arguments import numbers, whole_number
 from hybridsim.errors import UsageError
 
+_REMEDY = "use one finite number for each measured point"
 _CANDIDATES = 40  # positions at which a further knot is tried
 _ROUNDS = 10  # most rounds in which each knot is moved to its best place among the others
 _ROUGH, _FINE = 1e-4, 1e-14  # relative tolerances of an optimisation during the search and at its end
@@ -42,33 +44,16 @@ class _Points:
     """The points to fit, and the best values at given inner knots."""
 
     def __init__(self, x: object, y: object, count: int) -> None:
-        try:
-            first, second = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-        except (TypeError, ValueError):
-            raise UsageError(
-                "`at` and `values` must be numbers", remedy="use two arrays of numbers"
-            ) from None
-        if first.ndim != 1 or first.shape != second.shape:
-            raise UsageError(
-                f"`at` and `values` have the shapes {first.shape} and {second.shape}",
-                remedy="use two arrays (k,) of equal length",
-            )
+        first, second = (numbers(column, name, _REMEDY) for column, name in ((x, "at"), (y, "values")))
+        if len(first) != len(second):
+            message = f"`at` has {len(first)} numbers, but `values` has {len(second)}"
+            raise UsageError(message, remedy=_REMEDY)
         if not (np.isfinite(first).all() and np.isfinite(second).all()):
-            raise UsageError(
-                "`at` or `values` contains a number that is not finite", remedy="remove these points"
-            )
+            raise UsageError("`at` or `values` contains a number that is not finite", remedy=_REMEDY)
         order = np.argsort(first, kind="stable")
         self.x, self.y = first[order], second[order]
         places = np.unique(self.x)
-        if (
-            isinstance(count, bool)
-            or not isinstance(count, int | np.integer)
-            or not 2 <= count <= len(places)
-        ):
-            raise UsageError(
-                f"`knots` cannot be {count!r}",
-                remedy=f"use a whole number from 2 to {len(places)}, the number of different arguments",
-            )
+        whole_number(count, "knots", 2, len(places))
         self.ends = places[[0, -1]]
         between = np.concatenate([places[1:-1], 0.5 * (places[1:] + places[:-1])])
         self.candidates = np.unique(

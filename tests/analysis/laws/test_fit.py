@@ -52,6 +52,12 @@ def test_two_knots_are_the_line_of_least_squares() -> None:
     assert table.values == pytest.approx([5 / 6, 11 / 6], rel=1e-12)
 
 
+def test_as_many_knots_as_arguments_pass_through_all_points() -> None:
+    at, values = [0, 1, 2.5, 3], [0.5, 0.3, 0.4, 0.1]
+    table = hs.LawTable.fit(at, values, knots=4)
+    assert [table.value(each) for each in at] == pytest.approx(values, abs=1e-9)
+
+
 def test_the_order_of_points_does_not_matter_and_arguments_may_repeat() -> None:
     """Two values at each argument count as their mean, since each has as many."""
     at, values, v = [0, 0.7, 2], [0.5, 0.3, 0.4], speeds(7, 40)
@@ -74,14 +80,14 @@ def test_a_run_with_a_fitted_law() -> None:
 @pytest.mark.parametrize(
     ("at", "values", "knots", "message"),
     [
-        ([0, 1, 2], [1, 2], 2, "have the shapes"),
-        ([[0, 1]], [[1, 2]], 2, "have the shapes"),
+        ([0, 1, 2], [1, 2], 2, "`at` has 3 numbers, but `values` has 2"),
+        ([[0, 1]], [[1, 2]], 2, "a value of `at`"),
         ([0, 1, np.nan], [1, 2, 3], 2, "not finite"),
         ([0, 1, 2], [1, 2, np.inf], 2, "not finite"),
         ([0, 1, 1], [1, 2, 3], 3, "`knots` cannot be 3"),
         ([0, 1, 2], [1, 2, 3], 1, "`knots` cannot be 1"),
         ([0, 1, 2], [1, 2, 3], 2.5, "`knots` cannot be 2.5"),
-        (["a", 1, 2], [1, 2, 3], 2, "must be numbers"),
+        (["a", 1, 2], [1, 2, 3], 2, "a value of `at` cannot be 'a'"),
     ],
 )
 def test_what_is_refused(at: object, values: object, knots: object, message: str) -> None:
