@@ -52,10 +52,10 @@ class _Points:
             raise UsageError("`at` or `values` contains a number that is not finite", remedy=_REMEDY)
         order = np.argsort(first, kind="stable")
         self.x, self.y = first[order], second[order]
-        places = np.unique(self.x)
-        whole_number(count, "knots", 2, len(places))
-        self.ends = places[[0, -1]]
-        between = np.concatenate([places[1:-1], 0.5 * (places[1:] + places[:-1])])
+        distinct = np.unique(self.x)
+        whole_number(count, "knots", 2, len(distinct))
+        self.ends = distinct[[0, -1]]
+        between = np.concatenate([distinct[1:-1], 0.5 * (distinct[1:] + distinct[:-1])])
         self.candidates = np.unique(
             np.quantile(between, np.linspace(0.0, 1.0, _CANDIDATES), method="nearest")
         )
