@@ -1,4 +1,4 @@
-"""Draws docs/images/laws/*.png: each friction law that comes with the package, at values where its shape is seen.
+"""Draws docs/images/laws/*.svg: each friction law that comes with the package, at values where its shape is seen.
 
 python docs/make/draw_laws.py [NAME ...]
 """
@@ -6,12 +6,16 @@ python docs/make/draw_laws.py [NAME ...]
 from __future__ import annotations
 
 import sys
+import textwrap
 from pathlib import Path
 from typing import Any
 
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
 import hybridsim as hs
 from hybridsim.model import list_laws
-from hybridsim.plot import friction_law, save
+from hybridsim.plot import friction_law, save, style
 
 FOLDER = Path(__file__).parents[2] / "docs" / "images" / "laws"
 
@@ -57,7 +61,15 @@ def main(names: list[str]) -> None:
     for name in names or [*list_laws(), "table"]:
         law = MEASURED if name == "table" else name
         arguments, motion = LAWS.get(name, ({}, {"speed": 1}))
-        save(friction_law(law, arguments, **motion), FOLDER / f"{name}.png")
+        save(small(friction_law(law, arguments, **motion)), FOLDER / f"{name}.svg")
+
+
+def small(axes: list[Axes]) -> Figure:
+    """The picture of a law at the width at which a table shows it, with its title in shorter lines."""
+    figure, title = style.figure_of(axes), axes[0].get_title(loc="left").replace("\n", " ")
+    figure.set_size_inches(0.5 + 2.3 * len(axes), 2.3)
+    axes[0].set_title("\n".join(textwrap.wrap(title, 30 * len(axes))), fontsize=9, loc="left")
+    return figure
 
 
 if __name__ == "__main__":

@@ -2,12 +2,11 @@
 
     python docs/make/event_pictures.py
 
-Writes docs/images/event-*.png. What they show is computed: events by runs, the chance of signs by plain arithmetic.
+Writes docs/images/event-*.svg. What they show is computed: events by runs, the chance of signs by plain arithmetic.
 """
 
 from __future__ import annotations
 
-import textwrap
 from pathlib import Path
 
 import numpy as np
@@ -28,10 +27,10 @@ def draw_domains() -> None:
         "is zero at the start and rises": "t*(1.5 - t)",
         "goes below zero and comes back": "1.8*(t - 0.4)*(t - 0.7)",
     }
-    figure = style.figure(10, 3.1)
+    figure = style.figure(style.WIDTH, 4.6)
     t = np.linspace(0, 1, 501)
-    rows = figure.subplots(1, 4, sharex=True)
-    for axes, (title, guard) in zip(rows, cases.items(), strict=True):
+    grid = figure.subplots(2, 2, sharex=True)
+    for axes, (title, guard) in zip(grid.ravel(), cases.items(), strict=True):
         model = hs.Model(
             "one-guard",
             states=[hs.State("x", 0, "1")],
@@ -63,14 +62,18 @@ def draw_domains() -> None:
         )
         for at in events:
             axes.plot(at, 0, marker="v", color=ORANGE, markersize=10, zorder=6)
-        said = f"ends at t = {events[0]:.1f}" if events else "goes on"
-        axes.set_title(f"{textwrap.fill(title, 20)}:\n{said}", fontsize=10)
+        outcome = f"ends at t = {events[0]:.1f}" if events else "goes on"
+        is_seen = values[0] >= 0 > values[-1]
+        test = "right" if is_seen == bool(events) else "wrong"
+        axes.set_title(f"{title}:\nmode {outcome}; test of signs {test}", fontsize=9, loc="left")
         axes.set_ylim(-0.45, 0.75)
-        axes.set_xlabel("time t (one step)")
-    rows[0].set_ylabel("guard g")
-    for axes in rows[1:]:
+    for axes in grid[1]:
+        axes.set_xlabel("time t (one step)", fontsize=9)
+    for axes in grid[:, 0]:
+        axes.set_ylabel("guard g", fontsize=9)
+    for axes in grid[:, 1]:
         axes.set_yticklabels([])
-    style.save(figure, IMAGES / "event-domain.png")
+    style.save(figure, IMAGES / "event-domain.svg")
 
 
 def value_of(guard: str, t: float) -> float:
@@ -93,7 +96,7 @@ def draw_releases() -> None:
     acceleration = (force * np.sin(omega * release) - limit) / mass  # exactly zero in exact arithmetic
     rate = force * omega * np.cos(omega * release) / mass
     backward = acceleration < 0
-    figure = style.figure(10, 3.3)
+    figure = style.figure(style.WIDTH, 3.4)
     left, right = figure.subplots(1, 2)
     for axes, values, unit in ((left, acceleration * 1e13, r"$10^{-13}$ m/s²"), (right, rate, "m/s³")):
         style.dress(axes)
@@ -111,19 +114,19 @@ def draw_releases() -> None:
                 label=label,
             )
         axes.axhline(0, color=style.INK, linewidth=0.8)
-        axes.set_xlabel("time of the release (s)")
-        axes.set_ylabel(("acceleration" if axes is left else "rate of the acceleration") + f" ({unit})")
+        axes.set_xlabel("time of the release [s]")
+        axes.set_ylabel(("acceleration" if axes is left else "rate of the acceleration") + f" [{unit}]")
     left.set_title(
-        f"What the naive machine asks: {100 * backward.mean():.0f} % have the wrong sign",
+        f"The sign of the acceleration\nis wrong at {100 * backward.mean():.0f} % of the releases",
         fontsize=10,
         loc="left",
     )
-    right.set_title("What decides: the first derivative that is not zero", fontsize=10, loc="left")
+    right.set_title(
+        "The first derivative that is not zero\ndecides: its sign is always right", fontsize=10, loc="left"
+    )
     right.set_ylim(0, None)
-    low, high = left.get_ylim()
-    left.set_ylim(low, high + 0.3 * (high - low))
-    left.legend(loc="upper left", ncols=2, fontsize=9, frameon=False)
-    style.save(figure, IMAGES / "event-release.png")
+    style.legend_below(figure, left.get_legend_handles_labels()[0])
+    style.save(figure, IMAGES / "event-release.svg")
 
 
 def draw_accumulation() -> None:
@@ -137,7 +140,7 @@ def draw_accumulation() -> None:
     sol = hs.simulate(ball, (0, 3.2))
     bounces = np.array([e.t for e in sol.events if e.target == "open"])
     rest = sol.modes["p"][-1].t0
-    figure = style.figure(10, 3.2)
+    figure = style.figure(style.WIDTH, 3.0)
     left, right = figure.subplots(1, 2)
     t = np.linspace(0, 3.2, 3201)
     style.dress(left)
@@ -146,12 +149,12 @@ def draw_accumulation() -> None:
     left.annotate(
         f"closed from t = {rest:.4f} s on",
         (rest, 0.01),
-        (1.9, 0.45),
+        (0.9, 0.7),
         fontsize=9,
         arrowprops={"arrowstyle": "->", "color": style.INK},
     )
-    left.set_xlabel("time t (s)")
-    left.set_ylabel("height h (m)")
+    left.set_xlabel("time t [s]")
+    left.set_ylabel("height h [m]")
     left.set_ylim(-0.04, 1.05)
     gaps = np.diff(bounces)
     gaps = gaps[gaps > 0]
@@ -159,12 +162,12 @@ def draw_accumulation() -> None:
     right.semilogy(np.arange(1, len(gaps) + 1), gaps, linestyle="none", marker="o", markersize=3, color=BLUE)
     end = 1024 * np.spacing(rest)
     right.axhline(end, color=ORANGE, linewidth=1.2)
-    right.text(2, 1.6 * end, "1024 units in the last place of t", fontsize=9, color=ORANGE, va="bottom")
+    right.text(2, 1.6 * end, "1024 units in the last place of t", fontsize=9, color=style.INK, va="bottom")
     right.set_xlabel("number of the bounce")
-    right.set_ylabel("time to the next (s)")
+    right.set_ylabel("time to the next [s]")
     left.set_title("Infinitely many bounces in a finite time", fontsize=10, loc="left")
-    right.set_title("Taken one by one as long as they can be told apart", fontsize=10, loc="left")
-    style.save(figure, IMAGES / "event-accumulation.png")
+    right.set_title("The intervals fall to the resolution of t", fontsize=10, loc="left")
+    style.save(figure, IMAGES / "event-accumulation.svg")
 
 
 def draw_pasts() -> None:
@@ -188,10 +191,10 @@ def draw_pasts() -> None:
         fontsize=9,
         arrowprops={"arrowstyle": "->", "color": style.INK},
     )
-    axes.set_xlabel("time t (s)")
-    axes.set_ylabel("velocity v (m/s)")
+    axes.set_xlabel("time t [s]")
+    axes.set_ylabel("velocity v [m/s]")
     axes.set_title("Four starts, one state of rest", fontsize=10, loc="left")
-    style.save(figure, IMAGES / "event-pasts.png")
+    style.save(figure, IMAGES / "event-pasts.svg")
 
 
 if __name__ == "__main__":

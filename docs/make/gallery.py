@@ -79,7 +79,7 @@ def main(names: list[str], with_pictures: bool) -> None:
             continue
         solution = run(info.name)
         if with_pictures:
-            save(PICTURES.get(info.name, time_history)(solution), FOLDER / f"{info.name}.svg")
+            save(picture_of(info.name, solution), FOLDER / f"{info.name}.svg")
         if info.name in MOVES:
             path = solution.animate(
                 ANIMATIONS / f"{info.name}.gif", **{"quantities": [], "fps": 12} | MOVES[info.name]
@@ -88,6 +88,11 @@ def main(names: list[str], with_pictures: bool) -> None:
         print(info.name, flush=True)
     sections = (section(hs.load(info.name)) for info in infos)
     (DOCS / "reference" / "gallery.md").write_text(HEAD + "\n".join(sections), encoding="utf-8")
+
+
+def picture_of(name: str, solution: hs.Solution | None = None) -> Any:
+    """The picture of a scene, of its run over its duration."""
+    return PICTURES.get(name, time_history)(solution or run(name))
 
 
 def run(name: str) -> hs.Solution:

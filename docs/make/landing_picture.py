@@ -1,6 +1,6 @@
 """Draws the picture of the landing page: a block on a belt, its motion, and its amplitude over the belt's speed.
 
-python docs/make/landing_picture.py        (writes docs/images/landing.png)
+python docs/make/landing_picture.py        (writes docs/images/landing.svg)
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ import numpy as np
 from matplotlib.axes import Axes
 
 import hybridsim as hs
+from hybridsim.plot import save
 
-PICTURE = Path(__file__).parents[2] / "docs" / "images" / "landing.png"
+PICTURE = Path(__file__).parents[2] / "docs" / "images" / "landing.svg"
 BLUE, ORANGE, BLACK, GREY = "#0072B2", "#D55E00", "#000000", "#777777"
 DAMPING, STATIC, FALL = 0.5, 1.0, 3.0  # the force of friction is STATIC/(1 + FALL*v)
 ONSET = (
@@ -56,7 +57,7 @@ def draw_mechanism(axes: Axes) -> None:
     for x in (1.6, 9.0):
         axes.add_patch(mpl.patches.Circle((x, 0.7), 0.4, facecolor="white", edgecolor=GREY))
     axes.annotate("", (8.6, 1.45), (7.0, 1.45), arrowprops={"arrowstyle": "->", "color": ORANGE})
-    axes.text(7.8, 1.65, "belt", color=ORANGE, ha="center")
+    axes.text(7.8, 1.65, "belt", color=BLACK, ha="center")
 
 
 def draw_motion(axes: Axes) -> None:
@@ -102,7 +103,7 @@ def main() -> None:
         draw_mechanism(parts["mechanism"])
         draw_motion(parts["motion"])
         draw_amplitudes(parts["amplitude"])
-        figure.savefig(PICTURE)
+        save(figure, PICTURE)
 
 
 if __name__ == "__main__":

@@ -58,8 +58,11 @@ def friction_law(
         _curve(axes[0], contact, speed)
     else:
         _driven(axes, contact, speed, amplitude, mean, integrator)
-    axes[0].set_xlabel("velocity")
-    axes[0].set_ylabel("friction force")
+    axes[0].set_xlabel("velocity", fontsize=9)
+    axes[0].set_ylabel("friction force" + (" / normal load" if normal == 1.0 else ""), fontsize=9)
+    low, high = axes[0].get_ylim()
+    if low > 0:  # a small effect looks small
+        axes[0].set_ylim(0.0, 1.1 * high)
     for each in axes:
         style.dress(each)
     style.head(axes[0], found.title or found.name)
@@ -72,6 +75,10 @@ def _curve(axes: Axes, contact: Contact, speed: float) -> None:
     for sign, colour in ((1, style.PALETTE[0]), (-1, style.PALETTE[1])):
         force = [sign * slip_force(contact, v, backward=sign < 0) for v in speeds]
         axes.plot(sign * speeds, force, color=colour, linewidth=1.6)
+        for table in contact.law.tables if sign > 0 else ():
+            marked = [v for v in table.at if v <= speed]
+            forces = [slip_force(contact, v) for v in marked]
+            axes.plot(marked, forces, "o", color=colour, markersize=4, label="points of the table")
     axes.plot([0, 0], limits, color=style.INK, linewidth=3.0, solid_capstyle="butt")
 
 
@@ -95,7 +102,10 @@ def _driven(
     solution = simulate(model, (0.0, 2 * period), integrator=integrator, rtol=1e-8)
     t = np.linspace(period, 2 * period, _POINTS)
     force = solution.output("f", t)
-    axes[0].plot(mean + speed * np.cos(rate * t), force, color=style.PALETTE[0], linewidth=1.4)
+    curves = [mean + speed * np.cos(rate * t), amplitude * np.sin(rate * t)]
+    for panel, x in zip(axes, curves, strict=False):
+        panel.plot(x, force, color=style.INK, linewidth=1.4)  # one curve: the law has no modes of slip
+        if contact.law.states:
+            style.point_along(panel, x, force, style.INK)
     if len(axes) > 1:
-        axes[1].plot(amplitude * np.sin(rate * t), force, color=style.PALETTE[0], linewidth=1.4)
-        axes[1].set_xlabel("displacement")
+        axes[1].set_xlabel("displacement", fontsize=9)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 _COLUMNS = 3
 _HEIGHT, _AROUND = 2.5, 1.9  # inches of a row of panels, and of title and legend
+_LETTERS = 75  # of the titles of a row of panels
 _MARKER = 4.5
 
 
@@ -37,7 +39,8 @@ def suite_page(suite: SuiteComparison) -> tuple[Axes, ...]:
     chosen = looks(rows)
     for panel, result in zip(panels, suite.results, strict=False):
         draw_panel(panel, result.comparison, "state", chosen, _MARKER)
-        panel.set_title(style.literal(result.scene.title), fontsize=9, loc="left", pad=8)
+        title = textwrap.fill(result.scene.title, _LETTERS // columns)
+        panel.set_title(style.literal(title), fontsize=9, loc="left", pad=8)
     for k, panel in enumerate(panels[: len(comparisons)]):
         panel.set_ylabel("state error / amplitude" if k % columns == 0 else "", fontsize=9)
         panel.set_xlabel("wall time" if k + columns >= len(comparisons) else "", fontsize=9)

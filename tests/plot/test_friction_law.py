@@ -35,3 +35,20 @@ def test_a_picture_needs_a_speed() -> None:
 def test_a_law_does_not_know_how_fast_it_is_used() -> None:
     with pytest.raises(UsageError, match="set `speed` to the largest"):
         friction_law("coulomb", {"mu": 0.5})
+
+
+def test_points_of_a_table_are_marked_and_loops_have_arrows() -> None:
+    table = hs.LawTable("mu", [0, 0.5, 2], [0.6, 0.4, 0.5])
+    law = hs.FrictionLaw("measured", slip="mu*N", stick="mu*N", tables=[table])
+    (axes,) = friction_law(law, {}, speed=1)
+    (points,) = (line for line in axes.get_lines() if line.get_marker() == "o")
+    assert points.get_xydata().tolist() == [[0, 0.6], [0.5, 0.4]]  # the third is outside
+    for axes in friction_law("dahl", {"mu": 0.5, "sigma": 2}, speed=1):
+        assert len([text for text in axes.texts if text.arrow_patch]) == 1
+
+
+def test_a_small_effect_on_a_force_looks_small() -> None:
+    arguments = {"mu_0": 0.6, "a": 0.01, "b": 0.015, "L": 0.2, "v_0": 1}
+    axes, _ = friction_law("rate-and-state", arguments, speed=0.95, mean=1)
+    low, high = axes.get_ylim()
+    assert low == 0 and high > 0.6

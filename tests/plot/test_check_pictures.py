@@ -1,0 +1,82 @@
+"""The pictures of the pages can be read: the size, the contrast and the place of their text, and their scales."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from plot.fake_comparison import comparison
+from plot.fake_solution import ball, oscillator
+
+from hybridsim.plot import friction_law, phase_portrait, save, style, time_history, work_precision
+
+sys.path.append(str(Path(__file__).parents[2] / "docs" / "make"))
+from check_pictures import IMAGES, contrast, faults_of_figure, faults_of_file
+
+
+def test_contrast_is_that_of_wcag() -> None:
+    """Black on white has 21, and #767676 is the palest grey with 4.5."""
+    assert contrast("#000000", "#ffffff") == pytest.approx(21)
+    assert contrast("#767676", "#ffffff") >= 4.5 > contrast("#777777", "#ffffff")
+
+
+@pytest.mark.parametrize("path", sorted(IMAGES.rglob("*.svg")), ids=lambda path: path.name)
+def test_the_text_of_a_picture_can_be_read(path: Path) -> None:
+    assert not faults_of_file(path)
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda: time_history(oscillator(3)),
+        lambda: time_history(ball()),
+        lambda: phase_portrait(oscillator(3)),
+        lambda: friction_law("coulomb", {"mu": 0.5}, speed=1),
+        lambda: work_precision(comparison()),
+    ],
+)
+def test_labels_have_room(draw) -> None:
+    assert not faults_of_figure(style.figure_of(draw()))
+
+
+def written(tmp_path: Path, **settings) -> Path:
+    figure = Figure(figsize=(4, 3))
+    figure.text(0.5, 0.5, "a text", **settings)
+    return save(figure, tmp_path / "picture.svg")
+
+
+def test_faults_of_a_file_are_found(tmp_path: Path) -> None:
+    assert not faults_of_file(written(tmp_path, fontsize=9))
+    assert "too small" in faults_of_file(written(tmp_path, fontsize=6))[0]
+    assert "too pale" in faults_of_file(written(tmp_path, color="#aaaaaa"))[0]
+
+
+def drawn() -> tuple[Figure, Axes]:
+    figure = style.figure(6, 4)
+    axes = figure.subplots()
+    axes.plot([0, 1], [0, 1])
+    return figure, axes
+
+
+def test_faults_of_a_figure_are_found() -> None:
+    assert not faults_of_figure(drawn()[0])
+    figure, axes = drawn()
+    axes.text(0.5, 0.5, "one")
+    axes.text(0.5, 0.5, "two")
+    assert faults_of_figure(figure) == ["'one' overlaps 'two'"]
+    figure, axes = drawn()
+    axes.set(xlabel="x [m]", ylabel="y [m]")
+    assert faults_of_figure(figure) == ["both axes have the unit m, but unequal scales"]
+    axes.set_aspect("equal")
+    assert not faults_of_figure(figure)
+    assert "leaves the picture" in faults_of_figure(_with_text_outside())[0]
+    assert faults_of_figure(style.figure(12, 4)) == ["the picture is 1152 pixels wide"]
+
+
+def _with_text_outside() -> Figure:
+    figure = Figure(figsize=(4, 3))
+    figure.text(0.99, 0.5, "a long text that does not fit")
+    return figure
