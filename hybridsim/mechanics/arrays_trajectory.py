@@ -75,6 +75,15 @@ class ArraysTrajectory(ABC):
     def values(self, name: str, times: np.ndarray, side: str) -> np.ndarray:
         """Return the values (k,) of a state or another quantity at given times."""
 
+    def friction_powers(self, times: np.ndarray) -> np.ndarray:
+        """Return the friction force times the relative velocity (k, contacts) of each contact at times (k,)."""
+        forces, velocities = self.forces_and_velocities(times)
+        return forces * velocities
+
+    @abstractmethod
+    def forces_and_velocities(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return friction forces and relative velocities (k, contacts) at times (k,), after events."""
+
     @property
     @abstractmethod
     def changes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.engine.record.time_lookup import Frame, locate_times
+from hybridsim.expr.evaluate import evaluate
+from hybridsim.expr.grammar import TIME
 from hybridsim.solution.by_name import ByName
 from hybridsim.solution.event import ModeInterval, counted_kind
 from hybridsim.solution.files.tabulated import at_steps, tabulated
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
     from hybridsim.engine.record.segments import Segment
     from hybridsim.engine.record.trajectory import Trajectory
     from hybridsim.model.parts.component import Component
+    from hybridsim.model.parts.contact import Contact
     from hybridsim.presentation.tables import Table
 
 
@@ -153,6 +156,25 @@ class ModelTrajectory(ModelEvents):
         for segment, chosen, s in by_segment:
             out[:, chosen] = self.values_at(names, segment, s, x[chosen])
         return out
+
+    def friction_powers(self, times: np.ndarray) -> np.ndarray:
+        """Return the friction force times the relative velocity (k, contacts) of each contact at times (k,)."""
+        contacts = self.model.contacts
+        forces = self.values_of([contact.name for contact in contacts], times, "+")
+        return forces.T * np.column_stack([self._relative_velocity(c, times) for c in contacts])
+
+    def _relative_velocity(self, contact: Contact, times: np.ndarray) -> np.ndarray:
+        name = relative_velocity(contact.name)
+        if name in self._velocities:
+            return self.values(name, times, "+")
+        # Without a surface, as for a law with a direct force, the expression itself is evaluated.
+        names = [n for n in contact.velocity.names if n in self.names or n in self.quantities]
+        rows = dict(zip(names, self.values_of(names, times, "+").tolist(), strict=True)) | {
+            TIME: times.tolist()
+        }
+        known = self.model.parameter_values()
+        here = (known | {name: row[k] for name, row in rows.items()} for k in range(len(times)))
+        return np.array([evaluate(contact.velocity, values) for values in here])
 
     def values_at(
         self, names: Sequence[str], segment: Segment, s: np.ndarray, x: np.ndarray

@@ -68,6 +68,9 @@ class RunTrajectory(Protocol):
     def values(self, name: str, times: np.ndarray, side: str) -> np.ndarray:
         """Return the values (k,) of a state or a quantity at times (k,)."""
 
+    def friction_powers(self, times: np.ndarray) -> np.ndarray:
+        """Return the friction force times the relative velocity (k, contacts) of each contact at times (k,)."""
+
     def own_values(self, name: str) -> np.ndarray:
         """Return the values (m,) of a state or a quantity at `own_times`."""
 

@@ -144,21 +144,6 @@ class Solution(InPictures):
         """
         return self._trajectory.stats
 
-    @property
-    def work(self) -> dict[str, float]:
-        """Energy that a `MechanicalSystem` receives during a run with ``moreau``, by source.
-
-        The sources are ``forcing``, ``damping``, ``friction``, ``impacts`` and the moving ``bases`` of its
-        contacts. Those of damping, friction and impacts are not positive, up to rounding in a step. With
-        theta = 1/2 they add up to the gain of kinetic and elastic energy. Other runs do not have this attribute.
-        """
-        return self._measured("work", self._trajectory.work, 'a MechanicalSystem with integrator="moreau"')
-
-    def _measured(self, name: str, value: Any, where: str) -> Any:
-        if value is None:
-            raise AttributeError(f"this Solution has no {name}: only a run of {where} has it", name=name)
-        return value
-
     # -- on disk, and on ------------------------------------------------------------------------------------
 
     def __reduce__(self) -> tuple[Any, ...]:

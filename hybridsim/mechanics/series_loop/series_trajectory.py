@@ -13,6 +13,7 @@ from hybridsim.errors import UsageError
 from hybridsim.mechanics.arrays import CASCADE, DONE, INCONSISTENT, LIMITED, LOST
 from hybridsim.mechanics.arrays_trajectory import ArraysTrajectory
 from hybridsim.mechanics.declaration.system import MechanicalSystem
+from hybridsim.mechanics.powers import work_by_source
 from hybridsim.mechanics.series_loop.node_segments import NodeSegments, instants, quantities
 from hybridsim.mechanics.series_loop.run import STATUS, MechanicalRun, new_scratch, new_state, reach_kernels
 from hybridsim.solution.event import Event
@@ -122,6 +123,16 @@ class SeriesTrajectory(ArraysTrajectory):
         column = int(self._place[self.event_names.index(own)])
         both = self._quantities(times, side, self._segments.states(times, side == "+"))
         return both[0 if own == name else 1][:, column]
+
+    def forces_and_velocities(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return friction forces and relative velocities (k, contacts) at times (k,), after events."""
+        forces, velocities = self._quantities(times, "+", self._segments.states(times, True))
+        return forces[:, self._place], velocities[:, self._place]
+
+    @cached_property
+    def work(self) -> dict[str, float]:
+        """Return the energy that the system receives from each source."""
+        return work_by_source(self)
 
     # -- events ---------------------------------------------------------------------------------------------
 

@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from hybridsim.mechanics.arrays_trajectory import ArraysTrajectory
+from hybridsim.mechanics.powers import SOURCES
 from hybridsim.mechanics.time_stepping.arrays import directions
 from hybridsim.mechanics.time_stepping.kernels import BOUNCES, STEPS, SWEEPS, UNSETTLED
 from hybridsim.solution.event import Event
+from hybridsim.solution.run_trajectory import relative_velocity
 
 if TYPE_CHECKING:
     from hybridsim.mechanics.time_stepping.run import SteppedRun
 
 _CONTACT, _IMPACT = {0: "stick", 1: "slip+", -1: "slip-"}, {0: "closed", 1: "open"}
-_WORKS = ("forcing", "damping", "friction", "bases", "impacts")
 
 
 class SteppedTrajectory(ArraysTrajectory):
@@ -92,6 +93,14 @@ class SteppedTrajectory(ArraysTrajectory):
         values: np.ndarray = (directions(self.model)[[k]] @ (x[n:] if k < nc else x[:n])).ravel()
         return values - self._base(k, times) if k < nc else values + self.run.arrays.gap[k - nc]
 
+    def forces_and_velocities(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return friction forces and relative velocities (k, contacts) at times (k,), after events."""
+        names = [contact.name for contact in self.model.contacts]
+        forces, velocities = (
+            [self.values(n, times, "+") for n in of] for of in (names, map(relative_velocity, names))
+        )
+        return np.transpose(forces), np.transpose(velocities)
+
     def _base(self, c: int, times: np.ndarray) -> np.ndarray:
         arrays = self.run.arrays
         constant, sine, cosine = arrays.base[c]
@@ -143,7 +152,7 @@ class SteppedTrajectory(ArraysTrajectory):
     @property
     def work(self) -> dict[str, float]:
         """Return the energy that the system receives from each source."""
-        return dict(zip(_WORKS, self.run.state.work.tolist(), strict=True))
+        return dict(zip(SOURCES, self.run.state.work.tolist(), strict=True))
 
     @property
     def status(self) -> str:

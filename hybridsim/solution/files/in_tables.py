@@ -6,7 +6,7 @@ from os import PathLike
 from typing import TYPE_CHECKING
 
 from hybridsim.presentation.tables import Table, event_columns, event_frame
-from hybridsim.solution.events_and_modes import EventsAndModes
+from hybridsim.solution.energies import Energies
 from hybridsim.solution.files.tabulated import equal_steps
 
 if TYPE_CHECKING:
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-class InTables(EventsAndModes):
+class InTables(Energies):
     """The results of a run in several formats, as a part of `Solution`."""
 
     def table(self, points: int | None = None) -> Table:
