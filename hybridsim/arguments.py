@@ -314,7 +314,7 @@ def initial_modes(system: System, z0: Any) -> np.ndarray:
 
 
 def retention_of(save: Any, system: System) -> Retention:
-    """Return the parts of the run to store; `save` is a word, or a length of time before the end of the run."""
+    """Return the parts of the run to store; `save` is the argument `keep`: a word, or a length of time at the end."""
     from hybridsim.engine.record.retention import ALL, EVENTS, NOTHING, Retention
 
     retentions = {"all": ALL, "events": EVENTS, "nothing": NOTHING}
@@ -326,14 +326,14 @@ def retention_of(save: Any, system: System) -> Retention:
         length = system_period(system)
         if length is None:
             raise UsageError(
-                f"`save` is 'last-period', but model '{system.model.name}' has no forcing period",
-                remedy="use a length of time: save=1.5 stores the last 1.5 time units",
+                f"`keep` is 'last-period', but model '{system.model.name}' has no forcing period",
+                remedy="use a length of time: keep=1.5 stores the last 1.5 time units",
             )
         return Retention(length, length)
     remedy = "use 'all', 'events', 'last-period', 'nothing', or a length of time"
-    length = number(save, "save", remedy)
+    length = number(save, "keep", remedy)
     if not length > 0.0:
-        raise cannot_be("save", save, remedy)
+        raise cannot_be("keep", save, remedy)
     return Retention(length, length)
 
 
@@ -362,8 +362,8 @@ def time_grid(
         return None
     if retention.segments is None:
         raise UsageError(
-            f"`t_eval` needs the states over time, which save={save!r} does not store",
-            remedy="remove `t_eval`, or use save='all'",
+            f"`t_eval` needs the states over time, which keep={save!r} does not store",
+            remedy="remove `t_eval`, or use keep='all'",
         )
     grid = numbers(t_eval, "t_eval", "use times from t0 to t1")
     low, high = min(span), max(span)
@@ -376,7 +376,7 @@ def time_grid(
     if retention.segments < math.inf and (np.abs(span[1] - grid) > retention.segments).any():
         raise UsageError(
             f"`t_eval` contains times before the last {retention.segments:.9g} of the run, which "
-            f"save={save!r} does not store",
-            remedy="use later times, or save='all'",
+            f"keep={save!r} does not store",
+            remedy="use later times, or keep='all'",
         )
     return grid

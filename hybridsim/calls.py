@@ -1,11 +1,13 @@
-"""This module defines a decorator that turns wrong arguments of public functions into `UsageError`."""
+"""This module checks the calls of public functions: unknown, missing and renamed arguments."""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from inspect import Signature, signature
 from typing import Any, ParamSpec, TypeVar
+from warnings import warn
 
 from hybridsim.errors import UsageError, near
 
@@ -25,6 +27,17 @@ def refusing(function: Callable[Arguments, Result]) -> Callable[Arguments, Resul
             raise
 
     return call
+
+
+def renamed(function: str, options: dict[str, Any], former: str, name: str) -> Any:
+    """Take the value of an argument out of `options` under its former name, and warn that the name is deprecated."""
+    text = f"{function}({former}=...) is deprecated; version 0.2 removes it. Use {name}=..."
+    package = __name__.partition(".")[0]
+    level, frame = 2, sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == package:
+        level, frame = level + 1, frame.f_back
+    warn(text, DeprecationWarning, stacklevel=level)
+    return options.pop(former)
 
 
 def refuse_unless_taken(

@@ -9,6 +9,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any, overload
 
 from hybridsim import arguments
+from hybridsim.calls import renamed
 from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.model import Model
 
@@ -32,7 +33,7 @@ def simulate(
     max_step: float = math.inf,
     first_step: float | None = None,
     t_eval: Sequence[float] | None = None,
-    save: str | float = "all",
+    keep: str | float = "all",
     limits: Mapping[str, float] | None = None,
     progress: Callable[[float], None] | None = None,
     **options: Any,
@@ -50,7 +51,7 @@ def simulate(
     max_step: float = math.inf,
     first_step: float | None = None,
     t_eval: Sequence[float] | None = None,
-    save: str | float = "all",
+    keep: str | float = "all",
     limits: Mapping[str, float] | None = None,
     progress: Callable[[float], None] | None = None,
     **options: Any,
@@ -85,7 +86,7 @@ def simulate(
     t_eval : sequence of float, optional
         Times of ``sol.t`` and ``sol.y``; the default is the steps of the integrator. It does not change the
         run.
-    save : str or float, optional
+    keep : str or float, optional
         Parts of the run to store, without any effect on the run itself. "all" stores everything, "events" no
         states between events, "last-period" the states and events of the last forcing period, a number those of
         the last such length of time, and "nothing" the final state, status and cost. With the last three the
@@ -98,7 +99,7 @@ def simulate(
     progress : callable, optional
         Called at intervals with the finished fraction of the time span.
     **options : Any
-        Options of the integrator.
+        Options of the integrator. The former name of ``keep``, ``save``, is deprecated and works until version 0.2.
 
     Returns
     -------
@@ -121,12 +122,14 @@ def simulate(
     """
     if misplaced:
         raise arguments.without_a_name(misplaced[0])
+    if "save" in options:
+        keep = renamed("simulate", options, "save", "keep")
     if isinstance(model, MechanicalSystem):
         from hybridsim.mechanics.simulate import simulate_mechanical
 
         return simulate_mechanical(
             model, t_span, x0=x0, integrator=integrator, rtol=rtol, atol=atol, max_step=max_step, t_eval=t_eval,
-            save=save, limits=limits, progress=progress, params=params, z0=z0, first_step=first_step, **options,
+            keep=keep, limits=limits, progress=progress, params=params, z0=z0, first_step=first_step, **options,
         )  # fmt: skip
     from hybridsim.preparation import prepared
     from hybridsim.solution.running import carried_out
@@ -144,7 +147,7 @@ def simulate(
         max_step=max_step,
         first_step=first_step,
         t_eval=t_eval,
-        save=save,
+        save=keep,
         limits=limits,
         options=options,
         keywords=KEYWORDS,

@@ -36,6 +36,11 @@ RETIRED = (
 ALLOWED = {
     ("mechanics", "chain_on_belt"): "a public name",
     ("cli", "keep"): "the option --keep",
+    ("simulate", "keep"): "an argument of hs.simulate",
+    ("mechanics", "keep"): "the same",
+    ("simulator", "keep"): "an argument of Simulator.run",
+    ("analysis", "keep"): "the same argument, passed on",
+    ("studies", "keep"): "the same argument, passed on",
     ("cli", "rungs"): "the option --rungs",
     ("analysis", "rungs"): "an argument of hs.advise",
     ("analysis", "settle"): "an argument of hs.steady_state and hs.bifurcation",

@@ -88,7 +88,7 @@ def regularised(kind: str, v0: float, ratio: float, r: float) -> float:
     w, count = r * NATURAL, periods_of(r)
     period = 2.0 * math.pi / w
     model = hs.load("dfcs").with_(F0=ratio * N, omega=w).regularized(kind, v0=v0)
-    run = hs.simulate(model, (0.0, count * period), integrator="auto", rtol=1e-8, save=period)
+    run = hs.simulate(model, (0.0, count * period), integrator="auto", rtol=1e-8, keep=period)
     x = run(np.linspace(run.t_start, run.t_end, SAMPLES))[0]
     return 0.5 * (top(x) + top(-x))
 

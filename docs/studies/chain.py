@@ -44,7 +44,7 @@ def ours(chain: hs.MechanicalSystem, rtol: float) -> Run:
     """A run of the package, in its compiled loop."""
 
     def run(end: float) -> tuple[float, int, np.ndarray]:
-        sol = hs.simulate(chain, (0, end), rtol=rtol, save="nothing")
+        sol = hs.simulate(chain, (0, end), rtol=rtol, keep="nothing")
         assert sol.success, sol.message
         return sol.stats["kernel_time"], int(sol.stats["events"]), sol.x_end
 
@@ -67,7 +67,7 @@ def measured(n: int) -> dict[str, tuple[float, float, float]]:
     """Of each, ms per unit of time, events per unit of time, and the error after JUDGED."""
     runs = runs_of(n)
     chain = hs.chain_on_belt(n, coupling=COUPLING, leaf=LEAF, delta=DELTA, belt=BELT)
-    truth = hs.simulate(chain, (0, JUDGED), rtol=1e-13, save="nothing").x_end
+    truth = hs.simulate(chain, (0, JUDGED), rtol=1e-13, keep="nothing").x_end
     errors = {name: float(abs(run(JUDGED)[2] - truth).max()) for name, run in runs.items()}
     seconds: dict[str, list[float]] = {name: [] for name in runs}
     events = {}

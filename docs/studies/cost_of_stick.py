@@ -55,7 +55,7 @@ def main() -> None:
             keywords = {"integrator": method, **({} if rtol is None else {"rtol": rtol})}
             models = {"friction": here.model, "free": frictionless(here)}
             for what, model in models.items():
-                runs[name, method, what] = _run(model, here, keywords, save="events")
+                runs[name, method, what] = _run(model, here, keywords, keep="events")
                 runs[name, method, f"{what}, grid"] = _run(model, here, keywords, t_eval=here.grid)
         runs[name, "rk4-dichotomy", "friction"] = _run(here.model, here, {"integrator": "rk4-dichotomy"})
         runs[name, "rk4-sign", "friction"] = _run(here.model, here, {"integrator": "rk4-sign"})

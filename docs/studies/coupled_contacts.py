@@ -49,7 +49,7 @@ def examine(seed: int, law: str) -> Found:
     difference = 0.0
     for order in range(ORDERS):
         other, dofs = reordered(system, 1000 * seed + order)
-        moved = hs.simulate(other, (0, SPAN), rtol=RTOL, save="nothing")
+        moved = hs.simulate(other, (0, SPAN), rtol=RTOL, keep="nothing")
         difference = max(difference, abs(moved.x_end - sol.x_end[np.r_[dofs, system.n + dofs]]).max())
     trials, wrong, several = Enumeration(system), 0, 0
     instants = sorted({e.t for e in sol.events})

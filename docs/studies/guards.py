@@ -148,7 +148,7 @@ def study(count: int, seed: int = 1) -> dict[str, Tally]:
             x0=draw.start,
             z0={"c": "up" if draw.truth.starts_up else "down"},
             integrator=integrator,
-            save="events",
+            keep="events",
             **options,
         )
         tallies[integrator].add(judge(f"{integrator} {kind} {i}", draw, span, sol))

@@ -178,7 +178,7 @@ class Others:
         if integrator not in FIXED:
             changes["rtol"] = 10.0 ** -rng.randint(3, 12)
             changes |= {"max_step": share * (case.end - case.start) / 7.0} if rng.random() < 0.1 else {}
-        changes["save"] = rng.choice(["all", "events", "nothing"])
+        changes["keep"] = rng.choice(["all", "events", "nothing"])
         if kind == "new":  # an equal model that is another object
             changes["model"] = Case(case.name).model
         if rng.random() < 0.05 and kind == "plain":

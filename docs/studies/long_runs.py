@@ -134,7 +134,7 @@ def stick(last: int) -> None:
         assert sol.success and not sol.events, sol.message
         for checkpoint in [n for n in CHECKPOINTS if n <= last]:
             window = sol(points((checkpoint - WINDOW) * period, checkpoint * period))
-            ended = hs.simulate(system, (0, checkpoint * period), rtol=1e-6, save="nothing").x_end
+            ended = hs.simulate(system, (0, checkpoint * period), rtol=1e-6, keep="nothing").x_end
             print(
                 f"stick, base {base:g}, {checkpoint:8d} periods: {ulps_off(system, window):.2g} ulp in the window, "
                 f"{ulps_off(system, ended[:, None]):.2g} at the end  ({time.perf_counter() - began:.0f} s)",
@@ -159,7 +159,7 @@ def orbits(last: int) -> None:
         first = window(model, SETTLED + CHUNK, period)
         began, memory = time.perf_counter(), [resident_megabytes()]
         whole = hs.simulate(
-            model, (0, last * period), integrator="exact", save=CHUNK * period,
+            model, (0, last * period), integrator="exact", keep=CHUNK * period,
             progress=lambda fraction, m=memory: m.append(resident_megabytes()),
         )  # fmt: skip
         took = time.perf_counter() - began
@@ -179,7 +179,7 @@ def orbits(last: int) -> None:
 
 def window(model: hs.Model, end: int, period: float) -> hs.Solution:
     """The last CHUNK periods of a run from rest."""
-    sol = hs.simulate(model, (0, end * period), integrator="exact", save=CHUNK * period)
+    sol = hs.simulate(model, (0, end * period), integrator="exact", keep=CHUNK * period)
     assert sol.success, sol.message
     return sol
 

@@ -39,7 +39,7 @@ HEAD = """# The published methods at their own speed
 as a person would write them for this one system, compiled by numba (`docs/studies/rivals/published_rk4.py`).
 
 - 100 periods of 1200 steps, {turns} turns; {machine}
-- Processor time of `hs.simulate(..., save="events")` and of reading the times of events and the states at them. The
+- Processor time of `hs.simulate(..., keep="events")` and of reading the times of events and the states at them. The
   method by hand records its events alone.
 - A ratio is that of two calls of one turn: the median and, in brackets, the middle nine tenths.
 - By hand, a body that is held with v = 0 has no stages. With v kept the force is e at every stage, as Eq. 4 reads.

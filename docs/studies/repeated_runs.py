@@ -71,7 +71,7 @@ def measured(case: Case, turns: int) -> dict[str, float]:
     value, x = here.model.parameter_values()[case.parameter], here.model.start_values()["x"]
 
     def run(model: hs.Model | str, **changes: Any) -> None:
-        sol = hs.simulate(model, (0.0, here.end), save="events", **case.options, **changes)
+        sol = hs.simulate(model, (0.0, here.end), keep="events", **case.options, **changes)
         for component in components:
             sol.event_times(component)
             sol.event_states(component)
@@ -148,7 +148,7 @@ def page(rows: list[str]) -> str:
 A loop over a parameter or a start calls `hs.simulate` with the same structure and other numbers. The structure is
 compiled, bound and checked once. For new numbers the engine checks what depends on them, evaluates the parameters that
 are expressions of them, decides the start in compiled code, and computes the tables of linear modes. The table gives
-medians of processor time in one process, where the calls take turns: the run with `save="events"`, and reading the
+medians of processor time in one process, where the calls take turns: the run with `keep="events"`, and reading the
 times of events and the states at them. Each new value differs in its eighth digit, so that all runs have the same
 events. "By name" is compared with the same packaged model passed as an object.
 

@@ -59,7 +59,7 @@ def adaptive(case: Case, widths: np.ndarray) -> list[tuple[float, float, float]]
         t0 = float(case.orbit.t[0])
         span = (t0, t0 + 40 * case.period)
         sol = hs.simulate(
-            model, span, x0=case.orbit(t0), integrator="dop853", rtol=1e-6, save=10 * case.period
+            model, span, x0=case.orbit(t0), integrator="dop853", rtol=1e-6, keep=10 * case.period
         )
         x = sol(np.linspace(span[1] - case.period, span[1], 4001))[0]
         rows.append((width, float(np.ptp(x)) / 2 / case.amplitude - 1, sol.stats["steps"] / 40))

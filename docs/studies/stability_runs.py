@@ -138,7 +138,7 @@ class Case:
             (t0, t0 + count[0] * self.period),
             x0=self.orbit(t0),
             integrator=method.integrator,
-            save=count[1] * self.period,
+            keep=count[1] * self.period,
             **options,
         )
 

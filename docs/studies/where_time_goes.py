@@ -54,7 +54,7 @@ def run_for_ever(name: str) -> None:
     components = [component.name for component in here.model.all_components()]
 
     def once() -> None:
-        sol = hs.simulate(here.model, (0.0, here.end), save="events", **keywords)  # type: ignore[arg-type]  # as above
+        sol = hs.simulate(here.model, (0.0, here.end), keep="events", **keywords)  # type: ignore[arg-type]  # as above
         for component in components:
             sol.event_times(component)
 

@@ -23,6 +23,7 @@ def refuse_unknown(calls: Iterable[Callable[..., Any]], options: Mapping[str, An
         For a name that no function and no integrator accepts, or an unknown integrator.
     """
     own = {name for call in calls for name in _names(call)}
+    own |= {"save"} if "keep" in own else set()  # the deprecated name of an argument of simulate
     name = integrator_name(options.get("integrator", "auto"))
     classes = [integrator_class(one) for one in (_OF_AUTO if name == "auto" else (name,))]
     known = own | {option for one in classes for option in option_names(one)}

@@ -175,6 +175,6 @@ class ArraysTrajectory(ABC):
         """Raise an error if the run stored no states."""
         if self.save != "all":
             raise UsageError(
-                f"the run was made with save={self.save!r}, which keeps no states between start and end",
-                remedy="simulate it with save='all'",
+                f"the run was made with keep={self.save!r}, which keeps no states between start and end",
+                remedy="simulate it with keep='all'",
             )

@@ -41,7 +41,7 @@ def simulate_mechanical(
     atol: Any = None,
     max_step: float = math.inf,
     t_eval: Sequence[float] | None = None,
-    save: str | float = "all",
+    keep: str | float = "all",
     limits: Mapping[str, float] | None = None,
     progress: Callable[[float], None] | None = None,
     **refused: Any,
@@ -90,15 +90,15 @@ def simulate_mechanical(
             f"`t_span` cannot be {t_span!r}",
             remedy="use t1 >= t0 (time runs forward only), or simulate system.to_model()",
         )
-    if not (isinstance(save, str) and save in ("all", "events", "nothing")):
+    if not (isinstance(keep, str) and keep in ("all", "events", "nothing")):
         raise UsageError(
-            f"`save` cannot be {save!r}", remedy="for a MechanicalSystem use 'all', 'events' or 'nothing'"
+            f"`keep` cannot be {keep!r}", remedy="for a MechanicalSystem use 'all', 'events' or 'nothing'"
         )
     start, relative = _start(system, x0), arguments.relative_tolerance(rtol)
     absolute = _absolute(system, atol, relative, start)
     longest = arguments.step_bound(max_step, "max_step")
     refuse_endless(longest, span, "max_step")
-    grid = None if t_eval is None else arguments.time_grid(t_eval, span, ALL, save)
+    grid = None if t_eval is None else arguments.time_grid(t_eval, span, ALL, keep)
     callback, most = arguments.callback(progress), arguments.run_limits(limits)
     announce_compilation()
     began = time.perf_counter()
@@ -106,19 +106,19 @@ def simulate_mechanical(
         from hybridsim.mechanics.time_stepping.run import SteppedRun
         from hybridsim.mechanics.time_stepping.stepped_trajectory import SteppedTrajectory
 
-        stepped = SteppedRun(system, method, span, start, save == "all", most)
+        stepped = SteppedRun(system, method, span, start, keep == "all", most)
         refuse_longer(stepped.step, longest, name)
         built_in = time.perf_counter() - began
         stepped.go(callback)
         built_in += stepped.compile_time
         cost = (time.perf_counter() - began - built_in, built_in)
-        return Solution(SteppedTrajectory(stepped, grid, str(save), cost))
-    run = MechanicalRun(build(system), span, start, relative, absolute, longest, save == "all", most)
+        return Solution(SteppedTrajectory(stepped, grid, str(keep), cost))
+    run = MechanicalRun(build(system), span, start, relative, absolute, longest, keep == "all", most)
     built_in = time.perf_counter() - began
     run.go(callback)
     built_in += run.compile_time
     cost = (time.perf_counter() - began - built_in, built_in)
-    return Solution(SeriesTrajectory(system, run, grid, str(save), cost))
+    return Solution(SeriesTrajectory(system, run, grid, str(keep), cost))
 
 
 def _start(system: MechanicalSystem, x0: Any) -> np.ndarray:

@@ -94,7 +94,7 @@ class Settings:
     def _limits(self) -> dict[str, Any]:
         limits = {k: v for k, v in vars(self._run.task.limits).items() if math.isfinite(v)}
         found: dict[str, Any] = {"limits": limits} if limits else {}
-        return found if self._run.save == "all" else {**found, "save": self._run.save}
+        return found if self._run.save == "all" else {**found, "keep": self._run.save}
 
     # -- as text --------------------------------------------------------------------------------------------
 
@@ -115,7 +115,7 @@ class Settings:
     def command(self) -> str | None:
         """Return the command line that repeats the run, or None if there is none."""
         call = dict(self.call)
-        save, limits = call.pop("save", "all"), call.pop("limits", {})
+        save, limits = call.pop("keep", "all"), call.pop("limits", {})
         atol = call.get("atol")
         is_possible = (
             self.text is not None and self.t_span[0] == 0.0 and self.t_span[1] > 0.0 and not self.z0

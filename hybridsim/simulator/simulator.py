@@ -95,7 +95,7 @@ class Simulator(CurrentState):
     def _prepared(self, t_span: tuple[float, float], model: Model, x0: Any, z0: Any) -> Run:
         """Return a prepared run with the settings of the simulator."""
         run, _ = prepared(
-            model, t_span, x0=x0, z0=z0, t_eval=None, save="events", limits=None, options=self._options,
+            model, t_span, x0=x0, z0=z0, t_eval=None, keep="events", limits=None, options=self._options,
             keywords=KEYWORDS, **self._settings,
         )  # fmt: skip
         return run
@@ -114,9 +114,10 @@ class Simulator(CurrentState):
         x0: Mapping[str, float] | Sequence[float] | None = None,
         z0: Mapping[str, str] | None = None,
         t_eval: Sequence[float] | None = None,
-        save: str | float = "all",
+        keep: str | float = "all",
         limits: Mapping[str, float] | None = None,
         progress: Callable[[float], None] | None = None,
+        **former: Any,
     ) -> Solution:
         """Simulate a whole span and return its solution, as `simulate` does; the steps of `advance` are not affected.
 
@@ -124,16 +125,12 @@ class Simulator(CurrentState):
         ----------
         t_span : tuple of float
             (t0, t1).
-        params, x0, z0 : mapping, optional
+        params, x0, z0, limits : mapping, optional
             As in `simulate`.
-        t_eval : sequence of float, optional
+        t_eval, keep, progress : optional
             As in `simulate`.
-        save : str or float, optional
-            As in `simulate`.
-        limits : mapping of str to float, optional
-            As in `simulate`.
-        progress : callable, optional
-            As in `simulate`.
+        **former : Any
+            Deprecated names of arguments, as in `simulate`.
 
         Returns
         -------
@@ -141,8 +138,8 @@ class Simulator(CurrentState):
             The solution.
         """
         return simulate(
-            self.model, t_span, params=params, x0=x0, z0=z0, t_eval=t_eval, save=save, limits=limits,
-            progress=progress, **self._settings, **self._options,
+            self.model, t_span, params=params, x0=x0, z0=z0, t_eval=t_eval, keep=keep, limits=limits,
+            progress=progress, **former, **self._settings, **self._options,
         )  # fmt: skip
 
     # -- steps ----------------------------------------------------------------------------------------------

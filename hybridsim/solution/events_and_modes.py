@@ -80,6 +80,6 @@ class EventsAndModes(States):
     def _require_events(self) -> None:
         if self._save == "nothing":
             raise UsageError(
-                "the run was made with save='nothing', which keeps no events and no modes",
-                remedy="simulate it with save='events', or 'last-period'",
+                "the run was made with keep='nothing', which keeps no events and no modes",
+                remedy="simulate it with keep='events', or 'last-period'",
             )

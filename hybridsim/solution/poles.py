@@ -141,7 +141,7 @@ def passed_unseen(system: System, trajectory: Trajectory, x0: np.ndarray, t0: fl
     begun = _Way(system, [start])
     return [
         f"the denominator {d.text} in the rate of {d.state} has different signs at the start and at the end: it may "
-        f"have passed a pole, after which the results are meaningless. Use save='all' to check, or {_REMEDY}"
+        f"have passed a pole, after which the results are meaningless. Use keep='all' to check, or {_REMEDY}"
         for d in every
         if begun.sign(d, 0, float(first.s[0]), x0)
         * way.sign(d, len(way.segments) - 1, float(last.s[-1]), last.x[-1])

@@ -48,7 +48,7 @@ def carried_out(
 
 
 def _close(run: Run, trajectory: Trajectory) -> None:
-    """Add the warnings of the run, and drop data that `save` excludes."""
+    """Add the warnings of the run, and drop data that `keep` excludes."""
     if isinstance(run.system.code, PythonCode):
         run.system.code.report(trajectory)
     for caution in jumps_of(run.model):

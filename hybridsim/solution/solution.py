@@ -94,7 +94,7 @@ class Solution(InPictures):
         Raises
         ------
         UsageError
-            If there is no such event, ``save`` did not keep the data that is needed, or a `MechanicalSystem` was
+            If there is no such event, ``keep`` did not store the data that is needed, or a `MechanicalSystem` was
             simulated.
 
         Examples

@@ -59,7 +59,7 @@ class States:
 
     @property
     def x_end(self) -> np.ndarray:
-        """States (n,) at the end of the run; they are available for every value of ``save``."""
+        """States (n,) at the end of the run; they are available for every value of ``keep``."""
         return self._trajectory.x_end
 
     def __call__(self, t: Any, side: str = "+") -> np.ndarray:
@@ -141,13 +141,13 @@ class States:
             )
         if self._save in ("events", "nothing"):
             raise UsageError(
-                f"the run was made with save={self._save!r}, which keeps no states between start and end",
-                remedy="simulate it with save='all', or store the end of it with save='last-period'",
+                f"the run was made with keep={self._save!r}, which keeps no states between start and end",
+                remedy="simulate it with keep='all', or store the end of it with keep='last-period'",
             )
         if (outside := self._outside(times)) is not None:
             bad, (low, high) = times[outside][0], sorted((self.t_start, self.t_end))
             whole = (
-                "the run" if self._save == "all" else f"the part of the run that save={self._save!r} stores"
+                "the run" if self._save == "all" else f"the part of the run that keep={self._save!r} stores"
             )
             raise UsageError(
                 f"t = {float(bad)!r} is outside {whole}, which covers t = {low!r} to {high!r}",

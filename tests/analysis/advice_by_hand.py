@@ -35,7 +35,7 @@ def smooth(model: hs.Model, force: str, **parameters: float) -> hs.Model:
 
 def last(model: hs.Model, name: str, span: float, kept: float) -> np.ndarray:
     """Samples of a quantity over the end of a long run by `dop853`."""
-    run = hs.simulate(model, (0.0, span), integrator="dop853", rtol=1e-10, save=kept)
+    run = hs.simulate(model, (0.0, span), integrator="dop853", rtol=1e-10, keep=kept)
     return np.asarray(run.output(name, np.linspace(run.t_start, run.t_end, _SAMPLES)))
 
 

@@ -14,7 +14,7 @@ def end(model: hs.Model) -> dict[str, object]:
     load = model.parameter_values()["F0"]
     if load > 39:
         raise RuntimeError("too heavy\nfor this")
-    run = hs.simulate(model, SPAN, save="events")
+    run = hs.simulate(model, SPAN, keep="events")
     x, v = run.y[:, -1]
     return {"x": math.nan if load == 38 else x, "state": [x, v], "events": len(run.events)}
 

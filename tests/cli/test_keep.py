@@ -21,7 +21,7 @@ def test_it_keeps_what_python_keeps(keep: str, hybridsim: Callable, tmp_path: Pa
     code, out, _ = hybridsim(*asked, "--json", "--save", "r.hsol")
     found = json.loads(out)
     save = float(keep) if keep[0] == "0" else keep
-    sol = hs.simulate("dfcs", (0, 0.3), integrator="dop853", save=save)
+    sol = hs.simulate("dfcs", (0, 0.3), integrator="dop853", keep=save)
     assert (
         code == 0
         and found["kept"] == save

@@ -36,7 +36,7 @@ def test_readings_of_the_last_period(hybridsim: Callable) -> None:
     assert code == 0, err
     period = 2 * math.pi / hs.load("dfcs").parameter_values()["omega"]
     for load, amplitude in zip((22.0, 30.0), json.loads(out)["values"]["amplitude.x"], strict=True):
-        x = hs.simulate("dfcs", (0, 40 * period), params={"F0": load}, save="last-period").y[0]
+        x = hs.simulate("dfcs", (0, 40 * period), params={"F0": load}, keep="last-period").y[0]
         # it turns where v is zero: at events
         assert amplitude == pytest.approx(0.5 * (x.max() - x.min()), rel=1e-12)
     code, _, err = hybridsim("sweep", "dfcs", "F0=22,30", *FINAL, "--after", 40)

@@ -26,7 +26,7 @@ READ = 10  # periods at the end of a run
 def steady(model: hs.Model, steps: float, **options) -> hs.Solution:
     """The last ten of forty periods of a run that starts on the exact motion."""
     x0 = [float(value) for value in MOTION.state(60 * PERIOD)[:2]]
-    sol = hs.simulate(model, (0, 40 * PERIOD), x0=x0, step=PERIOD / steps, save=READ * PERIOD, **options)
+    sol = hs.simulate(model, (0, 40 * PERIOD), x0=x0, step=PERIOD / steps, keep=READ * PERIOD, **options)
     assert sol.success, sol.message
     return sol
 

@@ -21,7 +21,7 @@ def test_a_forcing_that_is_far_too_fast_ends_at_the_limit_of_seconds() -> None:
 def test_time_stepping_takes_limits() -> None:
     system = hs.chain_on_belt(3)
     sol = hs.simulate(
-        system, (0, 5000), integrator="moreau", step=1e-3, save="nothing", limits={"steps": 1000}
+        system, (0, 5000), integrator="moreau", step=1e-3, keep="nothing", limits={"steps": 1000}
     )
     assert sol.status == "limit"
     assert 1000 <= sol.stats["steps"] < 5_000_000

@@ -171,11 +171,11 @@ def test_what_is_kept_and_asked_for() -> None:
     whole = hs.simulate(system, (0, 4), integrator="moreau", step=1e-3)
     grid = hs.simulate(system, (0, 4), integrator="moreau", step=1e-3, t_eval=[0.0, 1.2345, 4.0])
     assert (grid.y == whole([0.0, 1.2345, 4.0])).all()
-    events = hs.simulate(system, (0, 4), integrator="moreau", step=1e-3, save="events")
+    events = hs.simulate(system, (0, 4), integrator="moreau", step=1e-3, keep="events")
     assert [e.t for e in events.events] == [e.t for e in whole.events]
     assert (events.x_end == whole.y[:, -1]).all()
     assert (
-        hs.simulate(system, (0, 4), integrator="moreau", step=1e-3, save="nothing").x_end == events.x_end
+        hs.simulate(system, (0, 4), integrator="moreau", step=1e-3, keep="nothing").x_end == events.x_end
     ).all()
     with pytest.raises(hs.UsageError, match="no states"):
         events(1.0)

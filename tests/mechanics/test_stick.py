@@ -17,7 +17,7 @@ def test_a_single_block_at_rest_moves_by_no_bit_in_1e5_periods() -> None:
     period = 2 * math.pi / 1.3
     stuck = hs.MechanicalContact("f", [1.0], 1.0, "coulomb", {"mu": 0.5})
     system = hs.MechanicalSystem([1.0], [0.05], [1.0], [hs.Harmonic(1.3, sin=0.3)], [stuck], q0=[0.1])
-    sol = hs.simulate(system, (0, 1e5 * period), save="nothing")
+    sol = hs.simulate(system, (0, 1e5 * period), keep="nothing")
     assert sol.success
     assert sol.x_end.tolist() == [0.1, 0.0]
     assert sol.stats["events"] == 0
@@ -33,7 +33,7 @@ def test_constraints_over_several_coordinates_hold_to_4_ulp_and_do_not_grow(base
         states = sol(np.linspace(first * period, (first + 100) * period, 300))
         assert np.ptp(states[3:], axis=1).max() > 0.01  # one way to move is left
         assert ulps_off(system, states) <= 4
-    ends = [sol, *(hs.simulate(system, (0, n * period), rtol=1e-6, save="nothing") for n in range(100, 110))]
+    ends = [sol, *(hs.simulate(system, (0, n * period), rtol=1e-6, keep="nothing") for n in range(100, 110))]
     assert ulps_off(system, np.array([run.x_end for run in ends]).T) <= 4
 
 
@@ -71,7 +71,7 @@ def test_restarting_parts_is_as_good_as_restarting_everything() -> None:
         ({"integrator": "dop853"}, "dop853 cannot simulate a MechanicalSystem"),
         ({"t_span": (1, 0)}, "forward only"),
         ({"z0": {"f1": "stick"}}, "does not support `z0`"),
-        ({"save": 3.0}, "`save` cannot be 3.0"),
+        ({"keep": 3.0}, "`keep` cannot be 3.0"),
         ({"x0": {"w": 1.0}}, "contains 'w'"),
         ({"tolerance": 1e-3}, "`tolerance` is an option of moreau"),
     ],

@@ -244,7 +244,7 @@ def test_states_beyond_single_precision_are_stored(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("save", ["all", "events", "last-period", "nothing"])
 def test_a_report_shows_what_the_run_stored(save: str, tmp_path: Path) -> None:
-    page = page_of(hs.simulate("dfcs", (0, 0.1), save=save), tmp_path)
+    page = page_of(hs.simulate("dfcs", (0, 0.1), keep=save), tmp_path)
     assert page.has("events") == (save != "nothing")
     assert (page.data["curves"] is not None) == (save in ("all", "last-period"))
     assert page.has("chart") == (save != "nothing")

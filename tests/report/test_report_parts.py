@@ -101,7 +101,7 @@ def test_a_run_can_be_repeated(
 
 
 def test_what_the_command_line_cannot_repeat_has_python_only() -> None:
-    late = hs.simulate("dfcs", (0.01, 0.05), z0={"f": "slip+"}, save="events")
+    late = hs.simulate("dfcs", (0.01, 0.05), z0={"f": "slip+"}, keep="events")
     settings = Settings(late)
     assert settings.command() is None
     again = called(settings.python("1"))

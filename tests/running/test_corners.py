@@ -45,7 +45,7 @@ def test_corners_are_kept_apart() -> None:
 
 @pytest.mark.parametrize("save", ["events", "last-period", 1.0])
 def test_what_is_kept_of_a_run_does_not_show_them_either(save: str | float) -> None:
-    sol = hs.simulate(rubbing(), (0, 20), save=save)
+    sol = hs.simulate(rubbing(), (0, 20), keep=save)
     whole = hs.simulate(rubbing(), (0, 20))
     assert list(sol.modes) == ["f"]
     assert [event.t for event in sol.events] == [event.t for event in whole.events if event.t >= sol.t_start]

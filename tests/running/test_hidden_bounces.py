@@ -190,7 +190,7 @@ def test_a_fast_oscillator_beside_hidden_bounces_keeps_its_size(integrator: str)
     ball = dropped("1", 0.9, 1 + 2e-5)
     states = [*ball.states, hs.State("x", 1, "1e6*y"), hs.State("y", 0, "-1e6*x")]
     model = hs.Model("both", states=states, impacts=ball.impacts)
-    sol = hs.simulate(model, (0, 0.0399), integrator=integrator, rtol=1e-12, save="events")
+    sol = hs.simulate(model, (0, 0.0399), integrator=integrator, rtol=1e-12, keep="events")
     assert sol.events[-1].target == "closed"
     x, y = sol.y[2:, -1]
     assert x**2 + y**2 == pytest.approx(1, abs=1e-9)
@@ -213,7 +213,7 @@ def test_what_is_kept_does_not_change_where_they_end(integrator: str, save: str 
     ball = by_transitions(0.5, 100)
     falls = falling({ball: 100.2})
     model = hs.Model("clock", states=[*falls.states, hs.State("c", 0, "g_ball/10")], components=[ball])
-    kept = hs.simulate(model, (0, 2), integrator=integrator, save=save)
+    kept = hs.simulate(model, (0, 2), integrator=integrator, keep=save)
     assert kept.y[2, -1] == pytest.approx(limit(0.5), rel=1e-11)
     assert (kept.y[:, -1] == hs.simulate(model, (0, 2), integrator=integrator).y[:, -1]).all()
 

@@ -24,7 +24,7 @@ def braked(rate: str = "B*(v - r*w)/v") -> hs.Model:
 @pytest.mark.parametrize("integrator", ["dop853", "tsit5", "rodas5p", "scipy-rk45"])
 def test_a_run_ends_where_nothing_is_known_beyond(integrator: str, save: str) -> None:
     """m r v + J w = 930 - T t is zero with v and w at t = 3.1, where the slip ratio is 0/0."""
-    sol = hs.simulate(braked(), (0, 10), integrator=integrator, rtol=1e-6, save=save)
+    sol = hs.simulate(braked(), (0, 10), integrator=integrator, rtol=1e-6, keep=save)
     ends = sol.status == "step-failure" and sol.t_end == pytest.approx(3.1, abs=1e-4)
     # where the way is not kept it is said
     told = save != "all" and any("the denominator v in the rate of v" in w for w in sol.warnings)

@@ -198,14 +198,14 @@ def test_the_same_words_find_the_run_that_was_prepared(model: hs.Model) -> None:
     """Only for plain numbers and words; times of output are not among them, and may differ."""
     system_of(model)
     kept = runs_of(model)
-    first = hs.simulate(model, SPAN, integrator="exact", save="events")
+    first = hs.simulate(model, SPAN, integrator="exact", keep="events")
     assert len(kept) == 1
-    again = hs.simulate(model, SPAN, integrator="exact", save="events")
+    again = hs.simulate(model, SPAN, integrator="exact", keep="events")
     assert len(kept) == 1 and again._run is first._run and again is not first
     assert again.stats["compile_time"] == 0.0
     assert [e.t for e in again.events] == [e.t for e in first.events]
-    for other in ({"save": "all"}, {"rtol": 1e-8}, {"max_step": 1.0}):
-        hs.simulate(model, SPAN, **{"integrator": "exact", "save": "events"} | other)
+    for other in ({"keep": "all"}, {"rtol": 1e-8}, {"max_step": 1.0}):
+        hs.simulate(model, SPAN, **{"integrator": "exact", "keep": "events"} | other)
     assert len(kept) == 4
     for not_plain in ({"x0": {"v": 0.1}}, {"z0": {"f": "stick"}}, {"limits": {"events": 3}}):
         hs.simulate(model, SPAN, integrator="exact", **not_plain)
@@ -226,12 +226,12 @@ def test_the_times_of_output_are_those_of_each_call(model: hs.Model) -> None:
 
 
 def test_what_equals_a_number_and_is_none_is_refused_every_time(model: hs.Model) -> None:
-    hs.simulate(model, (0.0, 1.0), integrator="exact", max_step=1.0, save=1.0)
-    for wrong in ({"max_step": True}, {"save": True}):
+    hs.simulate(model, (0.0, 1.0), integrator="exact", max_step=1.0, keep=1.0)
+    for wrong in ({"max_step": True}, {"keep": True}):
         with pytest.raises(hs.UsageError, match="cannot be True"):
-            hs.simulate(model, (0.0, 1.0), integrator="exact", **{"max_step": 1.0, "save": 1.0} | wrong)
+            hs.simulate(model, (0.0, 1.0), integrator="exact", **{"max_step": 1.0, "keep": 1.0} | wrong)
     with pytest.raises(hs.UsageError, match="a value of `t_span` cannot be True"):
-        hs.simulate(model, (0.0, True), integrator="exact", max_step=1.0, save=1.0)
+        hs.simulate(model, (0.0, True), integrator="exact", max_step=1.0, keep=1.0)
 
 
 def test_a_name_that_means_another_class_is_another_run(model: hs.Model) -> None:
@@ -265,7 +265,7 @@ def test_functions_that_change_their_answers_are_asked_each_time() -> None:
 @pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853"])
 def test_a_run_of_events_alone_goes_on_over_many_leaps(model: hs.Model, integrator: str) -> None:
     """Of more segments than one call of the compiled loop has room for; the end is all that is kept of them."""
-    span, keywords = (0.0, 12.0), {"integrator": integrator, "save": "events"}
+    span, keywords = (0.0, 12.0), {"integrator": integrator, "keep": "events"}
     whole = hs.simulate(model, span, **keywords)
     assert len(whole.events) > 3000
     for events in (3, 1100, 2050):

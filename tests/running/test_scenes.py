@@ -22,7 +22,7 @@ def test_a_vibrating_plate_makes_friction_viscous(integrator: str) -> None:
     p = model.parameter_values()
     orbit = hs.steady_state(model, integrator=integrator)
     assert orbit.stick_fraction["f"] == 0
-    sol = hs.simulate(model, (0, 10), integrator=integrator, save="last-period")
+    sol = hs.simulate(model, (0, 10), integrator=integrator, keep="last-period")
     downward = sum(piece.t1 - piece.t0 for piece in sol.modes["f"] if piece.mode == "slip+")
     share = downward * p["omega"] / (2 * pi)
     assert share == pytest.approx((1 + tan(p["alpha"]) / p["mu"]) / 2, rel=1e-7)
@@ -130,7 +130,7 @@ def test_the_duty_of_a_buck_converter(integrator: str) -> None:
     model = hs.load("buck-converter").with_(E=20.0)
     p = model.parameter_values()
     s, x = duty(p)
-    sol = hs.simulate(model, (0, 400 * p["T"]), integrator=integrator, rtol=1e-11, save=1.5 * p["T"])
+    sol = hs.simulate(model, (0, 400 * p["T"]), integrator=integrator, rtol=1e-11, keep=1.5 * p["T"])
     assert sol.y[:2, -1] == pytest.approx(x, rel=1e-8)
     closing = [e.t for e in sol.events if e.target == "closed"][-1]
     assert closing / p["T"] - 399 == pytest.approx(s / p["T"], abs=1e-7)
@@ -141,7 +141,7 @@ def test_the_period_of_a_buck_converter_doubles() -> None:
     for E, period in ((24.4, 1), (24.7, 2)):
         model = hs.load("buck-converter").with_(E=E)
         T = model.parameter_values()["T"]
-        sol = hs.simulate(model, (0, 3000 * T), save=6.5 * T)
+        sol = hs.simulate(model, (0, 3000 * T), keep=6.5 * T)
         at_ticks = np.array([sol(T * k)[0] for k in range(2994, 3000)])
         assert np.ptp(at_ticks[::period]) < 1e-6
         assert period == 1 or np.ptp(at_ticks) > 1e-3
@@ -175,7 +175,7 @@ def test_a_rattling_gear_hits_both_sides_with_one_speed(integrator: str) -> None
 
     V = speed(brentq(misfit, -pi / 2, 0))
     sol = hs.simulate(
-        model, (0, 400 * 2 * pi / omega), integrator=integrator, rtol=1e-10, save=4.5 * pi / omega
+        model, (0, 400 * 2 * pi / omega), integrator=integrator, rtol=1e-10, keep=4.5 * pi / omega
     )
     own = [ev.x_plus[1] + A * omega * cos(omega * ev.t) for ev in sol.events]
     assert len(own) >= 4

@@ -72,7 +72,7 @@ def is_at_once(sol: hs.Solution) -> bool:
 @pytest.mark.parametrize("engine", ENGINES)
 def test_what_is_made_later_is_what_was_made_at_once(engine: str, save: str) -> None:
     for model, end in ((hs.load("dfcs"), 0.5), (pair(), 60.0), (struck(), 100.0)):
-        options: dict[str, Any] = {"integrator": engine, "save": save}
+        options: dict[str, Any] = {"integrator": engine, "keep": save}
         wanted = content(hs.simulate(model, (0, end), limits=ENOUGH, **options), save)
         hs.simulate(model, (0, end), **options)
         sol = hs.simulate(model, (0, end), **options)
@@ -106,16 +106,16 @@ def test_events_and_states_alone_make_no_record(engine: str) -> None:
 def test_what_waits_takes_no_more_memory_than_what_is_made(engine: str, save: str) -> None:
     model = pair()
     for _ in range(40):  # machine code is made, or read, once modes have taken many steps
-        hs.simulate(model, (0, 20), integrator=engine, save=save)
+        hs.simulate(model, (0, 20), integrator=engine, keep=save)
 
     def held(**options: Any) -> int:
         """Bytes that sixteen solutions hold."""
         # leaves free as many blocks of memory as are ever kept to be handed on
-        before = [hs.simulate(model, (0, 20), integrator=engine, save=save, **options) for _ in range(8)]
+        before = [hs.simulate(model, (0, 20), integrator=engine, keep=save, **options) for _ in range(8)]
         del before
         gc.collect()
         tracemalloc.start()
-        kept = [hs.simulate(model, (0, 20), integrator=engine, save=save, **options) for _ in range(16)]
+        kept = [hs.simulate(model, (0, 20), integrator=engine, keep=save, **options) for _ in range(16)]
         gc.collect()
         size = tracemalloc.get_traced_memory()[0]
         tracemalloc.stop()
@@ -139,7 +139,7 @@ def test_a_run_that_is_over_is_let_go_at_once(engine: str, options: dict[str, An
     gc.disable()
     try:
         for _ in range(3):
-            hs.simulate(model, (0, 30), integrator=engine, save="nothing", **options)
+            hs.simulate(model, (0, 30), integrator=engine, keep="nothing", **options)
         made = [
             o
             for o in gc.get_objects()

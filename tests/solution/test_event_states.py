@@ -22,8 +22,8 @@ CASES = [
 @pytest.mark.parametrize("save", ["all", "events"])
 def test_they_are_those_of_the_objects(name: str, end: float, options: dict[str, object], save: str) -> None:
     model = hs.load(name)
-    sol = hs.simulate(model, (0.0, end), save=save, **options)
-    again = hs.simulate(model, (0.0, end), save=save, **options)
+    sol = hs.simulate(model, (0.0, end), keep=save, **options)
+    again = hs.simulate(model, (0.0, end), keep=save, **options)
     assert sol.events
     for component in {e.component for e in sol.events}:
         mine = [e for e in sol.events if e.component == component]

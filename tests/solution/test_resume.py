@@ -169,8 +169,8 @@ assert part.status == "limit" and "MB" in part.message, part.message
 
 @pytest.mark.parametrize("save", ["events", "last-period", "nothing", 0.01])
 def test_what_was_kept_goes_on(save: str | float) -> None:
-    whole = hs.simulate("dfcs", (0.0, 0.2), integrator="dop853", save=save)
-    part = hs.simulate("dfcs", (0.0, 0.1), integrator="dop853", save=save).resume(0.2)
+    whole = hs.simulate("dfcs", (0.0, 0.2), integrator="dop853", keep=save)
+    part = hs.simulate("dfcs", (0.0, 0.1), integrator="dop853", keep=save).resume(0.2)
     assert (whole.y[:, -1] == part.y[:, -1]).all() and whole.t_end == part.t_end
     if save != "nothing":
         assert [e.t for e in whole.events] == [e.t for e in part.events]
@@ -310,8 +310,8 @@ def test_what_is_kept_does_not_change_where_a_resumed_run_rests(
     ball = hs.Component("ball", modes, initial="flight", limit=stop)
     states = [hs.State("h", 1e6 + 0.2, "w"), hs.State("w", 0, "-g"), hs.State("clock", 0, "g/10")]
     model = hs.Model("far", states=states, components=[ball])
-    whole = hs.simulate(model, (0, 5), integrator=integrator, save=save)
-    part = hs.simulate(model, (0, 5), integrator=integrator, save=save, limits={"events": 72})
+    whole = hs.simulate(model, (0, 5), integrator=integrator, keep=save)
+    part = hs.simulate(model, (0, 5), integrator=integrator, keep=save, limits={"events": 72})
     assert part.status == "limit"
     part.save(tmp_path / "part.hsol")
     for rest in (part.resume(), hs.load_solution(tmp_path / "part.hsol").resume()):

@@ -35,22 +35,22 @@ def again(whole: hs.Solution, **options) -> hs.Solution:
 
 def test_events_alone(whole: hs.Solution) -> None:
     """All events and modes, the state at the end, no states between."""
-    sol = again(whole, save="events")
+    sol = again(whole, keep="events")
     assert rows(sol.events) == rows(whole.events)
     assert sol.modes == whole.modes
     assert (sol.t_start, sol.t_end) == SPAN
     assert sol.t.tolist() == [whole.t_end]
     assert (sol.y[:, 0] == whole.y[:, -1]).all()
-    with pytest.raises(UsageError, match="save='events'"):
+    with pytest.raises(UsageError, match="keep='events'"):
         sol(sol.t_end)
-    with pytest.raises(UsageError, match="save='events'"):
+    with pytest.raises(UsageError, match="keep='events'"):
         sol.output("f", 0.01)
 
 
 @pytest.mark.parametrize("save", ["last-period", 0.7 * PERIOD])
 def test_the_last_stretch(whole: hs.Solution, save: str | float) -> None:
     """It begins at its exact time, inside a step, and holds what the whole run holds there."""
-    sol = again(whole, save=save)
+    sol = again(whole, keep=save)
     length = PERIOD if save == "last-period" else save
     assert sol.t_start == sol.t[0] == pytest.approx(SPAN[1] - length, rel=1e-15)
     assert sol.t_end == sol.t[-1] == SPAN[1]
@@ -64,33 +64,33 @@ def test_the_last_stretch(whole: hs.Solution, save: str | float) -> None:
     for name, intervals in sol.modes.items():
         assert intervals[0].t0 == sol.t_start
         assert [i.mode for i in intervals] == [i.mode for i in whole.modes[name][-len(intervals) :]]
-    with pytest.raises(UsageError, match="outside the part of the run that save="):
+    with pytest.raises(UsageError, match="outside the part of the run that keep="):
         sol(0.5 * sol.t_start)
 
 
 def test_nothing_but_the_end(whole: hs.Solution) -> None:
-    sol = again(whole, save="nothing")
+    sol = again(whole, keep="nothing")
     assert sol.t.tolist() == [whole.t_end]
     assert (sol.y[:, 0] == whole.y[:, -1]).all()
     counts = ("steps", "rejected", "rhs_evaluations", "guard_evaluations", "events", "restarts")
     assert [sol.stats[name] for name in counts] == [whole.stats[name] for name in counts]
     assert (sol.status, sol.message) == (whole.status, whole.message)
     for ask in (lambda: sol.events, lambda: sol.modes, lambda: sol.event_times("f"), lambda: sol(0.0)):
-        with pytest.raises(UsageError, match="save='nothing'"):
+        with pytest.raises(UsageError, match="keep='nothing'"):
             ask()
     assert "not kept" in repr(sol)
     assert "finished" in sol._repr_html_()
 
 
 def test_a_stretch_longer_than_the_run_is_the_run(whole: hs.Solution) -> None:
-    sol = again(whole, save=10 * SPAN[1])
+    sol = again(whole, keep=10 * SPAN[1])
     assert (sol.t == whole.t).all() and (sol.y == whole.y).all()
     assert rows(sol.events) == rows(whole.events)
 
 
 def test_a_grid_in_the_last_stretch() -> None:
     grid = np.linspace(4.5 * PERIOD, SPAN[1], 11)
-    sol = hs.simulate(DFCS, SPAN, save="last-period", t_eval=grid)
+    sol = hs.simulate(DFCS, SPAN, keep="last-period", t_eval=grid)
     assert sol.t.tolist() == grid.tolist()
     assert (sol.y == hs.simulate(DFCS, SPAN, t_eval=grid).y).all()
 
@@ -99,14 +99,14 @@ def test_the_kept_times_lie_within_what_is_kept() -> None:
     """The first of them was rounded otherwise than the start of it: found by trial, one run in two thousand."""
     t0 = 1e-2 * (1 + 246 / 97)
     options = {"integrator": "rk4-dichotomy", "eps_v": 1e-9, "stick_velocity": "zero", "step": PERIOD / 7}
-    sol = hs.simulate(DFCS, (t0, t0 + 40 * PERIOD), x0=[1.4e-4, -0.19], save=10 * PERIOD, **options)
+    sol = hs.simulate(DFCS, (t0, t0 + 40 * PERIOD), x0=[1.4e-4, -0.19], keep=10 * PERIOD, **options)
     assert (sol.t[0], sol.t[-1]) == (sol.t_start, sol.t_end)
     assert np.isfinite(sol(sol.t)).all()
 
 
 def test_backward_in_time_the_last_stretch_is_the_earliest() -> None:
     model = hs.Model("turn", states=[hs.State("x", 1, "v"), hs.State("v", 0, "-x")])
-    whole, sol = (hs.simulate(model, (10, 0), rtol=1e-10, save=save) for save in ("all", 2.0))
+    whole, sol = (hs.simulate(model, (10, 0), rtol=1e-10, keep=save) for save in ("all", 2.0))
     assert (sol.t_start, sol.t_end) == (2.0, 0.0)
     grid = np.linspace(2, 0, 41)
     assert (sol(grid) == whole(grid)).all()
@@ -119,7 +119,7 @@ def test_a_run_that_stops_early_keeps_the_last_stretch_before() -> None:
     model = hs.Model(
         "ended", ball.states, parameters=ball.parameters, components=ball.components, monitors=[end]
     )
-    whole, sol = (hs.simulate(model, (0, 3), save=save) for save in ("all", 0.2))
+    whole, sol = (hs.simulate(model, (0, 3), keep=save) for save in ("all", 0.2))
     assert sol.status == whole.status == "terminated"
     assert sol.t_end == whole.t_end < 3
     assert sol.t_start == pytest.approx(whole.t_end - 0.2, rel=1e-14)
@@ -145,7 +145,7 @@ def test_modes_out_of_events_with_transitions_at_both_ends() -> None:
         components=[gate],
         schedules=ticks,
     )
-    whole, sol = (hs.simulate(model, (0, 2), save=save) for save in ("all", "events"))
+    whole, sol = (hs.simulate(model, (0, 2), keep=save) for save in ("all", "events"))
     assert sol.modes == whole.modes
     assert [i.mode for i in sol.modes["gate"]] == ["open", "done"]
 
@@ -153,26 +153,52 @@ def test_modes_out_of_events_with_transitions_at_both_ends() -> None:
 @pytest.mark.parametrize(
     ("save", "said"),
     [
-        ("some", "`save` cannot be 'some'"),
-        (-1.0, "`save` cannot be -1.0"),
-        (0, "`save` cannot be 0"),
-        (math.nan, "`save` cannot be nan"),
-        (None, "`save` cannot be None"),
-        (True, "`save` cannot be True"),
+        ("some", "`keep` cannot be 'some'"),
+        (-1.0, "`keep` cannot be -1.0"),
+        (0, "`keep` cannot be 0"),
+        (math.nan, "`keep` cannot be nan"),
+        (None, "`keep` cannot be None"),
+        (True, "`keep` cannot be True"),
     ],
 )
 def test_what_save_cannot_be(save: object, said: str) -> None:
     with pytest.raises(UsageError, match=said):
-        hs.simulate(DFCS, (0, 0.01), save=save)
+        hs.simulate(DFCS, (0, 0.01), keep=save)
+
+
+def deprecated(call) -> hs.Solution:
+    """The run of a call with the former name, after checking that the warning names the new one and this file."""
+    with pytest.warns(DeprecationWarning, match=r"simulate\(keep=\.\.\.\) is deprecated.*keep=") as caught:
+        sol = call()
+    assert [warning.filename for warning in caught] == [__file__]
+    return sol
+
+
+def test_the_former_name_does_the_same_and_warns() -> None:
+    for call in (
+        lambda: hs.simulate(DFCS, (0, 0.01), keep="nothing"),
+        lambda: hs.Simulator(DFCS).run((0, 0.01), keep="nothing"),
+        lambda: hs.simulate(hs.two_blocks_on_belt(), (0, 0.1), keep="nothing"),
+    ):
+        with pytest.raises(UsageError, match="keep='nothing'"):
+            _ = deprecated(call).events
+    with pytest.raises(UsageError, match="has no argument 'sve'"):
+        hs.Simulator(DFCS).run((0, 0.01), sve="all")
+
+
+def test_analyses_take_the_former_name_too() -> None:
+    with pytest.warns(DeprecationWarning, match="Use keep="):
+        found = hs.sweep(DFCS, {"F0": [30.0]}, "final.x", t_span=(0, 0.01), keep="events", workers=1)
+    assert found.status.tolist() == ["ok"]
 
 
 def test_what_does_not_go_together() -> None:
     with pytest.raises(UsageError, match="no forcing period"):
-        hs.simulate("bouncing-ball", (0, 1), save="last-period")
+        hs.simulate("bouncing-ball", (0, 1), keep="last-period")
     with pytest.raises(UsageError, match="`t_eval` needs the states"):
-        hs.simulate(DFCS, (0, 0.01), save="events", t_eval=[0.0])
+        hs.simulate(DFCS, (0, 0.01), keep="events", t_eval=[0.0])
     with pytest.raises(UsageError, match="`t_eval` contains times before"):
-        hs.simulate(DFCS, (0, 1), save=0.5, t_eval=[0.1, 0.9])
+        hs.simulate(DFCS, (0, 1), keep=0.5, t_eval=[0.1, 0.9])
 
 
 @pytest.mark.parametrize("integrator", ["taylor", "dop853", "rk4-dichotomy"])
@@ -188,7 +214,7 @@ def test_memory_does_not_grow_with_the_run(
 
     def peak(count: int, keep: str) -> int:
         tracemalloc.start()
-        sol = hs.simulate(DFCS, (0, count * PERIOD), integrator=integrator, save=keep)
+        sol = hs.simulate(DFCS, (0, count * PERIOD), integrator=integrator, keep=keep)
         found = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
         assert sol.success and sol.stats["events"] >= 3 * count

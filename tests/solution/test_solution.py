@@ -87,7 +87,7 @@ def test_modes_cover_the_run_without_gaps(ball: hs.Solution) -> None:
 
 @pytest.mark.parametrize("save", ["all", "events"])
 def test_modes_of_no_component_are_refused(save: str) -> None:
-    modes = hs.simulate("dfcs", (0, 10), save=save).modes
+    modes = hs.simulate("dfcs", (0, 10), keep=save).modes
     with pytest.raises(UsageError, match="no component 'f3'\ndid you mean 'f'"):
         modes["f3"]
     assert modes.get("f3") is None and list(modes) == ["f"]

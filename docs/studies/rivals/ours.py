@@ -31,7 +31,7 @@ def method(
         components = [component.name for component in model.all_components()]
 
         def events() -> Any:
-            sol = hs.simulate(model, span, save="events", **keywords)
+            sol = hs.simulate(model, span, keep="events", **keywords)
             return sol, sol.events if objects else happened(sol), None
 
         def on_grid() -> Any:

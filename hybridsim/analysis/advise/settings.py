@@ -96,7 +96,7 @@ class _Settling:
     def ask(self, model: Model, name: str, options: Mapping[str, Any], watch: Watch | None = None) -> Answer:
         stopwatch = Stopwatch()
         try:
-            solution = simulate(model, self.span, integrator=name, save=self.save, progress=watch, **options)
+            solution = simulate(model, self.span, integrator=name, keep=self.save, progress=watch, **options)
             seconds = stopwatch.seconds
             if not solution.success:
                 raise NoAnswer(f"{solution.status}: {solution.message}")

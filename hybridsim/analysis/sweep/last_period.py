@@ -60,7 +60,7 @@ class LastPeriod:
     def run(self, model: Model, previous: Any) -> MeasuredPeriod:
         """Run the model up to the end of the measured period."""
         period = period_of(model)
-        solution = simulate(model, (0.0, self.after * period), **{**self.options, "save": period})
+        solution = simulate(model, (0.0, self.after * period), **{**self.options, "keep": period})
         if not solution.success:
             raise SimulationError(f"{solution.status}: {solution.message}")
         return MeasuredPeriod(solution, period)

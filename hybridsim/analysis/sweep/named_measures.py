@@ -75,7 +75,7 @@ class Final:
 
     def run(self, model: Model, previous: Any) -> dict[str, float]:
         """Return the final states by name; with `warm_start`, the run begins at the previous end."""
-        arguments = {"save": "nothing", **self.options}
+        arguments = {"keep": "nothing", **self.options}
         if previous is not None:
             arguments["x0"] = previous
         solution = simulate(model, **arguments)
@@ -148,7 +148,7 @@ def named_measure(
 
 def _last_period(reading_names: tuple[str, ...], model: Model, options: dict[str, Any]) -> LastPeriod:
     after = whole(options.pop(AFTER), AFTER)
-    for name in ("t_span", "save", "t_eval"):
+    for name in ("t_span", "keep", "save", "t_eval"):
         if name in options:
             raise UsageError(f"`{name}` and `after` cannot be combined", remedy=f"remove `{name}`")
     period_of(model)  # an unforced model is refused here, once for all points

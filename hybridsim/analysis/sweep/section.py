@@ -75,7 +75,7 @@ class Section:
                 remedy="set `section` to an expression that passes zero upward, such as 'v'",
             )
         times = period * np.arange(self.settle + 1, self.settle + self.samples + 1)
-        run = motion.run(start, float(times[-1]), save=self.samples * period)
+        run = motion.run(start, float(times[-1]), keep=self.samples * period)
         return Passings(run(times, side="-").T, _sizes(run), point_at_end(run))
 
     def _passed(self, motion: Motion, start: Point | None) -> Passings:

@@ -101,7 +101,7 @@ def sensitivities(
     Parameters
     ----------
     solution : Solution
-        A run of `simulate`, forward in time, with save="all". The derivatives are as accurate as this run.
+        A run of `simulate`, forward in time, with keep="all". The derivatives are as accurate as this run.
     parameters : sequence of str, optional
         Names of the parameters; by default all.
     starts_follow : bool, optional
@@ -201,8 +201,8 @@ def _found(
 def _refuse(solution: Solution) -> None:
     if solution._save != "all":
         raise UsageError(
-            f"the run was made with save={solution._save!r}, but derivatives need all of the run",
-            remedy="simulate it with save='all'",
+            f"the run was made with keep={solution._save!r}, but derivatives need all of the run",
+            remedy="simulate it with keep='all'",
         )
     if solution.t_end <= solution.t_start:
         raise UsageError("`solution` does not run forward in time", remedy="use a run with t1 > t0")

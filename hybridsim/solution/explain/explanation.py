@@ -328,8 +328,8 @@ def _segment_before(solution: Solution, occurrence: Occurrence) -> Segment | Non
     """Return the segment that ends with an event, or None."""
     if solution._save != "all":
         raise UsageError(
-            f"the run was made with save={solution._save!r}",
-            remedy="simulate it with save='all' to explain events",
+            f"the run was made with keep={solution._save!r}",
+            remedy="simulate it with keep='all' to explain events",
         )
     segments = solution._segments
     last = int(np.searchsorted(solution._of_model.frame.starts, float(occurrence.instant), side="right"))

@@ -61,7 +61,7 @@ def test_the_upper_fold_is_where_a_slow_rise_of_the_frequency_falls_off(branch: 
             hardening().with_(w=w),
             (0.0, 300.0 * 2.0 * np.pi / w),
             x0=start,
-            save="last-period",
+            keep="last-period",
             integrator="dop853",
         )
         return bool(np.abs(run.y[0]).max() > 1.0)

@@ -54,7 +54,7 @@ def by_itself(model: hs.Model, after: int, word: str) -> float:
     """A reading from an ordinary run of `exact`, by its dense output where it is of a state."""
     omega = model.parameter_values()["omega" if "omega" in model.parameter_values() else "w"]
     period = 2.0 * math.pi / omega
-    run = hs.simulate(model, (0.0, after * period), integrator="exact", save=period)
+    run = hs.simulate(model, (0.0, after * period), integrator="exact", keep=period)
     assert run.success, run.message
     head, _, name = word.partition(".")
     if head == "period":
@@ -185,8 +185,8 @@ def test_what_has_no_last_period_is_refused() -> None:
         hs.sweep("belt", {"v_belt": [0.1]}, ["amplitude.x"], after=10)
     with pytest.raises(UsageError, match="`after` cannot be 0"):
         hs.sweep("dfcs", {"F0": [30.0]}, ["amplitude.x"], after=0)
-    with pytest.raises(UsageError, match="`save` and `after` cannot be combined"):
-        hs.sweep("dfcs", {"F0": [30.0]}, ["amplitude.x"], after=3, save="all")
+    with pytest.raises(UsageError, match="`keep` and `after` cannot be combined"):
+        hs.sweep("dfcs", {"F0": [30.0]}, ["amplitude.x"], after=3, keep="all")
     with pytest.raises(UsageError, match="kind belongs to a steady state"):
         hs.sweep("dfcs", {"F0": [30.0]}, ["kind"], after=3)
 

@@ -55,7 +55,7 @@ def test_what_does_not_repeat_says_its_kind() -> None:
 def test_the_end_of_a_run() -> None:
     found = hs.sweep("dfcs", {"F0": LOADS}, "final", t_span=(0, 0.03))
     for k, load in enumerate(LOADS):
-        run = hs.simulate("dfcs", (0, 0.03), params={"F0": load}, save="nothing")
+        run = hs.simulate("dfcs", (0, 0.03), params={"F0": load}, keep="nothing")
         assert [found["final.x"][k], found["final.v"][k]] == run.y[:, -1].tolist()
     chained = hs.sweep("dfcs", {"F0": [22.0, 22.0]}, "final.x", warm_start=True, t_span=(0, 0.03))
     once = hs.simulate("dfcs", (0, 0.03), params={"F0": 22.0})

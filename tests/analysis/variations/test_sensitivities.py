@@ -90,7 +90,7 @@ def test_what_cannot_be_differentiated_is_refused() -> None:
     with pytest.raises(UsageError, match="input"):
         hs.sensitivities(solution)
     with pytest.raises(UsageError, match="save"):
-        hs.sensitivities(hs.simulate("dfcs", (0.0, 0.1), save="events"))
+        hs.sensitivities(hs.simulate("dfcs", (0.0, 0.1), keep="events"))
     with pytest.raises(UsageError, match="'nu'"):
         hs.sensitivities(hs.simulate("dfcs", (0.0, 0.1)), ["nu"])
 

@@ -81,7 +81,7 @@ def test_entries_and_exits_of_a_forced_relay(integrator: str) -> None:
 def test_a_hundred_thousand_periods_of_a_forced_relay() -> None:
     leaves, back = crossings(1.2)
     count = 200_000  # half periods
-    solution = run(FORCED, count * math.pi, integrator="exact", save="events")
+    solution = run(FORCED, count * math.pi, integrator="exact", keep="events")
     times = np.array([event.t for event in solution.events])
     expected = np.array([t + k * math.pi for k in range(count) for t in (leaves, back)])
     assert len(times) == len(expected)
@@ -101,7 +101,7 @@ def test_no_drift_off_a_circle(integrator: str) -> None:
 @pytest.mark.slow
 def test_no_drift_in_a_hundred_thousand_turns() -> None:
     end = 2e5 * math.pi
-    solution = run(ALONG_A_CIRCLE, end, integrator="taylor", rtol=1e-10, save=20 * math.pi)
+    solution = run(ALONG_A_CIRCLE, end, integrator="taylor", rtol=1e-10, keep=20 * math.pi)
     x, y = solution(np.linspace(end - 20 * math.pi, end, 5001))
     assert np.abs(x**2 + y**2 - 1).max() <= 4.5e-16
 

@@ -178,7 +178,7 @@ import hybridsim as hs
 from engine.system.test_many_modes import bits, one_way_chain
 
 for other in (4.0, 8.0)[: int(sys.argv[1])]:  # with these its vectors of modes are met in another order
-    hs.simulate(one_way_chain(4), (0, 200), params={"F": other}, integrator="exact", save="nothing")
+    hs.simulate(one_way_chain(4), (0, 200), params={"F": other}, integrator="exact", keep="nothing")
 print(repr(bits(hs.load_solution(sys.argv[2]).resume())))
 """
 
@@ -226,10 +226,10 @@ def test_tables_of_many_values_do_not_fill_the_memory(monkeypatch: pytest.Monkey
     kept = cached_tables(system_of(model))
     kept.clear()
     for end in (1.0, 20.0, 400.0):  # a table for each order of magnitude
-        hs.simulate(model, (0, end), integrator="exact", save="nothing")
+        hs.simulate(model, (0, end), integrator="exact", keep="nothing")
     assert len(kept) >= 3
     most = max(made.rows.size for made in kept.values())
     monkeypatch.setattr("hybridsim.engine.linear.tables._MAX_BYTES", most)
-    hs.simulate(model, (0, 0.01), integrator="exact", save="nothing")
+    hs.simulate(model, (0, 0.01), integrator="exact", keep="nothing")
     assert len(kept) == 1 or sum(made.rows.size for made in kept.values()) <= most
     assert len(kept) < 3

@@ -23,7 +23,7 @@ METHODS: list[tuple[str, dict[str, Any]]] = [
 
 
 def run(name: str, options: dict[str, Any], save: str | float) -> hs.Solution:
-    return hs.simulate("dfcs", (0.0, 7.3 * PERIOD), params=PARAMS, integrator=name, save=save, **options)
+    return hs.simulate("dfcs", (0.0, 7.3 * PERIOD), params=PARAMS, integrator=name, keep=save, **options)
 
 
 @pytest.mark.parametrize(("name", "options"), METHODS)

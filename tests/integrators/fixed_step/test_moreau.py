@@ -79,9 +79,9 @@ def test_theta_one_half_keeps_the_energy_of_a_free_vibration() -> None:
 def test_a_step_may_hold_many_events() -> None:
     """Thirty steps a period, fewer than a method that locates four events would care to take; nothing is missed."""
     period = 2 * math.pi / (0.6 * math.sqrt(5e5))
-    exact = hs.simulate("dfcs", (0, 50 * period), integrator="exact", save=2 * period)
+    exact = hs.simulate("dfcs", (0, 50 * period), integrator="exact", keep=2 * period)
     coarse = hs.simulate(
-        "dfcs", (0, 50 * period), integrator="moreau", steps_per_period=30.0, save=2 * period
+        "dfcs", (0, 50 * period), integrator="moreau", steps_per_period=30.0, keep=2 * period
     )
     assert np.abs(coarse.y[0]).max() == pytest.approx(np.abs(exact.y[0]).max(), rel=0.02)
 

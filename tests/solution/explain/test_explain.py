@@ -97,8 +97,8 @@ def test_what_cannot_be_explained() -> None:
     for number in (99, -99, 0.5, True):
         with pytest.raises(hs.UsageError, match="there is no event"):
             sol.explain(number)
-    with pytest.raises(hs.UsageError, match="save='events'"):
-        hs.simulate("dfcs", (0.0, 0.01), save="events").explain(0)
+    with pytest.raises(hs.UsageError, match="keep='events'"):
+        hs.simulate("dfcs", (0.0, 0.01), keep="events").explain(0)
 
 
 def test_the_command_line_explains(capsys: pytest.CaptureFixture[str]) -> None:

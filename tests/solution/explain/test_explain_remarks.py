@@ -181,7 +181,7 @@ def test_events_of_one_instant_are_listed_in_their_order(integrator: str) -> Non
 
 
 def test_an_event_alone_has_no_remarks_and_little_is_explained_of_a_run_that_kept_little() -> None:
-    sol = hs.simulate(guarded("x", 1.0, "-1", monitors=[hs.Monitor("m", "x - 0.5")]), (0, 2), save="events")
+    sol = hs.simulate(guarded("x", 1.0, "-1", monitors=[hs.Monitor("m", "x - 0.5")]), (0, 2), keep="events")
     assert sol.explain(0).remarks == ()
     assert hs.simulate(guarded("x", 1.0, "-1"), (0, 2)).explain(0).remarks == ()
 

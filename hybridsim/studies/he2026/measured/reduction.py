@@ -121,7 +121,7 @@ def _stribeck(point: Point) -> ExactState:
         (0.0, _STRIBECK_PERIODS * point.period),
         params=point.params,
         integrator="taylor",
-        save="last-period",
+        keep="last-period",
     )
     return measured(solution, point)
 

@@ -81,7 +81,7 @@ def _start(point: Point) -> tuple[float, tuple[float, float]]:
         (0.0, settling_periods(point) * point.period),
         params=point.params,
         integrator="exact",
-        save="last-period",
+        keep="last-period",
     )
     x, v = solution.y[:, -1].tolist()
     return measured(solution, point).amplitude, (x, v)
@@ -102,7 +102,7 @@ def _coarsest(variant: Variant, point: Point, start: tuple[float, tuple[float, f
             params=point.params,
             x0=state,
             integrator=variant.integrator,
-            save=_LAST * point.period,
+            keep=_LAST * point.period,
             steps_per_period=float(setting if by_steps else STEPS_PER_PERIOD),
             **options,
         )

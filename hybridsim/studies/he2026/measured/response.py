@@ -77,7 +77,7 @@ def _response(point: Point, variant: Variant | None, size: Size) -> Response:
             (0.0, periods * point.period),
             params=point.params,
             integrator="exact",
-            save=last_periods * point.period,
+            keep=last_periods * point.period,
         )
     else:
         periods = size.periods

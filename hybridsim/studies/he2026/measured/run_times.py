@@ -103,7 +103,7 @@ def _run(point: Point, variant: Variant | None, eps: float, periods: int) -> Cos
         (0.0, periods * point.period),
         params=point.params,
         integrator="exact" if variant is None else variant.integrator,
-        save="last-period",
+        keep="last-period",
         **options,
     )
     return Cost(float(solution.stats["wall_time"]), int(solution.stats["rhs_evaluations"]))

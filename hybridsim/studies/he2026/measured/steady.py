@@ -76,7 +76,7 @@ def exact(point: Point, periods: int | None = None) -> ExactState:
         (0.0, count * point.period),
         params=point.params,
         integrator="exact",
-        save="last-period",
+        keep="last-period",
     )
     return measured(solution, point)
 
@@ -126,7 +126,7 @@ def solve_by_steps(
         (0.0, periods * point.period),
         params=point.params,
         integrator=variant.integrator,
-        save=last * point.period,
+        keep=last * point.period,
         steps_per_period=float(steps),
         **options,
     )
