@@ -95,7 +95,7 @@ class Simulator(CurrentState):
     def _prepared(self, t_span: tuple[float, float], model: Model, x0: Any, z0: Any) -> Run:
         """Return a prepared run with the settings of the simulator."""
         run, _ = prepared(
-            model, t_span, x0=x0, z0=z0, t_eval=None, keep="events", limits=None, options=self._options,
+            model, t_span, x0=x0, z0=z0, t_eval=None, save="events", limits=None, options=self._options,
             keywords=KEYWORDS, **self._settings,
         )  # fmt: skip
         return run

@@ -107,7 +107,7 @@ def test_what_was_not_measured_is_no_attribute() -> None:
     assert run("moreau").work["friction"] < 0.0 and as_model().nfev > 0
 
 
-@pytest.mark.parametrize("picture", [plot.time_history, plot.phase_portrait, plot.friction_loop])
+@pytest.mark.parametrize("picture", [plot.phase_portrait, plot.friction_loop])
 def test_pictures_are_refused_with_a_way_to_one(picture: Any) -> None:
     with pytest.raises(hs.UsageError, match=r"Solution of two-blocks") as caught:
         picture(run("taylor"))

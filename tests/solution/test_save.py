@@ -168,7 +168,7 @@ def test_what_save_cannot_be(save: object, said: str) -> None:
 
 def deprecated(call) -> hs.Solution:
     """The run of a call with the former name, after checking that the warning names the new one and this file."""
-    with pytest.warns(DeprecationWarning, match=r"simulate\(keep=\.\.\.\) is deprecated.*keep=") as caught:
+    with pytest.warns(DeprecationWarning, match=r"simulate\(save=\.\.\.\) is deprecated.*keep=") as caught:
         sol = call()
     assert [warning.filename for warning in caught] == [__file__]
     return sol
@@ -176,9 +176,9 @@ def deprecated(call) -> hs.Solution:
 
 def test_the_former_name_does_the_same_and_warns() -> None:
     for call in (
-        lambda: hs.simulate(DFCS, (0, 0.01), keep="nothing"),
-        lambda: hs.Simulator(DFCS).run((0, 0.01), keep="nothing"),
-        lambda: hs.simulate(hs.two_blocks_on_belt(), (0, 0.1), keep="nothing"),
+        lambda: hs.simulate(DFCS, (0, 0.01), save="nothing"),
+        lambda: hs.Simulator(DFCS).run((0, 0.01), save="nothing"),
+        lambda: hs.simulate(hs.two_blocks_on_belt(), (0, 0.1), save="nothing"),
     ):
         with pytest.raises(UsageError, match="keep='nothing'"):
             _ = deprecated(call).events
@@ -188,7 +188,7 @@ def test_the_former_name_does_the_same_and_warns() -> None:
 
 def test_analyses_take_the_former_name_too() -> None:
     with pytest.warns(DeprecationWarning, match="Use keep="):
-        found = hs.sweep(DFCS, {"F0": [30.0]}, "final.x", t_span=(0, 0.01), keep="events", workers=1)
+        found = hs.sweep(DFCS, {"F0": [30.0]}, "final.x", t_span=(0, 0.01), save="events", workers=1)
     assert found.status.tolist() == ["ok"]
 
 
