@@ -13,6 +13,7 @@ from hybridsim.errors import UsageError, nearest
 from hybridsim.model import Model
 from hybridsim.model.library import loaded
 from hybridsim.model.parts.remedies import remedy_for_state
+from hybridsim.presentation.progress_bar import callback as callback
 
 if TYPE_CHECKING:
     from hybridsim.engine.record.limits import Limits
@@ -251,13 +252,6 @@ def refuse_unused(method: Integrator, **tolerances: Any) -> None:
             f"{method.name} does not accept {', '.join(unused)}: {method.lacks['adaptive']}",
             remedy=f"use an option that 'hybridsim integrators {method.name}' lists, or another integrator",
         )
-
-
-def callback(progress: Any) -> Any:
-    """Return the progress function or None, or raise an error."""
-    if progress is not None and not callable(progress):
-        raise cannot_be("progress", progress, "use a function of the finished fraction")
-    return progress
 
 
 def relative_tolerance(rtol: Any) -> float:

@@ -35,7 +35,7 @@ def simulate(
     t_eval: Sequence[float] | None = None,
     keep: str | float = "all",
     limits: Mapping[str, float] | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | bool | None = None,
     **options: Any,
 ) -> Solution: ...
 def simulate(
@@ -53,7 +53,7 @@ def simulate(
     t_eval: Sequence[float] | None = None,
     keep: str | float = "all",
     limits: Mapping[str, float] | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | bool | None = None,
     **options: Any,
 ) -> Solution:
     """Simulate a model from t0 to t1 and return its trajectory, its events and its cost.
@@ -96,8 +96,9 @@ def simulate(
         checked every 1024 events or 4096 steps in compiled code, so a run stops shortly after a limit is
         exceeded. It then has status "limit" and its partial result; ``sol.resume()`` continues it bit for bit as
         if it had never stopped.
-    progress : callable, optional
-        Called at intervals with the finished fraction of the time span.
+    progress : bool or callable, optional
+        True shows a bar in a terminal or a notebook, if the run takes more than half a second. A function is called
+        at intervals with the finished fraction of the time span.
     **options : Any
         Options of the integrator. The former name of ``keep``, ``save``, is deprecated and works until version 0.2.
 

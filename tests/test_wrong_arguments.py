@@ -109,6 +109,11 @@ def sliding() -> hs.Solution:
     return hs.simulate("dfcs", (0, 0.05), integrator="taylor")
 
 
+def integrated(t_span: Any = None) -> float:
+    """The integral of a quantity over part of a run."""
+    return sliding().integral("x", t_span=t_span)
+
+
 @cache
 def settled() -> hs.SteadyState:
     """A steady motion, whose methods are called."""
@@ -298,6 +303,9 @@ CALLS: dict[str, tuple[Callable[[], Callable[..., Any]], Callable[[], dict[str, 
         lambda: sliding().animate,
         lambda: {"path": "s.gif", "quantities": [], "speed": 0.1, "fps": 1},
     ),
+    "Solution.plot": (lambda: sliding().plot, lambda: {"t_span": (0.0, 0.01)}),
+    "Solution.integral": (lambda: integrated, lambda: {"t_span": (0.0, 0.01)}),
+    "Solution.stored_energy": (lambda: moved().stored_energy, lambda: {"t": 0.1}),
     "Solution.report": (lambda: sliding().report, lambda: {"path": "s.html"}),
     "Solution.to_csv": (lambda: sliding().to_csv, lambda: {"path": "s.csv"}),
     "Solution.to_npz": (lambda: sliding().to_npz, lambda: {"path": "s.npz"}),
@@ -319,6 +327,7 @@ CALLS: dict[str, tuple[Callable[[], Callable[..., Any]], Callable[[], dict[str, 
     "Solution.to_xarray by time stepping": (lambda: stepped().to_xarray, dict),
     "SteadyState.harmonic": (lambda: settled().harmonic, lambda: {"name": "x"}),
     "SteadyState.held_mode": (lambda: settled().held_mode, lambda: {"contact": "f"}),
+    "SteadyState.plot": (lambda: settled().plot, dict),
     "SteadyState.to_dict": (lambda: settled().to_dict, dict),
     "Sweep.plot": (lambda: swept().plot, dict),
     "Sweep.to_csv": (lambda: swept().to_csv, lambda: {"path": "w.csv"}),
@@ -338,6 +347,8 @@ CALLS: dict[str, tuple[Callable[[], Callable[..., Any]], Callable[[], dict[str, 
     "SuiteComparison.to_csv": (lambda: suite().to_csv, lambda: {"path": "u.csv"}),
     "SuiteComparison.to_json": (lambda: suite().to_json, dict),
     "Advice.to_json": (lambda: advised().to_json, dict),
+    "Sensitivities.plot": (lambda: hs.sensitivities(sliding(), ["mu"]).plot, dict),
+    "Branch.plot": (lambda: branch().plot, lambda: {"name": "x"}),
     "Branch.amplitude": (lambda: branch().amplitude, lambda: {"name": "x"}),
     "Model.from_toml": (lambda: hs.Model.from_toml, lambda: {"text": "schema = 1"}),
     "LawTable.fit": (lambda: hs.LawTable.fit, lambda: {"at": [0, 1, 2], "values": [1, 2, 2], "knots": 2}),

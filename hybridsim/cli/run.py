@@ -77,7 +77,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
     outcome.check_arguments(args)
     settings = run_settings(args)
     if args.keep is not None:
-        settings["save"] = _save_setting(args)
+        settings["keep"] = _save_setting(args)
     model = values.changed_model(args)
     outcome.check_drawing(model, args)
     solution, cautions = simulated(model, settings, args, session)

@@ -43,7 +43,7 @@ def simulate_mechanical(
     t_eval: Sequence[float] | None = None,
     keep: str | float = "all",
     limits: Mapping[str, float] | None = None,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | bool | None = None,
     **refused: Any,
 ) -> Solution:
     """Simulate a `MechanicalSystem`; `hybridsim.simulate.simulate` describes the arguments.

@@ -26,7 +26,7 @@ def branch(result: Branch, name: str | None = None, *, axes: Axes | None = None)
     axes : the axes to draw in; by default a new figure.
     """
     model = result.points[0].motion.model
-    name = name or model.states[0].name
+    name = model.states[0].name if name is None else name
     if axes is None:
         axes = style.figure(6.4, 4.2).subplots()
     across, up, stable = result.parameter, result.amplitude(name), result.stable

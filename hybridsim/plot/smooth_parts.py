@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hybridsim.arguments import two_numbers
 from hybridsim.engine.system.period import forcing_period
 from hybridsim.errors import UsageError, nearest
 from hybridsim.mechanics.declaration.system import Harmonic, MechanicalSystem
@@ -70,7 +71,7 @@ def window_of(solution: Solution, t_span: tuple[float, float] | None) -> Window:
     """Return the part of a run to draw: `t_span` if given, otherwise all or the last periods or events."""
     start, end = sorted((solution.t_start, solution.t_end))
     if t_span is not None:
-        t0, t1 = sorted(map(float, t_span))
+        t0, t1 = sorted(two_numbers(t_span, "t_span", "use two times, (a, b)"))
         if not (t1 > start and t0 < end):
             raise UsageError(
                 f"t_span = ({t0:g}, {t1:g}) is outside the run",

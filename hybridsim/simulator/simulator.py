@@ -116,7 +116,7 @@ class Simulator(CurrentState):
         t_eval: Sequence[float] | None = None,
         keep: str | float = "all",
         limits: Mapping[str, float] | None = None,
-        progress: Callable[[float], None] | None = None,
+        progress: Callable[[float], None] | bool | None = None,
         **former: Any,
     ) -> Solution:
         """Simulate a whole span and return its solution, as `simulate` does; the steps of `advance` are not affected.

@@ -66,6 +66,12 @@ class Energies(EventsAndModes):
 
         whole = (self.t_start, self.t_end)
         first, last = whole if t_span is None else two_numbers(t_span, "t_span", "use two times, (a, b)")
+        low, high = sorted(whole)
+        if not (low <= min(first, last) and max(first, last) <= high):
+            raise UsageError(
+                f"`t_span` = ({first!r}, {last!r}) is outside the run",
+                remedy=f"use times from t = {low!r} to {high!r}",
+            )
         return float(self._integrated(product, first, last, 1)[0])
 
     @cached_property

@@ -55,7 +55,7 @@ class InPictures(InTables):
         speed: float | None = None,
         fps: float = 20.0,
         dark: bool = False,
-        progress: Callable[[float], None] | None = None,
+        progress: Callable[[float], None] | bool | None = None,
     ) -> Path:
         """Write the moving mechanism next to its curves and modes to a file; the model needs a `drawing`.
 
@@ -67,7 +67,7 @@ class InPictures(InTables):
         speed : time of the model per second of the animation; by default a round number for about 8 s.
         fps : frames per second, at most 50; there are at most 1000 frames.
         dark : whether the background is dark.
-        progress : a function that is called with the finished part, from 0 to 1.
+        progress : True for a bar, or a function that is called with the finished part, from 0 to 1.
 
         Returns
         -------

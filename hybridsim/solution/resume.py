@@ -19,7 +19,7 @@ def resumed(
     solution: Solution,
     t_end: float | None,
     limits: Mapping[str, float] | None,
-    progress: Callable[[float], None] | None,
+    progress: Callable[[float], None] | bool | None,
 ) -> Solution:
     """Return the solution of the whole run after continuing it to a later time."""
     run, trajectory = solution._run, solution._of_model.record

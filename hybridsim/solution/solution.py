@@ -179,7 +179,7 @@ class Solution(InPictures):
         t_end: float | None = None,
         *,
         limits: Mapping[str, float] | None = None,
-        progress: Callable[[float], None] | None = None,
+        progress: Callable[[float], None] | bool | None = None,
     ) -> Solution:
         """Resume the run from just after its last event, and return the solution of the whole run.
 

@@ -159,7 +159,7 @@ def test_what_is_refused() -> None:
     for call, message in (
         (lambda: sol.integral(), "has no quantity"),
         (lambda: sol.integral("w"), "no quantity 'w'"),
-        (lambda: sol.integral("v", t_span=(0, 2)), "t = 2.0 is outside the run"),
+        (lambda: sol.integral("v", t_span=(0, 2)), "is outside the run"),
         (lambda: sol.stored_energy(), "does not declare masses"),
         (lambda: hs.simulate(block(), (0, 1), keep="events").dissipated, "keeps no states"),
     ):

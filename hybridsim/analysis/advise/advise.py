@@ -52,7 +52,7 @@ def advise(
     integrators: bool = True,
     workers: int | None = None,
     budget: float | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Advice:
     """Find the simplest model, and the cheapest integrator setting, that give a quantity within a tolerance.
 
@@ -94,8 +94,8 @@ def advise(
         Time limit in seconds: 120 by default, unlimited over a region. Work that does not fit is not run, and
         its row says so. A rung that takes ten times as long as the full model is stopped earlier, but not
         before 5 seconds (over a region, 2 seconds per point).
-    progress : callable, optional
-        Called as progress(done, total, name of the next item).
+    progress : bool or callable, optional
+        True shows a bar; a function is called as progress(done, total, name of the next item).
 
     Returns
     -------
@@ -219,7 +219,7 @@ def _chosen(names: Sequence[str] | None) -> tuple[LadderStep, ...]:
 class _ProgressReport:
     """Report to the progress callback which item begins, and repeat the report during long items."""
 
-    def __init__(self, progress: Progress | None, total: int) -> None:
+    def __init__(self, progress: Progress | bool | None, total: int) -> None:
         self._progress, self._total, self._done = arguments.callback(progress), total, -1
         self._what, self._next = "", 0.0
 

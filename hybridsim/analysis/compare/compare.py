@@ -40,7 +40,7 @@ def compare(
     regularized: str | Sequence[str] | None = None,
     v0: Sequence[float] | None = None,
     budget: float = BUDGET,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> Comparison:
     """Run a model with several integrators at several settings, and measure error and cost of each run.
 
@@ -79,8 +79,8 @@ def compare(
     budget : float, optional
         Time limit in seconds. Work that does not fit is not run, and its row says so: first the repetitions
         are dropped, then the settings that take longest. A run of the reference may take a quarter of it.
-    progress : callable, optional
-        Called as progress(done, total, name of the next item).
+    progress : bool or callable, optional
+        True shows a bar; a function is called as progress(done, total, name of the next item).
 
     Returns
     -------

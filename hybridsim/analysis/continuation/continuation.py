@@ -58,7 +58,7 @@ def continuation(
     max_points: int = 400,
     integrator: str = "auto",
     rtol: float = 1e-11,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | bool | None = None,
     **options: Any,
 ) -> Branch:
     """Follow a periodic orbit over a parameter, in both directions, to the bounds or the branch's end.
@@ -81,8 +81,8 @@ def continuation(
         The largest number of orbits in each direction.
     integrator, rtol : str, float, optional
         As in `simulate`, for the runs along the branch.
-    progress : callable, optional
-        Called with the finished fraction from time to time.
+    progress : bool or callable, optional
+        True shows a bar; a function is called with the finished fraction from time to time.
     **options : Any
         Further options of `steady_state`, for the first orbit.
 
@@ -112,7 +112,7 @@ def continuation(
             remedy=remedy_for_parameter(model, parameter),
         )
     low, high = arguments.two_numbers(bounds, "bounds", "use two numbers, (low, high)")
-    progress = arguments.callback(progress)
+    report = arguments.callback(progress)
     value = model.parameter_values()[parameter]
     if not low <= value <= high or low == high:
         raise UsageError(
@@ -137,8 +137,8 @@ def continuation(
     sides = []
     for number, sign in enumerate((-1.0, 1.0)):
         sides.append(follower.follow(first, sign))
-        if progress is not None:
-            progress(0.5 * (number + 1))
+        if report is not None:
+            report(0.5 * (number + 1))
     (backward, why_low), (forward, why_high) = sides
     points = (*reversed(backward), first.point, *forward)
     return Branch(parameter, points, specials(points), f"it ends at {why_low} and at {why_high}")

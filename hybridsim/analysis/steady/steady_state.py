@@ -84,7 +84,7 @@ def steady_state(
     tol: float = 1e-10,
     settle: int = _SETTLE,
     max_periods: int = _MAX_PERIODS,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | bool | None = None,
     **options: Any,
 ) -> SteadyState:
     """Find the steady motion that a model reaches from its initial state, and measure one period of it.
@@ -115,9 +115,9 @@ def steady_state(
     max_periods : int, optional
         Number of periods after which the motion is classified as it is: chaotic if its largest Lyapunov
         exponent is positive, quasi-periodic if the exponent is zero, else not settled.
-    progress : callable, optional
-        Called from time to time with the finished fraction of these periods; an exception from it ends the
-        search.
+    progress : bool or callable, optional
+        True shows a bar. A function is called from time to time with the finished fraction of these periods; an
+        exception from it ends the search.
     **options : Any
         As in `simulate`.
 

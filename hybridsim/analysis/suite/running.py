@@ -45,7 +45,7 @@ def compare_suite(
     steps: Sequence[int] | None = None,
     repeat: int = 3,
     budget: float = BUDGET,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
 ) -> SuiteComparison:
     """Run the scenes of the suite with several integrators at several settings, and compare correctness and cost.
 
@@ -61,8 +61,8 @@ def compare_suite(
     budget : float, optional
         Time limit in seconds. If it does not suffice, the repetitions are dropped first, then the settings
         that take longest; `SuiteComparison.notes` lists the omissions.
-    progress : callable, optional
-        Called as progress(done, total, name of the next item).
+    progress : bool or callable, optional
+        True shows a bar; a function is called as progress(done, total, name of the next item).
 
     Returns
     -------

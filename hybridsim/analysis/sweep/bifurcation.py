@@ -63,7 +63,7 @@ def bifurcation(
     z0: Mapping[str, str] | None = None,
     executor: Executor | None = None,
     workers: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     **options: Any,
 ) -> Sweep:
     """Sample the settled motion at a section, while a parameter is raised and lowered in steps.

@@ -73,7 +73,7 @@ def sweep(
     after: int | None = None,
     units: Mapping[str, str] | None = None,
     journal: str | PathLike[str] | None = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     **options: Any,
 ) -> Sweep:
     """Measure a model at many values of its parameters and initial values.
@@ -122,8 +122,8 @@ def sweep(
         the result is bit for bit that of an uninterrupted sweep. A function is identified by its code and all
         data that it reads, an object by its class and its state; a value that cannot be identified is
         refused.
-    progress : callable, optional
-        Called as progress(done, total, name of the next item).
+    progress : bool or callable, optional
+        True shows a bar; a function is called as progress(done, total, name of the next item).
     **options : Any
         Passed on to the measure: to the function, to `steady_state`, or to `simulate`.
 

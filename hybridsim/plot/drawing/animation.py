@@ -43,7 +43,7 @@ def animate(
     speed: float | None = None,
     fps: float = 20.0,
     dark: bool = False,
-    progress: Callable[[float], None] | None = None,
+    progress: Callable[[float], None] | bool | None = None,
 ) -> Path:
     """Write the moving mechanism of a run, next to its curves and modes, to a file.
 
@@ -56,10 +56,10 @@ def animate(
     speed = None if speed is None else _positive("speed", speed, math.inf)
     if t_span is not None:
         t_span = two_numbers(t_span, "t_span", "use two times (t0, t1)")
-    progress = callback(progress)
+    on_progress = callback(progress)
     theme = DARK if flag(dark, "dark") else LIGHT
     clip = Clip(solution, _names(solution, quantities), window_of(solution, t_span), speed, fps, theme)
-    pictures = _counted(clip, progress)
+    pictures = _counted(clip, on_progress)
     suffix = path.suffix.lower()
     if suffix == ".mp4":
         _write_film(path, pictures, clip)

@@ -1,0 +1,88 @@
+"""This module shows the progress of a long call as a bar on one line of a terminal or a notebook."""
+
+from __future__ import annotations
+
+import sys
+import time
+from typing import Any
+
+from hybridsim.errors import UsageError
+
+_WAIT = 0.5  # seconds before the first display; shorter calls show no bar
+_PAUSE = 0.1  # seconds between updates
+_CELLS = 24  # characters of the bar
+_WIDTH = 79  # characters of the line
+
+
+class ProgressBar:
+    """A progress callback that shows a bar, the time left and the current step on stderr.
+
+    It is called with the finished fraction, or with the numbers of finished and of all steps and the name of the
+    next step. Output that is neither a terminal nor a notebook shows nothing.
+    """
+
+    def __init__(self) -> None:
+        self._began = time.monotonic()
+        self._next = self._began + _WAIT
+        self._shown = 0  # characters of the open line
+
+    def __call__(self, done: float, total: float = 1.0, what: str = "") -> None:
+        now, fraction = time.monotonic(), min(max(done / total, 0.0), 1.0)
+        is_last = fraction == 1.0 and self._shown > 0
+        if not is_last and (now < self._next or not can_show()):
+            return
+        self._next = now + _PAUSE
+        filled = round(_CELLS * fraction)
+        left = (
+            ""
+            if is_last or fraction == 0.0
+            else _clock((now - self._began) * (1.0 - fraction) / fraction) + " left"
+        )
+        parts = f"{100 * fraction:5.1f} % |{'#' * filled}{' ' * (_CELLS - filled)}| {left}  {what}"
+        line = parts[:_WIDTH].rstrip()
+        print("\r" + line.ljust(self._shown), end="", file=sys.stderr, flush=True)
+        self._shown = len(line)
+        if is_last:
+            self.close()
+
+    def close(self) -> None:
+        """End the line of the bar, if it is open."""
+        if self._shown:
+            self._shown, self._next = 0, time.monotonic() + _WAIT
+            print(file=sys.stderr, flush=True)
+
+    def __del__(self) -> None:
+        if getattr(self, "_shown", 0) and sys.stderr is not None:
+            self.close()
+
+
+def can_show() -> bool:
+    """Return whether stderr is a terminal, or the output of a notebook."""
+    return sys.stderr is not None and (sys.stderr.isatty() or "ipykernel" in sys.modules)
+
+
+def callback(progress: Any) -> Any:
+    """Return the progress function of the argument `progress`: a bar for True, None for None and False.
+
+    Raises
+    ------
+    UsageError
+        For anything else that cannot be called.
+    """
+    if progress is None or progress is False:
+        return None
+    if progress is True:
+        return ProgressBar()
+    if not callable(progress):
+        raise UsageError(
+            f"`progress` cannot be {progress!r}",
+            remedy="use True for a bar, or a function of the finished fraction",
+        )
+    return progress
+
+
+def _clock(seconds: float) -> str:
+    """Return a duration as minutes and seconds, or as hours, minutes and seconds."""
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
