@@ -96,7 +96,7 @@ def fit(
     """
     model = chosen_model(model, None).validate()
     refuse_unknown([simulate], options)
-    for name in ("t_eval", "save", "params", "x0", "progress"):
+    for name in ("t_eval", "keep", "save", "params", "x0", "progress"):
         if name in options:
             raise UsageError(f"a fit sets {name!r} itself", remedy="describe the experiment by hs.Record")
     if loss not in _LOSSES:
