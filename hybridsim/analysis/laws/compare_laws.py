@@ -86,7 +86,7 @@ def compare_laws(
     t0, t1 = run_span(t_span, model.duration_value(), period)
     is_last_period = period is not None and t1 - t0 > period
     if is_last_period:
-        options |= {"save": period}
+        options |= {"keep": period}
     rows = [
         LawRow(label, changed, simulate(changed, (t0, t1), **options), contact, quantity)
         for label, changed in models.items()
