@@ -15,12 +15,12 @@ from hybridsim.analysis.keyword_options import refuse_unknown
 from hybridsim.analysis.progress import Progress
 from hybridsim.analysis.sweep.axes import Points, points_of
 from hybridsim.analysis.sweep.result import Sweep
-from hybridsim.analysis.sweep.section import Section, with_section
+from hybridsim.analysis.sweep.section import Section, sampling_period, with_section
 from hybridsim.analysis.sweep.work.job import Job, Settings, new_token
 from hybridsim.analysis.sweep.work.measure import work
 from hybridsim.arguments import callback, chosen_model, text
 from hybridsim.calls import refusing
-from hybridsim.errors import UsageError
+from hybridsim.errors import HybridsimError, UsageError
 from hybridsim.model import Model
 from hybridsim.model.checks.units import units_of
 from hybridsim.simulate import simulate
@@ -98,6 +98,12 @@ def bifurcation(
         ``repeats_after``, the n of a motion that repeats after n passages, or 0 if it does not within the
         samples.
 
+    Raises
+    ------
+    UsageError
+        If the model has no forcing of one period at any of the values and no ``section`` is given. If it has one at
+        some values only, the error is the status of the others.
+
     Examples
     --------
     >>> import hybridsim as hs
@@ -123,6 +129,8 @@ def bifurcation(
     )
     branches = _Branches(points, len(points.axes[0].values))
     job = Job(new_token(), with_level, (parameter,), frozenset(), measure, True)
+    if not level:
+        _refuse_unforced(job, branches.settings(range(0, 2 * len(branches.values), 2)))
     count = None if workers is None else whole(workers, "workers")
     began = time.perf_counter()
     collected, finished, who = work(job, branches, executor, count, callback(progress))
@@ -141,6 +149,22 @@ def bifurcation(
         time.perf_counter() - began,
         who,
     )
+
+
+def _refuse_unforced(job: Job, points: Sequence[Settings]) -> None:
+    """Raise the error of a missing period if the forcing has a period at none of the points."""
+    fault: UsageError | None = None
+    for settings in points:
+        try:
+            sampling_period(job.at(settings))
+        except UsageError as error:
+            fault = error
+        except HybridsimError:  # it becomes the status of that point
+            return
+        else:
+            return
+    if fault is not None:
+        raise fault
 
 
 def _turned(array: np.ndarray) -> np.ndarray:

@@ -68,12 +68,7 @@ class Section:
         return {**columns, REPEATS: repeats_after(result.states, self.tol * result.sizes)}
 
     def _strobed(self, motion: Motion, start: Point | None) -> Passings:
-        period = system_period(system_of(motion.model))
-        if period is None:
-            raise UsageError(
-                f"model {motion.model.name} has no forcing of one period",
-                remedy="set `section` to an expression that passes zero upward, such as 'v'",
-            )
+        period = sampling_period(motion.model)
         times = period * np.arange(self.settle + 1, self.settle + self.samples + 1)
         run = motion.run(start, float(times[-1]), keep=self.samples * period)
         return Passings(run(times, side="-").T, _sizes(run), point_at_end(run))
@@ -95,6 +90,17 @@ class Section:
                 )
             length *= 2.0
         raise SimulationError(f"the section was crossed {len(found)} times, but {passages} are needed")
+
+
+def sampling_period(model: Model) -> float:
+    """Return the period of the forcing, or raise `UsageError` if there is no single one."""
+    period = system_period(system_of(model))
+    if period is None:
+        raise UsageError(
+            f"model {model.name} has no forcing of one period",
+            remedy="set `section` to an expression that passes zero upward, such as 'v'",
+        )
+    return period
 
 
 def with_section(model: Model, section: str | None) -> tuple[Model, str]:
