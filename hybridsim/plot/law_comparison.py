@@ -28,11 +28,12 @@ def law_comparison(comparison: LawComparison) -> tuple[Axes, Axes]:
     ends = {across: [0.0], up: [0.0]}
     for k, row in enumerate(rows):
         colour = style.PALETTE[k % len(style.PALETTE)]
-        parts = smooth_parts_of(row.solution, (across, up), window_of(row.solution, None))
-        x, y = (np.concatenate([part.values[name] for part in parts]) for name in (across, up))
-        loops.plot(x, y, color=colour, linewidth=1.4, linestyle=("-", "--", "-.", ":")[k % 4])
-        for name, values in ((across, x), (up, y)):
-            ends[name] += [values.min(), values.max()]
+        if row.solution.t_end > row.solution.t_start:
+            parts = smooth_parts_of(row.solution, (across, up), window_of(row.solution, None))
+            x, y = (np.concatenate([part.values[name] for part in parts]) for name in (across, up))
+            loops.plot(x, y, color=colour, linewidth=1.4, linestyle=("-", "--", "-.", ":")[k % 4])
+            for name, values in ((across, x), (up, y)):
+                ends[name] += [values.min(), values.max()]
         size = row.amplitude_of_quantity
         bars.barh(k, size or 0.0, color=colour, height=0.6)
         text = "no result" if size is None else with_prefix(float(f"{size:.3g}"), units[0]) if size else "0"

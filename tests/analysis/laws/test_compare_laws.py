@@ -83,6 +83,12 @@ def test_a_run_that_fails_is_a_row_and_the_others_are_measured() -> None:
     assert bars.texts[0].get_text().strip() == "no result"
 
 
+def test_a_run_that_stops_at_its_start_has_no_loop() -> None:
+    found = hs.compare_laws(block("x - 1"), ["coulomb"], (0, 1))
+    loops, bars = found.plot()
+    assert len(loops.lines) == 0 and bars.texts[0].get_text().strip() == "no result"
+
+
 def test_what_the_answer_shows() -> None:
     found = hs.compare_laws(block(), ["coulomb", THICK], (0, 4))
     lines = repr(found).splitlines()
