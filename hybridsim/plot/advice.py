@@ -23,11 +23,13 @@ if TYPE_CHECKING:
 # factor.
 _NEAR, _FAR, _MARGIN = 30.0, 1e5, 2.0
 _TOP_LINE = -0.75  # above the first rung, in rungs
+_BESIDE = (1.03, 1.17)  # places of the columns of error and cost, in widths of the axes
 _NOTHING = "#d8d8d8"  # grey is not the colour of any rung
+# Distinguishable with every kind of colour vision: Okabe and Ito's palette, two of Tol's colours and dark grey.
 _COLOURS = {
-    "at-rest": "#4d4d4d", "no-friction": "#a6cee3", "viscous": "#1f78b4", "no-stop": "#33a02c",
-    "constant-mu-at-rest": "#fdbf6f", "constant-mu-mean": "#ff7f00", "mu_s=mu_k": "#b15928",
-    "tanh": "#cab2d6", "arctan": "#6a3d9a", "karnopp": "#fb9a99", "full model": "#e31a1c",
+    "at-rest": "#4d4d4d", "no-friction": "#56b4e9", "viscous": "#0072b2", "no-stop": "#009e73",
+    "constant-mu-at-rest": "#f0e442", "constant-mu-mean": "#e69f00", "mu_s=mu_k": "#7f4f24",
+    "tanh": "#cc79a7", "arctan": "#882255", "karnopp": "#999933", "full model": "#d55e00",
 }  # fmt: skip
 
 
@@ -60,11 +62,11 @@ def _ladder(found: Advice, axes: Axes) -> None:
     for k, step in enumerate(steps):
         if step.value is None:
             word = "no value" if step.verdict == NOT_ADEQUATE else step.verdict
-            axes.text(1.1 * found.tol, k, word, va="center", fontsize=8, color=style.GREY)
+            axes.text(1.1 * found.tol, k, word, va="center", fontsize=8, color=style.TEXT_GREY)
             continue
         _draw(axes, k, step, found.tol, (low, high))
-        _beside(axes, k, f"{_short(step.error)}, {duration(step.seconds)}", style.INK)
-    _beside(axes, _TOP_LINE, "error, cost", style.GREY)
+        _beside(axes, k, (_short(step.error), duration(step.seconds)), style.INK)
+    _beside(axes, _TOP_LINE, ("error", "cost"), style.TEXT_GREY)
     axes.text(
         found.tol / 1.1, _TOP_LINE, f"adequate: up to {found.tol:g}", ha="right", va="center", fontsize=8
     )
@@ -93,11 +95,10 @@ def _draw(axes: Axes, k: int, step: Step, tol: float, ends: tuple[float, float])
     axes.plot([at], [k], marker, color=colour, markerfacecolor=face, markersize=7, clip_on=False, zorder=3)
 
 
-def _beside(axes: Axes, y: float, text: str, colour: str) -> None:
-    """Write text to the right of the axes, at the height of one simplified model."""
-    axes.text(
-        1.03, y, text, transform=axes.get_yaxis_transform(), va="center", fontsize=8, color=colour
-    )  # fmt: skip
+def _beside(axes: Axes, y: float, cells: tuple[str, str], colour: str) -> None:
+    """Write two cells to the right of the axes, at the height of one simplified model."""
+    for x, text in zip(_BESIDE, cells, strict=True):
+        axes.text(x, y, text, transform=axes.get_yaxis_transform(), va="center", fontsize=8, color=colour)
 
 
 def _short(error: float) -> str:

@@ -21,6 +21,7 @@ from hybridsim.plot.sweep_readings import (
     positions,
     range_of,
     setting,
+    show_range,
     title_of,
 )
 
@@ -105,7 +106,10 @@ def _draw(
         )  # fmt: skip
         if other is None:
             panel.legend(handles=panel.lines[-1:], fontsize=8, frameon=False)
-    label_axis(panel.yaxis, label_of(result, name), result.units.get(name, ""), *range_of(values))
+    label = label_of(result, name)
+    title = label if " " in label else ""
+    label_axis(panel.yaxis, label, result.units.get(name, ""), *range_of(values), title=title)
+    show_range(panel.yaxis, values)
 
 
 def _colours(count: int) -> list[str]:

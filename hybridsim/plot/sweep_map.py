@@ -93,6 +93,8 @@ def _draw(panel: Axes, result: Sweep, name: str) -> None:
     bar = panel.figure.colorbar(mesh, ax=panel, pad=0.02)
     bar.outline.set_visible(False)
     bar.ax.tick_params(color=style.GREY, labelsize=9)
-    label_axis(bar.ax.yaxis, label_of(result, name), result.units.get(name, ""), *range_of(values))
+    label = label_of(result, name)
+    title = label if " " in label else ""
+    label_axis(bar.ax.yaxis, label, result.units.get(name, ""), *range_of(values), title=title)
     if not np.isfinite(values).all():
         panel.legend(handles=[Patch(color=_NOTHING, label=NO_RESULT)], fontsize=8, loc="upper right")

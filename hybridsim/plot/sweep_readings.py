@@ -16,6 +16,7 @@ from hybridsim.plot.symbols import symbol_of, unit_text
 if TYPE_CHECKING:
     from hybridsim.analysis import Sweep
 
+_ROUNDING, _ROOM = 1e-9, 0.1  # of a value: differences that are noise, and the range that is shown instead
 _MAX_PANELS = 6  # panels that fit on a page
 _RATHER = (
     "amplitude",
@@ -83,8 +84,19 @@ def range_of(values: np.ndarray) -> tuple[float, float]:
 
 
 def label_of(result: Sweep, name: str) -> str:
-    """Return the name of a result of a sweep as an axis label."""
-    return f"|{name}|" if np.iscomplexobj(result[name]) else name
+    """Return a result of a sweep as an axis label, such as "amplitude of x" for amplitude.x."""
+    kind, _, whose = name.partition(".")
+    kind = "dissipated energy" if kind == "dissipated" else kind.replace("_", " ")
+    text = f"{kind} of {whose}" if whose else name
+    return f"|{text}|" if np.iscomplexobj(result[name]) else text
+
+
+def show_range(axis: Axis, values: np.ndarray) -> None:
+    """Widen the range of an axis if all values are equal but for rounding, so that no noise is enlarged."""
+    low, high = range_of(values)
+    size = max(abs(low), abs(high))
+    if high - low <= _ROUNDING * size:
+        axis.set_view_interval(low - (_ROOM * size or 1.0), high + (_ROOM * size or 1.0), ignore=True)
 
 
 def positions(values: np.ndarray) -> np.ndarray:

@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import hybridsim as hs
 from hybridsim.plot import save, sweep_lines, sweep_map
-from hybridsim.plot.sweep_readings import not_drawn
+from hybridsim.plot.sweep_readings import label_of, not_drawn, show_range
 
 OMEGA, N = [300.0, 500.0, 400.0, 600.0], [20.0, 40.0]
 
@@ -43,18 +44,18 @@ def test_lines_over_one_parameter() -> None:
 
 def test_of_many_readings_those_that_people_ask_for_first_are_drawn() -> None:
     result = hs.sweep("dfcs", {"omega": [400.0, 500.0]}, "steady")
-    drawn = [axes.get_ylabel().split(" ")[0] for axes in sweep_lines(result)]
-    kinds = [
-        "amplitude.x",
-        "amplitude.v",
-        "amplitude.f",
-        "stick_fraction.f",
-        "stops_per_period.f",
-        "dissipated.f",
-    ]
-    assert drawn == kinds
+    drawn = [" ".join(axes.get_ylabel().split()).partition(" [")[0] for axes in sweep_lines(result)]
+    labels = {
+        "amplitude.x": "amplitude of x",
+        "amplitude.v": "amplitude of v",
+        "amplitude.f": "amplitude of f",
+        "stick_fraction.f": "stick fraction of f",
+        "stops_per_period.f": "stops per period of f",
+        "dissipated.f": "dissipated energy of f",
+    }
+    assert drawn == list(labels.values())
     assert not_drawn(result, arrays=True) == tuple(
-        name for name, values in result.values.items() if values.dtype.kind in "fc" and name not in kinds
+        name for name, values in result.values.items() if values.dtype.kind in "fc" and name not in labels
     )
 
 
@@ -120,3 +121,19 @@ def test_texts_as_values_of_a_parameter() -> None:
 def test_what_cannot_be_drawn(draw, message: str) -> None:
     with pytest.raises(hs.UsageError, match=message):
         draw()
+
+
+def test_a_constant_is_drawn_without_its_rounding() -> None:
+    values = 2.0 + 1e-12 * np.array([0, 1, -1, 1])
+    axis = Figure().subplots().yaxis
+    show_range(axis, values)
+    low, high = axis.get_view_interval()
+    assert (low, high) == pytest.approx((1.8, 2.2))
+    axis.set_view_interval(0, 1, ignore=True)
+    show_range(axis, np.array([2.0, 2.1]))
+    assert tuple(axis.get_view_interval()) == (0, 1)
+
+
+def test_labels_of_measures_are_phrases() -> None:
+    result = hs.sweep("dfcs", {"F0": [22.0, 30.0]}, "steady")
+    assert label_of(result, "amplitude.x") == "amplitude of x"
