@@ -16,7 +16,7 @@ from hybridsim.plot.symbols import symbol_of, unit_text
 if TYPE_CHECKING:
     from hybridsim.analysis import Sweep
 
-_ROUNDING, _ROOM = 1e-9, 0.1  # of a value: differences that are noise, and the range that is shown instead
+_ROUNDING, _MARGIN = 1e-9, 0.1  # of a value: differences that are noise, and the range that is shown instead
 _MAX_PANELS = 6  # panels that fit on a page
 _RATHER = (
     "amplitude",
@@ -96,7 +96,7 @@ def show_range(axis: Axis, values: np.ndarray) -> None:
     low, high = range_of(values)
     size = max(abs(low), abs(high))
     if high - low <= _ROUNDING * size:
-        axis.set_view_interval(low - (_ROOM * size or 1.0), high + (_ROOM * size or 1.0), ignore=True)
+        axis.set_view_interval(low - (_MARGIN * size or 1.0), high + (_MARGIN * size or 1.0), ignore=True)
 
 
 def positions(values: np.ndarray) -> np.ndarray:
