@@ -71,7 +71,7 @@ def _form(element: Element, template: str, **names: str) -> Expression:
     """Fill a template with the expressions of an element, and with names."""
     fields = {name: getattr(element, name) for name in element.__dataclass_fields__ if name not in names}
     parts = {name: value for name, value in fields.items() if isinstance(value, Expression)}
-    return substitute(parse(template, element.place), {**parts, **names})
+    return parse(substitute(parse(template, element.place), {**parts, **names}).text, element.place)
 
 
 class _Forms:
@@ -131,7 +131,7 @@ class _Forms:
         ]
         for mode, value, turns in (("up", "input - width/2", "rate"), ("down", "input + width/2", "-rate")):
             moved = _form(element, value)
-            turning = substitute(parse(turns, place), {"rate": rate})
+            turning = parse(substitute(parse(turns, place), {"rate": rate}).text, place)
             guard = Guard("turns", turning, (Choice("free", None, {held: moved}, place=place),), place=place)
             modes.append(Mode(mode, (guard,), set={element.name: moved}, place=place))
         return Component(element.name, tuple(modes), "free", place=place)

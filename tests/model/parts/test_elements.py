@@ -143,3 +143,22 @@ def test_floor_and_the_remainder_are_written_as_the_messages_say() -> None:
     )
     sol = hs.simulate(model, (0, 3.5))
     assert sol.y[1:, -1] == pytest.approx([1 + 0 - 1 - 0.5 * 2, 2 * 1.5**2 / 2 + 0.5**2 / 2])
+
+
+def test_a_part_may_have_elements() -> None:
+    text = """
+schema = 1
+name = "servo"
+[states]
+x = { start = 0, der = "limited" }
+[inputs.e]
+kind = "connected"
+[elements]
+limited = { kind = "saturation", input = "e + 0", lower = -1, upper = 1 }
+u = { kind = "relay", input = "2*x", on = 1, off = 0 }
+y = { kind = "backlash", input = "3*x", width = 1 }
+"""
+    whole = hs.Model("whole", use=[hs.Use("s", hs.Model.from_toml(text), connect={"e": 2})])
+    sol = hs.simulate(whole, (0, 1))
+    assert [(event.component, event.t) for event in sol.events] == [("s.y", 1 / 6), ("s.u", 0.5)]
+    assert sol.output("s.y", 1.0) == pytest.approx(2.5)
