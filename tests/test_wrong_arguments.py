@@ -36,6 +36,7 @@ _ALSO = {
     "kind": ("regularis",),
     "name": ("quantity", "law"),
     "path": ("cannot be read", "states"),
+    "data": ("the file",),
     "text": ("TOML",),
     "number": ("event",),
     "v0": ("unknown name",),
@@ -48,7 +49,16 @@ _ALSO = {
 # Made by calls and not by users; errors.
 _RESULTS = {
     *("Event", "Explanation", "SavedState", "Solution", "SteadyState", "Sweep", "LawComparison"),
-    *("Comparison", "SuiteComparison", "Advice", "Branch", "Equilibrium", "Linearization", "Sensitivities"),
+    *(
+        "Comparison",
+        "SuiteComparison",
+        "Advice",
+        "Branch",
+        "Equilibrium",
+        "Linearization",
+        "Sensitivities",
+        "Fit",
+    ),
     *(
         "HybridsimError",
         "ExpressionError",
@@ -130,6 +140,12 @@ def swept() -> hs.Sweep:
 def compared() -> hs.Comparison:
     """A comparison, whose methods are called."""
     return hs.compare(tiny(), (0, 0.1), integrators=["taylor"], rtols=[1e-6], repeat=1)
+
+
+@cache
+def fitted() -> hs.Fit:
+    """A fit of one start value to three samples."""
+    return hs.fit(tiny(), {"t": [0, 1, 2], "x": [1, 2, 3]}, {"x(0)": (0, 2)})
 
 
 @cache
@@ -346,6 +362,18 @@ CALLS: dict[str, tuple[Callable[[], Callable[..., Any]], Callable[[], dict[str, 
     "SuiteComparison.cheapest": (lambda: suite().cheapest, dict),
     "SuiteComparison.to_csv": (lambda: suite().to_csv, lambda: {"path": "u.csv"}),
     "SuiteComparison.to_json": (lambda: suite().to_json, dict),
+    "Element": (
+        lambda: hs.Element,
+        lambda: {"name": "e", "kind": "saturation", "input": "x", "lower": -1, "upper": 1},
+    ),
+    "Unknown": (lambda: hs.Unknown, lambda: {"low": 0.1, "high": 1.0}),
+    "Record": (lambda: hs.Record, lambda: {"data": {"t": [0, 1, 2], "x": [1, 2, 3]}}),
+    "fit": (
+        lambda: hs.fit,
+        lambda: {"model": tiny(), "records": {"t": [0, 1, 2], "x": [1, 2, 3]}, "unknowns": {"x(0)": (0, 2)}},
+    ),
+    "Fit.interval": (lambda: fitted().interval, lambda: {"name": "x(0)"}),
+    "Fit.solution": (lambda: fitted().solution, dict),
     "Advice.to_json": (lambda: advised().to_json, dict),
     "Sensitivities.plot": (lambda: hs.sensitivities(sliding(), ["mu"]).plot, dict),
     "Branch.plot": (lambda: branch().plot, lambda: {"name": "x"}),

@@ -48,7 +48,7 @@ def test_a_run_draws_its_quantities_and_modes() -> None:
 
 def test_a_run_without_names_draws_the_states_and_outputs() -> None:
     picture = hs.simulate(block(), (0, 1)).plot()
-    assert [axes.get_ylabel() for axes in picture.quantities] == ["x", "v", "power", "f"]
+    assert [axes.get_ylabel() for axes in picture.quantities] == ["x", "v", "power", "friction force\nf"]
 
 
 def test_a_run_does_not_draw_what_it_has_not() -> None:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.arguments import as_real, cannot_be
+from hybridsim.arguments import as_real, cannot_be, finite_number, is_row
 from hybridsim.errors import UsageError, nearest
 from hybridsim.model import Model
 from hybridsim.model.toml.table_file import column_names, read_columns
@@ -51,10 +51,14 @@ class Record:
     t0: float | None = None
 
     def __post_init__(self) -> None:
+        for name in ("quantities", "params", "x0"):
+            value = getattr(self, name)
+            if not isinstance(value, Mapping) and (value is not None or name != "quantities"):
+                raise cannot_be(name, value, "use a dict of names, such as {'position': 'x'}")
         columns = _columns(self.data, self.quantities)
         if "t" not in columns:
             raise UsageError(
-                f"the record has no column 't'; it has {', '.join(columns) or 'no columns'}",
+                f"the `data` of the record have no column 't', but {', '.join(columns) or 'no columns'}",
                 remedy="name the column of times t",
             )
         t = columns.pop("t")
@@ -62,7 +66,7 @@ class Record:
             raise UsageError(
                 "the times of the record do not increase", remedy="sort the record by time, without repeats"
             )
-        start = float(t[0]) if self.t0 is None else float(self.t0)
+        start = float(t[0]) if self.t0 is None else finite_number(self.t0, "t0")
         if start > t[0]:
             raise UsageError(
                 f"t0 is {start!r}, after the first time {float(t[0])!r} of the record",
@@ -134,6 +138,8 @@ def _columns(data: Any, renamed: Mapping[str, str] | None) -> dict[str, np.ndarr
 
 def _numbers(column: Any, name: str) -> np.ndarray:
     """Return real numbers (k,); None and NaN become NaN."""
+    if not is_row(column):
+        raise UsageError(f"column {name!r} of `data` is {column!r}", remedy="use a sequence of numbers")
     values = [math.nan if value is None else as_real(value) for value in column]
     if None in values:
         raise UsageError(

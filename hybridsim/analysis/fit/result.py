@@ -12,7 +12,7 @@ from scipy.stats import t as student
 
 from hybridsim.analysis.fit.record import Record
 from hybridsim.analysis.fit.unknown import Unknown, start_of
-from hybridsim.arguments import known_name
+from hybridsim.arguments import known_name, number, whole_number
 from hybridsim.errors import UsageError
 from hybridsim.model import Model
 from hybridsim.presentation.readable import Readable, aligned
@@ -140,8 +140,9 @@ class Fit(Readable):
         """
         from hybridsim.analysis.fit.residuals import Residuals
 
+        which = whole_number(record, "record", 0, len(self.records) - 1)
         residuals = Residuals(self.model, self.records, self.unknowns, self.settings)
-        return residuals.solution(self.records[record], self.values)
+        return residuals.solution(self.records[which], self.values)
 
     def plot(self) -> Any:
         """Draw the measured and the simulated values of each record, with the residuals below.

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from hybridsim.arguments import cannot_be, number
+from hybridsim.arguments import cannot_be, flag, number
 from hybridsim.errors import UsageError, nearest
 from hybridsim.model import Model
 
@@ -41,9 +41,10 @@ class Unknown:
     def __post_init__(self) -> None:
         for name in ("low", "high", *(["guess"] if self.guess is not None else [])):
             object.__setattr__(self, name, number(getattr(self, name), f"`{name}` of an unknown"))
+        object.__setattr__(self, "log", flag(self.log, "log"))
         if not self.low < self.high:
             raise UsageError(
-                f"the bounds of an unknown are {self.low!r} and {self.high!r}",
+                f"the bounds of an unknown are low = {self.low!r} and high = {self.high!r}",
                 remedy="use a lower bound below the upper bound",
             )
         if self.guess is not None and not self.low <= self.guess <= self.high:

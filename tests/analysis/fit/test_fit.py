@@ -275,7 +275,7 @@ DATA = {"t": [0.0, 1.0, 2.0], "x": [1.0, 1.5, 2.0]}
         ({"t": [0, 1], "x": [1, 2, 3]}, {"a": (0, 1)}, {}, "3 values, but there are 2 times"),
         ({"t": [0, 1], "x": [1, math.inf]}, {"a": (0, 1)}, {}, "infinite"),
         ({"t": [0, 1], "x": [1, "two"]}, {"a": (0, 1)}, {}, "not a number"),
-        ({"time": [0, 1], "x": [1, 2]}, {"a": (0, 1)}, {}, "no column 't'; it has time, x"),
+        ({"time": [0, 1], "x": [1, 2]}, {"a": (0, 1)}, {}, "no column 't', but time, x"),
         ({"t": [0, 1]}, {"a": (0, 1)}, {}, "no measured quantity"),
         ([], {"a": (0, 1)}, {}, "at least one record"),
         (3.0, {"a": (0, 1)}, {}, "a dict of columns"),
