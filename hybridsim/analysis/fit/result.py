@@ -113,8 +113,8 @@ class Fit(Readable):
         tuple of float
             The ends of the interval.
         """
-        known_name(name, tuple(self.values), "a fit has no unknown", "unknowns")
-        if not 0.0 < level < 1.0:
+        known_name(name, tuple(self.values), "`name` of an unknown cannot be", "unknowns")
+        if not 0.0 < number(level, "level") < 1.0:
             raise UsageError(
                 f"`level` is {level!r}", remedy="use a probability between 0 and 1, such as 0.95"
             )
