@@ -17,7 +17,7 @@ from hybridsim.analysis.fit.summary import summed_up
 from hybridsim.analysis.fit.unknown import Unknown, unknowns_of
 from hybridsim.analysis.keyword_options import refuse_unknown
 from hybridsim.analysis.progress import Progress
-from hybridsim.arguments import cannot_be, chosen_model, number, whole_number
+from hybridsim.arguments import callback, cannot_be, chosen_model, number, text, whole_number
 from hybridsim.calls import refusing
 from hybridsim.errors import SimulationError, UsageError, nearest
 from hybridsim.model import Model
@@ -39,7 +39,7 @@ def fit(
     loss: str = "linear",
     starts: int = 1,
     max_evaluations: int = 200,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     **options: Any,
 ) -> Fit:
     """Fit parameters and start values of a model to measured quantities.
@@ -68,8 +68,8 @@ def fit(
         The best result counts.
     max_evaluations : int, optional
         Largest number of steps from each start.
-    progress : callable, optional
-        Called as progress(done, total, text) before each step.
+    progress : bool or callable, optional
+        True shows a bar; a function is called as progress(done, total, text) before each step.
     **options : Any
         Options of `simulate`, such as ``integrator`` or ``rtol``.
 
@@ -99,7 +99,7 @@ def fit(
     for name in ("t_eval", "keep", "save", "params", "x0", "progress"):
         if name in options:
             raise UsageError(f"a fit sets {name!r} itself", remedy="describe the experiment by hs.Record")
-    if loss not in _LOSSES:
+    if text(loss, "loss") not in _LOSSES:
         raise UsageError(f"`loss` is {loss!r}", remedy=f"use one of {', '.join(_LOSSES)}")
     starts = whole_number(starts, "starts", 1, 10_000)
     most = whole_number(max_evaluations, "max_evaluations", 1, 1_000_000)
@@ -118,7 +118,7 @@ def fit(
     spread = {
         name: float(np.std(residuals.measured[residuals.quantity == name])) or 1.0 for name in residuals.names
     }
-    search = Search(residuals, loss, most, progress, len(guesses))
+    search = Search(residuals, loss, most, callback(progress), len(guesses))
     results = [found for guess in guesses if (found := search.best_from(guess, stated or spread)) is not None]
     if not results:
         failed = residuals.failure

@@ -76,7 +76,7 @@ class Record:
             for name in self.quantities:
                 if name not in columns:
                     raise UsageError(
-                        f"the record has no column {name!r}",
+                        f"`quantities` contains {name!r}, which is not a column of the record",
                         remedy=nearest(str(name), columns, kind="columns"),
                     )
             columns = {quantity: columns[name] for name, quantity in self.quantities.items()}

@@ -89,7 +89,7 @@ def unknowns_of(model: Model, unknowns: Any) -> dict[str, Unknown]:
     for name, declared in unknowns.items():
         if name not in current:
             raise UsageError(
-                f"model {model.name} has no parameter or start value {name!r}",
+                f"`unknowns` contains {name!r}, which is not a parameter or start value of model {model.name}",
                 remedy=nearest(str(name), current, kind="parameters and start values"),
             )
         unknown = _unknown(name, declared)

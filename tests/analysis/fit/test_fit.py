@@ -258,7 +258,7 @@ DATA = {"t": [0.0, 1.0, 2.0], "x": [1.0, 1.5, 2.0]}
 @pytest.mark.parametrize(
     ("records", "unknowns", "options", "words"),
     [
-        (DATA, {"c": (0, 1)}, {}, "no parameter or start value 'c'"),
+        (DATA, {"c": (0, 1)}, {}, "`unknowns` contains 'c'"),
         (DATA, {"a": 3}, {}, r"use \(low, high\)"),
         (DATA, {"a": (1, 0)}, {}, "lower bound below the upper bound"),
         (DATA, {}, {}, "a dict of names and bounds"),

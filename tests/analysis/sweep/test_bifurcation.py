@@ -71,7 +71,7 @@ def test_friction_repeats_each_period_whatever_the_number_of_workers() -> None:
     assert found["x"].tobytes() == again["x"].tobytes() and (found["repeats_after"] == 1).all()
     assert found.units["x"] == "m" and found.units["F0"] == "N"
     (panel,) = found.plot("x", over="F0")
-    assert panel.get_xlabel() == "F0 [N]"
+    assert panel.get_xlabel() == r"F$_{\mathregular{0}}$ [N]"
 
 
 def test_after_how_many_samples_they_repeat() -> None:
