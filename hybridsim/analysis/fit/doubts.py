@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -11,6 +12,7 @@ from hybridsim.analysis.fit.residuals import Residuals
 _EXPLAINED = 0.5  # of the variance of a quantity; below, the model does not describe the data
 _CORRELATED = 0.5  # correlation of neighbouring residuals; noise of separate samples has about 0
 _ROUNDING = 1e-6  # of a quantity's deviation; smaller residuals are errors of the runs and no noise
+_FACTOR = 100.0  # between the spreads of measured and simulated values; more is a wrong unit
 _CHI_SQUARE = 2.0  # ratio of the residuals' mean square to the given noise
 
 
@@ -33,35 +35,54 @@ def doubts(
         spread, size = float(np.std(residuals.measured[here])), float(np.sqrt(np.mean(off[here] ** 2)))
         if spread == 0.0 or size <= _ROUNDING * spread:
             continue
+        ratio = spread / max(float(np.std(residuals.measured[here] - off[here])), 1e-300)
+        if not 1.0 / _FACTOR < ratio < _FACTOR:
+            found.append(
+                f"the measured values of {name} vary {ratio:.3g} times as much as the simulated ones: compare the "
+                "units"
+            )
         explained = 1.0 - (size / spread) ** 2
         if explained < _EXPLAINED:
             found.append(
                 f"the model explains {100 * max(explained, 0.0):.0f} % of the variance of {name}: it does not describe "
-                "these data, or the fit ended in a local minimum"
+                "these data, or the fit ended in a local minimum (use more starts)"
             )
         neighbours = _correlation(residuals, off, name)
         if neighbours > _CORRELATED:
             found.append(
-                f"neighbouring residuals of {name} have a correlation of {neighbours:.2f}: the model lacks "
-                "something, or the noise is correlated; the errors are too small"
+                f"neighbouring residuals of {name} have a correlation of {neighbours:.2f}: the fit ended in "
+                "a local minimum (use more starts), the model lacks something, or the noise is correlated; the "
+                "errors are too small"
             )
-        if is_stated and (ratio := (size / noise[name]) ** 2) > _CHI_SQUARE:
+        if is_stated and (excess := (size / noise[name]) ** 2) > _CHI_SQUARE:
             found.append(
-                f"the mean square of the residuals of {name} is {ratio:.3g} times the given noise: the model lacks "
+                f"the mean square of the residuals of {name} is {excess:.3g} times the given noise: the model lacks "
                 "something, or the noise is larger"
             )
     return tuple(found)
 
 
+def is_local(residuals: Residuals, off: np.ndarray) -> bool:
+    """Return whether the residuals may be those of a local minimum: large, or with correlated neighbours."""
+    for name in residuals.names:
+        here = residuals.quantity == name
+        spread, size = float(np.std(residuals.measured[here])), float(np.sqrt(np.mean(off[here] ** 2)))
+        if size > _ROUNDING * spread > 0.0 and (
+            1.0 - (size / spread) ** 2 < _EXPLAINED or _correlation(residuals, off, name) > _CORRELATED
+        ):
+            return True
+    return False
+
+
 def _correlation(residuals: Residuals, off: np.ndarray, name: str) -> float:
     """Return the correlation of residuals of a quantity with their successors in the same record."""
-    products, squares, begin, k = 0.0, 0.0, 0, 0
+    products, before, after, begin, k = 0.0, 0.0, 0.0, 0, 0
     for record in residuals.records:
         for column in record.columns:
             count = int(residuals.present[k].sum())
             if column == name and count > 2:
                 part = off[begin : begin + count]
                 products += float(part[1:] @ part[:-1])
-                squares += float(part[1:] @ part[1:])
+                before, after = before + float(part[:-1] @ part[:-1]), after + float(part[1:] @ part[1:])
             begin, k = begin + count, k + 1
-    return products / squares if squares else 0.0
+    return products / math.sqrt(before * after) if before * after > 0.0 else 0.0

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from scipy.stats import qmc
 
-from hybridsim.analysis.fit.record import records_of
+from hybridsim.analysis.fit.doubts import is_local
+from hybridsim.analysis.fit.record import records_of, refuse_unknowns_of_records
 from hybridsim.analysis.fit.residuals import Residuals
 from hybridsim.analysis.fit.result import Fit
 from hybridsim.analysis.fit.search import Search
@@ -25,6 +26,7 @@ from hybridsim.simulate import simulate
 
 _LOSSES = ("linear", "soft_l1", "huber", "cauchy")
 _SEED = 0  # of the Latin hypercube
+_SCANNED, _FOLLOWED = 60, 6  # of its points, if the first guess leads to a local minimum
 _PASSES = 4  # of the estimate of the noise of several quantities
 _SETTLED = 0.01  # relative change of this estimate
 
@@ -37,7 +39,7 @@ def fit(
     *,
     noise: Mapping[str, float] | None = None,
     loss: str = "linear",
-    starts: int = 1,
+    starts: int | None = None,
     max_evaluations: int = 200,
     progress: Progress | bool | None = None,
     **options: Any,
@@ -64,8 +66,9 @@ def fit(
         The function rho of SciPy, "linear", "soft_l1", "huber" or "cauchy". The last three bound the effect of samples
         that are far off.
     starts : int, optional
-        Number of first guesses: the guess of the unknowns, and points of a Latin hypercube between the bounds.
-        The best result counts.
+        Number of first guesses: the guess of the unknowns, and points of a Latin hypercube between the bounds. The
+        best result counts. The default is one guess. If its result may be a local minimum and all bounds are finite,
+        the best 6 of 60 such points follow.
     max_evaluations : int, optional
         Largest number of steps from each start.
     progress : bool or callable, optional
@@ -101,10 +104,11 @@ def fit(
             raise UsageError(f"a fit sets {name!r} itself", remedy="describe the experiment by hs.Record")
     if text(loss, "loss") not in _LOSSES:
         raise UsageError(f"`loss` is {loss!r}", remedy=f"use one of {', '.join(_LOSSES)}")
-    starts = whole_number(starts, "starts", 1, 10_000)
+    count = 1 if starts is None else whole_number(starts, "starts", 1, 10_000)
     most = whole_number(max_evaluations, "max_evaluations", 1, 1_000_000)
     checked = unknowns_of(model, unknowns)
     chosen = records_of(records)
+    refuse_unknowns_of_records(chosen, checked)
     residuals = Residuals(model, chosen, checked, options)
     if len(residuals.measured) <= len(checked):
         raise UsageError(
@@ -114,12 +118,18 @@ def fit(
     for record in chosen:  # a record of unknown quantities is refused before the first long run
         record.require_quantities(model, _quantities(residuals, record))
     stated = _noise_of(noise, residuals)
-    guesses = _guesses(checked, starts)
+    guesses = _guesses(checked, count)
     spread = {
         name: float(np.std(residuals.measured[residuals.quantity == name])) or 1.0 for name in residuals.names
     }
     search = Search(residuals, loss, most, callback(progress), len(guesses))
     results = [found for guess in guesses if (found := search.best_from(guess, stated or spread)) is not None]
+    is_bounded = starts is None and all(unknown.is_bounded for unknown in checked.values())
+    if is_bounded and (not results or is_local(residuals, residuals.measured - results[0].predicted)):
+        more = search.most_promising(_guesses(checked, 1 + _SCANNED)[1:], stated or spread)[:_FOLLOWED]
+        results += [
+            found for guess in more if (found := search.best_from(guess, stated or spread)) is not None
+        ]
     if not results:
         failed = residuals.failure
         raise SimulationError(

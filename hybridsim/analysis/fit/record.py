@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.analysis.fit.unknown import start_of
 from hybridsim.arguments import as_real, cannot_be, finite_number, is_row
 from hybridsim.errors import UsageError, nearest
 from hybridsim.model import Model
@@ -28,7 +29,7 @@ class Record:
         has the name and unit of a quantity of the model. NaN marks a missing sample. A path names a CSV file whose
         first line contains the names.
     quantities : mapping of str to str, optional
-        Quantity of the model by column, if the names differ; other columns are then ignored.
+        Quantity of the model, or ``t``, by column, if the names differ; other columns are then ignored.
     params : mapping of str to str or float, optional
         Parameters that this experiment had, such as the speed of a belt.
     x0 : mapping of str to float, optional
@@ -59,7 +60,8 @@ class Record:
         if "t" not in columns:
             raise UsageError(
                 f"the `data` of the record have no column 't', but {', '.join(columns) or 'no columns'}",
-                remedy="name the column of times t",
+                remedy="name the column of times t, or rename it: quantities={'time': 't'}, "
+                "on the command line --column time=t",
             )
         t = columns.pop("t")
         if len(t) < 2 or not np.isfinite(t).all() or not (np.diff(t) > 0.0).all():
@@ -72,14 +74,6 @@ class Record:
                 f"t0 is {start!r}, after the first time {float(t[0])!r} of the record",
                 remedy="use an earlier t0",
             )
-        if self.quantities is not None:
-            for name in self.quantities:
-                if name not in columns:
-                    raise UsageError(
-                        f"`quantities` contains {name!r}, which is not a column of the record",
-                        remedy=nearest(str(name), columns, kind="columns"),
-                    )
-            columns = {quantity: columns[name] for name, quantity in self.quantities.items()}
         if not columns:
             raise UsageError(
                 "the record has times but no measured quantity", remedy="add a column for each quantity"
@@ -107,7 +101,8 @@ class Record:
                 raise UsageError(
                     f"model {model.name} has no quantity {name!r}, which is a column of a record",
                     remedy=f"{nearest(name, known, kind='quantities')}; "
-                    "hs.Record(data, quantities={column: quantity}) selects and renames columns",
+                    "hs.Record(data, quantities={column: quantity}) selects and renames columns, "
+                    "on the command line --column COLUMN=QUANTITY",
                 )
 
 
@@ -120,20 +115,40 @@ def records_of(records: Any) -> tuple[Record, ...]:
     return (records if isinstance(records, Record) else Record(records),)
 
 
-def _columns(data: Any, renamed: Mapping[str, str] | None) -> dict[str, np.ndarray]:
-    if isinstance(data, str | PathLike):
-        path = Path(data)
-        names = ["t", *(name for name in column_names(path) if name != "t")]
-        columns = [name for name in names if renamed is None or name == "t" or name in renamed]
-        return dict(zip(columns, map(np.array, read_columns(path, columns)), strict=True))
-    if not hasattr(data, "keys") or not hasattr(data, "__getitem__"):
+def refuse_unknowns_of_records(records: tuple[Record, ...], unknowns: Iterable[str]) -> None:
+    """Raise an error if a record sets a quantity that is unknown, since all records share the unknowns."""
+    for name in unknowns:
+        for record in records:
+            if name in record.params or name in map(start_of, record.x0):
+                raise UsageError(
+                    f"a record sets {name}, which is also one of the `unknowns`",
+                    remedy="leave it out of one of them; all records share the unknowns",
+                )
+
+
+def _columns(data: Any, quantities: Mapping[str, str] | None) -> dict[str, np.ndarray]:
+    """Return the columns by quantity, the times first; with `quantities` those that it names, and t."""
+    is_file = isinstance(data, str | PathLike)
+    if not is_file and not (hasattr(data, "keys") and hasattr(data, "__getitem__")):
         raise cannot_be("data", data, "use a dict of columns, a DataFrame or the path of a CSV file")
-    names = list(data.keys())  # a DataFrame has keys, too
-    return {
-        str(name): _numbers(data[name], str(name))
-        for name in names
-        if renamed is None or name in {"t", *renamed}
-    }
+    names = column_names(Path(data)) if is_file else list(data.keys())  # a DataFrame has keys, too
+    for name in quantities or ():
+        if name not in names:
+            raise UsageError(
+                f"`quantities` contains {name!r}, which is not a column of the record",
+                remedy=nearest(str(name), [str(each) for each in names], kind="columns"),
+            )
+    chosen = {name: name for name in names} if quantities is None else dict(quantities)
+    if "t" in names and "t" not in chosen.values():
+        chosen["t"] = "t"
+    ordered = sorted(chosen, key=lambda name: str(chosen[name]) != "t")
+    if is_file:
+        if "t" not in chosen.values():
+            return dict.fromkeys(map(str, names), np.empty(0))
+        values = [np.array(column) for column in read_columns(Path(data), ordered)]
+    else:
+        values = [_numbers(data[name], str(name)) for name in ordered]
+    return {str(chosen[name]): column for name, column in zip(ordered, values, strict=True)}
 
 
 def _numbers(column: Any, name: str) -> np.ndarray:

@@ -192,12 +192,19 @@ class Fit(Readable):
                     units[name] or "",
                 )
             )
-        noise = ", ".join(f"{name} {size:.3g}" for name, size in self.noise.items())
+        columns = [(name, part) for record in self.residuals for name, part in record.items()]
+        sizes = {
+            name: float(
+                np.sqrt(np.nanmean(np.concatenate([part for each, part in columns if each == name]) ** 2))
+            )
+            for name in self.noise
+        }
+        noise = ", ".join(f"{name} {size:.3g}" for name, size in sizes.items())
         return "\n".join(
             [
                 f"Fit of {self.model.name}: {self.samples} samples, {self.runs} simulations",
                 *aligned([("unknown", "value", "error", "95 % interval", ""), *rows], indent="  "),
-                f"  standard deviation of the residuals: {noise}",
+                f"  root mean square of the residuals: {noise}",
                 *([] if self.success else [f"  not converged: {self.message}"]),
                 *(f"  undetermined: {text}" for text in self.undetermined),
                 *(f"  warning: {text}" for text in self.warnings),

@@ -32,6 +32,16 @@ class Search:
             guess = self._minimum(guess, noise, is_coarse=True).x
         return self._minimum(guess, noise)
 
+    def most_promising(self, guesses: list[np.ndarray], noise: Mapping[str, float]) -> list[np.ndarray]:
+        """Return the guesses that can be simulated, the one with the smallest sum of squares first."""
+        residuals = self.residuals
+        weights = 1.0 / np.array([noise[name] for name in residuals.quantity])
+        sums = [
+            float(np.sum(((residuals.measured - residuals.predicted(x)) * weights) ** 2)) for x in guesses
+        ]
+        ranked = sorted((value, k) for k, value in enumerate(sums) if math.isfinite(value))
+        return [guesses[k] for _, k in ranked]
+
     def _minimum(
         self, guess: np.ndarray, noise: Mapping[str, float], is_coarse: bool = False
     ) -> OptimizeResult:
@@ -59,6 +69,12 @@ class Search:
             found: np.ndarray = -residuals.slopes(x, predicted(x), is_coarse) * weights[:, None]
             return np.where(np.isfinite(found), found, 0.0)
 
+        if not slopes(guess).any():  # the method would divide by zero
+            cost = 0.5 * float(np.sum(weighted(guess) ** 2))
+            same = predicted(guess)
+            return OptimizeResult(
+                x=guess, cost=cost, status=1, message="no unknown has an effect", predicted=same
+            )
         result = least_squares(
             weighted, guess, slopes, bounds, x_scale=residuals.sizes, loss=self._loss, max_nfev=self._most,
             xtol=1e-4 if is_coarse else 1e-10, ftol=1e-4 if is_coarse else 1e-12, gtol=None,

@@ -10,6 +10,7 @@ from typing import Any
 from hybridsim.arguments import cannot_be, flag, number
 from hybridsim.errors import UsageError, nearest
 from hybridsim.model import Model
+from hybridsim.model.parts.remedies import remedy_for_parameter
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,9 @@ def unknowns_of(model: Model, unknowns: Any) -> dict[str, Unknown]:
         if name not in current:
             raise UsageError(
                 f"`unknowns` contains {name!r}, which is not a parameter or start value of model {model.name}",
-                remedy=nearest(str(name), current, kind="parameters and start values"),
+                remedy=remedy_for_parameter(model, str(name))
+                if not str(name).endswith("(0)")
+                else nearest(str(name), current, kind="start values"),
             )
         unknown = _unknown(name, declared)
         guess = unknown.guess

@@ -30,8 +30,9 @@ class Element(Declared):
     """A quantity that follows an input in a nonlinear way; its name can be used in expressions.
 
     relay
-        The value is ``high`` from the time when the input rises to the level ``on``, and ``low`` from the time when it
-        falls to the level ``off``, which is below ``on``. ``initial`` is the mode at the start, "on" or "off".
+        The value is ``high`` from the time when the input rises through the level ``on``, and ``low`` from the time
+        when it falls through the level ``off``, which is below ``on``. An input that stops exactly at a level does not
+        pass it: for a signal of 0 and 1 use levels between them. ``initial`` is the mode at the start, "on" or "off".
     saturation
         The input, limited to values from ``lower`` to ``upper``.
     deadband
@@ -45,8 +46,9 @@ class Element(Declared):
         use it; guards, resets and contacts may not.
     delay
         The value that the input had some ticks of a schedule or clock before: one of ``ticks`` values in a queue, each
-        taken just before a tick. All are ``start`` at first. With ``time`` instead of ``clock`` and ``ticks`` it is
-        the value of an input of kind "table" or "wave" that much earlier.
+        taken at a tick. If an input jumps at a tick, its value after the jump counts; a discrete state that another
+        schedule sets at this time has its value before. All are ``start`` at first. With ``time`` instead of ``clock``
+        and ``ticks`` it is the value of an input of kind "table" or "wave" that much earlier.
 
     A model writes its elements as definitions, components and discrete states; ``model.elements`` is then empty.
 

@@ -110,6 +110,44 @@ def test_an_unknown_without_effect_is_named() -> None:
     assert found.errors["a"] < 1e-8
 
 
+def test_a_single_unknown_without_effect_is_named() -> None:
+    t = np.linspace(0.0, 2.0, 30)
+    found = hs.fit(LINE, {"t": t, "x": 1 + 0.5 * t}, {"b": (0, 4)})
+    assert found.undetermined == ("the data do not determine b",)
+
+
+def test_a_local_minimum_of_many_half_cycles_is_left() -> None:
+    # the sum of squares over mu has several minima: the block stops in another half cycle
+    t = np.linspace(0.0, 15.0, 150)
+    x = free_decay(t, 0.22) + 0.01 * np.random.default_rng(2).normal(size=150)
+    for guess in (0.1, 0.3, 0.7):
+        found = hs.fit("free-decay", {"t": t, "x": x}, {"mu": hs.Unknown(0.02, 0.9, guess=guess)})
+        assert abs(found.values["mu"] - 0.22) < 4 * found.errors["mu"] < 0.002
+
+
+def test_a_wrong_unit_is_said() -> None:
+    t = np.linspace(0.0, 2.0, 30)
+    found = hs.fit(LINE, {"t": t, "x": 1000 * (1 + 0.3 * t)}, {"a": (0.1, 0.9)})
+    assert any("compare the units" in text for text in found.warnings)
+
+
+def test_the_time_has_a_name_of_its_own(tmp_path: Path) -> None:
+    t = np.linspace(0.0, 2.0, 30)
+    data = {"time_s": t, "place": 1 + 0.3 * t, "note": ["a"] * 30}
+    names = {"time_s": "t", "place": "x"}
+    assert hs.fit(LINE, hs.Record(data, names), {"a": (0, 1)}).values["a"] == pytest.approx(0.3, abs=1e-8)
+    path = tmp_path / "record.csv"
+    path.write_text(
+        "note,place,time_s\n" + "".join(f"a,{1 + 0.3 * each!r},{each!r}\n" for each in t.tolist())
+    )
+    assert hs.fit(LINE, hs.Record(path, names), {"a": (0, 1)}).values["a"] == pytest.approx(0.3, abs=1e-8)
+    with pytest.raises(hs.UsageError, match="'t', but note, place, time_s"):
+        hs.Record(path)
+    with pytest.raises(hs.UsageError, match="`quantities` contains 'plaice'") as caught:
+        hs.Record(path, {"plaice": "x", "time_s": "t"})
+    assert "place" in str(caught.value.remedy)
+
+
 BLOCK = """
 schema = 1
 name = "sliding-block"
@@ -207,12 +245,13 @@ def test_a_wrong_first_guess_is_left_by_more_starts() -> None:
         parameters=[hs.Parameter("omega", 1.0)],
     )
     data = {"t": t, "x": np.cos(3.7 * t)}
-    one = hs.fit(model, data, {"omega": (0.5, 8)})
+    one = hs.fit(model, data, {"omega": (0.5, 8)}, starts=1)
     assert abs(one.values["omega"] - 3.7) > 0.1
     assert any("does not describe" in text for text in one.warnings)
-    many = hs.fit(model, data, {"omega": (0.5, 8)}, starts=20)
-    assert many.values["omega"] == pytest.approx(3.7, rel=1e-7)
-    assert many.warnings == ()
+    for starts in (None, 20):
+        many = hs.fit(model, data, {"omega": (0.5, 8)}, starts=starts)
+        assert many.values["omega"] == pytest.approx(3.7, rel=1e-7)
+        assert many.warnings == ()
 
 
 def test_doubtful_results_are_said() -> None:
@@ -247,7 +286,7 @@ def test_a_run_that_stops_early_is_an_error_or_a_step_that_is_not_taken() -> Non
     )
     t = np.linspace(0.0, 1.0, 30)
     with pytest.raises(hs.SimulationError, match="stop early from every first guess"):
-        hs.fit(model, {"t": t, "x": 1 / (1 - 0.8 * t)}, {"a": hs.Unknown(0, 5, guess=2.0)})
+        hs.fit(model, {"t": t, "x": 1 / (1 - 0.8 * t)}, {"a": hs.Unknown(0, 5, guess=2.0)}, starts=1)
     found = hs.fit(model, {"t": t, "x": 1 / (1 - 0.8 * t)}, {"a": (0, 5)}, starts=5)
     assert found.values["a"] == pytest.approx(0.8, rel=1e-7)
 
@@ -277,6 +316,8 @@ DATA = {"t": [0.0, 1.0, 2.0], "x": [1.0, 1.5, 2.0]}
         ({"t": [0, 1], "x": [1, "two"]}, {"a": (0, 1)}, {}, "not a number"),
         ({"time": [0, 1], "x": [1, 2]}, {"a": (0, 1)}, {}, "no column 't', but time, x"),
         ({"t": [0, 1]}, {"a": (0, 1)}, {}, "no measured quantity"),
+        (hs.Record(DATA, params={"a": 1}), {"a": (0, 1)}, {}, "a record sets a"),
+        (hs.Record(DATA, x0={"x": 1}), {"x(0)": (0, 1)}, {}, r"a record sets x\(0\)"),
         ([], {"a": (0, 1)}, {}, "at least one record"),
         (3.0, {"a": (0, 1)}, {}, "a dict of columns"),
     ],
