@@ -71,7 +71,7 @@ def _file(module: str) -> Path | None:
 
 def _handed_on(package: str, name: str) -> set[tuple[str, str]]:
     """Where a package has a name from."""
-    if not name:
+    if not name or (package == PACKAGE and name.startswith("__")):  # __version__ is a text
         return set()
     if package == PACKAGE and name in _public():
         return {(_public()[name], name)}

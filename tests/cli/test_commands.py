@@ -276,8 +276,8 @@ def test_cache_path_and_clear(hybridsim: Callable, tmp_path: Path, monkeypatch: 
 
 
 def test_default_spans_are_those_of_the_library() -> None:
-    library = importlib.import_module("hybridsim.analysis.compare.compare")
-    assert (values.COMPARED_PERIODS, values.DEFAULT_SECONDS) == (library.PERIODS, library.TIME)
+    library = importlib.import_module("hybridsim.analysis.compare.comparison_request")
+    assert (values.COMPARED_PERIODS, values.DEFAULT_SECONDS) == (library._PERIODS, library._TIME)
 
 
 def test_one_integrator_with_its_options(hybridsim: Callable) -> None:

@@ -74,6 +74,7 @@ CASES = {
     ],
     "advise": ["advise", "dfcs", "--quantity", "amplitude.x", "--rungs", "no-friction", "--no-integrators"],
     "report": ["report", "dfcs", "--t-end", "0.01"],
+    "fit": ["fit", "free-decay", "record.csv", "--unknown", "mu=0.05:0.5"],
     "steady": ["steady", "dfcs"],
     "sweep": ["sweep", "dfcs", "F0=20,30", "--measure", "amplitude.x", "--out", "s"],
     "study": ["study", "he2026", "--quick"],
@@ -87,6 +88,7 @@ FAULTY = {
     "run": ["run", "dfsc"],
     "resume": ["resume", "none.hsol"],
     "report": ["report", "dfsc"],
+    "fit": ["fit", "free-decay", "none.csv", "--unknown", "mu=0.05:0.5"],
     "compare": ["compare", "dfcs", "--integrators", "exakt"],
     "advise": ["advise", "dfcs", "--quantity", "amplitud.x"],
     "steady": ["steady", "dfcs", "--tol", "-1"],
@@ -126,6 +128,8 @@ def test_every_subcommand_prints_one_document_whatever_libraries_print(
     """Beside the command something prints by Python and by the descriptor of C, and warns."""
     if command == "resume":
         hs.simulate("dfcs", (0, 0.1)).save(folder / "run.hsol")
+    if command == "fit":
+        (folder / "record.csv").write_text("t,x\n0,10.5\n1,6.1\n2,-3.5\n3,-8.4\n")
     module = importlib.import_module(f"hybridsim.cli.{command}")
     execute = module.execute
 

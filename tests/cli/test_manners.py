@@ -180,6 +180,7 @@ LINES = {
     "run": ["dfcs"],
     "resume": ["r.hsol"],
     "report": ["dfcs"],
+    "fit": ["dfcs", "r.csv", "--unknown", "N=1:100"],
     "compare": ["dfcs"],
     "advise": ["dfcs", "--quantity", "x"],
     "steady": ["dfcs"],

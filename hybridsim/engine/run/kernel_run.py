@@ -136,8 +136,9 @@ class KernelRun:
 
     @property
     def is_at_target(self) -> bool:
-        """Return whether the call reached its target."""
-        return self.code == AT_TARGET and not (self.known and self.known.is_part)
+        """Return whether the call reached its target, or a known time that is not ordinary."""
+        known = self.known
+        return self.code == AT_TARGET and not (known and known.is_part and self.passed == len(known.kinds))
 
     @property
     def is_full(self) -> bool:

@@ -89,7 +89,7 @@ def test_what_cannot_be_differentiated_is_refused() -> None:
     solution = hs.simulate("square-wave", (0.0, 3.0))
     with pytest.raises(UsageError, match="input"):
         hs.sensitivities(solution)
-    with pytest.raises(UsageError, match="save"):
+    with pytest.raises(UsageError, match="keep"):
         hs.sensitivities(hs.simulate("dfcs", (0.0, 0.1), keep="events"))
     with pytest.raises(UsageError, match="'nu'"):
         hs.sensitivities(hs.simulate("dfcs", (0.0, 0.1)), ["nu"])

@@ -210,9 +210,9 @@ def test_a_decision_does_not_hang_on_the_last_bits_of_a_basis(
 
     An eigenvector is known to rounding of its largest entry. Whatever that makes of the velocity, it stops.
     """
-    from hybridsim.engine.linear import tables
+    from hybridsim.engine.linear import units
 
-    made = tables.modals
+    made = units.modals
 
     def otherwise_rounded(*given: Any, **named: Any) -> Any:
         flows, noise = made(*given, **named), np.random.default_rng(seed)
@@ -220,7 +220,7 @@ def test_a_decision_does_not_hang_on_the_last_bits_of_a_basis(
         entries = 2.0**-53 * np.abs(basis).max(axis=1, keepdims=True) * noise.integers(-2, 3, basis.shape)
         return flows._replace(full_basis=basis + entries)
 
-    monkeypatch.setattr(tables, "modals", otherwise_rounded)
+    monkeypatch.setattr(units, "modals", otherwise_rounded)
     # a value of its own, for which no tables are kept
     sol = hs.simulate("pid-servo", (0, 40), params={"ki": 200 + seed / 1024}, integrator="exact")
     assert sol.status == "finished" and sol.events[-1].target == "stick"

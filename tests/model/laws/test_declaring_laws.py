@@ -105,4 +105,4 @@ def test_every_packaged_law_is_listed_in_the_reference() -> None:
     page = (Path(__file__).parents[3] / "docs" / "reference" / "laws.md").read_text(encoding="utf-8")
     assert [name for name in list_laws() if f"| `{name}` |" not in page] == []
     for name in list_laws():
-        assert f"images/laws/{name}.png" in page
+        assert f"images/laws/{name}.svg" in page
