@@ -59,6 +59,11 @@ def check_values(scope: Scope) -> None:
     constants = _constant_definitions(scope, values)
     for contact in model.contacts:
         _contact(scope, contact, constants)
+    for requirement in model.requirements:
+        if requirement.low.names | requirement.high.names <= constants.keys():
+            low, high = (_value(scope, expr, constants) for expr in (requirement.low, requirement.high))
+            if low is not None and high is not None and not low < high:
+                scope.fail(requirement, *requirement.fault(low, high))
     for impact in model.impacts:
         check_restitution(scope, impact, constants)
 
@@ -79,6 +84,8 @@ def checked_names(model: Model) -> frozenset[str]:
             used |= set().union(
                 *(contact.limit_force(b).names | contact.onset_force(b).names for b in (False, True))
             )
+    for requirement in model.requirements:
+        used |= requirement.low.names | requirement.high.names
     if model.impacts:
         used |= {parameter.name for parameter in model.parameters}
     made_of = {p.name: p.value.names for p in model.parameters} | {n: e.names for n, e in model.definitions}

@@ -6,11 +6,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
-from hybridsim.errors import ModelError, nearest
-from hybridsim.expr import Expression, evaluate, parse, parse_reset, resolve, substitute
+from hybridsim.errors import nearest
+from hybridsim.expr import Expression, evaluate, parse, parse_reset, substitute
 from hybridsim.model.elements.element import Element
 from hybridsim.model.elements.guard_direction import without_directions
 from hybridsim.model.elements.quantizer_readers import refuse_readers
+from hybridsim.model.elements.requirement import requirements_of
 from hybridsim.model.parts.component import Choice, Component, Guard, Mode
 from hybridsim.model.parts.declared import Declared
 from hybridsim.model.parts.inputs import HeldInput
@@ -21,8 +22,6 @@ _FORMULAS = {
     "saturation": "min(max(input, lower), upper)",
     "deadband": "max(input - upper, 0) + min(input - lower, 0)",
 }
-# Fields of which the first is below the second.
-_ORDERS = {"relay": ("off", "on"), "saturation": ("lower", "upper"), "deadband": ("lower", "upper")}
 # Numbers of steps that a quantizer takes at once where its input jumps, or has another value at the start than 0.
 _STRIDES = tuple(2**k for k in range(13, 0, -1))
 
@@ -32,7 +31,6 @@ def written_out(model: Any) -> dict[str, Any]:
     forms = _Forms(model)
     for element in model.elements:
         element.refuse_unless_complete()
-        _require_order(model, element)
         forms.add(element)
     parts = {"definitions": forms.definitions, "components": forms.components, "schedules": forms.schedules}
     refuse_readers(model, parts, {one.name: one for one in model.elements if one.kind == "quantizer"})
@@ -43,28 +41,8 @@ def written_out(model: Any) -> dict[str, Any]:
         "schedules": tuple(forms.schedules),
         "inputs": tuple(forms.inputs),
         "elements": (),
+        "requirements": (*model.requirements, *requirements_of(model.elements)),
     }
-
-
-def _require_order(model: Any, element: Element) -> None:
-    """Raise an error if the levels of an element, as far as they are numbers, are in the wrong order."""
-    if element.kind not in _ORDERS:
-        return
-    lower, upper = _ORDERS[element.kind]
-    try:
-        values = resolve({parameter.name: parameter.value for parameter in model.parameters})
-        low, high = (evaluate(getattr(element, name), values) for name in (lower, upper))
-    except (ModelError, KeyError):
-        return  # not a number, or an error that the checks report
-    if not low < high:
-        remedy = f"use a value of `{lower}` below that of `{upper}`"
-        if element.kind == "relay":
-            remedy += (
-                "; for a relay that is on at low values, change the sign of the input and of both levels"
-            )
-        raise element.error(
-            f"element {element.name}: `{lower}` is {low:.6g} and `{upper}` is {high:.6g}", remedy
-        )
 
 
 def _form(element: Element, template: str, **names: str) -> Expression:

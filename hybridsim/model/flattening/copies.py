@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 from hybridsim.errors import Place
 from hybridsim.expr import Expression
+from hybridsim.model.elements.requirement import Requirement
 from hybridsim.model.flattening.prefix import prefixed
 from hybridsim.model.parts.component import Choice, Component, Mode, Surface
 from hybridsim.model.parts.contact import Contact
@@ -45,6 +46,7 @@ class Copies:
             Monitor: lambda m: {"expr": self.expr(m.expr), "reset": self.named(m.reset)},
             Schedule: self._schedule,
             Shape: self._shape,
+            Requirement: lambda r: {"low": self.expr(r.low), "high": self.expr(r.high)},
             Output: lambda o: {"expr": self.expr(o.expr), "modes": self.named(o.modes)},
         }
 

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 MAX_DECLARATIONS = 20_000
 KINDS = (
     "parameters", "states", "discrete", "inputs", "contacts", "surfaces", "impacts", "components", "monitors",
-    "schedules", "outputs", "drawing",
+    "schedules", "outputs", "drawing", "requirements",
 )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from hybridsim.expr.evaluate import dependency_order
 from hybridsim.files import path_text
 from hybridsim.model.elements.element import Element
 from hybridsim.model.elements.forms import written_out
+from hybridsim.model.elements.requirement import Requirement
 from hybridsim.model.flattening.flatten import flattened
 from hybridsim.model.laws.law import FrictionLaw
 from hybridsim.model.laws.law_with_states import ContactState
@@ -81,24 +82,22 @@ class Model(Declared):
     title, source, description, look : str, optional
         Title, reference, longer description, and a hint what to look at.
     duration : str or float, optional
-        Default length of runs and comparisons of the command line, in the unit of t; an expression of parameters.
+        Default length of runs of the command line, in the unit of t; an expression of parameters.
     path : str, optional
         Path of the file that the model was read from.
     flow : callable, optional
         A Python function (t, x, p) that returns the n rates (a tuple or an array), instead of expressions. The
         parameters are ``p.g`` or ``p[0]``. The states are then a dict of names and start values, or have der 0.
         ``flow`` of a `Mode` replaces it in that mode. Guards, monitors, outputs, conditions and resets are functions
-        (t, x, p) that return a number, or constants. Contacts, inputs, definitions and discrete states need
-        expressions.
+        (t, x, p) that return a number, or constants. Contacts, inputs and discrete states need expressions.
     surfaces, impacts : sequence, optional
         `SwitchingSurface` objects, along which the motion may slide, and `Impact` objects (unilateral contacts).
     drawing : sequence of Shape, optional
         Shapes that show the mechanism, for `hybridsim.plot.mechanism` and `Solution.animate`; runs ignore them.
     use : sequence of Use, optional
-        Other models as parts. Their declarations become declarations of this model, with names such as ``left.x``,
-        and ``use`` is empty afterwards.
-    elements : sequence of Element, optional
-        Elements of control loops, which become definitions, components and other parts at once.
+        Other models as parts, whose declarations become declarations of this model with names such as ``left.x``.
+    elements, requirements : sequence, optional
+        `Element` objects, which become definitions, components and other parts, and inequalities that these add.
     place : Place, optional
         Place of the declaration, for error messages.
 
@@ -135,6 +134,7 @@ class Model(Declared):
     drawing: tuple[Shape, ...] = ()
     use: tuple[Use, ...] = ()
     elements: tuple[Element, ...] = ()
+    requirements: tuple[Requirement, ...] = ()
 
     _part_files: ClassVar[tuple[str, ...]] = ()  # files of its parts, if it was read from a file
     connected_units: ClassVar[dict[str, str]] = {}  # units of the inputs of its parts that are connected

@@ -74,6 +74,33 @@ def test_an_error_names_the_line_of_the_element(element: str, what: str, remedy:
     assert remedy in str(error)
 
 
+@pytest.mark.parametrize(
+    ("values", "what"),
+    [
+        ({"L": -1}, ["s: `lower` is 1 and `upper` is -1", "r: `off` is 0.5 and `on` is -1"]),
+        ({"L": 0.5}, ["r: `off` is 0.5 and `on` is 0.5"]),
+        ({"W": -1}, ["b: `width` is -1", "q: `step` is -1"]),
+        ({"W": 0}, ["b: `width` is 0", "q: `step` is 0"]),
+    ],
+)
+def test_changed_parameters_keep_the_order_of_levels(values: dict[str, float], what: list[str]) -> None:
+    elements = [
+        hs.Element("s", "saturation", "x", lower="-L", upper="L"),
+        hs.Element("b", "backlash", "x", width="W"),
+        hs.Element("q", "quantizer", "x", step="W"),
+        hs.Element("r", "relay", "x", on="L", off=0.5),
+    ]
+    part = hs.Model("p", parameters={"L": 1, "W": 1}, states=[hs.State("x", 0, "cos(t)")], elements=elements)
+    assert hs.simulate(part, (0, 1)).status == "finished"
+    with pytest.raises(ModelError) as caught:
+        hs.simulate(part, (0, 1), params=values)
+    assert [error.message for error in caught.value.errors] == [f"element {text}" for text in what]
+    whole = hs.Model("m", parameters={"A": 1}, use=[hs.Use("k", part, dict.fromkeys(values, "A"))])
+    (value,) = values.values()
+    with pytest.raises(ModelError, match=f"use.k: element k.{what[0][0]}"):
+        whole.with_(A=value).validate()
+
+
 @pytest.mark.parametrize("ticks", [0, 1001, 2.5, True])
 def test_ticks_are_a_whole_number(ticks: object) -> None:
     with pytest.raises(HybridsimError, match="`ticks` cannot be"):

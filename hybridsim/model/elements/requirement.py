@@ -1,0 +1,54 @@
+"""This module defines a requirement: an inequality that the parameters of an element have to fulfil."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from hybridsim.expr import Expression, parse
+from hybridsim.model.elements.element import Element
+from hybridsim.model.parts.declared import Declared
+
+# Fields of which the first is below the second; None is zero.
+_ORDERS = {
+    "relay": ("off", "on"),
+    "saturation": ("lower", "upper"),
+    "deadband": ("lower", "upper"),
+    "backlash": (None, "width"),
+    "quantizer": (None, "step"),
+}
+_FOR_LOW_VALUES = "; for a relay that is on at low values, change the sign of the input and of both levels"
+
+
+@dataclass(frozen=True)
+class Requirement(Declared):
+    """A value `low` that has to be below `high` for all parameters of a run.
+
+    name : the element. fields : what the two values are in it, None for zero.
+    """
+
+    name: str
+    low: Expression
+    high: Expression
+    fields: tuple[str | None, str]
+    kind: str
+
+    def fault(self, low: float, high: float) -> tuple[str, str]:
+        """Return the message and the remedy for values in the wrong order."""
+        lower, upper = self.fields
+        if lower is None:
+            return f"element {self.name}: `{upper}` is {high:.6g}", f"use a value of `{upper}` above zero"
+        remedy = f"use a value of `{lower}` below that of `{upper}`"
+        message = f"element {self.name}: `{lower}` is {low + 0.0:.6g} and `{upper}` is {high:.6g}"
+        return message, remedy + (_FOR_LOW_VALUES if self.kind == "relay" else "")
+
+
+def requirements_of(elements: tuple[Element, ...]) -> Iterator[Requirement]:
+    """Yield the requirements of elements; those that depend on states or time are not checked."""
+    for element in elements:
+        if element.kind in _ORDERS:
+            lower, upper = _ORDERS[element.kind]
+            low = parse(0) if lower is None else getattr(element, lower)
+            yield Requirement(
+                element.name, low, getattr(element, upper), (lower, upper), element.kind, place=element.place
+            )
