@@ -80,3 +80,23 @@ def test_a_storey_on_friction_follows_a_cubic_record() -> None:
     assert len(events) > 15
     assert events == pytest.approx([t for t, _ in true.events], abs=5e-13)
     assert pytest.approx(true.states, abs=5e-13) == sol(true.knots).T
+
+
+@pytest.mark.parametrize("length", [1e-3, 0.03, 1.0, 30.0, 1000.0])
+@pytest.mark.parametrize("before", [0.01, 1.0, 50.0])
+def test_a_body_is_released_at_a_knot_between_pieces_of_any_lengths(before: float, length: float) -> None:
+    """The force jumps at the knot from half of the friction limit 1 to 3, and then rises by 2 within the next piece.
+
+    x(s) = s^2 + s^3/(3 length) at a time s after the knot.
+    """
+    times, values = [0.0, before, before, before + length], [0.25, 0.5, 3.0, 5.0]
+    model = hs.Model(
+        "m",
+        states=[hs.State("x", 0, "v"), hs.State("v", 0, "F - f")],
+        inputs=[hs.Input("F", "table", times=times, values=values)],
+        contacts=[hs.Contact("f", "v", 1, "coulomb", {"mu": 1})],
+    )
+    sol = hs.simulate(model, (0, before + length), integrator="exact")
+    assert [(event.target, event.t) for event in sol.events] == [("slip+", before)]
+    s = 0.5 * length
+    assert sol(before + s)[0] == pytest.approx(s**2 + s**3 / (3 * length), rel=1e-11)
