@@ -187,7 +187,6 @@ def _guesses(unknowns: Mapping[str, Unknown], starts: int) -> list[np.ndarray]:
                 f"{name} has no finite bounds, which more than one start needs",
                 remedy="give both bounds, or starts=1",
             )
-    low = np.array([u.coordinate(u.low) for u in unknowns.values()])
-    high = np.array([u.coordinate(u.high) for u in unknowns.values()])
+    low, high = np.array([unknown.coordinate_bounds for unknown in unknowns.values()]).T
     points = qmc.LatinHypercube(len(first), seed=_SEED).random(starts - 1)
     return [first, *(low + points * (high - low))]

@@ -126,8 +126,8 @@ class Residuals:
             for move in (step, -step):
                 moved = coordinates.copy()
                 moved[k] += move
-                ends = unknown.coordinate(unknown.low), unknown.coordinate(unknown.high)
-                if ends[0] <= moved[k] <= ends[1]:
+                low, high = unknown.coordinate_bounds
+                if low <= moved[k] <= high:
                     one_sided.append((self.predicted(moved) - base) / move)
             found[:, k] = _central(one_sided, is_coarse)
         return found

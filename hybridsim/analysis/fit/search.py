@@ -47,11 +47,7 @@ class Search:
     ) -> OptimizeResult:
         residuals = self.residuals
         weights = 1.0 / np.array([noise[name] for name in residuals.quantity])
-        unknowns = residuals.unknowns.values()
-        bounds = (
-            [u.coordinate(u.low) if not u.log or u.low > 0 else -math.inf for u in unknowns],
-            [u.coordinate(u.high) for u in unknowns],
-        )
+        bounds = np.array([unknown.coordinate_bounds for unknown in residuals.unknowns.values()]).T
         known: dict[bytes, np.ndarray] = {}
 
         def predicted(x: np.ndarray) -> np.ndarray:

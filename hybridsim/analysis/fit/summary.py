@@ -32,12 +32,8 @@ def summed_up(
     for k, (name, unknown) in enumerate(unknowns.items()):
         if not unknown.log:
             sizes[k] = abs(values[name]) or residuals.sizes[k]
-    at_bound = np.array(
-        [
-            min(values[name] - u.low, u.high - values[name]) <= _AT_BOUND * residuals.sizes[k] and not u.log
-            for k, (name, u) in enumerate(unknowns.items())
-        ]
-    )
+    bounds = np.array([unknown.coordinate_bounds for unknown in unknowns.values()])
+    at_bound = np.abs(bounds - best.x[:, None]).min(axis=1) <= _AT_BOUND * residuals.sizes
     free = np.flatnonzero(~at_bound)
     lacking, found = undetermined([names[k] for k in free], slopes[:, free] * sizes[free], 1.0)
     units = np.array(

@@ -64,6 +64,11 @@ class Unknown:
         """Whether both bounds are finite."""
         return math.isfinite(self.low) and math.isfinite(self.high)
 
+    @property
+    def coordinate_bounds(self) -> tuple[float, float]:
+        """Lower and upper bound of the coordinate."""
+        return self.coordinate(self.low), self.coordinate(self.high)
+
     def coordinate(self, value: float) -> float:
         """Return the coordinate that the fit varies: the value or its logarithm."""
         return math.log(value) if self.log else value
@@ -106,8 +111,7 @@ def unknowns_of(model: Model, unknowns: Any) -> dict[str, Unknown]:
                     f"{unknown.high!r}",
                     remedy=f"use hs.Unknown({unknown.low!r}, {unknown.high!r}, guess=...)",
                 )
-            ends = unknown.coordinate(unknown.low), unknown.coordinate(unknown.high)
-            guess = unknown.value(0.5 * (ends[0] + ends[1]))
+            guess = unknown.value(0.5 * sum(unknown.coordinate_bounds))
         found[str(name)] = Unknown(unknown.low, unknown.high, guess, unknown.log)
     return found
 

@@ -266,6 +266,8 @@ def test_doubtful_results_are_said() -> None:
     bound = hs.fit(LINE, {"t": t, "x": 1 + 0.3 * t}, {"a": (0.4, 5)})
     assert any("at a bound" in text for text in bound.warnings)
     assert math.isnan(bound.errors["a"])
+    bound = hs.fit(LINE, {"t": t, "x": 1 + 0.3 * t}, {"a": hs.Unknown(0.4, 5, log=True)})
+    assert any("at a bound" in text for text in bound.warnings)
 
 
 def test_a_robust_loss_bounds_the_effect_of_outliers() -> None:
