@@ -88,6 +88,8 @@ class Energies(EventsAndModes):
         states raises `UsageError`.
         """
         contacts = [contact.name for contact in self.model.contacts]
+        if not contacts:
+            return ByName()
         found = self._integrated(self._trajectory.friction_powers, self.t_start, self.t_end, len(contacts))
         return ByName(zip(contacts, found.tolist(), strict=True))
 

@@ -169,3 +169,8 @@ def test_what_is_refused() -> None:
         sol.dissipated["g"]
     with pytest.raises(AttributeError, match="only a run of a MechanicalSystem"):
         _ = sol.work
+
+
+def test_a_model_without_contacts_dissipates_nothing() -> None:
+    model = hs.Model("free", states=[hs.State("x", 1, "-x")])
+    assert hs.simulate(model, (0, 1)).dissipated == {}
