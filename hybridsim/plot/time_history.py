@@ -99,12 +99,13 @@ def time_history(
         _mark(axis, marks)
         style.dress(axis)
         low, high = zip(*(extents[name] for name in panel), strict=True)
+        is_of_one_unit = len({units[name] for name in panel}) == 1
+        unit, power = (units[panel[0]], powers.get(panel[0])) if is_of_one_unit else ("", None)
         label_axis(
-            axis.yaxis, panel[0], units[panel[0]], min(low), max(high), title=title_of(model, panel[0]),
-            power=powers.get(panel[0]),
-        )  # fmt: skip
+            axis.yaxis, panel[0], unit, min(low), max(high), title=title_of(model, panel[0]), power=power
+        )
         if len(panel) > 1:
-            height = _name_curves(axis, model, panel, units[panel[0]])
+            height = _name_curves(axis, model, panel)
             above = height if axis is history.quantities[0] else above
         axis.set_xlim(window.t0, window.t1)
     if history.modes is not None:
@@ -147,12 +148,12 @@ def _looks(count: int) -> list[tuple[str, Any]]:
     return [(_CURVES[k % len(_CURVES)], _DASHES[k // len(_CURVES) % len(_DASHES)]) for k in range(count)]
 
 
-def _name_curves(axis: Axes, model: Any, panel: Sequence[str], unit: str) -> float:
+def _name_curves(axis: Axes, model: Any, panel: Sequence[str]) -> float:
     """Write the symbols of several curves above their panel, and what their titles share beside it."""
     titles = [title_of(model, name).split() for name in panel]
     shared = " ".join(w[0] for w in itertools.takewhile(lambda w: len(set(w)) == 1, zip(*titles)))
     label = axis.yaxis.get_label_text()
-    bracket = label[label.rindex("[") :] if unit else ""
+    bracket = label[label.rindex("[") :] if label.endswith("]") else ""
     axis.yaxis.set_label_text("\n".join(filter(None, (shared, bracket))))
     handles = [
         Line2D([], [], color=colour, linestyle=dashes, label=symbol_of(name))

@@ -95,6 +95,15 @@ def test_quantities_of_one_unit_share_a_panel_if_they_are_three() -> None:
     assert len(apart.quantities) == 2
 
 
+def test_a_panel_of_several_units_has_no_unit_and_keeps_its_power_of_ten() -> None:
+    states = [hs.State("x", 2e-6, "0", "m"), hs.State("v", 4e-6, "0", "m/s"), hs.State("u", 3e-6, "0")]
+    sol = hs.simulate(hs.Model("small", states), (0.0, 1.0))
+    for panel in (["x", "v"], ["u", "x"]):
+        (axes,) = time_history(sol, [panel]).quantities
+        assert axes.get_ylabel() == "[$10^{-6}$]"
+        assert axes.yaxis.get_major_formatter()(2e-6) in ("2", "2.0", "2.00")
+
+
 def test_equal_units_have_equal_scales_in_a_phase_portrait() -> None:
     circle = [hs.State("x", 1, "y"), hs.State("y", 0, "-x")]
     assert phase_portrait(hs.simulate(hs.Model("circle", circle), (0, 7))).get_aspect() == 1.0
