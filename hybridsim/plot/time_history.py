@@ -82,11 +82,13 @@ def time_history(
     require_run(solution)
     model = solution.model
     panels = _unasked(solution) if quantities is None else [_names(one) for one in quantities]
+    changing = changing_components(solution)
+    if not all(panels) or not (panels or changing):
+        raise UsageError("a panel has no quantity", remedy="use names of states, outputs, forces or inputs")
     names = list(dict.fromkeys(name for panel in panels for name in panel))
     units = {name: unit_of(solution, name) for name in names}
     window = window_of(solution, t_span)
     smooth_parts = smooth_parts_of(solution, names, window)
-    changing = changing_components(solution)
     components = changing[:_MOST_COMPONENTS]
     history = _axes(len(panels), len(components), axes)
     marks = _marks_in(solution, window)

@@ -251,6 +251,8 @@ def test_nothing_global_is_touched() -> None:
     [
         (lambda: time_history(oscillator(2), ["y"]), "has no quantity 'y'"),
         (lambda: time_history(oscillator(2), ["x"], axes=[]), "0 axes"),
+        (lambda: time_history(hs.simulate("gear-rattle", (0, 1)), []), "a panel has no quantity"),
+        (lambda: time_history(oscillator(2), ["x", []]), "a panel has no quantity"),
         (lambda: time_history(oscillator(2), t_span=(5, 6)), "outside the run"),
         (lambda: time_history(oscillator(2), t_span=(1e-3, 1e-3)), "no curve from t = 0.001 to 0.001"),
         (lambda: hs.simulate("dfcs", (1, 1)).plot(), "no curve from t = 1 to 1"),
