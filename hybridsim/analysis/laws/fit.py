@@ -10,7 +10,7 @@ from hybridsim.arguments import numbers, whole_number
 from hybridsim.errors import UsageError
 
 _REMEDY = "use one finite number for each measured point"
-_CANDIDATES = 40  # positions at which a further knot is tried
+_CANDIDATES = 40  # positions at which a further knot is tried; more for more than 20 knots
 _ROUNDS = 10  # most rounds in which each knot is moved to its best place among the others
 _ROUGH, _FINE = 1e-4, 1e-14  # relative tolerances of an optimisation during the search and at its end
 _GAIN = 1e-3  # a smaller relative gain of a round ends the search
@@ -53,12 +53,13 @@ class _Points:
         order = np.argsort(first, kind="stable")
         self.x, self.y = first[order], second[order]
         distinct = np.unique(self.x)
+        if len(distinct) < 2:
+            raise UsageError("`at` has no two different numbers", remedy=_REMEDY)
         whole_number(count, "knots", 2, len(distinct))
         self.ends = distinct[[0, -1]]
         between = np.concatenate([distinct[1:-1], 0.5 * (distinct[1:] + distinct[:-1])])
-        self.candidates = np.unique(
-            np.quantile(between, np.linspace(0.0, 1.0, _CANDIDATES), method="nearest")
-        )
+        levels = np.linspace(0.0, 1.0, max(_CANDIDATES, 2 * count))
+        self.candidates = np.unique(np.quantile(between, levels, method="nearest"))
 
     def values(self, inner: np.ndarray) -> np.ndarray | None:
         """Return the best values at all knots, or None if the points do not determine them."""

@@ -58,6 +58,14 @@ def test_as_many_knots_as_arguments_pass_through_all_points() -> None:
     assert [table.value(each) for each in at] == pytest.approx(values, abs=1e-9)
 
 
+@pytest.mark.parametrize("knots", [45, 60])
+def test_more_knots_than_a_straight_line_needs(knots: int) -> None:
+    """No knot moves from its first place, because each fit is exact."""
+    table = hs.LawTable.fit(range(60), [0.5 - 0.005 * k for k in range(60)], knots=knots)
+    assert len(table.at) == knots
+    assert [table.value(k) for k in (0, 30, 59)] == pytest.approx([0.5, 0.35, 0.205], rel=1e-9)
+
+
 def test_the_order_of_points_does_not_matter_and_arguments_may_repeat() -> None:
     """Two values at each argument count as their mean, since each has as many."""
     at, values, v = [0, 0.7, 2], [0.5, 0.3, 0.4], speeds(7, 40)
@@ -85,6 +93,7 @@ def test_a_run_with_a_fitted_law() -> None:
         ([0, 1, np.nan], [1, 2, 3], 2, "not finite"),
         ([0, 1, 2], [1, 2, np.inf], 2, "not finite"),
         ([0, 1, 1], [1, 2, 3], 3, "`knots` cannot be 3"),
+        ([1, 1], [1, 2], 2, "`at` has no two different numbers"),
         ([0, 1, 2], [1, 2, 3], 1, "`knots` cannot be 1"),
         ([0, 1, 2], [1, 2, 3], 2.5, "`knots` cannot be 2.5"),
         (["a", 1, 2], [1, 2, 3], 2, "a value of `at` cannot be 'a'"),
