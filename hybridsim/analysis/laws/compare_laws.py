@@ -88,7 +88,7 @@ def compare_laws(
     if is_last_period:
         options |= {"keep": period}
     rows = [
-        LawRow(label, changed, simulate(changed, (t0, t1), **options), contact, quantity)
+        LawRow(label, changed, simulate(changed, (t0, t1), **options), contact, quantity, is_last_period)
         for label, changed in models.items()
     ]
     measured = (t1 - period, t1) if is_last_period and period is not None else (t0, t1)

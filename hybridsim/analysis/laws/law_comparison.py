@@ -22,6 +22,7 @@ class LawRow(Measures):
     solution: Solution
     contact: str
     quantity: str
+    is_period: bool  # whether the solution is one period of the forcing
 
     @property
     def amplitude_of_quantity(self) -> float | None:
@@ -30,9 +31,16 @@ class LawRow(Measures):
 
     @property
     def stops(self) -> int | None:
-        """Number of intervals of stick; None for a law without stick."""
-        found = self.solution.success and self.contact in self._contacts
-        return int(self.stops_per_period[self.contact]) if found else None
+        """Number of intervals of stick; None for a law without stick.
+
+        In a period, an interval across the end counts once, and permanent stick is not counted.
+        """
+        if not (self.solution.success and self.contact in self._contacts):
+            return None
+        if self.is_period:
+            return int(self.stops_per_period[self.contact])
+        hold = self.held_mode(self.contact)
+        return sum(each.mode == hold and each.t1 > each.t0 for each in self.solution.modes[self.contact])
 
     @property
     def energy_loss(self) -> float | None:

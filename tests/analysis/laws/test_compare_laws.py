@@ -36,6 +36,18 @@ def test_a_block_that_slides_to_rest() -> None:
     assert third.stops is None
 
 
+def test_a_run_without_a_period_that_begins_and_ends_in_stick_has_two_stops() -> None:
+    """Of the forces 0, 1 and 0, one second each, only the second exceeds the limit 1/2; the speed 1/2 then decays."""
+    push = hs.Input("u", "table", times=[0, 1, 1, 2, 2, 4], values=[0, 0, 1, 1, 0, 0])
+    states = [hs.State("x", 0, "v", nominal=1), hs.State("v", 0, "u - f", nominal=1)]
+    contact = hs.Contact("f", "v", 1, "coulomb", {"mu": 0.5})
+    (row,) = hs.compare_laws(
+        hs.Model("pushed", states, inputs=[push], contacts=[contact]), ["coulomb"], (0, 4)
+    ).rows
+    assert row.stops == 2
+    assert row.amplitude_of_quantity == pytest.approx(0.25, rel=1e-9)
+
+
 def test_a_loop_of_coulombs_law_is_a_rectangle() -> None:
     """The last period of a forced motion: the loss is 4*mu*N times the amplitude."""
     model = hs.load("dfcs")
