@@ -52,7 +52,7 @@ def compare_laws(
     params, x0 : mapping of str to float, optional
         Parameter values and initial values by name, instead of the declared values.
     **options : object
-        Options of `simulate`, such as ``integrator`` and ``rtol``.
+        Options of `simulate`, such as ``integrator`` and ``rtol``, but not ``keep`` and ``t_eval``.
 
     Returns
     -------
@@ -68,6 +68,9 @@ def compare_laws(
     [2, 2]
     """
     refuse_unknown([simulate], options)
+    for name in ("keep", "save", "t_eval"):
+        if name in options:
+            raise UsageError(f"compare_laws() has no option `{name}`", remedy=f"remove `{name}`")
     model = chosen_model(model, params).with_start(**mapping(x0, "x0")).validate()
     names = [declared.name for declared in model.contacts]
     if contact is None:

@@ -134,6 +134,8 @@ def test_the_picture_has_a_loop_and_a_bar_for_each_law() -> None:
         (["coulomb"], {"contact": "g"}, "model block has no contact 'g'"),
         (["coulomb"], {"quantity": "y"}, "model block has no quantity 'y'"),
         (["coulomb"], {"rtl": 1}, "'rtl' is not an option"),
+        (["coulomb"], {"t_span": (0, 1), "keep": "events"}, "has no option `keep`"),
+        (["coulomb"], {"t_eval": [0, 1]}, "has no option `t_eval`"),
         (["coulomb"], {"t_span": (1, 0)}, r"`t_span` cannot be \(1, 0\)"),
     ],
 )
