@@ -162,13 +162,18 @@ def extent(smooth_parts: Sequence[SmoothPart], name: str) -> tuple[float, float]
     return float(min(map(np.min, values))), float(max(map(np.max, values)))
 
 
-def smooth_parts_of(solution: Solution, names: Sequence[str], window: Window) -> list[SmoothPart]:
-    """Return the smooth parts of a window in order of time, split at the events."""
+def require_length(window: Window) -> None:
+    """Raise an error for a part of a run that is one instant."""
     if not window.t1 > window.t0:
         raise UsageError(
             f"there is no curve from t = {window.t0:g} to {window.t1:g}",
-            remedy="draw a longer run, or two different times of it in `t_span`",
+            remedy="draw a longer run, or a longer part of it with `t_span`",
         )
+
+
+def smooth_parts_of(solution: Solution, names: Sequence[str], window: Window) -> list[SmoothPart]:
+    """Return the smooth parts of a window in order of time, split at the events."""
+    require_length(window)
     times = event_times(solution, CUTS)
     inner = set(times[(times > window.t0) & (times < window.t1)].tolist())
     cuts = np.array([window.t0, *sorted(inner), window.t1])

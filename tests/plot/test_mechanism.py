@@ -162,6 +162,7 @@ def test_the_speed_is_round_and_the_number_of_frames_is_bounded(slide: hs.Soluti
         ({"speed": "fast"}, "`speed` cannot be 'fast'"),
         ({"quantities": ["y"]}, "quantities: the run has no 'y'"),
         ({"t_span": (5, 6)}, "outside the run"),
+        ({"t_span": (1, 1)}, "no curve from t = 1 to 1"),
     ],
 )
 def test_wrong_arguments_are_refused(

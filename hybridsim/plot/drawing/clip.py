@@ -20,7 +20,7 @@ from hybridsim.plot import style
 from hybridsim.plot.drawing.canvas import Canvas
 from hybridsim.plot.drawing.poses import poses_at
 from hybridsim.plot.drawing.theme import DARK, Theme, darken
-from hybridsim.plot.smooth_parts import Window
+from hybridsim.plot.smooth_parts import Window, require_length
 from hybridsim.plot.time_history import time_history
 from hybridsim.solution import Solution
 
@@ -45,6 +45,7 @@ class Clip:
         fps: float,
         theme: Theme,
     ) -> None:
+        require_length(window)
         span = window.t1 - window.t0
         self.speed = speed or _round_speed(span / _SECONDS, time_unit(solution.model) == "s")
         count = max(2, math.floor(span / self.speed * fps + 1e-9) + 1)
