@@ -68,7 +68,13 @@ def small(axes: list[Axes]) -> Figure:
     """The picture of a law at the width at which a table shows it, with its title in shorter lines."""
     figure, title = style.figure_of(axes), axes[0].get_title(loc="left").replace("\n", " ")
     figure.set_size_inches(0.5 + 2.3 * len(axes), 2.3)
-    axes[0].set_title("\n".join(textwrap.wrap(title, 30 * len(axes))), fontsize=9, loc="left")
+    width = 30 * len(axes)
+    lines = title.split(", ", 1) if len(title) > width else [title]
+    if max(map(len, lines)) > width:
+        lines = textwrap.wrap(title, width)
+    else:
+        lines[:-1] = [f"{line}," for line in lines[:-1]]
+    axes[0].set_title("\n".join(lines), fontsize=9, loc="left")
     return figure
 
 

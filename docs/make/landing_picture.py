@@ -81,8 +81,8 @@ def draw_amplitudes(axes: Axes) -> None:
     orbits = [hs.steady_state(MODEL, params={"v_belt": float(speed)}) for speed in speeds]
     sizes = np.array([orbit.amplitude["x"] if orbit.kind == "periodic" else np.nan for orbit in orbits])
     axes.plot(speeds, sizes, color=BLACK, lw=2, label="stick-slip")
-    axes.plot([ONSET, speeds[-1]], [0, 0], color=BLUE, lw=2, label="steady sliding, stable")
-    axes.plot([0, ONSET], [0, 0], color=BLUE, lw=1.2, ls="--", label="steady sliding, unstable")
+    axes.plot([ONSET, speeds[-1]], [0, 0], color=BLUE, lw=2, label="stable sliding")
+    axes.plot([0, ONSET], [0, 0], color=BLUE, lw=1.2, ls="--", label="unstable sliding")
     last = np.flatnonzero(np.isfinite(sizes))[-1]
     axes.plot([speeds[last]] * 2, [0, sizes[last]], color=GREY, lw=1, ls=":")
     axes.axvspan(ONSET, float(speeds[last]), color=GREY, alpha=0.12, lw=0)

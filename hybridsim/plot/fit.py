@@ -52,7 +52,7 @@ def fit(result: Fit) -> Figure:
     values = ", ".join(
         f"{name} = {value:.4g} ± {result.errors[name]:.1g}" for name, value in result.values.items()
     )
-    style.put_title(whole, f"{result.model.title or result.model.name}\n{values}", size=10)
+    style.put_title(whole, style.literal(f"{result.model.title or result.model.name}\n{values}"), size=10)
     return whole
 
 

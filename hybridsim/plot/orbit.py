@@ -76,16 +76,18 @@ def draw_orbit(
         label_axis(axis, name, unit, *span, title=title, power=powers.get(name))
     if units[0] == units[1]:
         _equal_scales(axes, spans)
-    is_one_of_several = len(concerned) == 1 < len(solution.components)
+    # Of several components the colour of a held part belongs to the one that holds, and any other to the first.
+    named = [mode for mode in colours if len(concerned) == 1 or mode not in held_modes]
+    is_one_of_several = len(solution.components) > 1
     handles = [
         Line2D(
             [],
             [],
             color=colours[mode],
             linewidth=(_HELD if mode in held_modes else _FREE) if mode in lines else 0,
-            marker="o" if mode in dots else "",
+            marker="" if mode in lines else "o",
             markersize=_DOT,
-            label=style.literal(f"{concerned[0]}: {mode}" if is_one_of_several else mode),
+            label=style.literal(f"{concerned[0]}: {mode}" if is_one_of_several and mode in named else mode),
         )
         for mode in colours
         if mode in lines or mode in dots

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybridsim.arguments import two_numbers
+from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.period import forcing_period
 from hybridsim.errors import UsageError, nearest
 from hybridsim.mechanics.declaration.system import Harmonic, MechanicalSystem
@@ -28,6 +29,7 @@ _MAX_EVENTS, _LAST_EVENTS = 300, 24  # the same for events of a motion without a
 # A number of periods that differs from a whole one by this fraction is whole, because an end such as 100T is
 # rounded.
 _WHOLE = 1e-9
+_MOST_KNOTS = 1000  # of an input in a window: at more of them its curve is not cut
 
 
 @dataclass(frozen=True)
@@ -120,6 +122,23 @@ def _last_events(solution: Solution, start: float, end: float) -> Window:
     return Window(first, end, f"the last {count} of {len(times)} events")
 
 
+def _input_jumps(solution: Solution, window: Window) -> NDArray[np.float64]:
+    """Return the times in a window at which an input jumps; an input with very many knots has none."""
+    jumps: list[NDArray[np.float64]] = []
+    inputs = getattr(solution.model, "inputs", ())
+    for declared, signal in zip(inputs, solution._system.signals if inputs else ()):
+        knots: list[float] = []
+        knot = signal.next_knot(Instant(window.t0), True)
+        while knot is not None and float(knot) < window.t1 and len(knots) <= _MOST_KNOTS:
+            knots.append(float(knot))
+            knot = signal.next_knot(knot, True)
+        if 0 < len(knots) <= _MOST_KNOTS:
+            t = np.array(knots)
+            before, after = (solution.output(declared.name, t, side=side) for side in "-+")
+            jumps.append(t[before != after])
+    return np.concatenate([[], *jumps])
+
+
 def _whole(periods: float) -> int:
     """Return a number of periods without its fraction."""
     return math.floor(periods * (1 + _WHOLE))
@@ -174,7 +193,7 @@ def require_length(window: Window) -> None:
 def smooth_parts_of(solution: Solution, names: Sequence[str], window: Window) -> list[SmoothPart]:
     """Return the smooth parts of a window in order of time, split at the events."""
     require_length(window)
-    times = event_times(solution, CUTS)
+    times = np.concatenate([event_times(solution, CUTS), _input_jumps(solution, window)])
     inner = set(times[(times > window.t0) & (times < window.t1)].tolist())
     cuts = np.array([window.t0, *sorted(inner), window.t1])
     lengths = np.diff(cuts)

@@ -30,7 +30,7 @@ from hybridsim.plot.smooth_parts import (
     window_of,
 )
 from hybridsim.plot.strip import changing_components, draw_strip
-from hybridsim.plot.symbols import symbol_of
+from hybridsim.plot.symbols import symbol_of, unit_text
 from hybridsim.solution import Solution
 
 _MOST_QUANTITIES = 4  # the default number of quantities, and of outputs
@@ -107,7 +107,7 @@ def time_history(
             axis.yaxis, panel[0], unit, min(low), max(high), title=title_of(model, panel[0]), power=power
         )
         if len(panel) > 1:
-            height = _name_curves(axis, model, panel)
+            height = _name_curves(axis, model, panel, [units[name] for name in panel])
             above = height if axis is history.quantities[0] else above
         axis.set_xlim(window.t0, window.t1)
     if history.modes is not None:
@@ -150,17 +150,21 @@ def _looks(count: int) -> list[tuple[str, Any]]:
     return [(_CURVES[k % len(_CURVES)], _DASHES[k // len(_CURVES) % len(_DASHES)]) for k in range(count)]
 
 
-def _name_curves(axis: Axes, model: Any, panel: Sequence[str]) -> float:
-    """Write the symbols of several curves above their panel, and what their titles share beside it."""
+def _name_curves(axis: Axes, model: Any, panel: Sequence[str], units: Sequence[str]) -> float:
+    """Write the symbols of several curves above their panel, and what their titles share beside it.
+
+    The unit is beside the panel if all curves have the same, otherwise behind each symbol.
+    """
+    is_shared = len(set(units)) == 1
     titles = [title_of(model, name).split() for name in panel]
     shared = " ".join(w[0] for w in itertools.takewhile(lambda w: len(set(w)) == 1, zip(*titles)))
     label = axis.yaxis.get_label_text()
     bracket = label[label.rindex("[") :] if label.endswith("]") else ""
     axis.yaxis.set_label_text("\n".join(filter(None, (shared, bracket))))
-    handles = [
-        Line2D([], [], color=colour, linestyle=dashes, label=symbol_of(name))
-        for name, (colour, dashes) in zip(panel, _looks(len(panel)), strict=True)
-    ]
+    handles = []
+    for name, unit, (colour, dashes) in zip(panel, units, _looks(len(panel)), strict=True):
+        behind = f" [{unit_text(unit)}]" if unit and not is_shared else ""
+        handles.append(Line2D([], [], color=colour, linestyle=dashes, label=symbol_of(name) + behind))
     return style.legend_above(axis, handles)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from hybridsim.analysis.compare.rows import Row
 
 _MOST_TICKS = 4  # across a panel
+_APART = 0.25  # of a panel: the least distance of two ticks
 _COLUMNS = 2
 _HEIGHT, _AROUND = 3.0, 1.6  # inches of a row of panels, and of title and legend
 _TITLES = {
@@ -158,7 +160,8 @@ def label_ticks(panel: Axes) -> None:
     for steps in ((1, 2, 3, 4, 6, 8), (1, 2, 5), (1, 3), (1,)):
         times = [step * 10.0**decade for decade in decades for step in steps]
         times = [time for time in times if low <= time <= high]
-        if len(times) <= _MOST_TICKS:
+        ratios = [later / earlier for earlier, later in itertools.pairwise(times)]
+        if len(times) <= _MOST_TICKS and min(ratios, default=high / low) >= (high / low) ** _APART:
             break
     panel.xaxis.set_major_locator(FixedLocator(times[:: math.ceil(len(times) / _MOST_TICKS) or 1]))
     panel.xaxis.set_major_formatter(EngFormatter(unit="s", sep="\N{THIN SPACE}"))

@@ -181,6 +181,24 @@ def test_a_jump_is_dashed_and_interrupts_the_curve() -> None:
     assert np.isnan(drawn(w)).any() and not np.isnan(drawn(h)).any()
 
 
+def test_a_jump_of_an_input_is_dashed_without_an_event() -> None:
+    force = hs.Input("F", "wave", shape="square", amplitude=2.0, period=1.0)
+    moved = hs.Model("moved", [hs.State("x", 0, "F")], inputs=[force])
+    (axes,) = time_history(hs.simulate(moved, (0, 1.2)), ["F"]).quantities
+    solid, dashed = axes.get_lines()
+    assert dashed.get_xdata() == pytest.approx([0.5, 0.5, math.nan, 1, 1, math.nan], nan_ok=True)
+    assert dashed.get_ydata() == pytest.approx([2, -2, math.nan, -2, 2, math.nan], nan_ok=True)
+    assert np.isnan(solid.get_ydata()).sum() == 2
+
+
+def test_curves_of_different_units_in_one_panel_have_their_own() -> None:
+    states = [hs.State("x", 1, "v", unit="m"), hs.State("v", 0, "-2000*x", unit="m/s")]
+    (axes,) = time_history(hs.simulate(hs.Model("two", states), (0, 1)), [["x", "v"]]).quantities
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["x [m]", "v [m/s]"]
+    assert axes.get_ylabel() == ""
+    assert axes.yaxis.get_major_formatter().factor == 1
+
+
 def test_strips_show_the_modes_of_every_component() -> None:
     solution = oscillator(2)
     two = replace(solution, modes={**solution.modes, "g": (FakeInterval("stick", 0.0, solution.t_end),)})
@@ -229,6 +247,12 @@ def test_arrows_show_the_direction_of_an_orbit() -> None:
     assert x0 * y1 - x1 * y0 < 0
 
 
+def test_a_colour_that_shows_the_first_of_several_components_names_it() -> None:
+    axes = phase_portrait(hs.simulate("relay-spiral", (0, 20)), "x", "y")
+    shown = {text.get_text() for text in axes.get_legend().get_texts()}
+    assert {"u: above", "u: below"} <= shown <= {"u: above", "u: below", "sliding"}
+
+
 def test_axes_of_the_caller_are_used() -> None:
     figure = Figure()
     x, f, modes = figure.subplots(3)
@@ -256,6 +280,7 @@ def test_nothing_global_is_touched() -> None:
         (lambda: time_history(oscillator(2), t_span=(5, 6)), "outside the run"),
         (lambda: time_history(oscillator(2), t_span=(1e-3, 1e-3)), "no curve from t = 0.001 to 0.001"),
         (lambda: hs.simulate("dfcs", (1, 1)).plot(), "no curve from t = 1 to 1"),
+        (lambda: phase_portrait(hs.simulate("belt", (2, 2))), "no curve from t = 2 to 2"),
         (lambda: friction_loop(ball()), "no outputs"),
         (lambda: phase_portrait(oscillator(2), "x", "w"), "has no quantity 'w'"),
         (lambda: save(phase_portrait(ball()), "picture.jpg"), "picture.jpg"),

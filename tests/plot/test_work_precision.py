@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from matplotlib.colors import rgb_to_hsv, to_rgb
 from matplotlib.figure import Figure
@@ -12,6 +13,7 @@ from plot.fake_comparison import PERIOD, comparison
 from hybridsim.errors import UsageError
 from hybridsim.plot import save, work_precision
 from hybridsim.plot.lines import looks
+from hybridsim.plot.work_precision import label_ticks
 
 
 def points(panel) -> list[tuple[float, float, bool]]:
@@ -152,3 +154,13 @@ def test_times_are_labelled_sparsely(low: float, high: float) -> None:
     labels = [label.get_text() for label in panel.get_xticklabels()]
     assert 1 <= len(labels) <= 6
     assert all(least <= tick <= most for tick in panel.get_xticks())
+    apart = np.diff(np.log10(panel.get_xticks())) / np.log10(most / least)
+    assert (apart > 0.19).all()  # a label takes less than that
+
+
+def test_a_label_of_times_is_not_next_to_another() -> None:
+    """From 3.5 to 70 ms the labels at 10 and 20 would touch in a narrow panel."""
+    panel = Figure().subplots()
+    panel.set(xscale="log", xlim=(3.5e-3, 70e-3))
+    label_ticks(panel)
+    assert panel.get_xticks() == pytest.approx([10e-3, 30e-3])

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 import hybridsim as hs
-from hybridsim.model.checks.units import units_of
+from hybridsim.model.checks.units import time_unit, units_of
 
 
 @pytest.mark.parametrize(
@@ -51,3 +51,12 @@ def test_it_stands_in_tables_and_readings() -> None:
     assert hs.simulate(model, (0, 0.01)).table().units["f"] == "N"
     # a load that is a number leaves the unit to the coefficient
     assert units_of(hs.load("lugre-presliding"))["f"] == "N"
+
+
+@pytest.mark.parametrize(
+    ("units", "time"),
+    [(["m/s", "h"], "s"), (["K", "h"], "h"), (["1/min"], "min"), (["h", "min"], ""), (["m", "ohm"], "")],
+)
+def test_the_unit_of_time_is_known_from_the_other_units(units: list[str], time: str) -> None:
+    parameters = [hs.Parameter(f"p{k}", 1.0, unit=unit) for k, unit in enumerate(units)]
+    assert time_unit(hs.Model("timed", [hs.State("x", 0, "0")], parameters=parameters)) == time
