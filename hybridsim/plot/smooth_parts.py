@@ -29,6 +29,7 @@ _MAX_EVENTS, _LAST_EVENTS = 300, 24  # the same for events of a motion without a
 # A number of periods that differs from a whole one by this fraction is whole, because an end such as 100T is
 # rounded.
 _WHOLE = 1e-9
+_ROUNDING = 1e-9  # of an input: a smaller difference at a knot is no jump
 _MOST_KNOTS = 1000  # of an input in a window: at more of them its curve is not cut
 
 
@@ -135,7 +136,7 @@ def _input_jumps(solution: Solution, window: Window) -> NDArray[np.float64]:
         if 0 < len(knots) <= _MOST_KNOTS:
             t = np.array(knots)
             before, after = (solution.output(declared.name, t, side=side) for side in "-+")
-            jumps.append(t[before != after])
+            jumps.append(t[np.abs(after - before) > _ROUNDING * np.abs(after).max()])
     return np.concatenate([[], *jumps])
 
 

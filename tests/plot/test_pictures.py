@@ -17,6 +17,7 @@ from plot.fake_solution import FakeEvent, FakeInterval, ball, oscillator, oscill
 import hybridsim as hs
 from hybridsim.errors import UsageError
 from hybridsim.plot import friction_loop, phase_portrait, save, time_history
+from hybridsim.plot.smooth_parts import Window, smooth_parts_of
 
 PERIOD = 2 * math.pi / oscillator_model().parameter_values()["omega"]
 
@@ -189,6 +190,14 @@ def test_a_jump_of_an_input_is_dashed_without_an_event() -> None:
     assert dashed.get_xdata() == pytest.approx([0.5, 0.5, math.nan, 1, 1, math.nan], nan_ok=True)
     assert dashed.get_ydata() == pytest.approx([2, -2, math.nan, -2, 2, math.nan], nan_ok=True)
     assert np.isnan(solid.get_ydata()).sum() == 2
+
+
+def test_a_corner_of_an_input_does_not_cut_a_curve() -> None:
+    """Also where the two lines that meet at a knot differ by rounding there."""
+    knots = np.linspace(0, 1, 200) ** 1.1
+    force = hs.Input("F", "table", times=knots.tolist(), values=np.sin(20 * knots).tolist())
+    moved = hs.Model("moved", [hs.State("x", 0, "F")], inputs=[force])
+    assert len(smooth_parts_of(hs.simulate(moved, (0, 1)), ["F"], Window(0, 1))) == 1
 
 
 def test_curves_of_different_units_in_one_panel_have_their_own() -> None:

@@ -121,6 +121,13 @@ def test_sensitivities_without_events_say_so() -> None:
         found.plot()
 
 
+def test_the_title_of_a_fit_is_no_mathematics() -> None:
+    line = hs.Model("line", [hs.State("x", 0, "k")], {"k": 1.0}, title="From $5 to $10")
+    t = np.linspace(0, 1, 5)
+    found = hs.fit(line, {"t": t, "x": 2 * t + 0.01 * np.cos(9 * t)}, {"k": (0.5, 3)})
+    assert found.plot().get_suptitle().startswith(r"From \$5 to \$10")
+
+
 def test_a_branch_and_a_comparison_draw_themselves() -> None:
     branch = hs.continuation("dfcs", "F0", (29.0, 31.0))
     axes = branch.plot("v")
