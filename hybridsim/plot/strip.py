@@ -26,13 +26,17 @@ def changing_components(solution: Solution) -> list[str]:
     return [name for name in solution.modes if name not in single]
 
 
-def draw_strip(axis: Axes, solution: Solution, components: Sequence[str], window: Window) -> None:
-    """Draw one row per component with its modes as colours; the legend names the modes that occur."""
+def mode_colours_of(solution: Solution, components: Sequence[str]) -> dict[str, str]:
+    """Return the colour of each mode of a strip with these components."""
     if isinstance(solution.model, MechanicalSystem):
         occurring = dict.fromkeys(interval.mode for name in components for interval in solution.modes[name])
-        colours = style.colours_of(occurring, set())
-    else:
-        colours = style.mode_colours(solution.components)
+        return style.colours_of(occurring, set())
+    return style.mode_colours(solution.components)
+
+
+def draw_strip(axis: Axes, solution: Solution, components: Sequence[str], window: Window) -> None:
+    """Draw one row per component with its modes as colours; the legend names the modes that occur."""
+    colours = mode_colours_of(solution, components)
     seen: dict[str, list[str]] = {}
     is_shared = False
     columns = _columns(axis)

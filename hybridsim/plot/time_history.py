@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,7 +29,7 @@ from hybridsim.plot.smooth_parts import (
     unit_of,
     window_of,
 )
-from hybridsim.plot.strip import changing_components, draw_strip
+from hybridsim.plot.strip import changing_components, draw_strip, mode_colours_of
 from hybridsim.plot.symbols import symbol_of, unit_text
 from hybridsim.solution import Solution
 
@@ -39,8 +39,8 @@ _MOST_MARKS = 150  # event lines; more would merge into a grey area
 _VISIBLE = 1e-3  # of the range: a smaller jump is invisible
 _OVERLAID = 3  # quantities of one unit that share a panel
 _ROW, _STRIP, _AROUND = 1.45, 0.3, 0.95  # inches
-# Curves of one panel: the palette without the colours of slip, which the strip of modes uses.
-_CURVES, _DASHES = (style.INK, *style.PALETTE[2:5], style.PALETTE[5]), ("-", "--", ":")
+# Curves of one panel: black, and the palette without the colours of slip, which the strip of modes uses.
+_CURVES, _DASHES = style.PALETTE[2:6], ("-", "--", ":")
 
 
 @dataclass(frozen=True)
@@ -90,13 +90,15 @@ def time_history(
     window = window_of(solution, t_span)
     smooth_parts = smooth_parts_of(solution, names, window)
     components = changing[:_MOST_COMPONENTS]
+    taken = mode_colours_of(solution, components).values() if components else ()
     history = _axes(len(panels), len(components), axes)
     marks = _marks_in(solution, window)
     extents = {name: extent(smooth_parts, name) for name in names}
     powers = shared_powers({name: (units[name], *extents[name]) for name in names})
     above = 0.0
     for axis, panel in zip(history.quantities, panels, strict=True):
-        for name, (colour, dashes) in zip(panel, _looks(len(panel)), strict=False):
+        looks = _looks(len(panel), taken)
+        for name, (colour, dashes) in zip(panel, looks, strict=True):
             _draw(axis, smooth_parts, name, colour, dashes)
         _mark(axis, marks)
         style.dress(axis)
@@ -107,7 +109,7 @@ def time_history(
             axis.yaxis, panel[0], unit, min(low), max(high), title=title_of(model, panel[0]), power=power
         )
         if len(panel) > 1:
-            height = _name_curves(axis, model, panel, [units[name] for name in panel])
+            height = _name_curves(axis, model, panel, [units[name] for name in panel], looks)
             above = height if axis is history.quantities[0] else above
         axis.set_xlim(window.t0, window.t1)
     if history.modes is not None:
@@ -143,14 +145,17 @@ def _unasked(solution: Solution) -> list[list[str]]:
     return panels
 
 
-def _looks(count: int) -> list[tuple[str, Any]]:
-    """Return colours and dashes of the curves of a panel; black if there is one, and no colours of slip."""
+def _looks(count: int, taken: Collection[str]) -> list[tuple[str, Any]]:
+    """Return colours and dashes of the curves of a panel; black if there is one, and no other colour that is taken."""
     if count == 1:
         return [(style.INK, "-")]
-    return [(_CURVES[k % len(_CURVES)], _DASHES[k // len(_CURVES) % len(_DASHES)]) for k in range(count)]
+    colours = [style.INK, *([colour for colour in _CURVES if colour not in taken] or _CURVES)]
+    return [(colours[k % len(colours)], _DASHES[k // len(colours) % len(_DASHES)]) for k in range(count)]
 
 
-def _name_curves(axis: Axes, model: Any, panel: Sequence[str], units: Sequence[str]) -> float:
+def _name_curves(
+    axis: Axes, model: Any, panel: Sequence[str], units: Sequence[str], looks: Sequence[tuple[str, Any]]
+) -> float:
     """Write the symbols of several curves above their panel, and what their titles share beside it.
 
     The unit is beside the panel if all curves have the same, otherwise behind each symbol.
@@ -162,7 +167,7 @@ def _name_curves(axis: Axes, model: Any, panel: Sequence[str], units: Sequence[s
     bracket = label[label.rindex("[") :] if label.endswith("]") else ""
     axis.yaxis.set_label_text("\n".join(filter(None, (shared, bracket))))
     handles = []
-    for name, unit, (colour, dashes) in zip(panel, units, _looks(len(panel)), strict=True):
+    for name, unit, (colour, dashes) in zip(panel, units, looks, strict=True):
         behind = f" [{unit_text(unit)}]" if unit and not is_shared else ""
         handles.append(Line2D([], [], color=colour, linestyle=dashes, label=symbol_of(name) + behind))
     return style.legend_above(axis, handles)

@@ -10,6 +10,7 @@ import matplotlib
 import numpy as np
 import pytest
 from matplotlib.collections import LineCollection
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from plot.fake_solution import FakeEvent, FakeInterval, ball, oscillator, oscillator_model
@@ -168,6 +169,15 @@ def test_many_events_without_a_period_show_the_last_unless_they_crowd() -> None:
     fallen = hs.simulate(model, (0, 300))
     assert len(fallen.events) > 300
     assert time_history(fallen).quantities[0].get_xlim() == (0, 300)
+
+
+def test_a_curve_beside_another_has_no_colour_of_a_mode() -> None:
+    """The modes of the switch are green and brown, which are colours of curves, too."""
+    solution = hs.simulate("buck-converter", (0, 2e-3))
+    panel, strip = time_history(solution, [["ramp", "control", "v"]])
+    curves = {line.get_color() for line in panel.get_legend().get_lines()}
+    modes = {to_hex(patch.get_facecolor()) for patch in strip.get_legend().get_patches()}
+    assert len(curves) == 3 and len(modes) == 2 and not {curve.lower() for curve in curves} & modes
 
 
 def test_a_jump_is_dashed_and_interrupts_the_curve() -> None:
