@@ -110,6 +110,6 @@ def _has_bare_number(node: ast.expr, definitions: Mapping[str, ast.expr]) -> boo
 def time_unit(model: Model) -> str:
     """Return "s" if a unit of the model contains seconds, otherwise "min" or "h" if one of them occurs, or ""."""
     units = [*units_of(model).values(), *(parameter.unit for parameter in model.parameters)]
-    words = {word for unit in units for word in re.findall(r"[A-Za-z]+", unit)}
-    found = [time for time in ("s", "min", "h") if time in words]
+    symbols = {symbol for unit in units for symbol in re.findall(r"[A-Za-z]+", unit)}
+    found = [time for time in ("s", "min", "h") if time in symbols]
     return found[0] if "s" in found or len(found) == 1 else ""
