@@ -18,8 +18,11 @@ _UNITS = {"us": "µs", "um": "µm", "degC": "°C", "deg": "°", "ohm": "Ω", "Oh
 
 
 def label_of(name: str, title: str) -> tuple[str, str]:
-    """Return the title and the symbol of a quantity on an axis; a title replaces a name that is no symbol."""
-    if title and _SYMBOL.fullmatch(name) is None:
+    """Return the title and the symbol of a quantity on an axis; a title replaces a name that is no symbol.
+
+    The name of a quantity of a part remains, because its title does not name the part.
+    """
+    if title and "." not in name and _SYMBOL.fullmatch(name) is None:
         return literal(title), ""
     return literal(title), symbol_of(name)
 

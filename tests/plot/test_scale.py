@@ -67,6 +67,11 @@ def test_symbols(name: str, symbol: str) -> None:
     assert symbol_of(name) == symbol
 
 
+def test_quantities_of_two_parts_with_one_title_have_different_labels() -> None:
+    assert label_of("left.x", "displacement") == ("displacement", "left.x")
+    assert label_of("right.x", "displacement") == ("displacement", "right.x")
+
+
 def test_a_title_replaces_a_name_that_is_no_symbol() -> None:
     assert label_of("torque", "torque on the bit") == ("torque on the bit", "")
     assert label_of("theta", "angle") == ("angle", "θ")
