@@ -179,6 +179,10 @@ def _write(solution: Solution, args: argparse.Namespace, session: Session) -> No
     if args.npz:
         solution.to_npz(args.npz, args.points)
         session.wrote(args.npz)
+    if solution.t_end == solution.t_start:
+        if args.plot or args.animate:
+            complain("no picture was written, because the run ends where it begins")
+        return
     if args.plot:
         from hybridsim.plot import save, time_history
 

@@ -209,3 +209,17 @@ def test_out_of_memory_names_options_that_the_command_has(
     assert bool(named) == (
         command not in ("check", "models", "schema", "integrators", "explain_status", "cache")
     )
+
+
+def test_a_run_that_stops_at_its_start_says_why_and_writes_no_picture(
+    tmp_path: Path, hybridsim: Callable
+) -> None:
+    model, picture = tmp_path / "bad.toml", tmp_path / "bad.png"
+    model.write_text(
+        'schema = 1\nname = "bad"\n[states]\nx = { start = 0, der = "v" }\nv = { start = 1, der = "-f" }\n'
+        '[contacts.f]\nvelocity = "v"\nnormal = "x - 1"\nlaw = { name = "coulomb", mu = 0.3 }\n'
+    )
+    code, _, err = hybridsim("run", str(model), "--t-end", "1", "--plot", str(picture))
+    assert code == 1
+    assert "no picture was written" in err and "inconsistent" in err
+    assert not picture.exists()
