@@ -214,3 +214,22 @@ def test_the_known_times_are_those_of_the_timetable(seed) -> None:
         at = appointment.instant
         timetable.mark_done(at)
     assert count > 400
+
+
+@pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853", "tsit5", "rodas5p"])
+@pytest.mark.parametrize("knots", [255, 256, 257, 300])
+def test_more_known_times_than_one_block_holds(integrator: str, knots: int) -> None:
+    """Ticks of a clock lie between the knots of a table; x is the integral of the table, and y of the count."""
+    h, values = 1 / 64, np.sin(np.arange(knots + 1.0))
+    model = hs.Model(
+        "m",
+        states=[hs.State("x", 0, "F"), hs.State("y", 0, "n")],
+        discrete=[hs.Discrete("n", 0)],
+        inputs=[hs.Input("F", "table", times=h * np.arange(knots + 1), values=values)],
+        schedules=[hs.Schedule("tick", period=h, start=h / 2, reset={"n": "n + 1"})],
+    )
+    end = knots * h
+    sol = hs.simulate(model, (0, end), integrator=integrator)
+    assert sol.status == "finished"
+    counted = sum(end - (i + 0.5) * h for i in range(knots))
+    assert sol(end) == pytest.approx([h * (values[:-1] + values[1:]).sum() / 2, counted], rel=1e-8, abs=1e-8)

@@ -35,8 +35,10 @@ def doubts(
         spread, size = float(np.std(residuals.measured[here])), float(np.sqrt(np.mean(off[here] ** 2)))
         if spread == 0.0 or size <= _ROUNDING * spread:
             continue
-        ratio = spread / max(float(np.std(residuals.measured[here] - off[here])), 1e-300)
-        if not 1.0 / _FACTOR < ratio < _FACTOR:
+        ratio = spread / max(float(np.std(residuals.measured[here] - off[here])), 1e-12 * spread)
+        if ratio > 1e11:
+            found.append(f"the simulated values of {name} are constant")
+        elif not 1.0 / _FACTOR < ratio < _FACTOR:
             found.append(
                 f"the measured values of {name} vary {ratio:.3g} times as much as the simulated ones: compare the "
                 "units"

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 _NULL = 1e-5  # of the largest singular value; difference quotients have errors of this order
+_LARGEST = 30.0  # standard deviation relative to the sizes; a larger one may come from such errors
 _TAKES_PART = 0.03  # of the largest component
 
 
@@ -32,25 +33,30 @@ class Undetermined:
         return text
 
 
-def undetermined(names: list[str], slopes: np.ndarray, noise: float) -> tuple[list[Undetermined], np.ndarray]:
+def undetermined(
+    names: list[str], slopes: np.ndarray, per_value: np.ndarray
+) -> tuple[list[Undetermined], np.ndarray]:
     """Return undetermined combinations, and the covariance (n, n) without them, in units of the unknowns' sizes.
 
     A combination is undetermined if its derivative is zero within the errors of difference quotients, or if its
-    standard deviation is above the size of the unknowns.
+    standard deviation is far above the sizes of the unknowns.
 
-    slopes : (m, n), derivatives of the weighted samples by the unknowns, each relative to its size.
-    noise : standard deviation of the weighted samples.
+    slopes : (m, n), derivatives of the samples, relative to their noise, by the unknowns, relative to their sizes.
+    per_value : (n,), the sizes relative to the values.
     """
     _, singular, rows = np.linalg.svd(slopes, full_matrices=False)
-    is_null = singular <= np.maximum(_NULL * singular.max(initial=0.0), noise)
-    inverse = np.where(is_null, 0.0, noise / np.where(is_null, 1.0, singular))
+    is_null = singular <= np.maximum(_NULL * singular.max(initial=0.0), 1.0 / _LARGEST)
+    inverse = np.where(is_null, 0.0, 1.0 / np.where(is_null, 1.0, singular))
     covariance = (rows.T * inverse**2) @ rows
     found = []
     for row in rows[is_null]:
-        row = row / row[np.argmax(np.abs(row))]
-        taking_part = np.flatnonzero(np.abs(row) > _TAKES_PART)
+        changes = row * per_value
+        changes = changes / changes[np.argmax(np.abs(changes))]
+        taking_part = np.flatnonzero(np.abs(changes) > _TAKES_PART)
         found.append(
-            Undetermined(tuple(names[int(k)] for k in taking_part), tuple(float(row[k]) for k in taking_part))
+            Undetermined(
+                tuple(names[int(k)] for k in taking_part), tuple(float(changes[k]) for k in taking_part)
+            )
         )
         covariance[taking_part, taking_part] = np.inf
     return found, covariance

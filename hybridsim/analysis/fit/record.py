@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
@@ -26,8 +27,8 @@ class Record:
     ----------
     data : mapping of str to sequence of float, path or DataFrame
         The column ``t`` contains increasing times (k,), in the unit of the model's time. Each other column (k,)
-        has the name and unit of a quantity of the model. NaN marks a missing sample. A path names a CSV file whose
-        first line contains the names.
+        has the name and unit of a quantity of the model. NaN, or an empty cell of a file, marks a missing sample.
+        A path names a CSV file whose first line contains the names.
     quantities : mapping of str to str, optional
         Quantity of the model, or ``t``, by column, if the names differ; other columns are then ignored.
     params : mapping of str to str or float, optional
@@ -139,13 +140,19 @@ def _columns(data: Any, quantities: Mapping[str, str] | None) -> dict[str, np.nd
                 remedy=nearest(str(name), [str(each) for each in names], kind="columns"),
             )
     chosen = {name: name for name in names} if quantities is None else dict(quantities)
+    for quantity, count in Counter(chosen.values()).items():
+        if count > 1:
+            raise UsageError(
+                f"`quantities` has {count} columns of {quantity}",
+                remedy="use one record for each, or an output of the model for each sensor",
+            )
     if "t" in names and "t" not in chosen.values():
         chosen["t"] = "t"
     ordered = sorted(chosen, key=lambda name: str(chosen[name]) != "t")
     if is_file:
         if "t" not in chosen.values():
             return dict.fromkeys(map(str, names), np.empty(0))
-        values = [np.array(column) for column in read_columns(Path(data), ordered)]
+        values = [np.array(column) for column in read_columns(Path(data), ordered, may_lack=True)]
     else:
         values = [_numbers(data[name], str(name)) for name in ordered]
     return {str(chosen[name]): column for name, column in zip(ordered, values, strict=True)}

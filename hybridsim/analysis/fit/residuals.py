@@ -14,6 +14,7 @@ from hybridsim.simulate import simulate
 from hybridsim.solution import Solution
 
 _STEP = 1e-4  # of an unknown's size: difference quotients have errors of about 1e-8, and of 1e4 times rtol
+_OF_BOUNDS = 1e-3  # smallest size of an unknown, relative to the distance of its bounds
 _COARSE = 2e-2  # the same, to move jumps over samples
 _JUMP = 1e-6  # of a quantity's deviation: smaller differences of the sides of an event are no jump
 
@@ -48,12 +49,12 @@ class Residuals:
         self._scale = np.array([self._size(name, unknown) for name, unknown in unknowns.items()])
 
     def _size(self, name: str, unknown: Unknown) -> float:
-        """Return the size of an unknown's coordinate; an unknown that is zero has the size of its bounds, or 1."""
+        """Return the size of an unknown's coordinate: that of its guess, not far below that of its bounds, or 1."""
         if unknown.log:
             return 1.0
         guess = abs(unknown.guess or 0.0)
         spread = unknown.high - unknown.low if unknown.is_bounded else 0.0
-        return guess or spread or 1.0
+        return max(guess, _OF_BOUNDS * spread) or 1.0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -121,12 +122,13 @@ class Residuals:
         """
         found = np.empty((len(base), len(coordinates)))
         for k, unknown in enumerate(self.unknowns.values()):
-            step = (_COARSE if is_coarse else _STEP) * self._scale[k]
+            low, high = unknown.coordinate_bounds
+            size = self._scale[k] if unknown.log else max(self._scale[k], abs(coordinates[k]))
+            step = min((_COARSE if is_coarse else _STEP) * size, 0.25 * (high - low))
             one_sided = []
             for move in (step, -step):
                 moved = coordinates.copy()
                 moved[k] += move
-                low, high = unknown.coordinate_bounds
                 if low <= moved[k] <= high:
                     one_sided.append((self.predicted(moved) - base) / move)
             found[:, k] = _central(one_sided, is_coarse)

@@ -28,14 +28,16 @@ def summed_up(
     off = residuals.measured - best.predicted
     slopes = residuals.slopes(best.x, best.predicted) * weights[:, None]
     slopes = np.where(np.isfinite(slopes), slopes, 0.0)
-    names, sizes = list(values), np.ones(len(values))
+    names, sizes = list(values), residuals.sizes.copy()
     for k, (name, unknown) in enumerate(unknowns.items()):
         if not unknown.log:
-            sizes[k] = abs(values[name]) or residuals.sizes[k]
+            sizes[k] = max(abs(values[name]), sizes[k])
     bounds = np.array([unknown.coordinate_bounds for unknown in unknowns.values()])
     at_bound = np.abs(bounds - best.x[:, None]).min(axis=1) <= _AT_BOUND * residuals.sizes
     free = np.flatnonzero(~at_bound)
-    lacking, found = undetermined([names[k] for k in free], slopes[:, free] * sizes[free], 1.0)
+    values_now = np.array([1.0 if unknowns[name].log else abs(value) for name, value in values.items()])
+    per_value = sizes / np.where(values_now > 0.0, values_now, sizes)
+    lacking, found = undetermined([names[k] for k in free], slopes[:, free] * sizes[free], per_value[free])
     units = np.array(
         [sizes[k] * (values[name] if unknowns[name].log else 1.0) for k, name in enumerate(names)]
     )

@@ -181,7 +181,7 @@ class TimesAhead:
         for g in range(len(first) if is_clear.all() else int(np.argmin(is_clear))):
             members = sources[first[g] : last[g] + 1].tolist()
             kind = self._kind_at(members)
-            if kind is None:
+            if kind is None or len(kinds) == MAX_KNOWN_TIMES:
                 break
             kinds.append(kind)
         m = len(kinds)

@@ -22,6 +22,7 @@ def numbers_from_file(
     Parameters
     ----------
     what : the word for the numbers of the first column.
+    may_lack : whether empty cells and "nan" become NaN, except in the first column.
     """
     for key in keys:
         if key in table.data:
@@ -45,7 +46,7 @@ def numbers_from_file(
 
 
 def read_columns(
-    path: Path, columns: Sequence[str | int] | None, what: str = "times"
+    path: Path, columns: Sequence[str | int] | None, what: str = "times", may_lack: bool = False
 ) -> tuple[tuple[float, ...], ...]:
     """Return two columns of a CSV file as numbers: times (or arguments), which may not decrease, and values.
 
@@ -83,7 +84,10 @@ def read_columns(
             remedy=f"choose the {what} and the values with `columns`",
         )
     indices = [_index(column, names, len(head), Place(str(path), rows[0][0])) for column in columns]
-    found = tuple(tuple(_cell(row, index, line, path) for line, row in body) for index in indices)
+    found = tuple(
+        tuple(_cell(row, index, line, path, may_lack and k > 0) for line, row in body)
+        for k, index in enumerate(indices)
+    )
     first = found[0]
     for (line, _), before, after in zip(body[1:], first[:-1], first[1:], strict=True):
         if after < before:
@@ -221,8 +225,10 @@ def _index(column: str | int, names: list[str] | None, width: int, place: Place)
     return names.index(column)
 
 
-def _cell(row: list[str], index: int, line: int, path: Path) -> float:
+def _cell(row: list[str], index: int, line: int, path: Path, may_lack: bool) -> float:
     text = row[index].strip() if index < len(row) else ""
+    if may_lack and text.lower() in ("", "nan"):
+        return math.nan
     if not _is_number(text):
         what = f"'{text}' is not a number" if text else f"column {index} is empty"
         remedy = "write a number in both columns of every row"

@@ -125,6 +125,58 @@ def test_a_local_minimum_of_many_half_cycles_is_left() -> None:
         assert abs(found.values["mu"] - 0.22) < 4 * found.errors["mu"] < 0.002
 
 
+POLYNOMIAL = hs.Model(
+    "polynomial",
+    parameters={"a": 1.0, "b": 1.0, "c": 1.0},
+    states=[hs.State("x", 0, 0)],
+    outputs={"y": "a + b*t + c*t**2"},
+)
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("guess", [1e-12, 1.0, 0.0, -4.0])
+def test_errors_are_those_of_regression_where_a_value_is_zero(seed: int, guess: float) -> None:
+    """The true c is 0; neither its size nor that of the first guess says how well it is known."""
+    t = np.linspace(0.0, 1.0, 50)
+    y = 0.7 + 1.3 * t + 0.01 * np.random.default_rng(seed).normal(size=50)
+    unknowns = {name: hs.Unknown(-5, 5, guess=guess) for name in "abc"}
+    found = hs.fit(POLYNOMIAL, {"t": t, "y": y}, unknowns, noise={"y": 0.01})
+    X = np.column_stack([t**0, t, t**2])
+    assert found.undetermined == ()
+    assert list(found.values.values()) == pytest.approx(np.linalg.lstsq(X, y, rcond=None)[0], abs=1e-6)
+    assert found.covariance == pytest.approx(1e-4 * np.linalg.inv(X.T @ X), rel=1e-3)
+
+
+@pytest.mark.parametrize("width", [1e-3, 1e-6, 1e-9])
+def test_bounds_may_be_narrow(width: float) -> None:
+    t = np.linspace(0.0, 2.0, 30)
+    found = hs.fit(LINE, {"t": t, "x": 1 + 0.3 * t}, {"a": (0.3 - 0.6 * width, 0.3 + 0.4 * width)})
+    assert found.values["a"] == pytest.approx(0.3, abs=0.02 * width)
+
+
+def test_two_columns_of_one_quantity_are_refused() -> None:
+    t = np.linspace(0.0, 2.0, 30)
+    with pytest.raises(hs.UsageError, match="`quantities` has 2 columns of x"):
+        hs.Record({"t": t, "left": t, "right": t}, {"left": "x", "right": "x"})
+
+
+def test_missing_cells_of_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "record.csv"
+    path.write_text("t,x\n0,1\n1,\n2,nan\n3,1.9\n4,2.2\n")
+    record = hs.Record(path)
+    assert np.isnan(record.columns["x"]).tolist() == [False, True, True, False, False]
+    path.write_text("t,x\n0,1\n,2\n")
+    with pytest.raises(hs.ModelError, match="column 0 is empty"):
+        hs.Record(path)
+
+
+def test_a_constant_simulation_is_said() -> None:
+    t = np.linspace(0.0, 1.0, 30)
+    model = hs.Model("still", parameters={"g": 1.0}, states=[hs.State("x", 1, 0)])
+    found = hs.fit(model, {"t": t, "x": 1 + t}, {"g": (0, 5)})
+    assert any("simulated values of x are constant" in text for text in found.warnings)
+
+
 def test_a_wrong_unit_is_said() -> None:
     t = np.linspace(0.0, 2.0, 30)
     found = hs.fit(LINE, {"t": t, "x": 1000 * (1 + 0.3 * t)}, {"a": (0.1, 0.9)})
