@@ -47,6 +47,7 @@ _PARTS: dict[str, type[Declared]] = {
     "drawing": Shape,
     "use": Use,
     "elements": Element,
+    "requirements": Requirement,
 }
 
 # methods that other parts of the package call; completion does not offer them
@@ -92,10 +93,8 @@ class Model(Declared):
         (t, x, p) that return a number, or constants. Contacts, inputs and discrete states need expressions.
     surfaces, impacts : sequence, optional
         `SwitchingSurface` objects, along which the motion may slide, and `Impact` objects (unilateral contacts).
-    drawing : sequence of Shape, optional
-        Shapes that show the mechanism, for `hybridsim.plot.mechanism` and `Solution.animate`; runs ignore them.
-    use : sequence of Use, optional
-        Other models as parts, whose declarations become declarations of this model with names such as ``left.x``.
+    drawing, use : sequence, optional
+        `Shape` objects, which show the mechanism, and `Use` objects: other models as parts, with names like ``left.x``.
     elements, requirements : sequence, optional
         `Element` objects, which become definitions, components and other parts, and inequalities that these add.
     place : Place, optional
@@ -522,4 +521,5 @@ class Model(Declared):
 
 def _content(model: Model) -> tuple[object, ...]:
     texts = ("name", "definitions", "title", "source", "description", "look", "duration", "flow")
-    return tuple(getattr(model, field) for field in (*_PARTS, *texts))
+    fields = [field for field in (*_PARTS, *texts) if field != "requirements"]  # a file does not hold them
+    return tuple(getattr(model, field) for field in fields)
