@@ -248,3 +248,12 @@ def test_a_key_of_sources_is_that_of_what_they_do() -> None:
     ]
     assert all(key(modules, []) != key([law, flow], []) for modules in other)
     assert key([law, flow], [b"mu = 0.3"]) != key([law, flow], [b"mu = 0.4"])
+
+
+def test_the_pages_of_the_atlas_are_those_that_its_data_give() -> None:
+    """After a change of the texts of scenes: python docs/make/atlas_pages.py."""
+    written = runpy.run_path(str(ROOT / "docs" / "make" / "atlas_pages.py"))["written"]()
+    folder = ROOT / "docs" / "atlas"
+    assert set(written) == {page.name for page in folder.glob("*.md")}
+    old = [name for name, text in written.items() if (folder / name).read_text(encoding="utf-8") != text]
+    assert not old, f"{', '.join(old)}: run python docs/make/atlas_pages.py"

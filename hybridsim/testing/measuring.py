@@ -59,7 +59,7 @@ def load(scene: Scene) -> Any:
 
 
 def model_of(scene: Scene, form: str, settings: dict[str, Any]) -> Any:
-    """Return the model to run: the scene's model, or its regularised form with the setting v0 as width."""
+    """Return the model to run: the scene's model, or its regularized form with the setting v0 as width."""
     model = load(scene)
     return model.regularized(form, v0=settings.pop("v0")) if form else model
 
@@ -81,7 +81,7 @@ def prepare(scene: Scene, integrator: str, form: str = "", **settings: Any) -> N
 def run(
     scene: Scene, integrator: str, form: str = "", processor_seconds: float = inf, **settings: Any
 ) -> Any:
-    """Simulate the scene, or its regularised form with the width v0 of the settings."""
+    """Simulate the scene, or its regularized form with the width v0 of the settings."""
     model = model_of(scene, form, settings)
     return hs.simulate(
         model,

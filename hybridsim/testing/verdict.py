@@ -25,7 +25,7 @@ VERDICTS = {
     HANG: "the run exceeds its limit of time or steps",
     REFUSED: "the method reports that it cannot run the scene, with the reason, before the run or when it stops",
     ERROR: "the run ends in an unexpected exception",
-    NOT_RUN: "not applicable: no friction to regularise, or too many steps for a method that steps in Python",
+    NOT_RUN: "not applicable: no friction to regularize, or too many steps for a method that steps in Python",
 }
 WRONG = (WRONG_ANSWER, WRONG_SEQUENCE)
 

@@ -65,7 +65,7 @@ class Configuration:
 
     @property
     def form(self) -> str:
-        """The name of the regularised form, or an empty string."""
+        """The name of the regularized form, or an empty string."""
         return self.kind if self.kind in ("tanh", "karnopp") else ""
 
     def settings(self, scene: Scene) -> tuple[Setting, ...]:
@@ -107,9 +107,9 @@ class Configuration:
     def applies(self, scene: Scene) -> str:
         """Return the reason why a scene is not run, or an empty string."""
         if self.form and not measuring.load(scene).contacts:
-            return "the model has no friction contact to regularise"
+            return "the model has no friction contact to regularize"
         if self.form and not scene.truth.states:
-            return "only the modes of the motion are known, and a regularised contact has no modes"
+            return "only the modes of the motion are known, and a regularized contact has no modes"
         if self.form and not self.settings(scene):
             return "too long for its steps"
         return ""

@@ -17,14 +17,19 @@ _WIDTH = 118
 _INTRODUCTION = """\
 # The atlas: where methods fail
 
-The atlas runs benchmark scenes with known answers with every integrator and with other common methods. The known answer
-of each scene is a closed form, or at least 30 digits from a computation that shares no code with the package.
-`hybridsim atlas` creates these pages.
+{answer}
+
+The answer of each scene is known. It is a closed form, or has at least 30 digits from a computation that shares no code
+with the package. The command `hybridsim atlas` runs all scenes with all methods.
 
 ![scenes against integrators, a verdict for each pair](matrix.png)
 
-A method is *right* in a scene if it finds every event in the right mode and order, invents no event, keeps the held
-states exact at every setting, and converges to the scene's tolerance:
+A method is *right* in a scene if it satisfies four conditions:
+
+- It finds every event, in the right mode and order.
+- It reports no other events.
+- The held states are exact at every setting.
+- The errors converge to the scene's tolerance.
 
 | method | settings |
 | --- | --- |
@@ -36,27 +41,41 @@ states exact at every setting, and converges to the scene's tolerance:
 and unit/120000, if the run needs at most 2e6 steps |
 | `scipy-rk45 cooldown` | rtol 1e-9, guards ignored for 1e-2, 1e-3 and 1e-4 units after each event |
 
-The *unit* of a scene is its typical time: the forcing period, or about one oscillation. The scene's tolerance applies
-to methods with error control. It is at least 1e-5 for `rk4-dichotomy`, which bisects its steps, and 4.2e-4 (two of
-the finest 4800 steps) for methods that place events at the ends of steps. In scenes of more than fifty units
-`scipy-rk23` has tolerances that are 100 times looser. The number after a name is the larger of two errors at the last
-setting: the error of event times in units, and the error of states relative to their largest true value. If the error
-decreases with the step, the observed order of convergence follows. Scenes beyond the stated limits of an integrator
-are run too; the integrator then fails for the stated reason.
+The *unit* of a scene is its typical time. This is the period of the forcing, or about one oscillation. The scene's
+tolerance applies to methods with error control. It is at least 1e-5 for `rk4-dichotomy`, which bisects its steps. It is
+4.2e-4 for methods that place events at the ends of steps, which is two of the finest 4800 steps. In scenes of more than
+fifty units `scipy-rk23` has tolerances that are 100 times looser.
 
-All methods share the location of events and the selection of modes, except methods with native events, with a cooldown
-or with regularised forms, and the fixed-step methods. In scenes in which all methods are right, the text
-describes what goes wrong in other programs.
+The number after a name is the larger of two errors at the last setting. One is the error of event times in units. The
+other is the error of states relative to their largest true value. If the error decreases with the step, the observed
+order of convergence follows. An integrator also runs scenes beyond its stated limits, and then fails for the stated
+reason.
+
+Most methods share the location of events and the selection of modes. The exceptions are methods with native events,
+with a cooldown or with regularized forms, and the fixed-step methods. If all methods are right in a scene, the text
+describes the failure of other programs.
 
 The picture of a scene shows one state in a time window around the first visible error of a method. The solid line is a
 correct run. The dashed line is the failing method named in the legend, at the setting given in the table. The strip
 below shows the events of both runs in this window, and their numbers at its right edge. Circles are known values. An
 error below 4 % of the motion has its own panel.
 """
+_QUESTIONS = {
+    "events": "Does a method find each event once, at the right time and in the right order?",
+    "stick": "Does a body stop, stay at rest and start to slip at the right times?",
+    "sliding": "Does the motion stay on a switching surface, and leave it at the right time?",
+    "accumulation": "Does a run continue correctly after infinitely many events?",
+    "stiffness": "Can a method solve fast and slow rates in one run?",
+    "stability": "Are the steps of a method short enough for stability, and accurate enough for long runs?",
+    "sensitivity": "How accurate is a method if the motion amplifies its errors?",
+}
+_FAILURES = (*WRONG, HANG, ERROR)
+_FAILURE = """A failure is a wrong answer, a wrong mode sequence, a hang or an error. A method that refuses a scene,
+or is not run, does not fail. The atlas has the [whole matrix](index.md)."""
 _LEAST_ORDER = 0.5  # smallest order that counts as convergence
 _NUMBER = re.compile(r"(?<![\w.])\d+\.\d{9,}(?:e[+-]?\d+)?")
 _DIGITS = 9  # digits of numbers in reasons
-_RUBBING = "For friction at a hard stop see the scene `rubbing-stop` and `hybridsim run thrown-block`."
+_RUBBING = "For friction at a hard stop, see the scene `rubbing-stop` and `hybridsim run thrown-block`."
 
 
 def pages(result: Atlas, pictures: Collection[str] = ()) -> dict[str, str]:
@@ -70,7 +89,7 @@ def pages(result: Atlas, pictures: Collection[str] = ()) -> dict[str, str]:
 
 def index(result: Atlas, groups: Mapping[str, list[Scene]]) -> str:
     """Return the text of the index page."""
-    lines = [_INTRODUCTION, "| verdict | meaning |", "| --- | --- |"]
+    lines = [_INTRODUCTION.format(answer=_overall(result)), "| verdict | meaning |", "| --- | --- |"]
     lines += [f"| {verdict} | {meaning} |" for verdict, meaning in VERDICTS.items()]
     lines += ["", "## Classes of scenes", "", "| class | scenes | topic |", "| --- | --- | --- |"]
     for trouble, scenes in groups.items():
@@ -78,12 +97,12 @@ def index(result: Atlas, groups: Mapping[str, list[Scene]]) -> str:
         lines.append(
             f"| [{name}]({name}.md) | {len(scenes)} | {TROUBLES.get(trouble, '').partition(': ')[2]} |"
         )
-    lines += ["", "## Scenes", ""]
+    lines += ["", "## Scenes", "", "| class | names |", "| --- | --- |"]
     for trouble, scenes in groups.items():
         name = trouble or "scenes"
         links = ", ".join(f"[{one.name}]({name}.md#{anchor(one.title or one.name)})" for one in scenes)
-        lines += [*textwrap.wrap(f"**{name}**: {links}", _WIDTH, break_on_hyphens=False), ""]
-    lines.append(_RUBBING)
+        lines.append(f"| {name} | {links} |")
+    lines += ["", _RUBBING]
     shown = [verdict for verdict in VERDICTS if verdict != RIGHT]
     lines += ["", "## Integrators and other methods", ""]
     lines.append(f"| name | method | {RIGHT} | {' | '.join(shown)} |")
@@ -104,14 +123,47 @@ def anchor(title: str) -> str:
 
 def page(result: Atlas, trouble: str, scenes: list[Scene], pictures: Collection[str] = ()) -> str:
     """Return the Markdown text of the page on one class of scenes."""
-    lines = [f"# {TROUBLES.get(trouble, 'Scenes')}", "", "[The whole matrix](index.md)", ""]
+    sentence, table = _failures(result, scenes)
+    opening = f"{_QUESTIONS.get(trouble, '')} {sentence} {_FAILURE}"
+    lines = [f"# {TROUBLES.get(trouble, 'Scenes')}", "", _filled(opening), "", *table, ""]
     for scene in scenes:
         lines += [f"## {scene.title or scene.name}", "", f"`{scene.name}`: {scene.cause}.", ""]
-        lines += [textwrap.fill(" ".join(scene.story.split()), _WIDTH, break_on_hyphens=False), ""]
+        lines += [_filled(scene.story), ""]
         if scene.name in pictures:
             lines += [f"![{scene.title}]({trouble or 'scenes'}/{scene.name}.png)", ""]
         lines += [*verdicts(result.row(scene), result.configurations), ""]
     return "\n".join(lines).rstrip() + "\n"
+
+
+def _overall(result: Atlas) -> str:
+    """Return how many scenes there are, and which methods are right in all of them."""
+    right = [
+        f"`{one.name}`"
+        for one in result.configurations
+        if all(cell.verdict == RIGHT for cell in result.column(one))
+    ]
+    question = "Which methods solve difficult scenes with events and friction, and which fail?"
+    found = f"{question} The atlas runs {len(result.scenes)} scenes by {len(result.configurations)} methods."
+    return _filled(f"{found} These are right in all of them: {', '.join(right)}." if right else found)
+
+
+def _failures(result: Atlas, scenes: Sequence[Scene]) -> tuple[str, list[str]]:
+    """Return the number of scenes without a failure as a sentence, and a table of methods by their failures."""
+    failed = {
+        one.name: {scene.name for scene in scenes if result.cells[scene.name, one.name].verdict in _FAILURES}
+        for one in result.configurations
+    }
+    of_number: dict[int, list[str]] = {}
+    for name, those in failed.items():
+        of_number.setdefault(len(those), []).append(f"`{name}`")
+    harmless = len(scenes) - len(set().union(*failed.values()))
+    rows = [f"| {number} | {', '.join(names)} |" for number, names in sorted(of_number.items())]
+    sentence = f"No method fails in {harmless} of the {len(scenes)} scenes of this page."
+    return sentence, ["| scenes with a failure | methods |", "| --- | --- |", *rows]
+
+
+def _filled(text: str) -> str:
+    return textwrap.fill(" ".join(text.split()), _WIDTH, break_on_hyphens=False)
 
 
 def verdicts(cells: list[Cell], configurations: Sequence[Configuration] = ()) -> list[str]:

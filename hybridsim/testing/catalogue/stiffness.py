@@ -1,4 +1,4 @@
-"""Scenes of stiffness: regularised friction, and a smooth control."""
+"""Scenes of stiffness: regularized friction, and a smooth control."""
 
 from __future__ import annotations
 
