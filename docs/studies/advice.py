@@ -1,13 +1,14 @@
-"""Whether `advise` names the simplest adequate model: random points of the reference model's map, against brute force.
+"""Compare the simplest adequate model that `advise` names with brute force, at random points of one map.
 
     python docs/studies/advice.py [points]            (500 by default; they make docs/studies/advice.md)
 
-Points (F0/N, r) are drawn evenly from [0.5, 1.5] x [0.05, 2]; the question is the steady amplitude of x within 1 %.
-Brute force: the full motion is the oscillator's closed form, event by event, followed from rest until the free
-vibration has decayed below rounding; without friction and with equivalent viscous damping the amplitude is a formula;
-that Den Hartog's form holds is seen from the motion having no stops; the regularised models are plain runs by `dop853`
-(by `rodas5p` where stability would hold that to a million steps), settled as long, with extremes from samples. A rung
-that the advice stopped, because it had become ten times as dear as the full model, is run to its end here.
+Points (F0/N, r) are drawn evenly from [0.5, 1.5] x [0.05, 2]. The question is the steady amplitude of x within 1 %.
+In brute force the full motion is the closed form of the oscillator, event by event. It is followed from rest until the
+free vibration has decayed below rounding. The amplitude without friction and with equivalent viscous damping is a
+formula. Den Hartog's form holds if the motion has no stops. The regularized models are plain runs of the same length.
+Their method is `dop853`, or `rodas5p` if stability would limit `dop853` to a million steps. Their extremes come from
+samples. The advice stops a model that has become ten times as expensive as the full model. Such a model is run to its
+end here.
 """
 
 from __future__ import annotations
@@ -182,18 +183,22 @@ def page(
     lines = [
         "# Does the advice name the right model?",
         "",
-        f"`python docs/studies/advice.py` draws {count} points of the reference model's map, "
-        "F0/N in [0.5, 1.5] and r in "
-        f"[0.05, 2], asks `advise` for the steady amplitude of x within {100 * TOL:g} %, and finds the simplest "
-        "adequate rung once more by brute force: the full motion in closed form from rest until the free vibration is "
-        "below rounding, formulas without friction and with equivalent viscous damping, plain runs of the regularised "
-        "models, settled as long.",
+        f"Does `advise` name the simplest adequate model? It differs from brute force at "
+        f"**{len(wrong) + len(near) + len(dear)}** of {count} random points. At {len(near)} of these an error lies "
+        f"within 0.01 % of the tolerance. At {len(dear)} the advice had stopped a model that is adequate, but far more "
+        "expensive than the full model.",
         "",
-        f"The two differ at **{len(wrong) + len(near) + len(dear)}** points; at {len(near)} of these an error lies "
-        f"within 0.01 % of the tolerance, and at {len(dear)} the advice had stopped a rung that is adequate but far "
-        f"dearer than the full model (next to the threshold, at {stopped} points in all, a force smoothed over a "
-        f"hundredth of the speed there is stiff). Amplitudes of the full model differ by {worst:.1e} at most; brute "
-        f"force repeats from period to period to {drift:.1e}. The advice took {spent:.0f} s, brute "
+        f"`python docs/studies/advice.py` draws {count} points of the map of the reference model, with F0/N in "
+        f"[0.5, 1.5] and r in [0.05, 2]. For each point `advise` names the simplest model whose steady amplitude of x "
+        f"is within {100 * TOL:g} %. The script then finds this model again by brute force:",
+        "",
+        "- The full motion is computed in closed form, from rest until the free vibration is below rounding.",
+        "- Formulas give the amplitude without friction and with equivalent viscous damping.",
+        "- The regularized models are run for the same time.",
+        "",
+        f"Next to the threshold of motion, a force that is smoothed over a hundredth of the speed is stiff. The advice "
+        f"stopped such a model at {stopped} points. The amplitudes of the full model differ by {worst:.1e} at most. In "
+        f"brute force they differ by {drift:.1e} from one period to the next. The advice took {spent:.0f} s, and brute "
         f"force {brute:.0f} s, each on one thread.",
         "",
         "| simplest within 1 % | points |",
@@ -201,11 +206,11 @@ def page(
         *rows,
     ]
     if wrong:
-        lines += ["", "## Where they differ", *head, *wrong]
+        lines += ["", "## Points that differ", *head, *wrong]
     if dear:
-        lines += ["", "## Where an adequate rung was too dear", *head, *dear]
+        lines += ["", "## Points with an adequate model that was too expensive", *head, *dear]
     if near:
-        lines += ["", "## Where an error is at the tolerance", *head, *near]
+        lines += ["", "## Points with an error at the tolerance", *head, *near]
     lines += [
         "",
         "## The map",
@@ -214,10 +219,10 @@ def page(
         "it and at low frequencies, then tanh, then the closed form, and equivalent viscous damping at resonance]"
         "(../images/advice-map.png)",
         "",
-        "*The same question on a grid; N = 40 N. Below F0 = 20 N nothing moves. Where the motion stops, what serves is "
-        "mostly a force that is set-valued in all but name (Karnopp, v0 = 1 % of the largest speed), at some "
-        "frequencies one that is smoothed over the same speed (tanh, arctan); these are as dear as the full model or "
-        "dearer. Where it does not stop, Den Hartog's formula is exact; near resonance a damper is enough.*",
+        "*This is the same question on a grid with N = 40 N. Below F0 = 20 N nothing moves. If the motion stops, the "
+        "simplest adequate model is mostly Karnopp's, with v0 = 1 % of the largest speed. At some frequencies it is "
+        "tanh or arctan, smoothed over the same speed. These models are at least as expensive as the full model. If "
+        "the motion does not stop, Den Hartog's formula is exact. Near resonance a viscous damper is enough.*",
         "",
     ]
     return "\n".join(lines)

@@ -152,42 +152,45 @@ def page(
     assert np.array_equal(squeals, sizes[LARGE] > 1e-3)  # what the last sentence says
     return f"""# When does a brake begin to squeal?
 
-`models/mode-coupling.toml`, the model of Hoffmann, Fischer, Allgaier and Gaul (2002,
-[doi:10.1016/S0093-6413(02)00254-9](<https://doi.org/10.1016/S0093-6413(02)00254-9>)): a block pressed on a belt
-moves along and across it, and friction, mu times a normal load that depends on the motion across, couples the two.
-The coefficient is constant: what squeals here is no falling characteristic. Made by `python docs/studies/brake.py`.
+At which coefficient of friction does a brake begin to squeal? In this model squeal begins at
+**mu = (3/4) (1 + 2 c^2)**, where c is the damping. Linearization and simulation both agree with this closed form.
+Squeal was not found below the onset, even from a large disturbance.
 
-**Closed form.** In sliding lambda^2 + c lambda + 2 = +-sqrt(1 - 4 mu/3). Up to mu = 3/4 both motions decay with
-c/2; there their frequencies meet, and above it one of the two grows against c. It begins where lambda = i sqrt(2):
-**mu = (3/4) (1 + 2 c^2)**.
+The model `models/mode-coupling.toml` is that of Hoffmann, Fischer, Allgaier and Gaul (2002,
+[doi:10.1016/S0093-6413(02)00254-9](<https://doi.org/10.1016/S0093-6413(02)00254-9>)). A block pressed on a belt
+moves along and across the belt. Friction couples the two motions, because the normal load depends on the motion across.
+The coefficient of friction is constant, so that a falling characteristic is not the cause. The script
+`python docs/studies/brake.py` finds the onset in three ways:
 
-**Linearisation.** `hs.linearize` in `slip-`, and the coefficient at which its `growth` is zero.
+- **Closed form.** While the block slides, lambda^2 + c lambda + 2 = +-sqrt(1 - 4 mu/3). Up to mu = 3/4 both motions
+  decay with c/2. At mu = 3/4 their frequencies meet. For a larger mu one of the two grows, while c damps it. The
+  onset is at lambda = i sqrt(2).
+- **Linearization.** `hs.linearize` in the mode `slip-` gives the coefficient at which its `growth` is zero.
+- **Simulation.** The run starts {SHAKE:g} away from steady sliding, and lasts {WATCHED:g} units of time without an
+  event. One matrix that maps the states at t to those at t + {STEP:g} is fitted to the run (dynamic mode
+  decomposition, Schmid 2010, [doi:10.1017/S0022112010001217](https://doi.org/10.1017/S0022112010001217)). Its
+  largest eigenvalue gives the growth. It does not use derivatives of the model.
 
-**Simulation.** A run from {SHAKE:g} off the point of steady sliding, over {WATCHED:g} units of time without an
-event. One matrix that takes the states at t to those at t + {STEP:g} is fitted to the run (dynamic mode
-decomposition: Schmid 2010, [doi:10.1017/S0022112010001217](https://doi.org/10.1017/S0022112010001217)); its largest
-eigenvalue is the growth, which knows nothing of the model's derivatives.
-
-| c | onset, closed form | `linearize` (off by) | simulation (off by) | growth, off by: `linearize` | simulation |
+| c | onset, closed form | `linearize` (error) | simulation (error) | error of the growth, `linearize` | simulation |
 | --- | --- | --- | --- | --- | --- |
 {table}
 
 The last two columns are the largest differences from the closed form over mu = {FRICTION[0]:g} to {FRICTION[-1]:g}.
-The largest of them are at mu = 3/4 itself, where two eigenvalues meet and change like the square root of what the
-matrix changes by.
+The largest of them are at mu = 3/4 itself. Two eigenvalues meet there, so that they change like the square root of a
+change of the matrix.
 
-![Growth of a small shake, and the amplitude that is left, over the coefficient of friction](../images/brake.png)
+![Growth of a small disturbance, and the final amplitude, over the coefficient of friction](../images/brake.png)
 
-With c = {SQUEALING:g}:
+The next table is for c = {SQUEALING:g}.
 
-| mu | growth, closed form | `linearize` | simulation | amplitude left, shake of {SHAKE:g} | of {LARGE:g} |
+| mu | growth, closed form | `linearize` | simulation | final amplitude, disturbance of {SHAKE:g} | of {LARGE:g} |
 | --- | --- | --- | --- | --- | --- |
 {shown}
 
-Simulation also says what becomes of the shake: at mu = {FRICTION[squeals][0]:.2f} and above it grows until the block
-sticks to the belt in every cycle, and stays of that size: {sizes[SHAKE][squeals][0]:.2f} from the first, just above
-the onset. From a shake of {LARGE:g}, larger than any of these cycles, the block settles to the same: nothing was found
-to squeal below the onset.
+Simulation also gives the final motion. At mu = {FRICTION[squeals][0]:.2f} and above, the disturbance grows until the
+block sticks to the belt in every cycle. Just above the onset the final amplitude is already
+{sizes[SHAKE][squeals][0]:.2f}. A disturbance of {LARGE:g} is larger than any of these cycles, and the block settles to
+the same motion. Squeal was not found below the onset.
 """
 
 

@@ -2,8 +2,8 @@
 
     python docs/studies/chain.py [OUT_DIR]
 
-Beside hybridsim run heyoka, if it is installed (it is in the extra `rivals`), and what one would write in an afternoon:
-fixed-step RK4 in numba with bisection.
+hybridsim is compared with heyoka, if it is installed (it is in the extra `rivals`), and with a simple fixed-step RK4 in
+numba with bisection.
 """
 
 from __future__ import annotations
@@ -123,27 +123,30 @@ def page(rows: dict[int, dict[str, tuple[float, float, float]]], load: float) ->
     )
     is_ahead = {n: HAS_HEYOKA and rows[n][fine][0] < rows[n]["heyoka, 1e-9"][0] for n in SIZES}
     ahead, behind = (", ".join(str(n) for n in SIZES if is_ahead[n] is side) for side in (True, False))
-    but = f", and behind for n = {behind}" if behind else ""
+    but = f", and slower for n = {behind}" if behind else ""
     verdict = ""
     if HAS_HEYOKA:
         verdict = f"""
-Against heyoka hybridsim is ahead for n = {ahead or "none"}{but}. heyoka expands the whole chain at
-every event, in code that is made and compiled for this one chain (not counted), and its event callbacks are Python;
-hybridsim's kernels are compiled once for all systems.
+hybridsim is faster than heyoka for n = {ahead or "none"}{but}. heyoka expands the whole chain at every event. Its code
+is compiled for this one chain (not counted), and its event callbacks are Python. The kernels of hybridsim are compiled
+once for all systems.
 """
     heads = " | ".join(names)
     return f"""# A chain of blocks: what an event costs
 
-`hs.chain_on_belt(n)`: blocks of mass 1 on a belt of speed {BELT}, leaf springs {LEAF}, coupling {COUPLING}, friction
-1/(1 + {DELTA:g}|v|), from random positions. Made by `python docs/studies/chain.py`; every run finished. Each
-takes turns
-with the others, the least time counts. {machine()}
+How does the cost of an event grow with the number of blocks n? In hybridsim the time per event, including its share of
+the steps, grows as n^{exponent:.2f}.
 
-When it began, other programs kept {load:.1f} of {os.cpu_count()} processors busy. That makes all
-times longer, and ratios uncertain by a factor of two.
+`hs.chain_on_belt(n)` is a chain of blocks of mass 1 on a belt of speed {BELT}. The leaf springs have a stiffness of
+{LEAF}, and the coupling springs {COUPLING}. The friction is 1/(1 + {DELTA:g}|v|), and the initial positions are random.
+`python docs/studies/chain.py` runs the methods in turns and takes the least time of each. Every run finished.
+{machine()}
 
-Milliseconds per unit of simulated time, and in brackets the largest error of a state after {JUDGED:g} units, against a
-run of hybridsim at rtol 1e-13:
+When the study began, other programs kept {load:.1f} of {os.cpu_count()} processors busy. All times are longer for this
+reason, and ratios are uncertain by a factor of two.
+
+The table gives milliseconds per unit of simulated time. In brackets is the largest error of a state after {JUDGED:g}
+units, compared with a run of hybridsim at rtol 1e-13.
 
 | n | events per unit of time | us per event, hybridsim 1e-9 | {heads} |
 | --- | --- | --- | {" | ".join(["---"] * len(names))} |
@@ -151,14 +154,13 @@ run of hybridsim at rtol 1e-13:
 
 ![Time per event and per unit of simulated time against the number of blocks](../images/chain.png)
 
-hybridsim's time per event, steps included, goes as n^{exponent:.2f}. An event restarts the few blocks around it whose
-series it changes by more than a tenth of the tolerance; all blocks are expanded together only at the end of a step,
-which all events of the step share. The others restart everything at each event: with n times the events, each n times
-as dear.
+In hybridsim an event restarts only the few blocks around it whose series changes by more than a tenth of the tolerance.
+All blocks are expanded together at the end of a step, and all events of the step share this cost. The other methods
+restart all blocks at each event. With n times the events, each of their events is n times as expensive.
 {verdict}
-The series control their error; RK4 with h = {STEP:g} does not. What it has torn loose it puts 1e-14 off the belt's
-speed, so that it is not stopped again at once. siconos has no wheel on PyPI (`pip download siconos` finds no version),
-and was not run.
+The series methods control their error, and RK4 with h = {STEP:g} does not. When RK4 releases a block, it sets the speed
+of the block 1e-14 off the speed of the belt. The block is then not stopped again at once. siconos was not run, because
+it has no wheel on PyPI (`pip download siconos` finds no version).
 """
 
 

@@ -41,7 +41,7 @@ def machine() -> str:
         except PackageNotFoundError:
             continue
     today = datetime.date.today().isoformat()
-    return f"{_processor()}, Python {platform.python_version()}, {', '.join(versions)}; {today}."
+    return f"{_processor()}, Python {platform.python_version()}, {', '.join(versions)}, on {today}."
 
 
 def _processor() -> str:
