@@ -1,11 +1,11 @@
-"""Whether whole models that combine forms as people do move as an independent judge says.
+"""Compare the motion of random whole models, which combine many forms, with that of an independent judge.
 
     python docs/studies/combined_forms.py [structures] [draws] [journal]        (2000 and 10 make the page)
     python docs/studies/combined_forms.py shrink STRUCTURE DRAW INTEGRATOR      (a small model that shows the same)
 
-The generator and the judge are in tests/reference/combined. The runs go to two processes; one that does not come back
-in time is ended, counts as a finding, and the next set of numbers follows. With a journal the same call goes on where
-it stopped. SEEDS="3 17" in the environment takes these structures instead.
+The generator and the judge are in tests/reference/combined. The runs use two processes. A process that does not return
+in time is ended and counts as a finding, and the next set of numbers follows. With a journal the same command continues
+where it stopped. SEEDS="3 17" in the environment selects these structures instead.
 """
 
 from __future__ import annotations
@@ -141,34 +141,38 @@ def pairs(seeds: list[int]) -> tuple[Counter[str], Counter[tuple[str, str]]]:
 
 HEAD = """# Combined forms
 
-`python docs/studies/combined_forms.py` draws whole models at random and compares each run with a judge that shares no
-code with hybridsim. The models combine the forms that people combine:
+Do runs of models that combine many forms agree with an independent judge? Of {runs} runs {agree} agree and {differ}
+differ. The tables below list the others.
+
+`python docs/studies/combined_forms.py` draws whole models at random. It compares each run with a judge that shares no
+code with hybridsim. The models combine these forms:
 
 - Every number is a literal, a parameter, an expression of parameters, a definition, a discrete state or an input.
-- Guards, loads, gaps, laws, rates, monitors and resets contain `max`, `min`, `abs` and conditionals, each in one of
-  several equal ways to write it. Forces, loads and belts change at known times, by single conditions, by Boolean
-  combinations, by tables and by waves.
+- Guards, loads, gaps, laws, rates, monitors and resets contain `max`, `min`, `abs` and conditionals. Each of them is
+  written in one of several equal ways.
+- Forces, loads and belts change at known times. The changes are single conditions, Boolean combinations, tables and
+  waves.
 - Runs start on guards, at rest and on corners. Schedules, clocks, impacts, contacts, relays and monitors meet at one
   instant.
-- Parts look at states of other parts. Parts of expressions may be definitions.
-- Names, the order of declaration, the scale and sign of the states and the origin of time are drawn as well. One run in
+- Parts depend on states of other parts. Parts of expressions may be definitions.
+- Names, the order of declaration, the scale and sign of the states and the origin of time are also random. One run in
   ten is stopped in the middle and resumed.
 
 Each set of numbers is run by one integrator of hybridsim, or by the default, and by another one at random. The first
-structures are chosen so that rare pairs of forms come together: each is the one of {pool} drawn ones that has the most
-pairs which are in fewer than {enough} structures so far. The others are taken as they are drawn. No two forms exclude
-each other: every form is of a part, and parts are drawn independently.
+structures are chosen so that rare pairs of forms occur. Each of them is selected from {pool} random structures. It has
+the most pairs that are in fewer than {enough} structures so far. The other structures are not selected. No two forms
+exclude each other, because every form belongs to a part, and parts are drawn independently.
 
-*The judge* (`tests/reference/combined`) reads an abstract form of the model, not the model file. It follows the motion
-by Taylor series in each configuration, finds zeros by dense sampling and bisection, and decides an instant by
-definition: it tries every combination of modes and sides, and keeps those whose conditions hold just after the
-instant. Impulses are found by enumeration as well. A disagreement is judged again in 40 digits. A run is compared only
-as long as the motion is certain: not beyond a touch of zero within 1e-6, and not beyond an instant that the rules leave
-open.
+*The judge* (`tests/reference/combined`) reads an abstract form of the model, and not the model file. It computes the
+motion by Taylor series in each configuration. It finds zeros by dense sampling and bisection. At an instant it tries
+every combination of modes and sides, and keeps those whose conditions hold just after the instant. Impulses are
+found by enumeration too. A disagreement is judged again in 40 digits. A run is compared only as long as the motion
+is certain. The comparison ends at a touch of zero within 1e-6, and at an instant that the rules leave open.
 
-A run *agrees* if all states and discrete states are within {allowed:g} of the motion's size at {points} times, and its
-monitors fire as often as they should. A run that stops with a named status before the judge's motion ends is counted
-separately, and so is a wrong run whose warnings say that a jump inside a mode was integrated as it stands.
+A run *agrees* under two conditions. At {points} times all states and discrete states differ by at most {allowed:g}
+of the size of the motion, and the monitors fire as often as they should. Two kinds of runs are counted separately.
+One kind stops with a named status before the motion of the judge ends. The other kind is wrong, but warns that a
+jump inside a mode was integrated without location.
 
 """
 
@@ -180,13 +184,21 @@ def page(done: list[dict[str, Any]], draws: int) -> str:
 
     runs = [r for r in done if r.get("kind") not in (None, "names refused", "no model", "unclear")]
     seeds = sorted({r["seed"] for r in runs})
-    out = HEAD.format(allowed=ALLOWED, points=POINTS, pool=POOL, enough=ENOUGH)
-    instants = sum(r.get("instants", 0) for r in runs)
-    out += f"{len(seeds)} structures with {draws} sets of numbers each: {len(runs)} runs, {instants} instants.\n\n"
-    out += "| result | runs |\n| --- | --- |\n"
-    out += "".join(
-        f"| {kind} | {count} |\n" for kind, count in Counter(r["kind"] for r in runs).most_common()
+    kinds = Counter(r["kind"] for r in runs)
+    out = HEAD.format(
+        allowed=ALLOWED,
+        points=POINTS,
+        pool=POOL,
+        enough=ENOUGH,
+        runs=len(runs),
+        agree=kinds["agrees"],
+        differ=kinds["differs"],
     )
+    instants = sum(r.get("instants", 0) for r in runs)
+    out += f"{len(seeds)} structures with {draws} sets of numbers each give {len(runs)} runs with "
+    out += f"{instants} instants.\n\n"
+    out += "| result | runs |\n| --- | --- |\n"
+    out += "".join(f"| {kind} | {count} |\n" for kind, count in kinds.most_common())
     statuses = Counter((r["kind"], r["status"]) for r in runs if r["kind"] in ("refused", "stopped", "chose"))
     out += "\n| result | status | runs |\n| --- | --- | --- |\n"
     out += "".join(f"| {kind} | `{status}` | {count} |\n" for (kind, status), count in statuses.most_common())
@@ -196,7 +208,7 @@ def page(done: list[dict[str, Any]], draws: int) -> str:
         out += f"| `{name}` | {sum(of.values())} | {of['differs']} | {of['stopped'] + of['refused']} |\n"
     single, double = pairs(seeds)
     least = sorted((double[pair], *pair) for pair in combinations(sorted(single), 2))
-    out += f"\n## Forms\n\n{len(single)} forms and {len(least)} pairs of them. "
+    out += f"\n## Forms\n\nThere are {len(single)} forms and {len(least)} pairs of them. "
     out += f"{sum(count < 10 for count, *_ in least)} pairs occur in fewer than 10 structures.\n\n"
     out += "| form | structures | rarest partner | structures |\n| --- | --- | --- | --- |\n"
     for name in sorted(single):

@@ -1,12 +1,11 @@
-"""Whether the program survives what it is given: mutated model files and mutated command lines.
+"""Run mutated model files and mutated command lines, and look for internal errors, hangs and side effects.
 
     python docs/studies/fuzz.py [files] [lines] [--count N] [--seed S] [--results FOLDER] [--only K]
 
-Without a kind both, 10^4 of each unless told otherwise; half an hour on one core; that makes
-docs/studies/fuzz.md. Findings are printed. Cases are run in a child process, which is ended where one of them
-takes longer than a minute, and begun again behind it. With a folder for results the same command goes on where
-it stopped. `--only K` runs the K-th case alone and shows what becomes of it. Thousands of models are compiled:
-give it a cache folder of its own in HYBRIDSIM_CACHE.
+Without a kind both kinds run, with 10^4 cases each by default. This makes docs/studies/fuzz.md in half an hour on one
+core. Findings are printed. Cases run in a child process. It is ended if a case takes longer than a minute, and begun
+again after this case. With a folder for results the same command continues where it stopped. `--only K` runs the K-th
+case alone and shows its result. Thousands of models are compiled, so use a separate cache folder in HYBRIDSIM_CACHE.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ KINDS = {"files": file_case, "lines": line_case}
 COUNT = 10_000
 PAGE = Path(__file__).parents[2] / "docs" / "studies" / "fuzz.md"
 LIMIT = 60.0  # seconds of one case, compilation included; two processes on a core take twice their time
-MEMORY = 6 << 30  # bytes of address space; what asks for more is told so
+MEMORY = 6 << 30  # bytes of address space; more is refused
 
 
 def work(kind: str, seed: int, first: int, last: int, results: Path) -> None:
@@ -50,7 +49,7 @@ Case = tuple[int, str, list[str], float]  # number, ending, faults, seconds
 
 
 def all_cases(kind: str, seed: int, count: int, results: Path) -> list[Case]:
-    """What became of all cases, with a new child behind each that was ended."""
+    """The results of all cases, with a new child process after each that was ended."""
     results.touch()
     found = read(results)
     while len(found) < count:
@@ -82,31 +81,37 @@ def read(results: Path) -> list[Case]:
 
 TEXT = """# Wrong files, wrong command lines
 
-Made by `docs/studies/fuzz.py`, which runs the program on what people, editors and scripts get wrong, and on what
-somebody may try who means harm. Nothing of it may end in an internal error, a traceback, a warning of a
-library, a hang or a file that nobody asked for, and no text of a file may ever run as code.
+Does a faulty model file or command line ever cause an internal error? {verdict} The script `docs/studies/fuzz.py` ran
+{files} model files and {lines} command lines. They contain typical mistakes of users, editors and scripts, and
+deliberate attacks. None of them may cause an internal error, a traceback, a warning of a library, a hang or an
+unwanted file. No text of a file may run as code.
 
 ## Model files
 
-{files} files, each a model of the package or a scene of the atlas with one to a few changes: a line lost,
-doubled or moved, a number out of all range (5e-324, 1e308, a thousand digits), a wrong type, a misspelt key, an
-expression that is code, too deep, too long or without a value, letters of other scripts, control characters,
-bytes that are no text. Each file that is taken is looked over for warnings and run for up to a second of its
-time, with an integrator drawn at random and limits of 2 seconds, 5000 steps and 500 megabytes.
+Each file is a model of the package or a scene of the atlas with one to a few changes:
+
+- A line is lost, doubled or moved.
+- A number is far out of range (5e-324, 1e308, a thousand digits).
+- A type is wrong, or a key is misspelt.
+- An expression is code, too deep, too long or without a value.
+- The text has letters of other scripts, control characters or bytes that are not text.
+
+Each accepted file is checked for warnings. It then runs for up to a second of its own time, with a random integrator
+and limits of 2 seconds, 5000 steps and 500 megabytes.
 
 | ending | files |
 | --- | --- |
 {file_rows}
 
-A *refusal* is an error that names what is wrong and where. An error *on running* is one that only the run can
-find: a method that lacks what the model needs, a start in no mode. A *hang* would be what takes longer than {limit:g}
-seconds by the clock. The others are the status of the run.
+A *refusal* is an error that names the fault and its place. An error *on running* is one that only the run can find. An
+example is a method that lacks a capability which the model needs. Another is a start in no mode. A case that takes
+longer than {limit:g} seconds is a *hang*. The other endings are the status of the run.
 
 ## Command lines
 
-{lines} command lines, each a right one of any of the commands with one to a few changes: a word lost, doubled,
-moved, misspelt or replaced, values of all the kinds above, names of devices, of folders and of files that are
-not there. What runs longer than {commanded:g} seconds is interrupted as by Ctrl-C.
+Each command line is a correct one of any of the commands with one to a few changes. A word is lost, doubled, moved,
+misspelt or replaced. Values are of all the kinds above, and include names of devices, of folders and of missing
+files. A command that runs longer than {commanded:g} seconds is interrupted as by Ctrl-C.
 
 | ending | command lines |
 | --- | --- |
@@ -114,25 +119,25 @@ not there. What runs longer than {commanded:g} seconds is interrupted as by Ctrl
 
 The exit codes are [those of the reference](../reference/cli.md).
 
-## What is watched
+## Detection of faults
 
-Each case runs in a process that is looked at from inside: a function and a module whose names stand in the
-mutated texts tell when they are reached; an audit hook sees every file that is opened for writing, every folder
-made, every program started and every connection opened. Exceptions, warnings, an exit code that is not
-documented, a failure without a message, output that is no JSON under `--json`, and {limit:g} seconds without an
-end are faults.
+Each case runs in a process that is observed from inside:
 
-{verdict}
+- The mutated texts contain the names of a function and of a module, which report when they are reached.
+- An audit hook detects every file opened for writing, every new folder, every started program and every connection.
 
-Everything else that was found in this and in earlier runs is mended, and is a test in
-`tests/fuzz/test_found.py`: numbers at the ends of the range of doubles above all, whose squares and quotients
-are infinite, a guard whose bound is no number and whose search never ended, and messages as long as the word
-that they are about. A few cases of each kind run with the tests.
+These are faults: an exception, a warning, an undocumented exit code, a failure without a message, output that is not
+JSON under `--json`, and {limit:g} seconds without an end.
+
+All faults of earlier runs are fixed, and each has a test in `tests/fuzz/test_found.py`. Most of them were numbers at
+the ends of the range of doubles, whose squares and quotients are infinite. One was a guard whose bound is not a
+number, so that its search never ended. Others were messages as long as the word that they describe. A few cases of
+each kind run with the tests.
 """
 
 
 def page(found: dict[str, list[Case]]) -> str:
-    """The page of what became of both kinds."""
+    """The page with the results of both kinds."""
     rows = {
         kind: "\n".join(
             f"| {END.get(end, end)} | {n} |" for end, n in Counter(c[1] for c in cases).most_common()
@@ -147,9 +152,7 @@ def page(found: dict[str, list[Case]]) -> str:
         line_rows=rows["lines"],
         commanded=COMMANDED,
         limit=LIMIT,
-        verdict=f"Cases of this run with a fault: {', '.join(faulty)}."
-        if faulty
-        else "No case of this run has one.",
+        verdict=f"These cases do: {', '.join(faulty)}." if faulty else "No case does.",
     )
 
 
@@ -163,15 +166,18 @@ END = {
 
 
 def main() -> None:
-    """Run what was asked for."""
+    """Run the selected kinds or one case."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("kinds", nargs="*", metavar="KIND", help="files, lines (default: both)")
     parser.add_argument("--count", type=int, default=COUNT, help="cases of each kind (default: 10000)")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument(
-        "--results", type=Path, metavar="FOLDER", help="where results are kept, to go on from"
+        "--results",
+        type=Path,
+        metavar="FOLDER",
+        help="folder of the results, from which the command continues",
     )
-    parser.add_argument("--only", type=int, metavar="K", help="this case alone, with what became of it")
+    parser.add_argument("--only", type=int, metavar="K", help="this case alone, with its result")
     parser.add_argument("--work", nargs=4, help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.work:

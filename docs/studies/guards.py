@@ -1,13 +1,13 @@
-"""Whether a zero of a guard is ever lost: random guards with up to five zeros, close pairs too, against an oracle.
+"""Compare the zeros of random guards, with up to five zeros and with close pairs, with an oracle.
 
     python docs/studies/guards.py [guards]            (10^5 by default; they make docs/studies/guards.md)
 
-A guard g(t) of a model of two modes, `up` while g >= 0 and `down` while -g >= 0, changes the mode at each of its
-zeros. For `exact` it is a random combination of polynomials, exponentials, waves and products of them, that states
-and functions of time make up; for `taylor` a product of factors of known zeros, polynomial or trigonometric. One or
-two of the zeros are a pair or a near miss: g comes to within a depth of zero, on the far side or on the near one,
-from 10^-17 to 10^-1 of its size. The oracle knows g in closed form from the doubles as given and finds its zeros
-and depths in 40 digits.
+A model has a guard g(t) and two modes, `up` while g >= 0 and `down` while -g >= 0. It changes its mode at each zero
+of g. For `exact` the guard is a random combination of polynomials, exponentials, waves and their products, made of
+states and functions of time. For `taylor` it is a product of polynomial or trigonometric factors with known zeros.
+One or two of the zeros are a pair or a near miss. There g approaches zero up to a depth of 10^-17 to 10^-1 of its
+size, beyond zero or before it. The oracle has g in closed form from the given doubles, and finds its zeros and
+depths in 40 digits.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Tally:
 
 
 def judge(what: str, draw: Draw, span: float, sol: hs.Solution) -> Tally:
-    """Hold the events of one run against the truth; where they differ, against zeros searched on a finer grid."""
+    """Compare the events of one run with the truth, and if they differ, with zeros from a finer grid."""
     tally = judged(what, draw, span, sol)
     if tally.faults and draw.closer:
         tally = judged(what, replace(draw, truth=draw.closer()), span, sol)
@@ -71,7 +71,7 @@ def judge(what: str, draw: Draw, span: float, sol: hs.Solution) -> Tally:
 
 
 def judged(what: str, draw: Draw, span: float, sol: hs.Solution) -> Tally:
-    """Hold the events of one run against one opinion of its zeros."""
+    """Compare the events of one run with given zeros."""
     tally = Tally()
     truth = draw.truth
     events = [e.t for e in sol.events if e.kind == "transition"]
@@ -161,18 +161,25 @@ def study(count: int, seed: int = 1) -> dict[str, Tally]:
 
 HEAD = """# Is a zero of a guard ever lost?
 
-`python docs/studies/guards.py` draws {count} random guards, half for `exact` and half for `taylor` (rtol {rtol:.0e}),
-and holds every mode change of their runs against an oracle.
+Does hybridsim ever miss a zero of a guard? Of {zeros} single zeros of {count} random guards, {missed} were missed.
+Pairs of zeros are found or reported, as the tables below show.
 
-A model has two modes, one while g >= 0 and one while -g >= 0, so it changes its mode at each zero of g and starts
-again there, on a zero by decree. For `exact` g is a random combination of what linear modes can make: polynomials
-up to degree six, two waves, a damped driven oscillator, decays with waves and t exp(-t) as functions of time. For
-`taylor` it is a product of up to five zeros, polynomial or trigonometric, in t or in a state, times positive
-functions, beside a nonlinear state. Most have one or two *close extremes*: g comes to within a depth of zero and
-turns back, beyond zero (a pair of zeros) or before it (a near miss). Depths are spread evenly over the decades from
-1e-17 to 1e-1 of the guard's size, which is the largest sum of the sizes of its terms for `exact`, its largest value
-for `taylor`. Zeros closer than 1 % of the span count as a pair. The oracle knows g in closed form at the doubles as
-given and works out depths and zeros in 40 digits.
+`python docs/studies/guards.py` draws {count} random guards, half for `exact` and half for `taylor` (rtol {rtol:.0e}).
+It compares every mode change of their runs with an oracle. The oracle has g in closed form at the given doubles. It
+finds depths and zeros in 40 digits.
+
+A model has two modes, one while g >= 0 and one while -g >= 0. It changes its mode at each zero of g. The next segment
+starts there, with a guard that is zero by definition.
+
+- For `exact` the guard g is a random combination of the terms that linear modes can produce. These are polynomials
+  up to degree six, two waves, a damped driven oscillator, decays with waves, and t exp(-t) as a function of time.
+- For `taylor` the guard is a product of up to five factors with a zero. They are polynomial or trigonometric, in t
+  or in a state. Positive functions multiply the product, and the model also has a nonlinear state.
+
+Most guards have one or two *close extremes*. There g approaches zero up to a given depth and turns back. It turns
+beyond zero (a pair of zeros) or before it (a near miss). Depths are spread evenly over the decades from 1e-17 to
+1e-1 of the size of the guard. The size is the largest sum of the sizes of its terms for `exact`, and its largest
+value for `taylor`. Zeros closer than 1 % of the span count as a pair.
 
 ## Zeros
 
@@ -180,14 +187,16 @@ given and works out depths and zeros in 40 digits.
 | --- | --- | --- | --- | --- | --- | --- |
 """
 PAIRS = """
-*Late*: a zero of a pair found farther off than {late:.0e} of the span and than a guard's error of 1e-13 (`exact`) or a
-tenth of rtol (`taylor`) of its size explains; a single zero farther off than 1e-10 of the span and 1e-10 of its size
-over its slope, but not ten times as far, from where on it is missed and the event spurious. *Off by*: time times slope
-over size, of single zeros.
+A zero of a pair is *late* if its error exceeds {late:.0e} of the span, and is not explained by the error of the
+guard. The error of the guard is 1e-13 of its size for `exact`, and a tenth of rtol for `taylor`. A single zero is
+*late* if its error exceeds 1e-10 of the span and 1e-10 of the size over the slope. With ten times this error it is
+missed, and the event is spurious. *Off by* is the error in time of single zeros, times the slope and divided by the
+size.
 
 ## Pairs, by depth over size
 
-*Found*: both zeros. *Flagged*: neither, and a near-grazing says so there. *Lost*: neither and no word, or one of two.
+A pair is *found* if both zeros are found. It is *flagged* if neither is found, but a near-grazing is reported there.
+It is *lost* if neither is found without a report, or if only one is found.
 
 | depth | exact found | flagged | lost | taylor found | flagged | lost |
 | --- | --- | --- | --- | --- | --- | --- |
@@ -195,27 +204,34 @@ over size, of single zeros.
 MISSES = """
 ## Near misses, by depth over size
 
-*Passed*: no event, no word. *Crossed*: a pair of events that is not there.
+A near miss is *passed* if there is neither an event nor a report. It is *crossed* if the run has a pair of events that
+does not exist.
 
 | depth | exact passed | flagged | crossed | taylor passed | flagged | crossed |
 | --- | --- | --- | --- | --- | --- | --- |
 """
 TAIL = """
-## What it says
+## Error bounds
 
 The deepest pair that is flagged and not found has a depth of {exact:.1e} of the size (`exact`) and {taylor:.1e}
-(`taylor`). The error bounds that the compiled searches work with are (16 + 2 J + 2 w s) 2^-53 of the size for J modal
-coordinates, speeds up to w and a time s since the last event, some 4e-15 here, and 2 (|a_N| + |a_N-1|) + 8 2^-53
-sum |a_k| of the guard's series on the step, at most 6 rtol = {bound:.0e} of its largest value. So no pair whose dip
-exceeds ten times the bound is missed. Of the others {lost}.
+(`taylor`). The compiled searches use these error bounds:
 
-How to run: `python docs/studies/guards.py [guards]`; the first run compiles. {minutes:.0f} minutes on one core.
+- For `exact` the bound is (16 + 2 J + 2 w s) 2^-53 of the size. J is the number of modal coordinates, w the largest
+  speed and s the time since the last event. The bound is about 4e-15 here.
+- For `taylor` the bound is 2 (|a_N| + |a_N-1|) + 8 2^-53 sum |a_k|, with the series of the guard on the step. It is
+  at most 6 rtol = {bound:.0e} of the largest value of the guard.
+
+No pair is missed whose dip exceeds ten times the bound. Of the other pairs {lost}.
+
+Run `python docs/studies/guards.py [guards]` to repeat the study. The first run compiles. The study takes {minutes:.0f}
+minutes on one core.
 """
 
 
 def page(count: int, tallies: dict[str, Tally], minutes: float) -> str:
     """The page of the results."""
-    text = HEAD.format(count=count, rtol=RTOL)
+    zeros, missed = sum(a.zeros for a in tallies.values()), sum(a.missed for a in tallies.values())
+    text = HEAD.format(count=count, rtol=RTOL, zeros=zeros, missed=missed)
     for name, a in tallies.items():
         text += f"| `{name}` | {a.guards} | {a.zeros} | {a.missed} | {a.spurious} | {a.late} | {a.worst_time:.0e} |\n"
     text += PAIRS.format(late=LATE)
@@ -228,7 +244,7 @@ def page(count: int, tallies: dict[str, Tally], minutes: float) -> str:
     lost = "each is found or flagged"
     if silent:
         lost += (
-            f", but for {silent} that the table counts as lost, below the rounding of the guard's own terms"
+            f", except {silent} that the table counts as lost, below the rounding of the terms of the guard"
         )
     return text + TAIL.format(**deepest, bound=6 * RTOL, minutes=minutes, lost=lost)
 
