@@ -1,12 +1,12 @@
-"""Whether a run depends on what was run before: each run after a thousand other runs, against a fresh process.
+"""Compare each run after a thousand other runs with the same run in a fresh process.
 
     python docs/studies/history.py [models] [runs] [journal]     (100 and 1000 make docs/studies/history.md)
 
-For each model a process makes runs with other numbers, in random order. Between them, after them and beside them on
-other threads it makes the run of each integrator. Other processes make one run each, and nothing else: with an empty
-cache of compiled models, and with the cache that the first process left. With a journal the same call goes on where it
-stopped. ONLY="belt combined-58" in the environment takes these models instead. PAGE=1 writes the page of those that are
-in the journal.
+For each model a process makes runs with other numbers, in random order. Between them, after them, and on other threads
+at the same time, it makes the run of each integrator. Other processes make only one run each. They have an empty cache
+of compiled models, or the cache that the first process left. With a journal the same command continues where it
+stopped. ONLY="belt combined-58" in the environment selects these models instead. PAGE=1 writes the page of the
+models that are in the journal.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ MECHANICAL = {
     "chain-5": lambda: hs.chain_on_belt(5),
     "two-blocks": hs.two_blocks_on_belt,
 }
-PIECES = ("status", "events", "states", "dense")  # what is compared
+PIECES = ("status", "events", "states", "dense")  # parts of a result that are compared
 
 
 # -- models and runs -----------------------------------------------------------------------------------------------
@@ -100,7 +100,7 @@ class Case:
 
 
 def digest(case: Case, make: Any) -> dict[str, str]:
-    """Everything that a run found, to the last bit, as short texts."""
+    """All results of a run, to the last bit, as short texts."""
     try:
         sol = make()
     except hs.HybridsimError as error:
@@ -275,7 +275,7 @@ def after(name: str, runs: int, folder: Path) -> Iterator[dict[str, Any]]:
 
 
 def found_beside(case: Case, shares: dict[str, float]) -> list[dict[str, Any]]:
-    """Runs on threads of their own, all at once, beside two threads with other runs."""
+    """Runs on separate threads, all at once, while two further threads make other runs."""
     out: list[dict[str, Any]] = []
     is_over = threading.Event()
 
@@ -372,7 +372,7 @@ def study(names: list[str], runs: int, journal: Path) -> list[dict[str, Any]]:
 
 
 def differing(found: list[dict[str, Any]]) -> list[str]:
-    """What differs from the run of a fresh process, and what failed."""
+    """The differences from the run of a fresh process, and the failures."""
     out = [r["failed"] for r in found if "failed" in r]
     truth = {(r["name"], r["integrator"]): r["run"] for r in found if r.get("when") == "fresh" and "run" in r}
     for r in found:
@@ -385,20 +385,30 @@ def differing(found: list[dict[str, Any]]) -> list[str]:
 
 HEAD = """# Does a run depend on earlier runs?
 
-`python docs/studies/history.py` makes runs of 100 models: those of the package, three chains of blocks, and generated
-ones that combine forms at random ([combined forms](combined-forms.md)). Ten of these have more than {limit} vectors of
-modes, so that modes are added to the tables of a process when a run first meets them. The figures below are those of
-{models} models, {many} with that many vectors of modes.
+Does the result of a run depend on the runs before it? Of {compared} runs after others, {differ} differ from the same
+run in a fresh process.
 
-For each model one process makes {runs} other runs, in random order: with other values of parameters, other starts,
-other tolerances, spans and longest steps, by any of the integrators; runs that a limit stops, and some of these
-resumed; runs that an error from outside ends; runs backward in time; runs of another model, and of an equal model that
-is another object. After 1, 30 and all of them it makes the run of each integrator, twice at the end, then with an
-equal model, and then on a thread for each integrator, all at once, beside two threads that make other runs.
+`python docs/studies/history.py` makes runs of 100 models. They are the models of the package, three chains of blocks,
+and generated models that combine forms at random ([combined forms](combined-forms.md)). Ten of the generated models
+have more than {limit} vectors of modes, so that a process adds modes to its tables when a run first meets them. This
+page has the figures of {models} models, {many} of them with so many vectors.
 
-*The truth* is the same run in a process that makes no other, with a cache that has no compiled code of models. One more
-process makes it with the cache that the {runs} runs left. The status, the message and the warnings are compared, each
-event with its states before and after it, all steps, and the dense output at {points} times: bit for bit.
+For each model one process makes {runs} other runs, in random order and by any of the integrators:
+
+- Values of parameters, starts, tolerances, spans and longest steps are different.
+- A limit stops some runs, and some of these are resumed.
+- An error from outside ends some runs.
+- Some runs go backward in time.
+- Some are runs of another model, or of an equal model that is another object.
+
+After 1, 30 and all of these runs the process makes the run of each integrator, twice at the end. It repeats them
+with an equal model. It then makes them on one thread per integrator, all at once, while two further threads make
+other runs.
+
+The reference is the same run in a process that makes no other run, and has no compiled models in its cache. One more
+process makes the run with the cache that the {runs} runs left. The results are compared bit for bit. They are the
+status, the message, the warnings, each event with its states before and after it, all steps, and the dense output at
+{points} times.
 
 """
 
@@ -409,7 +419,17 @@ def page(done: list[dict[str, Any]], runs: int) -> str:
     many = 0
     for name in names:
         many += math.prod(len(one.modes) for one in Case(name).model.all_components()) > MANY
-    out = HEAD.format(models=len(names), many=many, limit=MANY, runs=runs, points=POINTS)
+    faults = differing(done)
+    compared = sum("run" in r and r["when"] != "fresh" for r in done)
+    out = HEAD.format(
+        models=len(names),
+        many=many,
+        limit=MANY,
+        runs=runs,
+        points=POINTS,
+        compared=compared,
+        differ=len(faults),
+    )
     whens = list(dict.fromkeys(r["when"] for r in done if "run" in r and r["when"] != "fresh"))
     truth = {(r["name"], r["integrator"]): r["run"] for r in done if r.get("when") == "fresh" and "run" in r}
     out += f"| integrator | models | events | {' | '.join(whens)} |\n" + "| --- " * (3 + len(whens)) + "|\n"
@@ -425,10 +445,9 @@ def page(done: list[dict[str, Any]], runs: int) -> str:
     kinds: Counter[str] = Counter()
     for r in done:
         kinds.update(r.get("others", {}))
-    out += f"\nOther runs: {sum(kinds.values())}, of which "
-    out += ", ".join(f"{count} {MEANING[kind]}" for kind, count in kinds.most_common()) + ".\n"
-    faults = differing(done)
-    return out + ("\n## What differs\n\n" + "".join(f"- {one}\n" for one in faults) if faults else "")
+    out += f"\nThere were {sum(kinds.values())} other runs:\n\n| other runs | number |\n| --- | --- |\n"
+    out += "".join(f"| {MEANING[kind]} | {count} |\n" for kind, count in kinds.most_common())
+    return out + ("\n## Differences\n\n" + "".join(f"- {one}\n" for one in faults) if faults else "")
 
 
 MEANING = {

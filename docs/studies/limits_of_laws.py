@@ -1,4 +1,4 @@
-"""How regularised and spring-like laws come to the set-valued one: orders observed beside those of theory.
+"""Compare the orders at which regularized and spring-like laws approach the set-valued law with those of theory.
 
     python docs/studies/limits_of_laws.py
 
@@ -88,12 +88,12 @@ class Scene:
         self.reversals = sum(a * b == -1 for a, b in pairwise(changes))
 
     def expected(self, law: Law) -> tuple[float, bool]:
-        """Order of the error: that of the worst that happens."""
+        """Order of the error, which is the lowest of the orders of the events that happen."""
         orders = [law.at_releases] * bool(self.releases) + [law.at_reversals] * bool(self.reversals)
         return min(orders, key=lambda order: (order[0], not order[1]))
 
     def with_law(self, law: Law, small: float) -> hs.Model:
-        """The model with another law, whose width or give is so small."""
+        """The model with another law and a given relative width or deflection."""
         if not law.is_spring:
             return self.model.regularized(law.name, v0=small * self.fastest)
         stiffness = self.limit / (small * self.largest)
@@ -118,7 +118,7 @@ class Scene:
 
 
 def scenes() -> list[Scene]:
-    """One that sticks now and then, one that sticks most of the time, one that turns round without stick."""
+    """One that sticks sometimes, one that sticks most of the time, and one that reverses without stick."""
     turning = hs.steady_state("dfcs", params={"F0": 60, "omega": "1.4*sqrt(k/m)"}).solution
     x, v = (float(value) for value in turning(0.0))
     return [
@@ -199,29 +199,34 @@ def page(found: dict[str, dict[str, np.ndarray]], every: list[Scene]) -> str:
     table = "\n".join(rows)
     heads = " | ".join(f"{scene.name}: theory | observed | error at 1e-5" for scene in every)
     about = "\n".join(
-        f"- *{scene.name}*: {scene.says}; {100 * scene.sticks:.0f} % of the time in stick, "
-        f"{scene.releases} releases, {scene.reversals} reversals without stick"
+        f"| *{scene.name}* | {scene.says} | {100 * scene.sticks:.0f} % | {scene.releases} | {scene.reversals} |"
         for scene in every
     )
     forms = "\n".join(
         f"| `{law.name}` | {law.says} | {order_text(law.at_releases)} | {order_text(law.at_reversals)} |"
         for law in LAWS
     )
-    return f"""# Laws that come to Coulomb's in the limit
+    return f"""# Laws with Coulomb's law as their limit
 
-A velocity v0 over which friction is rounded off, or a stiffness with which a contact gives way: as v0 goes to zero,
-or the stiffness to infinity, the motion becomes that of the set-valued law. How fast? The reference model over
-{PERIODS} periods, against its closed form with the set-valued law, mu_s = mu_k. Made by
-`python docs/studies/limits_of_laws.py`.
+How fast does the motion with a regularized or spring-like friction law approach the motion with Coulomb's law? The
+order depends on the law and on the events of the motion. With `karnopp` the error is of order 2 at a release and of
+order 1 at a reversal. With a spring contact it is only of order 1/2 at a reversal. The observed orders agree with
+theory.
 
+The laws have a small parameter. It is a velocity v0 over which the friction force changes its sign, or the inverse of a
+contact stiffness. `python docs/studies/limits_of_laws.py` runs the reference model with mu_s = mu_k over {PERIODS}
+periods, and compares it with the closed form for the set-valued law. There are three scenes:
+
+| scene | forcing and start | time in stick | releases | reversals without stick |
+| --- | --- | --- | --- | --- |
 {about}
 
-e is v0 over the largest speed, or the give mu N/stiffness over the largest displacement; the error is the largest of x
-over the run.
+The relative width e is v0 over the largest speed, or the deflection mu N/stiffness over the largest displacement. The
+error is the largest error of x over the run.
 
 ![Error over the width of a law, six laws in three scenes](../images/limits-of-laws.png)
 
-The order of theory and the one observed, both over the smallest decade of e:
+The table compares the order of theory with the observed order, both over the smallest decade of e.
 
 | law | {heads} |
 | --- | {" | ".join(["---"] * (3 * len(every)))} |
@@ -229,43 +234,43 @@ The order of theory and the one observed, both over the smallest decade of e:
 
 ## The orders of theory
 
-Two things are felt at the order at which they happen: a release from stick, and a reversal without stick. The
-larger error wins.
+Two kinds of events determine the error, a release from stick and a reversal without stick. The larger error dominates.
 
 | law | force | release | reversal |
 | --- | --- | --- | --- |
 {forms}
 
-**Release.** The applied force grows past mu N as r s, s being the time since. By the set-valued law m v = r s^2/2.
-A law whose force is short of mu N by d has m v' = r s + d, in a layer around s = 0 in which d and r s are of one
-size; the velocity with which the body leaves that layer too early is what remains.
+**Release.** The applied force passes mu N as r s, where s is the time since then. With the set-valued law m v = r
+s^2/2. Let d be the difference between mu N and the force of another law. Then m v' = r s + d, in a layer around s =
+0 in which d and r s are of the same size. The error is the velocity at which the body leaves this layer too early.
 
-- `tanh`: d = 2 mu N exp(-2 v/v0). Then v is of size v0 and s of size v0^(1/2), but for log(1/v0) in v, by which d
-  is brought down from mu N to r s.
-- `arctan`: d = (2/pi) mu N v0/v, which falls no faster than that. With v of size s^2: s^3 of size v0, v of size
-  v0^(2/3).
-- `dahl`, `lugre`: d = mu N exp(-sigma x/(mu N)). Then x is of size 1/sigma, hence s of size sigma^(-1/3) and v of
-  size sigma^(-2/3). The damping of the bristles, sqrt(sigma_0 m) v d/(mu N), is smaller than d by sigma^(-1/6).
-- `jenkins`: d = 0 once mu N is reached. What is left is the ringing of the body on the spring, with which each stop
-  begins: it slips by itself as the applied force grows, until at the release it is of size 1/k in x.
-- `karnopp`: the release is located. At the stop before, the body is held v0/a too early (a being its deceleration),
-  v0^2/(2 a) short of where it would have stopped.
+- `tanh`: d = 2 mu N exp(-2 v/v0). Then v is of size v0 and s of size v0^(1/2). The velocity also has a factor
+  log(1/v0), because d must decrease from mu N to r s.
+- `arctan`: d = (2/pi) mu N v0/v. With v of size s^2, s^3 is of size v0, and v of size v0^(2/3).
+- `dahl`, `lugre`: d = mu N exp(-sigma x/(mu N)). Then x is of size 1/sigma, s of size sigma^(-1/3) and v of size
+  sigma^(-2/3). The damping of the bristles, sqrt(sigma_0 m) v d/(mu N), is smaller than d by sigma^(-1/6).
+- `jenkins`: d = 0 when mu N is reached. The error is the vibration of the body on the spring, with which each stop
+  begins. The vibration itself causes slip as the applied force grows. At the release it is of size 1/k in x.
+- `karnopp`: the release is located. At the stop before, the body is held too early by v0/a, where a is its
+  deceleration. It stops short of its true position by v0^2/(2 a).
 
-**Reversal.** Friction changes by 2 mu N, at once by the set-valued law.
+**Reversal.** Friction changes by 2 mu N, and with the set-valued law it changes at once.
 
-- `tanh`, `arctan`, `karnopp`: the change takes the time v0/a, in which the velocity is wrong by the order of v0.
-  The tails of `arctan` last: the sum of v0/(a s) over s is v0 log(1/v0).
-- `jenkins`, `dahl`, `lugre`: it takes a distance of the size of 1/stiffness; from rest with a finite acceleration
-  that lasts stiffness^(-1/2), and so large is what is missing of the velocity after it. Half an order: a spring
-  contact is a poor stand-in for Coulomb's law where the body turns round without stick.
+- `tanh`, `arctan`, `karnopp`: the change takes the time v0/a. The velocity has an error of the order of v0 during this
+  time. The tails of `arctan` last longer, and the sum of v0/(a s) over s is v0 log(1/v0).
+- `jenkins`, `dahl`, `lugre`: the change takes a distance of the size of 1/stiffness. From rest with a finite
+  acceleration this takes a time of the size of stiffness^(-1/2). The error of the velocity is of the same size. A
+  spring contact is therefore a poor model of Coulomb's law for a body that reverses without stick.
 
-Regularisations by a function of the velocity and what they cost: E. Pennestri et al., Nonlinear Dyn. 83 (2016) 1785,
-[doi:10.1007/s11071-015-2485-3](https://doi.org/10.1007/s11071-015-2485-3). That solutions of regularised fields
-come to those of Filippov: A. F. Filippov, *Differential Equations with Discontinuous Righthand Sides* (1988),
-[doi:10.1007/978-94-015-7793-9](https://doi.org/10.1007/978-94-015-7793-9). Karnopp's law:
-[doi:10.1115/1.3140698](https://doi.org/10.1115/1.3140698); Dahl's:
-[doi:10.2514/3.61511](https://doi.org/10.2514/3.61511); LuGre:
-[doi:10.1109/9.376053](https://doi.org/10.1109/9.376053).
+## References
+
+- Regularizations by a function of the velocity, and their cost. E. Pennestri et al., Nonlinear Dyn. 83 (2016) 1785,
+  [doi:10.1007/s11071-015-2485-3](https://doi.org/10.1007/s11071-015-2485-3).
+- Convergence of solutions of regularized fields to those of Filippov. A. F. Filippov, *Differential Equations with
+  Discontinuous Righthand Sides* (1988), [doi:10.1007/978-94-015-7793-9](https://doi.org/10.1007/978-94-015-7793-9).
+- Karnopp's law, [doi:10.1115/1.3140698](https://doi.org/10.1115/1.3140698).
+- Dahl's law, [doi:10.2514/3.61511](https://doi.org/10.2514/3.61511).
+- LuGre's law, [doi:10.1109/9.376053](https://doi.org/10.1109/9.376053).
 """
 
 

@@ -1,11 +1,11 @@
-"""Whether accuracy lasts: a square wave at resonance over 10^4 periods, stick over 10^5, orbits over 10^6.
+"""Measure the accuracy of a square wave at resonance over 10^4 periods, of stick over 10^5, and of orbits over 10^6.
 
     python docs/studies/long_runs.py [periods] [integrator]     (10^6 with dop853 by default; 10^4 take a minute)
     python docs/studies/long_runs.py orbits [periods]           (the orbits by `exact` alone: half a minute)
 
-Errors are over the last hundred periods before each checkpoint, relative to the amplitude, against closed forms in 40
-digits (tests/reference). A run of a million periods is cut into runs of a thousand, each of which starts at a time
-that is no running sum, so that memory does not grow.
+Errors are those of the last hundred periods before each checkpoint, relative to the amplitude. The reference is a
+closed form in 40 digits (tests/reference). A run of a million periods is divided into runs of a thousand, so that memory does
+not grow. The start of each of them is not a running sum.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ SETTLED = 400  # periods after which the transient is below 1e-15: exp(-zeta*wn*
 
 
 def no_stop(last: int, integrator: str) -> None:
-    """F0 = 60, N = 40, omega = 1.4 wn: the body turns round twice a period and never sticks."""
+    """F0 = 60, N = 40, omega = 1.4 wn: the body reverses twice per period and never sticks."""
     model = hs.load("dfcs").with_(F0=60, N=40, omega="1.4*sqrt(k/m)")
     values = model.parameter_values()
     omega = values["omega"]
@@ -71,10 +71,10 @@ def no_stop(last: int, integrator: str) -> None:
 
 
 def square(last: int, damping: float, rtol: float, integrator: str) -> None:
-    """x'' + 2 d x' + x = +-1, switched at resonance; without damping the amplitude grows by 4 a period, for ever.
+    """x'' + 2 d x' + x = +-1, switched at resonance; without damping the amplitude grows by 4 per period.
 
-    Damped, an error is forgotten and the accuracy lasts. Undamped, nothing is: each step's truncation error adds to
-    the phase, and the relative error grows with the number of periods, at any tolerance.
+    With damping errors decay and the accuracy lasts. Without damping the truncation error of each step adds to the
+    phase. The relative error then grows with the number of periods, at any tolerance.
     """
     model = hs.Model(
         "square",
@@ -121,10 +121,10 @@ def turned(
 
 
 def stick(last: int) -> None:
-    """Two contacts over all of three coordinates, stuck for ever while the third way to move is shaken.
+    """Two contacts over all of three coordinates, which always stick while the third direction is shaken.
 
-    How far the relative velocities are off those of the bases, in ulp of the sum of their terms: read from the run at
-    all times of each window, and in the integrator's own state at the end of runs of each length.
+    Errors of the relative velocities are in ulp of the sum of their terms. They are read from the run at all times of
+    each window, and from the state of the integrator at the end of runs of each length.
     """
     period = 2 * math.pi / FORCING
     for base in (0.0, 0.2):
@@ -145,8 +145,8 @@ def stick(last: int) -> None:
 def orbits(last: int) -> None:
     """An orbit with two stops a period and one without, each in one run by `exact`: events, places, memory.
 
-    How many events there should be says the closed form: those of the first SETTLED periods from rest, then as many
-    a period as its last ten have.
+    The closed form gives the expected number of events. It is the number in the first SETTLED periods from rest, and
+    then the number per period of its last ten.
     """
     for name, force, ratio in (("two stops", 30, 0.6), ("no stop", 60, 1.4)):
         model = hs.load("dfcs").with_(F0=force, omega=f"{ratio}*sqrt(k/m)")
@@ -202,7 +202,7 @@ def amplitudes(sol: hs.Solution, period: float) -> tuple[np.ndarray, tuple[int, 
 
 
 def points(t0: float, t1: float) -> np.ndarray:
-    """Times at all phases, none of which is that of a switch: its rounded time stands for the switch itself."""
+    """Times at all phases, none of which is that of a switch, because a rounded time means the switch itself."""
     return t0 + (t1 - t0) * (np.arange(POINTS) + 1 / math.pi) / POINTS
 
 

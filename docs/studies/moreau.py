@@ -1,9 +1,9 @@
-"""Whether time stepping comes to what methods that locate events find, and at which order of the step.
+"""Measure the order at which time stepping approaches the results of methods that locate events.
 
     python docs/studies/moreau.py
 
-Writes docs/studies/moreau.md and docs/images/moreau.png. Ten scenes: half with dry friction, half with impacts; then
-chains of up to a thousand blocks that rub on a belt and collide.
+Writes docs/studies/moreau.md and docs/images/moreau.png. There are ten scenes, half with dry friction and half with
+impacts. Chains of up to a thousand blocks that rub on a belt and collide follow.
 """
 
 from __future__ import annotations
@@ -27,7 +27,9 @@ ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "studies" / "moreau.md"
 PICTURE = ROOT / "docs" / "images" / "moreau.png"
 LEVELS = 7  # steps are halved this often less one
-NEIGHBOURS = 6  # of each step, over which errors are averaged: where in a step an impact falls is chance
+NEIGHBOURS = (
+    6  # of each step, over which errors are averaged, since the place of an impact in its step is random
+)
 BLOCKS = (10, 100, 1000)
 GAP, STEP, SPAN = 0.1, 2e-3, 30.0  # of the chains
 POINTS = 400_001  # times at which errors are taken, closer than the finest step
@@ -35,7 +37,7 @@ POINTS = 400_001  # times at which errors are taken, closer than the finest step
 
 @dataclass(frozen=True)
 class Scene:
-    """A model over a span, which the coarsest steps cut into so many; the states that are positions, and velocities."""
+    """A model over a span, its number of coarsest steps, and the names of its positions and velocities."""
 
     name: str
     model: Callable[[], hs.Model] | str
@@ -74,7 +76,7 @@ class Found:
     seconds: float
 
     def order(self, errors: np.ndarray) -> float:
-        """The exponent with which they fall with the step."""
+        """The exponent with which errors decrease with the step."""
         return float(np.polyfit(np.log(self.steps), np.log(errors), 1)[0])
 
 
@@ -106,7 +108,7 @@ def measure(scene: Scene) -> Found:
 
 
 def chain(blocks: int) -> tuple[str, str]:
-    """Rows of the tables of chains: what a run of blocks that rub and collide comes to, and its energy."""
+    """Rows of the tables of chains, with the results and the energy of a run of blocks that rub and collide."""
     system = hs.chain_on_belt(blocks, gap=GAP, spread=0.49 * GAP)
     sol = hs.simulate(system, (0, SPAN), integrator="moreau", step=STEP)
     assert sol.success, sol
@@ -206,16 +208,19 @@ def main() -> None:
 
 TEXT = """# At which order does time stepping converge?
 
-`moreau` locates no event; it shares no decision with the methods that do. Ten scenes by it with {levels} steps, each
-half of the one before, held against `exact` or `taylor` at rtol 1e-11, which locate every event. Where in a step an
-impact falls is chance, so that single errors scatter: each is a mean over {neighbours} neighbouring steps. Made by
-`python docs/studies/moreau.py`.
+At which order of the step does time stepping converge? All orders of `moreau` lie between {least:.2f} and
+{most:.2f}, in ten scenes with friction and impacts.
+
+`moreau` does not locate events. It shares no decision with the methods that do. `python docs/studies/moreau.py` runs
+ten scenes with {levels} steps, each half of the one before. The reference is `exact` or `taylor` at rtol 1e-11,
+which locate every event. The place of an impact within its step is random, so that single errors scatter. Each error
+is therefore a mean over {neighbours} neighbouring steps.
 
 ![Errors over the step](../images/moreau.png)
 
-Positions: the largest error at any time. Velocities jump, and what jumps a step late is wrong by the whole jump for
-that long: their error is the mean over the time. Both relative to the largest value. The order is the slope through
-all steps; the errors stand for the finest one.
+For positions the table gives the largest error at any time. Velocities jump. A jump that is one step late is an
+error of the whole jump for this step. The error of velocities is therefore the mean over the time. Both errors are
+relative to the largest value. The order is the slope over all steps, and the errors are those of the finest step.
 
 | dry friction | changes of mode | order of x | order of v (L1) | finest step | error of x | error of v | seconds |
 | --- | --- | --- | --- | --- | --- | --- | --- |
@@ -225,24 +230,25 @@ all steps; the errors stand for the finest one.
 | --- | --- | --- | --- | --- | --- | --- | --- |
 {impacts}
 
-All orders lie between {least:.2f} and {most:.2f}. `dfcs` is of second order: its contact only
-stops, which takes exactly its momentum from it in that step, and is let go where static and kinetic friction are equal.
-A reversal without a stop is a stick of one step, of first order (`free-decay`), and a force that changes with the speed
-is taken at the end of the step, of first order too (`belt`). The scenes keep away from grazing: an impact whose speed
-goes to zero with a parameter moves by the square root of what moves it, and so does its error.
+`dfcs` is of second order. Its contact stops, and the step of the stop removes exactly its momentum. It is released
+when static and kinetic friction are equal. A reversal without a stop is a stick of one step, which is of first order
+(`free-decay`). A force that depends on the speed is taken at the end of the step, which is also of first order
+(`belt`). The scenes have no grazing impacts. The time of such an impact changes with the square root of a parameter,
+and so does its error.
 
-- *vibrating table*: a ball thrown off again and again; each flight ends in an accumulation of bounces, then rest.
-- *thrown block*: friction that each impact loads, sliding after the last one, stick.
-- *two balls* above each other: the upper one comes down on the lower while that bounces.
-- *pendulum*: a gap that is linear in no state; bounces, then rest.
-- *shaken mass* between two stops, on a spring to a block that sticks and slips on a belt.
+- *vibrating table*: a ball is thrown repeatedly. Each flight ends in an accumulation of bounces, and then in rest.
+- *thrown block*: each impact loads the friction. The block slides after the last impact, and then sticks.
+- *two balls*: they are above each other. The upper ball falls on the lower one, which bounces.
+- *pendulum*: its gap is nonlinear in all states. It bounces and comes to rest.
+- *shaken mass*: it moves between two stops. A spring connects it to a block that sticks and slips on a belt.
 
 ## Chains that collide
 
-`hs.chain_on_belt(n, gap={gap:g})`: n blocks of mass 1 on a belt, each rubbing with 1/(1 + 3|v|), neighbours joined by
-springs, colliding with e = 0.5 where a spring is compressed by {gap:g}. {span:g} units of time in steps of {step:g}.
-Friction and impacts are on the same blocks, n + (n - 1) contacts in one problem. Unsettled: steps whose impulses did
-not come to within 1e-12 of their largest. Times on one core of a machine that had other work.
+`hs.chain_on_belt(n, gap={gap:g})` has n blocks of mass 1 on a belt. The friction of each block is 1/(1 + 3|v|).
+Springs join neighbours, which collide with e = 0.5 when a spring is compressed by {gap:g}. The run lasts {span:g}
+units of time in steps of {step:g}. Friction and impacts act on the same blocks, so that one problem has n + (n - 1)
+contacts. A step is unsettled if its impulses did not converge to 1e-12 of their largest. Times are on one core of a
+machine that also ran other programs.
 
 | n | status | unsettled | bounces | changes of mode | us per step | sweeps per step | least gap |
 | --- | --- | --- | --- | --- | --- | --- | --- |
@@ -252,9 +258,10 @@ not come to within 1e-12 of their largest. Times on one core of a machine that h
 | --- | --- | --- | --- | --- | --- |
 {works}
 
-With theta = 1/2 the works of a step add up to the gain of kinetic and elastic energy exactly; what is missing is
-rounding. Neither friction nor impacts give energy: both sums are negative. A gap takes part in the
-first step that would close it by its middle, and may be negative by 1 - e/2 times a step's way then: no gap is less.
+With theta = 1/2 the works of a step add up exactly to the gain of kinetic and elastic energy. The missing energy is
+rounding. Neither friction nor impacts add energy, since both sums are negative. A gap takes part in the first step
+that would close it by the middle of the step. It may then be negative by 1 - e/2 times the distance of a step. No
+gap is smaller.
 """
 
 

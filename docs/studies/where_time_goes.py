@@ -1,9 +1,9 @@
-"""Where the time of a short run goes: P1 by `exact` and the belt by `taylor`, in percent, by sampling.
+"""Measure the shares of parts of the work in the time of a short run, by sampling P1 and the belt.
 
     python docs/studies/where_time_goes.py [--seconds 20] [--out DIR]
 
-Needs `perf` (of Linux). A process of its own runs the scene over and over, with a map of the compiled kernels, and perf
-samples it; what it finds is summed up by what each function is for. Writes docs/studies/profile.md (or DIR).
+The script needs `perf` (of Linux). A separate process runs the scene repeatedly, with a map of the compiled kernels.
+perf samples this process. The samples are added up by the purpose of each function. Writes docs/studies/profile.md (or DIR).
 """
 
 from __future__ import annotations
@@ -166,18 +166,24 @@ def page(found: dict[str, Counter[str]]) -> str:
         [
             "# Where the time goes",
             "",
-            "`python docs/studies/where_time_goes.py`, which writes this page: percent of the samples that perf takes "
-            "of",
-            "a process that runs a scene of [the study of speed](speed.md) again and again, `simulate` and the times",
-            f"of all events; `taylor` at {RTOL:g}. {machine()}",
+            "Which part of the work takes the time of a short run?",
+            *(
+                f"In {name} by `{SCENES[name]}` the largest part is *{each.most_common(1)[0][0]}*, with "
+                f"{100.0 * each.most_common(1)[0][1] / each.total():.1f} % of the time."
+                for name, each in found.items()
+            ),
+            "",
+            "`python docs/studies/where_time_goes.py` runs a scene of [the study of speed](speed.md) repeatedly.",
+            "perf samples the process. The run is `simulate`, followed by reading the times of all events. The tolerance of",
+            f"`taylor` is {RTOL:g}. The table gives percent of the samples. {machine()}",
             "",
             f"| part | {head} |",
             "| --- |" + " --- |" * len(names),
             *rows,
             "",
-            "*Zeros of guards*: bounds from below, polishing, Bernstein forms. *Which mode follows an event*: the",
-            "guards' first derivatives in each candidate, with their error bounds. A part that was made one with its",
-            "caller by the compiler counts as that.",
+            "*Zeros of guards* are bounds from below, polishing and Bernstein forms. *Which mode follows an event*",
+            "is the first derivatives of the guards in each candidate mode, with their error bounds. If the compiler",
+            "has inlined a part into its caller, the part counts as the caller.",
             "",
         ]
     )
@@ -194,7 +200,7 @@ def main() -> None:
         run_for_ever(given.run)
     if shutil.which("perf") is None:
         raise SystemExit(
-            "perf is not installed: it is in the package linux-perf, or linux-tools, of a distribution"
+            "perf is not installed; it is in the package linux-perf, or linux-tools, of a distribution"
         )
     text = page({name: samples(name, given.seconds) for name in SCENES})
     print(text)
