@@ -4,8 +4,8 @@
     python docs/studies/long_runs.py orbits [periods]           (the orbits by `exact` alone: half a minute)
 
 Errors are those of the last hundred periods before each checkpoint, relative to the amplitude. The reference is a
-closed form in 40 digits (tests/reference). A run of a million periods is divided into runs of a thousand, so that memory does
-not grow. The start of each of them is not a running sum.
+closed form in 40 digits (tests/reference). A run of a million periods is divided into runs of a thousand, so that
+memory does not grow. The start of each of them is not a running sum.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
-"""Whether random models of each kind come out to the tolerance asked for, and methods have the order they claim.
+"""Compare random models of each kind with references at a requested tolerance, and measure the orders of methods.
 
     python docs/studies/random_models.py [draws]      (50 by default; they make docs/studies/random-models.md)
 
-200 structures, each with so many draws of parameters and initial values: linear systems of one to eight states,
-generic, oscillatory, defective, nearly defective and stiff, with six kinds of forcing, against matrix exponentials
-in integers; smooth expressions against Taylor series in integers; stiff nonlinear systems whose motion is known.
+There are 200 structures, each with so many draws of parameters and initial values. Linear systems of one to eight
+states are generic, oscillatory, defective, nearly defective or stiff, with six kinds of forcing. Their reference is
+a matrix exponential in integers. The reference of smooth expressions is a Taylor series in integers. Stiff nonlinear
+systems have a known motion.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ TOLERANCES = {"taylor": 1e-12, "dop853": 1e-9, "tsit5": 1e-6, "rodas5p": 1e-6}
 
 @dataclass
 class Errors:
-    """Errors in units of what was asked for, of one family and integrator; runs that failed."""
+    """Errors in units of the tolerance, of one family and integrator, and runs that failed."""
 
     ends: list[float] = field(default_factory=list)
     between: list[float] = field(default_factory=list)
@@ -45,7 +46,7 @@ class Errors:
 
 
 def hold(case: Case, integrator: str, errors: Errors) -> None:
-    """Run a case and hold it against the truth, at its end and between its steps."""
+    """Run a case and compare it with the truth, at its end and between its steps."""
     tolerance = TOLERANCES.get(integrator)
     size = float(np.abs(np.vstack([case.truth, case.start])).max()) or 1.0
     options = {} if tolerance is None else {"rtol": tolerance, "atol": tolerance * 1e-3 * size}
@@ -86,7 +87,7 @@ STEPS = (4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
 
 
 def orders(count: int, seed: int) -> dict[str, list[float]]:
-    """Observed orders with fixed steps: the slope over the finest halving whose errors are clear of rounding."""
+    """Observed orders with fixed steps: the slope over the finest halving whose errors are above rounding."""
     found: dict[str, list[float]] = defaultdict(list)
     for k in range(count):
         case = next(smooth_cases(k, 1, seed))
@@ -141,27 +142,31 @@ def proportions(count: int, seed: int) -> dict[str, list[float]]:
 
 HEAD = """# Random models against references
 
-`python docs/studies/random_models.py` runs 200 random structures with {draws} draws of parameters and
-initial values each,
-and holds every run against a reference at four times: the end, and three between, where the dense output has to serve.
+Are runs as accurate as the tolerance requests? Of {runs} runs of random models, {faults} are not within the
+tolerance as defined below.
 
-- 100 linear systems x' = A x + f phi(t) of one to eight states, dense: generic, oscillatory (some ten turns),
-  defective (chains of equal eigenvalues behind integer transformations, exact in doubles), the same but for 1e-4 to
-  1e-15, stiff with ratios from 10 to 1e4, and from 1e4 to 1e8 (`exact` and `rodas5p` only). phi is nothing, constant,
-  a polynomial, an exponential, a sine, or t exp(-e t) cos(w t). Reference: matrix exponentials in integers of {bits}
-  bits.
-- 80 systems of one to four states of random smooth expressions (sums, products, quotients, roots, exp, sin, cos,
-  tanh, atan). Reference: Taylor series in integers, good to some 18 digits.
-- 20 stiff nonlinear systems of two to four states that are drawn to known waves and couple; 14 with ratios from 10 to
-  1e4, 6 with 1e4 to 1e8 (`rodas5p`).
+`python docs/studies/random_models.py` runs 200 random structures with {draws} draws of parameters and initial values
+each. It compares every run with a reference at four times. They are the end and three times between steps, which
+test the dense output.
 
-Errors are the largest of all states, relative to the largest state of the run, in units of rtol: {asked}.
-`exact` knows no tolerance. Its unit is 2^-53 of the largest state plus what relative changes of all numbers of the
-model by 2^-53 make of the motion (the worst of three random ones), which no computation in doubles can do without; its
-change of basis may cost a factor of a hundred on top.
+- There are 100 dense linear systems x' = A x + f phi(t) of one to eight states. The matrix A is generic or
+  oscillatory (about ten turns). Or it is defective, with chains of equal eigenvalues behind integer transformations,
+  exact in doubles. Or it differs from a defective one by 1e-4 to 1e-15. Stiff systems have ratios from 10 to 1e4,
+  and from 1e4 to 1e8 (`exact` and `rodas5p` only). The forcing phi is zero, constant, a polynomial, an exponential,
+  a sine, or t exp(-e t) cos(w t). The reference is a matrix exponential in integers of {bits} bits.
+- There are 80 systems of one to four states with random smooth expressions (sums, products, quotients, roots, exp,
+  sin, cos, tanh, atan). The reference is a Taylor series in integers, with about 18 correct digits.
+- There are 20 coupled stiff nonlinear systems of two to four states that approach known waves. In 14 the ratios are
+  from 10 to 1e4, and in 6 from 1e4 to 1e8 (`rodas5p`).
 
-*Within* means at most {within:.0f} units, for `exact` {exact:.0e}, which is 1e-12: a tolerance is kept step by step,
-and what a system makes of the errors of all steps is its own.
+The error is the largest of all states, relative to the largest state of the run, in units of rtol. The tolerance is {asked}.
+`exact` has no tolerance. Its unit has two parts. One is 2^-53 of the largest state. The other is the change of the
+motion if all numbers of the model change by 2^-53 (the worst of three random changes). No computation in doubles can
+avoid this error. The change of basis in `exact` may add a factor of a hundred.
+
+A run is *within* the tolerance if its error is at most {within:.0f} units. For `exact` the limit is {exact:.0e}
+units, which is 1e-12. A method keeps the tolerance in each step. The system determines the effect of the errors of
+all steps.
 
 | family | integrator | runs | median, end | 99 % | largest | median, between | 99 % | largest | not within |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |
@@ -169,21 +174,22 @@ and what a system makes of the errors of all steps is its own.
 ORDERS = """
 ## Orders
 
-Twenty of the smooth systems with fixed steps: log2 of the ratio of the errors of h and h/2, at the finest h whose
-errors are clear of rounding (above 1e-13).
+Twenty of the smooth systems run with fixed steps. The order is log2 of the ratio of the errors of h and h/2. It is
+taken at the finest h whose errors are above rounding (above 1e-13).
 
 | integrator | order claimed | median observed | from | to |
 | --- | --- | --- | --- | --- |
 """
 PROPORTIONS = """
-The error estimators: the slope of log error over log rtol between 1e-4 and 1e-10, of the same systems. 1 is an error
-proportional to the tolerance; `taylor` chooses its order by the tolerance.
+The second table tests the error estimators on the same systems. It gives the slope of log error over log rtol
+between 1e-4 and 1e-10. A slope of 1 means an error proportional to the tolerance. `taylor` chooses its order by the
+tolerance.
 
 | integrator | median | from | to |
 | --- | --- | --- | --- |
 """
 TAIL = """
-How to run: `python docs/studies/random_models.py [draws]`; {minutes:.0f} minutes on one core.
+Run `python docs/studies/random_models.py [draws]` to repeat the study. It takes {minutes:.0f} minutes on one core.
 """
 
 
@@ -196,7 +202,15 @@ def page(
 ) -> str:
     """The page of the results."""
     asked = ", ".join(f"{rtol:.0e} for `{name}`" for name, rtol in TOLERANCES.items())
-    out = HEAD.format(draws=draws, bits=BITS, asked=asked, within=WITHIN, exact=EXACT)
+    out = HEAD.format(
+        draws=draws,
+        bits=BITS,
+        asked=asked,
+        within=WITHIN,
+        exact=EXACT,
+        runs=sum(len(errors.ends) for errors in found.values()),
+        faults=sum(len(errors.faults) for errors in found.values()),
+    )
     for (family, name), errors in found.items():
         cells = [
             f"{f(values):.2g}"
@@ -216,7 +230,7 @@ def page(
 
 
 def ninety_nine(values: list[float]) -> float:
-    """What 99 in 100 stay below."""
+    """The value that 99 of 100 are below."""
     return float(np.quantile(values, 0.99))
 
 

@@ -1,11 +1,11 @@
-"""Whether random models with friction, relays, stops and automata end as they should, and agree with time stepping.
+"""Compare random models with friction, relays, stops and automata with a time stepping method.
 
     python docs/studies/random_structures.py [structures] [draws] [journal]    (200 and 50 make the page)
 
-Each draw is run by two of `dop853`, `taylor` and `exact`, and the first is held against a time stepping that shares
-no code with hybridsim (tests/reference/stepped_structures.py), at three numbers of steps and more, each about twice the
-one before. With a journal what is done is written there, structure by structure, and the same call goes on from it.
-What the page says under its last heading is written by hand, and stays.
+Each draw is run by two of `dop853`, `taylor` and `exact`. The first run is compared with a time stepping method that
+shares no code with hybridsim (tests/reference/stepped_structures.py). It has three or more numbers of steps, each
+about twice the one before. With a journal the results are stored there, structure by structure, and the same command
+continues from it. The text of the page under its last heading is written by hand, and stays.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ SEED = 1
 
 
 def study(structures: int, draws: int, journal: Path | None) -> list[dict[str, Any]]:
-    """What became of all draws; a record for each structure."""
+    """The results of all draws, with a record for each structure."""
     done: list[dict[str, Any]] = []
     if journal and journal.exists():
         done = [json.loads(line) for line in journal.read_text(encoding="utf-8").splitlines()]
@@ -54,7 +54,7 @@ def study(structures: int, draws: int, journal: Path | None) -> list[dict[str, A
 
 
 def tell(number: int, refused: str, verdicts: list[Verdict], seconds: float) -> None:
-    """One line on a structure, and all that is to be looked at."""
+    """One line on a structure, and all its open cases."""
     counts = Counter(verdict.kind for verdict in verdicts)
     print(f"{number}: {refused.splitlines()[0] if refused else dict(counts)} {seconds:.0f} s", flush=True)
     for v in verdicts:
@@ -66,29 +66,38 @@ def tell(number: int, refused: str, verdicts: list[Verdict], seconds: float) -> 
 
 HEAD = """# Random structures with events
 
-`python docs/studies/random_structures.py` makes random models and holds each run against a method that
-shares no code and no
-decision with hybridsim. A structure has one to four masses with springs, dampers and forces (constant, sines, square
-waves), and up to three of the following kinds of components: friction contacts (one to three; Coulomb, static above
-kinetic, Stribeck, asymmetric, viscous; on the ground, on a belt, between bodies; with loads that vary and that vanish),
-switching surfaces with a random field on either side, unilateral contacts with restitution (walls, moving walls, bodies
-that strike each other), automata (bilinear springs, hysteresis, kicks by a reset, saturations, a thermostat), monitors.
-Its numbers are drawn {draws} times; each time `dop853` (rtol 1e-9), `taylor` (1e-10) or, where it can, `exact` is
-judged, in turns, and held against the next of them, too.
+Do runs of random models with events agree with a method that does not locate events? Of {all} draws {agree} agree.
+{sensitive} are sensitive to the start, {unresolved} are unresolved, and {disagree} disagree.
 
-*The other method* steps through time without locating anything (`tests/reference/stepped_structures.py`): the forces of
-a step are those that fit the laws at its end. It is of first order, and is run with 2003, 4327 and 8923 steps, and
-with up to 568 019 where that does not decide. All these numbers are prime: no instant but the start and the end is met
-by two of the runs, so that their errors are not alike. Positions are compared at 100 times. With d the largest of the
-differences of successive runs, each taken to fall with the step, which is its error if the order is one,
+`python docs/studies/random_structures.py` makes random models and compares each run with another method. This method
+shares neither code nor decisions with hybridsim. A structure has one to four masses with springs, dampers and forces
+(constant, sines, square waves). It also has up to three kinds of components:
 
-- a run *agrees* where it is off by at most 3 d at all times, d is below 0.5 % of the motion, or with the most steps
-  below 2 %, and the other integrator differs from it by no more than a change of the start by 1e-6 does, and ends
-  likewise. That two of ours agree proves nothing; that they differ proves one of them wrong;
-- *sensitive*: where, and as far as, a change of the start by 1e-5 makes the other method itself change by more than
-  300 times that (a grazing impact, a stop that barely happens, chaos). Up to there the run has to agree;
-- *unresolved*: the other method has not converged by its smallest step;
-- *disagrees*: everything else.
+- One to three friction contacts. Their laws are Coulomb, static above kinetic, Stribeck, asymmetric and viscous.
+  They are on the ground, on a belt or between bodies. Their loads may vary, and may vanish.
+- Switching surfaces with a random field on each side.
+- Unilateral contacts with restitution. They are walls, moving walls, and bodies that strike each other.
+- Automata. They are bilinear springs, hysteresis, kicks by a reset, saturations and a thermostat.
+- Monitors.
+
+The numbers of a structure are drawn {draws} times. Each draw is run by `dop853` (rtol 1e-9), `taylor` (1e-10) or, if
+possible, `exact`, in turns. It is also compared with a run by the next of these integrators.
+
+The *other method* is time stepping without location of events (`tests/reference/stepped_structures.py`). The forces
+of a step are those that satisfy the laws at its end. The method is of first order. It runs with 2003, 4327 and 8923
+steps, and with up to 568 019 if these do not decide. All these numbers are prime. Two of the runs share no instant
+except the start and the end, so that their errors are independent. Positions are compared at 100 times. Let d be the
+largest of the differences of successive runs, each extrapolated to the finest step. It equals the error if the order
+is one. The verdicts are defined as follows:
+
+- A run *agrees* if it differs by at most 3 d at all times. In addition d must be below 0.5 % of the motion, or below
+  2 % with the most steps. The other integrator must end in the same way. It may differ no more than a change of the
+  start by 1e-6 does.
+- A run is *sensitive* after a certain time. A change of the start by 1e-5 then changes the other method by more than
+  300 times that amount. Examples are a grazing impact, a stop that barely happens, and chaos. The run must agree up
+  to this time.
+- A run is *unresolved* if the other method has not converged at its smallest step.
+- A run *disagrees* in all other cases.
 
 """
 
@@ -99,9 +108,16 @@ def page(done: list[dict[str, Any]], draws: int) -> str:
     all_verdicts = [v for record in accepted for v in record["verdicts"]]
     kinds = Counter(v["kind"] for v in all_verdicts)
     statuses = Counter(v["status"] for v in all_verdicts)
-    out = HEAD.format(draws=draws)
+    out = HEAD.format(
+        draws=draws,
+        all=len(all_verdicts),
+        agree=kinds["agrees"],
+        sensitive=kinds["sensitive"],
+        unresolved=kinds["unresolved"],
+        disagree=kinds["disagrees"],
+    )
     events = sum(v["events"] for v in all_verdicts)
-    out += f"{len(accepted)} structures, {len(all_verdicts)} draws, {events} events.\n\n"
+    out += f"The {len(accepted)} structures have {len(all_verdicts)} draws with {events} events.\n\n"
     out += "| verdict | draws |\n| --- | --- |\n"
     out += "".join(f"| {kind} | {kinds[kind]} |\n" for kind in sorted(kinds))
     out += "\n| status | draws | agree up to there | sensitive | unresolved | disagree |\n"
@@ -122,23 +138,34 @@ def page(done: list[dict[str, Any]], draws: int) -> str:
         )
     refused = Counter(record["refused"].splitlines()[0] for record in done if record["refused"])
     if refused:
-        out += "\nRefused as models, with their reasons:\n\n"
-        out += "".join(f"- {count}: {reason}\n" for reason, count in refused.most_common())
+        out += "\nThese structures were refused as models:\n\n| structures | reason |\n| --- | --- |\n"
+        out += "".join(f"| {count} | {reason} |\n" for reason, count in refused.most_common())
     open_cases = [
         (r["number"], v) for r in accepted for v in r["verdicts"] if v["kind"] not in ("agrees", "sensitive")
     ]
     if open_cases:
-        out += "\nNeither agree nor are sensitive (structure/draw):\n\n"
+        out += "\nThese draws neither agree nor are sensitive:\n\n"
+        out += (
+            "| structure/draw | integrator | verdict | status | details |\n| --- | --- | --- | --- | --- |\n"
+        )
         for number, v in open_cases:
-            out += (
-                f"- {number}/{v['draw']}, `{v['integrator']}`, {v['kind']}, `{v['status']}`: {v['detail']}\n"
+            cells = (
+                f"{number}/{v['draw']}",
+                f"`{v['integrator']}`",
+                v["kind"],
+                f"`{v['status']}`",
+                v["detail"],
             )
+            out += f"| {' | '.join(cells)} |\n"
     minutes = sum(record["seconds"] for record in done) / 60
-    return out + f"\n{minutes:.0f} minutes on one core, compilation of the models included.\n"
+    return (
+        out
+        + f"\nThe study took {minutes:.0f} minutes on one core, including the compilation of the models.\n"
+    )
 
 
 def main() -> None:
-    """Run the study, print the page, write it where it is whole."""
+    """Run the study, print the page, and write it if it is complete."""
     structures = int(sys.argv[1]) if len(sys.argv) > 1 else 200
     draws = int(sys.argv[2]) if len(sys.argv) > 2 else 50
     journal = Path(sys.argv[3]) if len(sys.argv) > 3 else None

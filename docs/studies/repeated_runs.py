@@ -1,8 +1,8 @@
-"""How long a run takes if the same model runs again with other parameters, another start, or by its name.
+"""Measure the time of a run if the same model runs again with other parameters, another start, or by its name.
 
     python docs/studies/repeated_runs.py [--turns 40] [--out DIR]
 
-One run, one process: the calls of a scene take turns, with the closed form by hand beside them. Writes
+The calls of a scene take turns in one process, with the closed form written by hand. Writes
 docs/studies/repeated-runs.md (or DIR). heyoka takes part if it is installed.
 """
 
@@ -58,8 +58,10 @@ def main() -> None:
     parser.add_argument("--turns", type=int, default=40, help="turns of all calls")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="where the page is written")
     options = parser.parse_args()
-    rows = [row for case in CASES for row in rows_of(case, measured(case, options.turns))]
-    (options.out / "repeated-runs.md").write_text(page(rows))
+    found = [measured(case, options.turns) for case in CASES]
+    rows = [row for case, times in zip(CASES, found, strict=True) for row in rows_of(case, times)]
+    ratios = [times["params"] / times["same"] for times in found]
+    (options.out / "repeated-runs.md").write_text(page(rows, ratios))
     print("\n".join(rows))
 
 
@@ -138,28 +140,35 @@ def rows_of(case: Case, found: dict[str, float]) -> list[str]:
     return rows
 
 
-def page(rows: list[str]) -> str:
+def page(rows: list[str], ratios: list[float]) -> str:
     """The page."""
     table = "\n".join(["| run | call | median | ratio | aim |", "| --- | --- | --- | --- | --- |", *rows])
     return f"""# Runs with other numbers
 
-`python docs/studies/repeated_runs.py` writes this page. {machine()}
+How much longer does a run take if the same model runs again with other numbers? A new value in `params` makes it
+{min(ratios):.2f} to {max(ratios):.2f} times as long as the same call again.
 
 A loop over a parameter or a start calls `hs.simulate` with the same structure and other numbers. The structure is
-compiled, bound and checked once. For new numbers the engine checks what depends on them, evaluates the parameters that
-are expressions of them, decides the start in compiled code, and computes the tables of linear modes. The table gives
-medians of processor time in one process, where the calls take turns: the run with `keep="events"`, and reading the
-times of events and the states at them. Each new value differs in its eighth digit, so that all runs have the same
-events. "By name" is compared with the same packaged model passed as an object.
+compiled, bound and checked once. For new numbers the engine does four things:
+
+- It repeats the checks that depend on them.
+- It evaluates the parameters that are expressions of them.
+- It decides the start in compiled code.
+- It computes the tables of linear modes.
+
+`python docs/studies/repeated_runs.py` writes this page. The table gives medians of processor time in one process, in
+which the calls take turns. A call is the run with `keep="events"`, followed by reading the times of events and the
+states at them. Each new value differs in its eighth digit, so that all runs have the same events. The call "by name"
+is compared with the same packaged model passed as an object. {machine()}
 
 {table}
 
-## What is prepared again
+## Repeated preparation
 
-| change | what happens |
+| change | effect |
 | --- | --- |
-| a number of a parameter | checks that depend on it are repeated, all else is kept |
-| an expression for a parameter | all values are checked; the code of the structure is kept |
+| a number of a parameter | checks that depend on it are repeated, and all else is kept |
+| an expression for a parameter | all values are checked, and the code of the structure is kept |
 | a number that decides a condition, or makes a coefficient vanish | linear modes are read again, once for each case |
 | a start, a discrete state | the start is decided again |
 | the file of a model | the model is read again if the time stamp or the size of the file has changed |

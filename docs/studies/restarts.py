@@ -1,10 +1,11 @@
-"""Whether a run starts again rightly on and near its guards: a million restarts judged by exact arithmetic.
+"""Compare a million restarts on and near guards with exact arithmetic.
 
     python docs/studies/restarts.py [restarts]        (10^6 by default; they make docs/studies/restarts.md)
 
-Three levels. The verdict on a guard just after a restart, from the engine's series and their error bounds, against
-the true series of the doubles as given. The search for the first zero after a restart on a zero by decree, against
-Sturm's count in integers. And whole runs of a sticking oscillator, some ten releases each, against the closed form.
+There are three levels. The verdict on a guard just after a restart follows from the series of the engine and their
+error bounds. It is compared with the true series of the given doubles. The search for the first zero after a restart
+on a zero by definition is compared with Sturm's count in integers. Whole runs of a sticking oscillator, with about
+ten releases each, are compared with the closed form.
 """
 
 from __future__ import annotations
@@ -62,65 +63,74 @@ def run_one(tally: Runs, seed: int, number: int, integrator: str) -> None:
 
 # -- the page ----------------------------------------------------------------------------------------------------
 
-HEAD = """# Does a run start again rightly on a guard?
+HEAD = """# Restarts on a guard
 
-`python docs/studies/restarts.py` makes random restarts on and near guards and holds each against exact
-arithmetic on the
-doubles as given. The zeros by decree, Z, are declared with each restart ([events](../explanation/events.md)): they
-are zero in the oracle too. A restart is *clear* where the first coefficient of the guard's true series that is not
-in Z lies beyond twice the engine's own error bound. There the verdict has to be the true one. The others start
-*inside the error bound*; they are counted apart and have to follow the stated rule: a coefficient within its bound
-counts as zero, the next one is asked, and where none decides the verdict is "undecided at rounding", which keeps
-the present mode.
+Does a run start correctly on a guard after an event? Of {clear} clear restarts, {spurious} were spurious and
+{missed} were missed.
+
+`python docs/studies/restarts.py` makes random restarts on and near guards. It compares each with exact arithmetic on
+the given doubles. Each restart declares the quantities that are zero by definition
+([events](../explanation/events.md)). They are zero in the oracle too.
+
+A restart is *clear* if the first coefficient of the true series of the guard is beyond twice the error bound of the
+engine. Coefficients that are zero by definition do not count. The verdict of a clear restart must be the true one.
+The other restarts start *inside the error bound*. They are counted separately and must follow the stated rule. A
+coefficient within its bound counts as zero, and the next one decides. If none decides, the verdict is "undecided at
+rounding", and the present mode stays.
 
 ## Verdicts
 
-Series and bounds come from the engine's recurrences, true series from integers of {bits} bits. The expressions are
-random (one structure for 500 draws), the state is random, and the guard is moved until it is zero at the state to
-the last bit, or 1e-19 to 1 away from it; with three in ten the rate is set to zero likewise. The oscillator is that
-of the releases below, over decades of its parameters and up to 10^6 periods out, with the load on the limit of
-friction or as near to it.
+Series and bounds follow from the recurrences of the engine, and true series from integers of {bits} bits. The
+expressions are random (one structure for 500 draws), and so is the state. The guard is moved until it is zero at the
+state to the last bit, or differs from zero by 1e-19 to 1. In three of ten restarts the rate is set to zero in the
+same way. The oscillator is that of the releases below. Its parameters extend over decades, and its time over up to
+10^6 periods. The load is at the limit of friction or very near to it.
 
 | restart | judged | clear | spurious | missed | inside, decided | undecided | against the rule | error/bound |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 SEARCHES = """
-*Spurious*: judged to leave and stays; *missed*: the other way. *Inside, decided*: by a higher derivative. The last
-column holds the engine's coefficients against the true ones: the bounds are bounds as long as it stays below 1.
+A restart is *spurious* if it is judged to leave and stays. It is *missed* in the opposite case. *Inside, decided*
+means decided by a higher derivative. The last column is the largest error of a coefficient of the engine, divided by
+its bound. The bounds are valid if it is below 1.
 
 ## Searches
 
-After the restart, the first zero: random polynomials of up to degree 8 with 0 to 5 zeros, some next to the restart,
-some in pairs, whose first 0 to 3 coefficients are zero by decree and hold noise. The oracle is Sturm's count in
-integers.
+A search finds the first zero after the restart. The functions are random polynomials of up to degree 8 with 0 to 5
+zeros. Some zeros are next to the restart, and some are in pairs. The first 0 to 3 coefficients are zero by
+definition and contain noise. The oracle is Sturm's count in integers.
 
-| by decree | searches | stays | leaves | spurious | missed | open | open without reason | start inside |
+| zero by definition | searches | stays | leaves | spurious | missed | open | open without reason | start inside |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 RUNS = """
-*Open*: the search says that it comes within its error bound; the general way, which samples the guard, then looks
-again. *Start inside*: the leading coefficient is itself within the bound.
+A search is *open* if it reports that the function comes within its error bound. The general method, which samples
+the guard, then searches again. *Start inside* means that the leading coefficient is within the bound.
 
 ## Whole runs
 
-A mass that sticks is released, slips, sticks again: {periods} periods of a random oscillator from a random time,
-against the closed form. Four kinds in turn: mu_s = mu_k, mu_s above mu_k, above it by 1e-14 to 1e-2 of it, and
-undamped. rtol 1e-8.
+A mass that sticks is released, slips, and sticks again. A run has {periods} periods of a random oscillator from a
+random time, at rtol 1e-8. It is compared with the closed form. There are four kinds in turn. In three of them mu_s
+equals mu_k, is above it, or is above it by 1e-14 to 1e-2 of its value. The fourth is undamped.
 
 | integrator | runs | mode changes | releases | spurious | missed | late | cut short | with a warning |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 TAIL = """
-*Late*: by 1e-5 of a period. *Cut short*: a slip after a release that lasts less than half of what it should, the mark
-of a wrong direction.
+An event is *late* if its error exceeds 1e-5 of a period. A slip is *cut short* if it lasts less than half of its true
+time after a release. This is the sign of a wrong direction.
 
-How to run: `python docs/studies/restarts.py [restarts]`; {minutes:.0f} minutes on one core.
+Run `python docs/studies/restarts.py [restarts]` to repeat the study. It takes {minutes:.0f} minutes on one core.
 """
 
 
 def page(verdicts: Verdicts, searches: Searches, runs: dict[str, Runs], minutes: float) -> str:
     """The page of the results."""
-    out = HEAD.format(bits=BITS)
+    all_of = {
+        column: sum(verdicts.counts[kind, column] for kind in verdicts.widest)
+        for column in ("clear", "spurious", "missed")
+    }
+    out = HEAD.format(bits=BITS, **all_of)
     columns = (
         "restarts",
         "clear",

@@ -1,4 +1,4 @@
-"""Random sequences of calls of a simulator against straight runs with knots at the same times.
+"""Compare random sequences of calls of a simulator with single runs that have knots at the same times.
 
     python docs/studies/steps.py [sequences]        (1000 by default; they make the table in docs/studies/steps.md)
 

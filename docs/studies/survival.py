@@ -1,11 +1,11 @@
-"""Whether runs that stop go on to the same bits, and what a sweep loses that is killed.
+"""Compare stopped and resumed runs with undisturbed ones, and count the points that a killed sweep loses.
 
     python docs/studies/survival.py [--moments N] [--kills N] [--seed S]      (100 and 50 make docs/studies/survival.md)
 
-Every integrator that is compiled or has a fixed step, on scenes with stick and slip, impacts that come to rest,
-clocks and discrete states, jumps of an input, sliding, friction along a stop: a run is stopped at a random step,
-resumed, and compared with one that was never stopped: times, states, events with both their sides, status. A sweep in
-a child process is ended by SIGKILL at random moments until it is done.
+The runs use every integrator that is compiled or has a fixed step. The scenes have stick and slip, impacts that come
+to rest, clocks and discrete states, jumps of an input, sliding, and friction along a stop. A run is stopped at a
+random step and resumed. Its times, states, events with both their sides, and status are compared with a run that was
+never stopped. A sweep in a child process is ended by SIGKILL at random moments until it is complete.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ FORCES, SPEEDS = 40, 25  # points of the sweep that is killed, by its two parame
 
 
 def difference(one: hs.Solution, other: hs.Solution) -> str:
-    """What differs between two solutions in the last bit; empty where nothing does."""
+    """The differences between two solutions in the last bit, empty if there are none."""
     if (one.status, one.message, len(one.events)) != (other.status, other.message, len(other.events)):
         return f"{one.status} with {len(one.events)} events, {other.status} with {len(other.events)}"
     for a, b in zip(one.events, other.events, strict=True):
@@ -86,7 +86,7 @@ def difference(one: hs.Solution, other: hs.Solution) -> str:
 def resumed(
     scene: str, integrator: str, moments: int, draws: np.random.Generator
 ) -> tuple[int, int, list[str]]:
-    """Moments at which a run was stopped, those at which it was already done, and what differed."""
+    """Moments at which a run was stopped, those at which it was already done, and the differences."""
     model, span = (
         hs.load(FILES.get(scene, scene)),
         (0.0, LONGER.get((integrator, scene), SCENES[scene])),
@@ -134,7 +134,7 @@ def resume_rows(moments: int, seed: int) -> tuple[list[str], list[str]]:
 
 
 def point(model: hs.Model) -> dict[str, float]:
-    """What is measured at a point, which is written down before anything is lost."""
+    """The measurement at a point, which is logged before it begins."""
     values = model.parameter_values()
     log = os.environ.get("SURVIVAL_LOG")
     if log:
@@ -154,7 +154,7 @@ def swept(journal: Path | None) -> hs.Sweep:
 
 
 def killed(kills: int, seed: int, folder: Path) -> dict[str, float | bool]:
-    """A sweep ended by so many SIGKILLs at random moments, held against one that nobody disturbed."""
+    """A sweep ended by so many SIGKILLs at random moments, compared with an undisturbed one."""
     draws = np.random.default_rng(seed)
     journal, log = folder / "sweep.journal", folder / "log"
     point(hs.load("dfcs"))  # so that all is compiled
@@ -173,7 +173,7 @@ def killed(kills: int, seed: int, folder: Path) -> dict[str, float | bool]:
             time.sleep(0.001)
         time.sleep(float(draws.uniform(0.0, 2.0 * usual / kills)))
         if child.poll() is not None:
-            begun_anew += 1  # all was done: the sweep begins anew
+            begun_anew += 1  # all was done, so the sweep begins again
             journal.unlink(missing_ok=True)
             log.unlink(missing_ok=True)
             continue
@@ -200,7 +200,7 @@ def killed(kills: int, seed: int, folder: Path) -> dict[str, float | bool]:
 
 
 def count_lines(path: Path) -> int:
-    """Lines of a file, 0 where there is none."""
+    """Lines of a file, 0 if it does not exist."""
     return path.read_bytes().count(b"\n") if path.exists() else 0
 
 
@@ -216,37 +216,35 @@ def entries(journal: Path) -> int:
 
 TEXT = """# Runs that are stopped, sweeps that are killed
 
-Made by `docs/studies/survival.py`.
+Does a run or a sweep survive an interruption? {verdict} A resumed sweep gives the same results, and one kill costs
+{most} point at most. `docs/studies/survival.py` interrupts both.
 
 ## Stopped at a random step and resumed
 
-{moments} random steps of each run, at which it was stopped by `limits={{"steps": ...}}` and went on by `resume()`. The
-numbers are those of runs that were really stopped: a compiled loop looks at its limits between stretches, and a run
-that ended meanwhile is *done*. Compared with a run that was never stopped, in their last bits: the times of all
-steps, the states there, all events with the states on both their sides, status and message.
+Each run was stopped at {moments} random steps by `limits={{"steps": ...}}` and continued by `resume()`. The table
+counts the runs that were really stopped. A compiled loop checks its limits only between stretches, and a run that
+ended meanwhile is *done*. Resumed runs are compared bit for bit with a run that was never stopped. The comparison
+has the times of all steps, the states there, all events with the states on both sides, the status and the message.
 
 | integrator | {scenes} |
 | --- | {lines} |
 {rows}
 
-{verdict}
-
-*refused*: the method says that it lacks what the scene needs.
+*Refused* means that the method reports a missing capability.
 
 ## Killed
 
-A sweep of {points} points in a process of its own, which took {seconds:.1f} s undisturbed, was ended {kills} times by
-SIGKILL at random moments and started again each time (anew, where it was done before: {begun} times). Each point says
-that it is begun in a file of its own, before it is computed.
+A sweep of {points} points runs in a separate process, and took {seconds:.1f} s without interruption. SIGKILL ended
+it {kills} times at random moments, and each time it was started again. It had already finished {begun} times and
+then began from the start. Each point writes to a separate file that it has begun, before it is computed.
 
 | | |
 | --- | --- |
 | results equal to those of an undisturbed sweep, to the last bit | {same} |
 | points whose computation was begun more than once, over all kills | {lost} |
-| the most that one kill cost | {most} |
+| points begun again after one kill, at most | {most} |
 
-The journal is written by the group: what a kill costs are the points of the group that is under way, with one worker
-here.
+The journal is written after each group of points. A kill costs the points of the current group, with one worker here.
 """
 
 
@@ -267,7 +265,11 @@ def main() -> None:
     rows, faults = resume_rows(args.moments, args.seed)
     print(*faults, f"{len(faults)} differ", sep="\n")
     if args.moments >= 100 and args.kills >= 50:
-        verdict = f"{len(faults)} of them differ." if faults else "None of them differs."
+        verdict = (
+            f"{len(faults)} of the resumed runs differ."
+            if faults
+            else "No resumed run differs from an undisturbed one."
+        )
         words = deaths | {"same": "yes" if deaths["same"] else "no"}
         PAGE.write_text(
             TEXT.format(

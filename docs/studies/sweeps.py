@@ -1,10 +1,11 @@
-"""Whether a sweep of 10^5 steady states stays small, survives its bad points, and is the same on a cluster.
+"""Run a sweep of 10^5 steady states on threads and on a cluster, and record its memory and its failed points.
 
     python docs/studies/sweeps.py [points]            (10^5 by default; they make docs/studies/sweeps.md)
 
-Random points (F0, omega, c) of the reference model, among them three that cannot succeed: a mass of zero, a damping
-that feeds the motion, a spring that pushes away. Once on threads, with the memory of the process read as it goes on,
-once by a dask cluster of two processes on this machine; results are compared bit for bit.
+The points (F0, omega, c) of the reference model are random. Three of them cannot succeed, with a mass of zero, a
+damping that adds energy, and a spring of negative stiffness. One sweep runs on threads, and the memory of the
+process is read meanwhile. The other one runs on a dask cluster of two processes on the same machine. Results are
+compared bit for bit.
 """
 
 from __future__ import annotations
@@ -92,25 +93,29 @@ def page(
         for sweep in (here, there)
     ]
     memory = [f"| {done} | {megabytes:.0f} |" for done, megabytes in seen]
-    same = "the same to the last bit" if not differing else "not the same: " + ", ".join(differing)
+    same = "the same to the last bit" if not differing else "not the same in " + ", ".join(differing)
     return "\n".join(
         [
             "# A sweep of 10^5 steady states",
             "",
-            f"`python docs/studies/sweeps.py`, which writes this page: `hs.sweep` of {', '.join(MEASURES)} of `dfcs`",
-            f"at {count} random points, F0/N from 0.5 to 1.5, omega from 0.05 to 2 of the natural frequency, c from",
-            "2 to 20 N s/m.",
+            "Is a large sweep complete, and is it the same on a cluster? "
+            f"In both executions the results of {count} points are {same}. The status of all of them is below.",
+            "",
+            f"`python docs/studies/sweeps.py` runs `hs.sweep` of {', '.join(MEASURES)} of `dfcs`",
+            f"at {count} random points.",
+            "F0/N is from 0.5 to 1.5, omega from 0.05 to 2 of the natural frequency, and c from 2 to 20 N s/m.",
             f"{machine()}",
             "",
-            "| where | seconds | points a second |",
+            "| executor | seconds | points per second |",
             "| --- | --- | --- |",
             *rates,
             "",
-            f"Both times the results are {same}: every reading and every status.",
+            "The comparison includes every reading and every status.",
             "",
             "## Memory",
             "",
-            "Of the process, in the sweep on threads. The results themselves are four numbers a point.",
+            "The table has the memory of the process during the sweep on threads. The results are four numbers per",
+            "point.",
             "",
             "| points done | MB |",
             "| --- | --- |",
@@ -118,15 +123,15 @@ def page(
             "",
             "## Points that cannot succeed",
             "",
-            "Three points in the middle have values for which there is no answer. Each has its status, and NaN.",
+            "Three points in the middle have values without a steady state. Each has a status, and NaN as its result.",
             "",
-            "| what | status |",
+            "| fault | status |",
             "| --- | --- |",
             *bad,
             "",
-            "## What became of the others",
+            "## Other points",
             "",
-            f"Kinds: {kinds}.",
+            f"The motions of the other points are: {kinds}.",
             "",
             "| points | status |",
             "| --- | --- |",

@@ -30,7 +30,7 @@ KINDS = {"unit": "another unit in a declaration", "factor": "a factor left out",
 
 
 def end_of(fault: Fault, model: hs.Model) -> str:
-    """What the check of units makes of a fault."""
+    """The result of the check of units for a fault."""
     lines = {caution.place.line for caution in unit_faults(model) if caution.place}
     return ENDS[2] if not lines else ENDS[0] if lines & fault.lines else ENDS[1]
 
@@ -60,7 +60,7 @@ def table(done: list[tuple[Fault, str]]) -> str:
 
 
 def page() -> str:
-    """The results as Markdown."""
+    """The page of the results."""
     models = [hs.load(MODELS / f"{name}.toml") for name in NAMES]
     alarms = sum(len([*unit_faults(model)]) for model in models)
     rows = [row for model in models for row in unit_rows(model)]
@@ -70,14 +70,14 @@ def page() -> str:
     share = 100 * sum(end == ENDS[0] for _, end in many) / len(many)
     lost = Counter((f"`{fault.model}`, `{fault.what}`", end) for fault, end in many if end != ENDS[0])
     out = (
-        HEAD
-        + f"\n## Results\n\nOn the {len(models)} models as they are the check gives {alarms} warnings. Of the "
+        HEAD.format(share=share)
+        + f"\n## Results\n\nOn the {len(models)} unchanged models the check gives {alarms} warnings. Of the "
     )
     out += f"{len(rows)} quantities and expressions in them {unknown} have an unknown unit.\n\n"
-    out += f"The first {FIRST} faults of seed {SEEDS[0]}:\n\n{table(first)}\n"
+    out += f"The first table has the first {FIRST} faults of seed {SEEDS[0]}.\n\n{table(first)}\n"
     seeds = ", ".join(map(str, SEEDS))
-    out += f"{MANY} faults of each of the seeds {seeds} ({share:.1f} % on the right line):\n\n{table(many)}\n"
-    out += "Those that were not found on the right line, the most frequent first:\n\n"
+    out += f"The second table has {MANY} faults of each of the seeds {seeds}.\n\n{table(many)}\n"
+    out += "The third table has faults that were not found on the right line, the most frequent first.\n\n"
     out += "| fault | end | times |\n| --- | --- | --- |\n"
     for (what, end), times in sorted(lost.items(), key=lambda item: (-item[1], item[0]))[:20]:
         out += f"| {what} | {end} | {times} |\n"
@@ -86,14 +86,17 @@ def page() -> str:
 
 HEAD = """# Faults of units
 
-`python docs/studies/units.py` puts faults of units into the packaged models that declare units, one fault at a time. It
-counts how many `hybridsim check` finds ([Check the units of a model](../how-to/check-units.md)), and on which line.
+How many faults of units does `hybridsim check` find? It finds {share:.1f} % of random faults on the right line.
+
+`python docs/studies/units.py` puts faults of units into the packaged models that declare units, one fault at a time.
+It counts how many `hybridsim check` finds, and on which line. See [Check the units of a
+model](../how-to/check-units.md).
 
 The faults are drawn at random, the three kinds in turn:
 
-- *Another unit*: a declaration gets a unit of another dimension, or of the same dimension in another size.
-- *A factor left out*: `a*b` becomes `a` or `b`, and `a/b` becomes `a`.
-- *A name exchanged*: a name in an expression becomes another name of the model.
+- *Another unit* means that a declaration gets a unit of another dimension, or of the same dimension in another size.
+- *A factor left out* means that `a*b` becomes `a` or `b`, and `a/b` becomes `a`.
+- *A name exchanged* means that a name in an expression becomes another name of the model.
 
 A fault counts only if it alters a unit. The factor that is left out is not a pure number, and the two names have
 different units. The script has its own table of the units of all names, which shares no code with the check. These
@@ -110,8 +113,8 @@ REASONS = """These are the reasons:
 
 - The unit of an impact force is not declared. In `-g + p/m` without `m` the force becomes an acceleration, and all
   units still agree, unless a contact force shows the unit of `p`. The same holds for the unit of t in `thermostat`.
-- A number in a product may be a constant with a unit: `0.6*sqrt(k/m)`, `0.1*A*omega`, `w**2/2`.
-- Where two expressions imply different units of a force, the warning may be on the line of the other one.
+- A number in a product may be a constant with a unit, as in `0.6*sqrt(k/m)`, `0.1*A*omega` and `w**2/2`.
+- If two expressions imply different units of a force, the warning may be on the line of the other one.
 """
 
 

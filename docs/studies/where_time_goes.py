@@ -3,7 +3,8 @@
     python docs/studies/where_time_goes.py [--seconds 20] [--out DIR]
 
 The script needs `perf` (of Linux). A separate process runs the scene repeatedly, with a map of the compiled kernels.
-perf samples this process. The samples are added up by the purpose of each function. Writes docs/studies/profile.md (or DIR).
+perf samples this process. The samples are added up by the purpose of each function. Writes docs/studies/profile.md (or
+DIR).
 """
 
 from __future__ import annotations
@@ -164,7 +165,7 @@ def page(found: dict[str, Counter[str]]) -> str:
     head = " | ".join(f"{name} by `{SCENES[name]}`" for name in names)
     return "\n".join(
         [
-            "# Where the time goes",
+            "# Profile of two short runs",
             "",
             "Which part of the work takes the time of a short run?",
             *(
@@ -174,8 +175,8 @@ def page(found: dict[str, Counter[str]]) -> str:
             ),
             "",
             "`python docs/studies/where_time_goes.py` runs a scene of [the study of speed](speed.md) repeatedly.",
-            "perf samples the process. The run is `simulate`, followed by reading the times of all events. The tolerance of",
-            f"`taylor` is {RTOL:g}. The table gives percent of the samples. {machine()}",
+            "perf samples the process. The run is `simulate`, followed by reading the times of all events. The",
+            f"tolerance of `taylor` is {RTOL:g}. The table gives percent of the samples. {machine()}",
             "",
             f"| part | {head} |",
             "| --- |" + " --- |" * len(names),

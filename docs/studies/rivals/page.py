@@ -19,10 +19,11 @@ _LIBRARIES = ("numpy", "numba", "scipy", "scikit-sundae", "heyoka", "jax", "diff
 def page(
     scenes: Mapping[str, Scene], truths: Mapping[str, Truth], found: Found, lacking: Sequence[str], text: str
 ) -> str:
-    """The whole page; `text` holds {machine}, {missed}, {ratios}, {overhead} and {scenes}."""
+    """The whole page; `text` has {answer}, {machine}, {missed}, {ratios}, {overhead}, {wrong} and {scenes}."""
     tables = [_scene_table(scenes[name], truths[name], lines) for name, lines in found.items()]
     missing = f" Not installed: {', '.join(lacking)}." if lacking else ""
     return text.format(
+        answer=_answer(found),
         machine=machine() + missing,
         ratios=_ratios(found),
         missed=_missed(found),
@@ -82,7 +83,7 @@ def _scene_table(scene: Scene, exact: Truth, lines: Sequence[Line]) -> str:
     rows = [
         f"### {scene.title}",
         "",
-        f"{len(exact.t)} events; held against: {exact.title}.",
+        f"The scene has {len(exact.t)} events. The reference is a {exact.title}.",
         "",
         "| method | events: median | least | with grid: median | least | first call | states | event times / T |",
         "| --- | --- | --- | --- | --- | --- | --- | --- |",
@@ -104,6 +105,15 @@ def _ratios(found: Found) -> str:
     return "\n".join(rows)
 
 
+def _answer(found: Found) -> str:
+    """The range of each ratio over the scenes."""
+    values: dict[str, list[float]] = {}
+    for r in ratios(found):
+        values.setdefault(r.what, []).append(r.value)
+    rows = [f"| {what} | {min(those):.3g} to {max(those):.3g} |" for what, those in values.items()]
+    return "\n".join(["| ratio of run times | over the scenes |", "| --- | --- |", *rows])
+
+
 def _missed(found: Found) -> str:
     """A sentence on the aims that are not met."""
     with_aim = [r for r in ratios(found) if r.asked]
@@ -111,7 +121,7 @@ def _missed(found: Found) -> str:
     if not missed:
         of_all = f"All {len(with_aim)} aims are" if len(with_aim) > 1 else "The aim is"
         return f"{of_all} met in this run, by the least times and by the medians."
-    return f"Of {len(with_aim)} aims {len(missed)} are not met in every way: {'; '.join(missed)}."
+    return f"Of {len(with_aim)} aims {len(missed)} are not met in every way. They are {', '.join(missed)}."
 
 
 def _wrong(found: Found) -> str:

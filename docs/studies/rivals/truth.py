@@ -1,4 +1,4 @@
-"""What the runs are held against: closed forms in 40 digits, and Taylor series in 32."""
+"""The reference solutions of the runs, which are closed forms in 40 digits and Taylor series in 32."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def _closed_form(scene: Scene) -> Truth:
     changes = motion.changes
     states = [[float(value) for value in motion.state(t)[:2]] for t in scene.grid[scene.last]]
     return Truth(
-        "closed form, 40 digits",
+        "closed form with 40 digits",
         np.array([float(c.t) for c in changes]),
         np.zeros(len(changes), dtype=int),
         np.array([c.mode for c in changes]),
@@ -105,7 +105,7 @@ def _series(scene: Scene) -> Truth:
     motion = multiple_precision_trajectory(scene.model, (0.0, scene.end), digits=DIGITS)
     names = [component.name for component in scene.model.all_components()]
     return Truth(
-        f"Taylor series, {DIGITS} digits",
+        f"Taylor series with {DIGITS} digits",
         np.array([e.t for e in motion.events], dtype=float),
         np.array([names.index(e.component) for e in motion.events]),
         np.array([_AFTER[e.target] for e in motion.events]),
