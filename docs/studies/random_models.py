@@ -159,10 +159,10 @@ test the dense output.
 - There are 20 coupled stiff nonlinear systems of two to four states that approach known waves. In 14 the ratios are
   from 10 to 1e4, and in 6 from 1e4 to 1e8 (`rodas5p`).
 
-The error is the largest of all states, relative to the largest state of the run, in units of rtol. The tolerance is {asked}.
-`exact` has no tolerance. Its unit has two parts. One is 2^-53 of the largest state. The other is the change of the
-motion if all numbers of the model change by 2^-53 (the worst of three random changes). No computation in doubles can
-avoid this error. The change of basis in `exact` may add a factor of a hundred.
+The error is the largest of all states, relative to the largest state of the run, in units of rtol. The tolerance is
+{asked}. `exact` has no tolerance. Its unit has two parts. One is 2^-53 of the largest state. The other is the change
+of the motion if all numbers of the model change by 2^-53 (the worst of three random changes). No computation in
+doubles can avoid this error. The change of basis in `exact` may add a factor of a hundred.
 
 A run is *within* the tolerance if its error is at most {within:.0f} units. For `exact` the limit is {exact:.0e}
 units, which is 1e-12. A method keeps the tolerance in each step. The system determines the effect of the errors of
