@@ -1,6 +1,6 @@
-"""Where methods with a fixed step or a zone around zero velocity are right: boundaries in the plane (step, zone).
+"""Measure the limits of methods with a fixed step or a zone around zero velocity, in the plane (step, zone).
 
-    python docs/studies/stability.py [coarse]      (six minutes on two cores; progress on stderr)
+    python docs/studies/stability.py [coarse]      (six minutes on two cores, with progress on stderr)
 
 Writes docs/studies/stability.md and docs/images/stability-*.png.
 """
@@ -145,25 +145,28 @@ def page(
         if c.stops and not c.belt_speed
     )
     adaptives = "\n".join(f"| {100 * w:g} % | {100 * e:+.2f} % | {n:.0f} |" for w, e, n in rows)
-    return f"""# Where fixed steps and zones around zero velocity are right
+    return f"""# Limits of fixed steps and of zones around zero velocity
 
-A fixed step h and a zone around v = 0 (eps_v of `rk4-dichotomy`, v0 of a regularised law) are chosen by the user.
-Which choices are right? Here the boundary is measured, for the reference model (`dfcs`, at several r and F0/N) and
-for the block on a `belt`. Made by `python docs/studies/stability.py`.
-r = 0.6 with F0/N = 0.75 is P1 of the [comparison](../explanation/comparison.md), r = 0.64 with F0/N = 0.55 its P2.
+How long may a fixed step be, and how wide a zone around zero velocity? For the two systems of this study,
+`rk4-dichotomy` with the velocity zeroed is right with 250 steps per period and a zone of up to 0.5 % of the largest
+speed. The table below has all methods.
 
-Each point is a run that starts on the exact steady motion (`exact` for the reference model, `steady_state` for the
-belt), lasts 40 periods (12 with Karnopp's band, 100 with `rk4-sign`) and is read over its last 10 (4, 50).
-**Right** means: no period's amplitude of x is off by more than 1 %, and the stops are as many as they should be.
-Zones are given as shares of
-the largest speed relative to what is rubbed on.
+The user chooses the step h and the zone around v = 0. The zone is eps_v of `rk4-dichotomy`, or v0 of a regularized law.
+`python docs/studies/stability.py` measures the limits of both. The systems are the reference model (`dfcs`, at
+several r and F0/N) and the block on a `belt`. r = 0.6 with F0/N = 0.75 is P1 of the
+[comparison](../explanation/comparison.md), and r = 0.64 with F0/N = 0.55 is its P2.
 
-## What to choose
+Each point is a run that starts on the exact steady motion. This motion is that of `exact` for the reference model,
+and that of `steady_state` for the belt. The run lasts 40 periods (12 with Karnopp's band, 100 with `rk4-sign`). Its
+last 10 periods are evaluated (4, 50). A run is **right** under two conditions. The amplitude of x is within 1 % in
+each of these periods, and the number of stops is correct. A zone is given as a share of the largest relative speed.
 
-This holds for the two systems measured here, a body on a spring with Coulomb friction that is driven harmonically, and
-a block on a belt, whose friction falls with the speed. It is no rule for others: a body that drifts, static friction
-with a drop to a kinetic one, or several contacts may need a narrower zone than the table allows; run with half of it
-and compare. Impacts are not the subject of this page.
+## Recommended values
+
+These values hold for the two systems of this study. One is a body on a spring with Coulomb friction and harmonic
+forcing. The other is a block on a belt, whose friction falls with the speed. Other systems may need a narrower zone.
+Examples are a body that drifts, static friction above kinetic friction, and several contacts. Run with half of the
+zone and compare. This page does not cover impacts.
 
 | method | zone, as a share of the largest speed | steps per period, at least | beyond |
 | --- | --- | --- | --- |
@@ -173,40 +176,41 @@ and compare. Impacts are not the subject of this page.
 | RK4 with mu N tanh(v/v0) | v0 at most 0.05 % | h < 2.785 m v0/(mu N): 5000 to 50 000 here | creep; chatter |
 | RK4 with Karnopp's dead band | v0 at most 1 % | 50 | early stops, late starts |
 
-At a largest speed of 0.1 m/s a share of 0.5 % is eps_v = 5e-4 m/s: options take speeds in the model's own unit.
+At a largest speed of 0.1 m/s a share of 0.5 % is eps_v = 5e-4 m/s. Options take speeds in the unit of the model.
 
     hybridsim run dfcs --integrator rk4-dichotomy --option eps_v=5e-4 \\
         --option stick_velocity=zero --option steps_per_period=500
 
-`stick_velocity=kept` is the other row. `model.regularized("tanh", v0=5e-5)` and `model.regularized("karnopp", v0=5e-4)`
-are the regularised laws, for `rk4-sign` or any other integrator. tanh is refused where static friction is above the
-kinetic one: a force that goes through zero has no peak at rest.
+`stick_velocity=kept` selects the other row. `model.regularized("tanh", v0=5e-5)` and `model.regularized("karnopp",
+v0=5e-4)` are the regularized laws, for `rk4-sign` or any other integrator. tanh is refused if static friction is
+above kinetic friction. A force that passes through zero has no peak at rest.
 
-The largest speed is not known beforehand, and is small where a zone does most harm: just above the threshold of
-motion. Run once, read the largest speed, and compare. Near the threshold (F0/N = 0.54) tanh takes 0.1 % or
-less, which RK4 needs 26 000 steps a period for, or more, to be stable.
-`exact`, `taylor` and `dop853` have neither choice.
+The largest speed is not known in advance. It is small just above the threshold of motion, where a zone causes the
+largest errors. Run once, read the largest speed, and compare it with the zone. Near the threshold (F0/N = 0.54) tanh
+needs a v0 of 0.1 % or less. RK4 is then stable only with 26 000 steps per period or more. `exact`, `taylor` and
+`dop853` need neither choice.
 
-## The plane
+## Maps of step and zone
 
 ![Error of the reference model over step and zone, four methods](../images/stability-dfcs.png)
 
-*`dfcs`, F0 = 30 N, r = 0.6. Right is to the right of and below the black line.*
+*`dfcs`, F0 = 30 N, r = 0.6. Runs are right below the black line and to its right.*
 
 ![Error of the belt over step and zone, four methods](../images/stability-belt.png)
 
-*`belt`; T = 12.0010 is the period of its limit cycle. The star has the share that 8e-4 m/s has in the picture
+*`belt`, with the period T = 12.0010 of its limit cycle. The star is at the same share as 8e-4 m/s in the picture
 above.*
 
-The widest zone up to which all are right, and what share 8e-4 m/s is:
+The table gives the widest zone up to which all runs are right. The last column is the share of 8e-4 m/s.
 
 | case | zeroed: eps_v | kept: eps_v | tanh: v0 | karnopp: v0 | 8e-4 m/s |
 | --- | --- | --- | --- | --- | --- |
 {zones}
 
-Steps: 2000 a period, 20000 with tanh. "None": with the smallest width at which RK4 is stable there, the amplitude
-is still more than 1 % off; narrower ones are right although they chatter, as the picture below shows.
-The fewest steps per period above which all are right, with a third of that zone:
+These runs have 2000 steps per period, and 20000 with tanh. "None" means an error of more than 1 % at the smallest
+width at which RK4 is stable. Narrower zones are right although the velocity chatters, as the picture below shows.
+
+The next table gives the fewest steps per period above which all runs are right, with a third of that zone.
 
 | case | {heads} |
 | {rule} |
@@ -214,87 +218,92 @@ The fewest steps per period above which all are right, with a third of that zone
 
 ## The published setting
 
-T/1200 and 8e-4 m/s (as v0 with tanh and Karnopp's band), error of the amplitude, and stops a period in excess where
-there are any. What `rk4-dichotomy` makes of a stop depends on where in a step it falls: each figure is the worst of
-{OFFSETS} runs whose steps begin so many equal parts of a step apart; the rest of the page has one such beginning.
+The published setting is T/1200 and 8e-4 m/s (as v0 with tanh and Karnopp's band). The table gives the error of the
+amplitude. It also gives the number of additional stops per period, if there are any. The result of `rk4-dichotomy`
+depends on the place of a stop within a step. Each value is therefore the worst of {OFFSETS} runs, whose steps begin
+at equally spaced parts of a step. The rest of the page has one such beginning.
 
 | case | {heads} |
 | {rule} |
 {published}
 
-With the velocity zeroed the published setting is inside everywhere: at most 4 % of the speed where 11 % would do.
-With the velocity kept, as Eq. 4 reads, it is inside at r = 0.6 for F0/N = 0.75 and above and where the body never
-sticks, and outside in every other case: the nearer the threshold, where the published map of deviations has its
-ridge, the further. As v0 of tanh it is outside in half of the cases. 1200 steps are five times what the dichotomy
-needs, and do not help against a zone that is too wide; `rk4-sign` may need ten times more.
+With the velocity zeroed the published setting is right everywhere. It is at most 4 % of the speed, and 11 % would be
+right. With the velocity kept, as in Eq. 4 of the paper, it is right in two kinds of cases. One is r = 0.6 with F0/N
+= 0.75 and above. The other is a body that never sticks. It is wrong in every other case. The error grows towards the
+threshold, where the published map of deviations has its ridge. As v0 of tanh the setting is wrong in half of the
+cases. 1200 steps are five times as many as the dichotomy needs. They do not help if the zone is too wide. `rk4-sign`
+may need ten times as many.
 
 ![How the boundary moves with r and F0/N](../images/stability-moves.png)
 
-*Lines of 1 % error of the amplitude. Two lines one above the other, at v0 near the largest speed, are where the
-error of tanh changes its sign: right by accident.*
+*Lines of 1 % error of the amplitude. At some points near the largest speed there are two lines, one above the other.
+The error of tanh changes its sign there, and the result is right by accident.*
 
-As a share of the speed the limit of the zeroed velocity hardly moves: 9 to 15 % wherever the body sticks, 1 to 2 %
-where it only turns round. That of the kept one is 0.2 to 0.8 %, narrowest where the sticks are long; that of tanh
-goes from 0.15 % to 2.3 % with no such rule. In m/s all shrink with the speed: at r = 0.6, from F0/N = 0.75 to 0.54,
-the zeroed one from 0.034 to 0.0022 m/s, the kept one from 1.8e-3 to 4e-5 m/s.
+As a share of the speed the limit of the zeroed velocity hardly changes. It is 9 to 15 % if the body sticks, and 1 to
+2 % if it only reverses. The limit of the kept velocity is 0.2 to 0.8 %, and is smallest for long sticks. The limit
+of tanh is 0.15 % to 2.3 %, without such a rule. In m/s all limits decrease with the speed. At r = 0.6, from F0/N =
+0.75 to 0.54, the zeroed one decreases from 0.034 to
+0.0022 m/s. The kept one decreases from 1.8e-3 to 4e-5 m/s.
 
 ![Error of rk4-sign over the step](../images/stability-sign.png)
 
-## Why each region ends where it ends
+## Reasons for the limits
 
-X is the amplitude, V the largest speed, a the deceleration into a stop, t_stick how long it lasts. G maps a stop to
-the place of the next one: G_x is its derivative with respect to the place, G_v to an outward speed at the release.
+Let X be the amplitude, V the largest speed, a the deceleration into a stop, and t_stick its duration. G maps a stop
+to the place of the next one. G_x is its derivative with respect to the place, and G_v that with respect to an
+outward speed at the release.
 
-**Velocity zeroed, zone too wide: stops come early.** Stopped at eps_v, the body misses eps_v^2/(2 a) of its way,
-and so does every stop: eps_v^2/(2 a) = 0.01 X (1 - G_x). The belt's extreme of x comes before the stop, where its
-relative speed is the belt's: there (eps_v - v_belt)^2/(2 a) = 0.02 X, which is 41 % of V, against 36 % measured.
-With eps_v above V the body is held as soon as the applied force allows: false stick, and the amplitude is off by 75
-%.
+**Velocity zeroed, zone too wide.** Stops are early. A body that stops at eps_v misses eps_v^2/(2 a) of its way. This
+is true of every stop, so that eps_v^2/(2 a) = 0.01 X (1 - G_x). On the belt the extreme of x is before the stop, at
+the relative speed of the belt. There (eps_v - v_belt)^2/(2 a) = 0.02 X. This is 41 % of V, and 36 % were measured.
+With eps_v above V the body is held as soon as the applied force allows it. This false stick gives an error of the
+amplitude of 75 %.
 
-**Velocity kept, zone too wide: creep.** The body moves on at up to eps_v while it should stick, d = eps_v t_stick
-too far, and begins its slip with eps_v the wrong way: eps_v (t_stick + (G_x t_stick + G_v)/(1 - G_x)) = 0.01 X. On
-the belt, where the friction falls with the speed, a slip that begins with another speed grows apart from the true
-one: 0.34 %.
+**Velocity kept, zone too wide.** The body creeps. It moves on at up to eps_v while it should stick, by d = eps_v
+t_stick. It then begins its slip with eps_v in the wrong direction. The limit is eps_v (t_stick + (G_x t_stick +
+G_v)/(1 - G_x)) = 0.01 X. On the belt the friction falls with the speed. A slip that begins with another speed
+diverges from the true one, so that the limit is 0.34 %.
 
 | case | early stop: theory | measured | creep: theory | measured | late release: theory, at most | measured |
 | --- | --- | --- | --- | --- | --- | --- |
 {theories}
 
-The theory of creep takes the whole of eps_v for the velocity that is kept; it lies between none and that.
+The theory of creep assumes that the kept velocity is eps_v. It is really between zero and eps_v.
 
-**No stop at all** (F0/N = 1 at r = 0.6, F0/N = 0.75 at r = 0.8): inside the zone Eq. 4 turns the friction to where
-the force pushes, before the body has turned. The reversal comes late by m eps_v (1/(e - mu N) - 1/(e + mu N)), e
-being the applied force: first order in eps_v, and 1 % of V is too much already. From 4 % of V on the body is held
-where it should turn (F0/N = 1).
+**No stop at all** (F0/N = 1 at r = 0.6, F0/N = 0.75 at r = 0.8). Inside the zone Eq. 4 changes the direction of
+friction to oppose the force, before the body has reversed. The reversal is late by m eps_v (1/(e - mu N) - 1/(e + mu
+N)), where e is the applied force. This is of first order in eps_v, and 1 % of V is too much already. From 4 % of V
+on, the body is held at the reversal (F0/N = 1).
 
-**Zone too narrow.** 16 halvings leave a speed of a h/2^16 (dotted line). Below it the method goes on from a speed
-that is outside the zone. On the reference model that costs nothing, with a step that is right at all; on the belt,
-with fewer than some 90 steps a period, sticks are missed.
+**Zone too narrow.** 16 halvings leave a speed of a h/2^16 (dotted line). In a narrower zone the method continues
+with a speed outside the zone. On the reference model this has no effect if the step is right. On the belt, with
+fewer than about 90 steps per period, sticks are missed.
 
-**Step too long: late release, missed stops.** A release is taken at the end of its step. A whole step late, the
-slip ends elsewhere by what the column above allows for; the measured limit lies below, as it is rarely a whole
-step. Below 10 steps a period stops are missed: velocities at both ends of a step have one sign, or the dichotomy's
-state is past the next release. On the belt the trial step asks for the friction of the old side beyond v = 0, where
-1/(1 + delta v) has its pole at v = -1/delta: reached when h > 1/(delta a), which is 55 steps a period, and below
-some 30 the motion grows without bound.
+**Step too long.** Releases are late, and stops are missed. A release is taken at the end of its step. If it is a
+whole step late, the slip ends at another place. The column above gives this limit. The measured limit is lower,
+because a release is rarely a whole step late. Below 10 steps per period stops are missed. The velocities at both
+ends of a step have one sign, or the state of the dichotomy is beyond the next release. On the belt the trial step
+uses the friction of the old side beyond v = 0. There 1/(1 + delta v) has its pole at v = -1/delta. The step reaches
+the pole if h > 1/(delta a), which is 55 steps per period. Below about 30 steps the motion grows without bound.
 
-**`rk4-sign`: chatter.** What should be stick is a zigzag of speeds up to 2 mu N h/m; the error is of first order in
-h, and larger the closer the amplitude is to nothing.
+**`rk4-sign`.** The velocity chatters. Instead of stick there is a zigzag of speeds up to 2 mu N h/m. The error is of
+first order in h. It is larger for smaller amplitudes.
 
-**tanh: creep above, instability below.** The body that should stick creeps at v0 artanh(e/(mu N)). The steepest
-part of the law has the rate mu N/(m v0), and classic RK4 damps h times it up to 2.785: the dotted line. Beyond it
-the velocity zigzags, and the amplitude goes wrong later: the force is bounded by mu N, so that what is left is
-`rk4-sign` with the same step, whose limit the black line comes to at small v0. An adaptive method finds its own
-step; `dop853` at rtol = 1e-6, reference model:
+**tanh.** Above its limit the body creeps, and below it RK4 is unstable. A body that should stick creeps at v0
+artanh(e/(mu N)). The steepest part of the law has the rate mu N/(m v0). Classic RK4 damps it if h times this rate is
+at most 2.785 (dotted line). Below this line the velocity chatters, and the amplitude becomes wrong later. The force
+is bounded by mu N. The result is then that of `rk4-sign` with the same step, and the black line approaches its limit
+at small v0.
+
+An adaptive method finds its own step. The table is for `dop853` at rtol = 1e-6 and the reference model.
 
 | v0/V | error of the amplitude | steps per period |
 | --- | --- | --- |
 {adaptives}
 
-**Karnopp's band** is entered at v0 and stops early, as with the zeroed velocity, and its limit is the same where
-the body sticks. Its events are located, so that the step matters least. On the belt it must first cross the band at
-the limit force, and starts late: 1.1 %.
-
+**Karnopp's band** is entered at v0, so that stops are early, as with the zeroed velocity. Its limit is the same if
+the body sticks. Its events are located, so that the step has the smallest effect. On the belt the body must first
+cross the band at the limit force, and its slip is late. The limit is 1.1 %.
 """
 
 

@@ -1,8 +1,8 @@
-"""Runs of the study of stability: the methods, the cases with their exact motion, verdicts, and what theory expects.
+"""Runs of the study of stability, with the methods, the cases with their exact motion, verdicts, and theory.
 
 Each point is a run that starts on the exact steady motion (`exact` for the reference model, `steady_state` for the
-belt) and is read over its last periods. It is right if no period's amplitude is off by more than 1 % and the stops are
-as many as they should be.
+belt). Its last periods are evaluated. It is right if the amplitude of each period is within 1 %, and the number of
+stops is correct.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ PAPER_STEPS, PAPER_EPS = 1200, 8e-4  # m/s
 
 @dataclass(frozen=True)
 class Method:
-    """A method at a point of the plane: how a run is made of steps per period and the width of the zone in m/s."""
+    """A method at a point of the plane: a run from steps per period and the width of the zone in m/s."""
 
     name: str
     title: str
@@ -116,7 +116,7 @@ class Case:
 
     @property
     def fastest(self) -> float:
-        """Largest relative speed: what eps_v and v0 are shares of."""
+        """Largest relative speed, of which eps_v and v0 are shares."""
         return float(np.abs(self.samples[2]).max())
 
     def run(self, method: Method, steps: float, zone: float, offset: float = 0.0) -> hs.Solution:
@@ -143,7 +143,7 @@ class Case:
         )
 
     def regularized(self, law: str, v0: float) -> hs.Model:
-        """The model with a regularised law; abs(v) in the belt's is v tanh(v/v0), or each v = 0 were an event."""
+        """The model with a regularized law; abs(v) of the belt is v tanh(v/v0), so that v = 0 is not an event."""
         if law != "tanh" or not self.belt_speed:
             return self.model.regularized(law, v0=v0)
         sides = "tanh((v - v_belt)/v0)"
@@ -165,7 +165,7 @@ class Case:
     ) -> tuple[float, float]:
         """Relative error of the amplitude, the worst period with its sign, and stops in excess a period.
 
-        NaN where the run ended early: a state that is no number, or events without end.
+        NaN if the run ended early, with a state that is not a number or with events without end.
         """
         sol = self.run(method, steps, zone, offset)
         if not sol.success:
@@ -211,7 +211,8 @@ class Case:
     def memory(self) -> tuple[float, float]:
         """dG/dx and dG/dv of the map G from a stop to the place of the next.
 
-        x: how much further out the body sticks, which lets it go at another time; v: its speed outward when let go.
+        x is the additional distance at which the body sticks, so that it is released at another time. v is its outward
+        speed at the release.
         """
         t0, small, slow = self.stop[0], NUDGE * self.amplitude, NUDGE * self.fastest
         places = []
@@ -289,7 +290,7 @@ def mapped(case: Case, method: Method, steps: np.ndarray, zones: np.ndarray) -> 
 
 
 def is_right(found: tuple[float, float], slack: float = 0.0) -> bool:
-    """Whether an answer is right; slack: stops a period more or less that are let pass."""
+    """Whether an answer is right; slack: the allowed difference of stops per period."""
     return abs(found[0]) <= TOLERATED and abs(found[1]) <= slack
 
 
