@@ -30,7 +30,7 @@ VERDICTS = {
     "reproduced",
     "reproduced in shape only",
     "not reproduced",
-    "an artefact of discretisation",
+    "an artefact of discretization",
 }
 
 
@@ -79,7 +79,7 @@ def test_the_whole_on_few_points(
         assert claim["verdict"] in VERDICTS
         assert claim["why"].endswith(".")
         assert claim["closest"]
-        if claim["verdict"] == "an artefact of discretisation":
+        if claim["verdict"] == "an artefact of discretization":
             assert claim["step_study"]
     page = (tmp_path / "page" / "he2026.md").read_text()
     links = re.findall(r"\]\(([^)]+)\)", page)

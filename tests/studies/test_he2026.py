@@ -162,7 +162,7 @@ class TestVerdictOnARidge:
         claim = deviation.claim(made_up_maps(0.2), "A", made_up_steps(1.0))
         text = json.dumps(plain(claim.to_plain(), 6), allow_nan=False)
         read = json.loads(text)
-        assert read["verdict"] == "an artefact of discretisation"
+        assert read["verdict"] == "an artefact of discretization"
         assert set(read["ours"]) == {
             deviation.pair_name(p) for p in deviation.combinations() if p[1] != "exact"
         }

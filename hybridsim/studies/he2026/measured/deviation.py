@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.studies.he2026.measured.pool import Pool
-from hybridsim.studies.he2026.measured.settings import MATTERING, SIGNS, Point, Size, Variant
+from hybridsim.studies.he2026.measured.settings import MATTERING, SIGNS, Point, Size, Variant, described
 from hybridsim.studies.he2026.measured.steady import by_steps, exact
 from hybridsim.studies.he2026.measured.step_study import StepStudy
 from hybridsim.studies.he2026.measured.verdicts import Claim, Verdict
@@ -165,19 +165,16 @@ def claim(found: Maps, quantity: str, study: StepStudy) -> Claim:
     end = best["above 10 %"] or {"F0/N": math.nan, "r": math.nan}
     truly = readings[pair_name((closest.split("; ")[0], EXACT))]
     why = (
-        f"A ridge is there: the closest reading ({closest}) has {_percent(best['maximum'])} at "
-        f"F0/N = {best['at'][0]:g}, r = {best['at'][1]:g} and stays above 10 % up to F0/N = {end['F0/N']:g}, "
-        f"r = {end['r']:g}; but "
-        f"{study.sentence(quantity)}, and towards the threshold (F0/N = {found.ratios[0]:g}, median over "
-        f"r) it is "
-        f"{_percent(best['near the threshold'])} in this reading and "
-        f"{_percent(truly['near the threshold'])} against "
-        f"the exact motion, where the paper's falls."
+        f"The map has a ridge. The closest reading ({described(closest)}) has {_percent(best['maximum'])} at "
+        f"F0/N = {best['at'][0]:g}, r = {best['at'][1]:g}. It stays above 10 % up to F0/N = {end['F0/N']:g}, "
+        f"r = {end['r']:g}. {study.sentence(quantity)} Near the threshold (F0/N = {found.ratios[0]:g}, median over r) "
+        f"it is {_percent(best['near the threshold'])} in this reading, and {_percent(truly['near the threshold'])} "
+        f"compared with the exact motion. In the paper it decreases there."
     )
     text = (
-        f"{quantity}_D >= 10 % for F0/N {_range_text(box10['F0/N'])}, r {_range_text(box10['r'])}; >= 5 % for "
-        f"{_range_text(box5['F0/N'])}, {_range_text(box5['r'])}; maximum {100 * published['maximum']:.2f} % at "
-        f"F0/N = {where[0]}, r = {where[1]}"
+        f"{quantity}_D is at least 10 % for F0/N {_range_text(box10['F0/N'])}, r {_range_text(box10['r'])}, and at "
+        f"least 5 % for {_range_text(box5['F0/N'])}, {_range_text(box5['r'])}, with a maximum of "
+        f"{100 * published['maximum']:.2f} % at F0/N = {where[0]}, r = {where[1]}"
     )
     exact_rows = {name: row for name, row in readings.items() if name.endswith(EXACT)}
     return Claim(

@@ -25,20 +25,23 @@ _PICTURES = {
     "text": "step-study",
 }
 _CAPTIONS = {
-    "figure 3": "Two periods by every reading, and the exact motion; below, the harmonics of x over the first.",
-    "figure 4": "Each line is a case: solid varies r, dashed N, dotted F0; black is a point on the ridge of Figure 10.",
-    "figure 5": "As above, over eps_v; the grey line is the published setting.",
-    "figure 6": "Left the run time, right the count of right-hand sides, which no machine disturbs.",
-    "figure 7": "The grey mark is what +225 % would be.",
-    "figures 8, 9": "A line that bends is a method, or a law, for which F0/N and r are not all that matters.",
-    "figure 10": "Columns: the published A2 with the velocity of a sticking body kept, set to zero, and the exact A2.",
+    "figure 3": "Two periods by every reading and by the exact motion, and below the harmonics of x over the first.",
+    "figure 4": "Each line is a case. Solid lines vary r, dashed N, dotted F0. Black is a point "
+    "on the ridge of Figure 10.",
+    "figure 5": "The same over eps_v. The grey line is the published setting.",
+    "figure 6": "Left is the run time. Right is the number of evaluations, which no other program disturbs.",
+    "figure 7": "The grey mark is +225 %.",
+    "figures 8, 9": "A curved line is a method, or a law, that depends on more than F0/N and r.",
+    "figure 10": "The columns have the published A2 with the velocity of a sticking body kept, "
+    "set to zero, and the exact A2.",
     "figure 11": "The same for the energy.",
-    "figure 12": "Without stick the force jumps between its limits; with v kept the body creeps while it sticks.",
-    "figure 13": "Nothing sticks here: all columns are the same.",
-    "text": "First order in the step: in the limit nothing is left, since the motion with stick is the limit.",
+    "figure 12": "Without stick the force jumps between its limits. With v kept the body creeps while it sticks.",
+    "figure 13": "Nothing sticks here, so that all columns are equal.",
+    "text": "The deviation is of first order in the step. It vanishes in the limit, since "
+    "the limit is the motion with stick.",
 }
 _WIDTH = 120
-_PAIR = "Read as: method without stick; reading of the method with stick."
+_PAIR = "Each pair names the method without stick, and then the reading of the method with stick."
 
 
 def page(study: Study, image: Callable[[str], str]) -> str:
@@ -58,8 +61,8 @@ def page(study: Study, image: Callable[[str], str]) -> str:
 
 
 def _wrapped(block: str) -> str:
-    """Return a paragraph with its lines wrapped; headings, tables and pictures are unchanged."""
-    if block.startswith(("#", "|", "!")):
+    """Return a paragraph with its lines wrapped; headings, tables, lists and pictures are unchanged."""
+    if block.startswith(("#", "|", "!", "- ")):
         return block
     return textwrap.fill(" ".join(block.split()), _WIDTH, break_long_words=False, break_on_hyphens=False)
 
@@ -70,25 +73,30 @@ def _head(study: Study, claims: tuple[Claim, ...]) -> str:
     return f"""\
 # He et al. 2026, claim by claim
 
-{SOURCE}: when must stick-slip be modelled? Every figure is done again with our implementation of the published
-method (`rk4-dichotomy`, and `rk4-sign` for "stick-slip not considered"), in every reading that the paper leaves open,
-beside the exact motion (`exact`), and every claim is judged.
+When must a model include stick-slip? The published map does not answer this question, because it shows the size of
+the step ({SOURCE}). The equation without stick has the motion with stick as its limit, so that the values of the map
+decrease with the step. The motion, the spectrum and the reduction to (r, F0/N) in the paper are right. Its run times
+are those of one implementation.
 
-**In short.** The paper's motion, its spectrum and its reduction to (r, F0/N) stand. Its map of where stick-slip must be
-modelled does not: the equation without stick has the motion with stick as its limit, so that what the map shows is the
-size of the step, and it shrinks with it. Its run times are those of one implementation. What holds independent of any
-step comes after the claims: where the motion stops, for how long, and how far off models without stops really are.
+This study computes every figure again with our implementation of the published method (`rk4-dichotomy`, and
+`rk4-sign` for "stick-slip not considered"). It uses every reading that the paper leaves open, and compares them with
+the exact motion (`exact`). Results that hold for any step are after the claims. They show which motions stop, for
+how long, and how large the errors of models without stops really are.
 
 | figure | claim | verdict |
 | --- | --- | --- |
 {rows}
 
-**Words.** r = omega/omega_n; A is half the range of x in a period, E the integral of x**2 over it. A0, E0: without
-friction; A1, E1: "stick-slip not considered" (`rk4-sign`); A2, E2: considered; A_D = |A1 - A2|/A2, E_D likewise. What
-the paper leaves open about the dichotomy, each with its readings: *v kept* or *v zero*, what becomes of the velocity of
-a body that has come to stick; *release step* or *located*, whether it breaks away at the next step or where the load
-reaches the limit; *force by step* or *by stage*, whether the side of friction is taken once a step or at each of RK4's
-stages (*sign by step*, *by stage* for A1); *full-step* or *rest-of-step*, how far it goes on after an event.
+**Terms.** r is omega/omega_n. A is half the range of x in a period, and E is the integral of x**2 over it. A0 and E0
+are without friction. A1 and E1 are with "stick-slip not considered" (`rk4-sign`), and A2 and E2 with stick-slip
+considered. A_D is
+|A1 - A2|/A2, and E_D is defined in the same way. The paper leaves these details of the dichotomy open:
+
+- *v kept* or *v zero* is the velocity of a body after it has stopped.
+- *release step* or *located* is the time of the release. It is at the next step, or when the load reaches the limit.
+- *force by step* or *by stage* is the side of friction. It is chosen once per step, or at each stage of RK4. For A1
+  these are *sign by step* and *by stage*.
+- *full-step* or *rest-of-step* is the length of the step after an event.
 
 One command makes this page, its pictures and the [verdicts as data](he2026.json):
 `hybridsim study he2026{quick} --out FOLDER`."""
@@ -100,9 +108,9 @@ def _section(claim: Claim, picture: str) -> str:
         [
             f"## {title}: {claim.verdict}",
             "",
-            f"*The paper:* {claim.claim}.",
+            f"The paper claims that {claim.claim}.",
             "",
-            f"*Here:* {claim.why}",
+            f"**Result.** {claim.why}",
             "",
             f"![{claim.name}]({picture})",
             "",
@@ -125,11 +133,13 @@ def _readings(study: Study) -> str:
         rows.append(f"| {name} | " + " | ".join(cells) + " |")
     return "\n".join(
         [
-            "## What the paper leaves open",
+            "## Details that the paper leaves open",
             "",
-            "Amplitude off the exact one in per cent, mean over the last periods of a run (least to greatest). Of the",
-            "choices that the text does not settle one matters: whether a sticking body keeps the velocity at which",
-            "the dichotomy stopped, as Eq. 4 reads. A motion that does not repeat has a range, not a value.",
+            "The table gives the error of the amplitude in per cent. It is the mean over the last",
+            "periods of a run (least",
+            "to greatest). One of the open details matters. It is the velocity of a sticking body, which",
+            "Eq. 4 keeps at its",
+            "value after the dichotomy. If the motion does not repeat, the amplitude is a range.",
             "",
             "| reading | " + " | ".join(columns) + " |",
             "| --- |" + " --- |" * len(columns),
@@ -145,30 +155,30 @@ def _truth(study: Study, image: Callable[[str], str]) -> str:
     disagree = facts["points on which the closed form and the exact run disagree whether there are stops"]
     return "\n".join(
         [
-            "## What is true, whatever the step",
+            "## Results that hold for any step",
             "",
-            f"The exact steady motion on {points[0]} x {points[1]} points (residual of periodicity: median "
-            f"{facts['median residual of periodicity']:.0e}, at most {facts['largest residual of periodicity']:.0e}). "
-            "Den Hartog's boundary, a closed form, separates the",
-            f"points with stops from those without: {disagree} of them lie on the wrong side, and where it "
-            f"says that there",
-            "are no stops its amplitude agrees with the run to",
+            f"The exact steady motion was computed on {points[0]} x {points[1]} points. The residual of periodicity is "
+            f"{facts['median residual of periodicity']:.0e} (median), and at most "
+            f"{facts['largest residual of periodicity']:.0e}. Den Hartog's boundary is a closed form that separates",
+            f"the points with stops from those without. {disagree} points are on the wrong side. If there",
+            "are no stops,",
+            "the closed form of the amplitude agrees with the run to",
             f"{facts['largest deviation of the closed form where it holds']:.0e}. There are up to",
-            f"{facts['most stops per period']} stops a period at low frequency.",
+            f"{facts['most stops per period']} stops per period at low frequency.",
             "",
             f"![stick fraction, stops per period, amplitude]({image('stick')})",
             "",
-            "Within 1 % of the exact amplitude, of the moving points: "
-            + "; ".join(f"{name} {_percent(share)}" for name, share in within.items())
-            + ". The last one needs no simulation at all, and is safe while less than "
+            "The simpler models are within 1 % of the exact amplitude on these shares of the moving points: "
+            + ", ".join(f"{name} {_percent(share)}" for name, share in within.items())
+            + ". The last model needs no simulation. Its error is below 1 % if less than "
             + _percent(facts["stick fraction below which the closed form without stops is within 1 %"])
-            + " of the period is spent in stick (5 % off: "
+            + " of the period is stick, and below 5 % if less than "
             + _percent(facts["stick fraction below which the closed form without stops is within 5 %"])
-            + ").",
+            + " is stick.",
             "",
             f"![deviation of simpler models]({image('simpler-models')})",
             "",
-            "*Grey: nothing moves, or the model has no answer.*",
+            "*Grey points do not move, or the model has no answer.*",
         ]
     )
 
@@ -183,13 +193,12 @@ def _required_settings(study: Study, picture: str) -> str:
     ]
     return "\n".join(
         [
-            "## The setting that is needed for 1 %",
+            "## Settings for an error of 1 %",
             "",
-            f"Started on the exact orbit, every one of the last forty periods within 1 % of its amplitude; "
-            f"h0 up to {STEPS[-1]},",
-            f"eps_v down to {EPS[-1]:.1e} m/s.",
+            "The runs start on the exact orbit. A setting is enough if each of the last forty periods is within 1 % of",
+            f"the exact amplitude. h0 is up to {STEPS[-1]}, and eps_v down to {EPS[-1]:.1e} m/s.",
             "",
-            "| method | published setting is enough, share of the map | the finest is not |",
+            "| method | share of the map with enough at the published setting | share without enough at the finest |",
             "| --- | --- | --- |",
             *rows,
             "",
@@ -209,16 +218,19 @@ def _timed_map(study: Study, picture: str) -> str:
     ]
     return "\n".join(
         [
-            "## A whole map, timed",
+            "## Run time of a whole map",
             "",
-            f"Steady amplitude and energy on {study.timed_map.side} x {study.timed_map.side} points, "
-            f"{facts['settling']}, the same",
-            "threads in the same run; all that a point costs is in its time. `exact` runs the whole map, as one",
-            "`hs.sweep(..., after=100)`; the others run a random sample of it, point by point, which is a millisecond",
-            "of each point's time. Errors are on the sample, against the motion settled to rounding. Shooting is",
-            "`hs.steady_state`: it finds the orbit instead of waiting for it, and settles the question of its kind.",
+            f"The map has the steady amplitude and energy on {study.timed_map.side} x "
+            f"{study.timed_map.side} points, from "
+            f"{facts['settling']}. All methods use the same",
+            "threads in the same run, and the time includes all costs of a point. `exact` runs the whole map as one",
+            "`hs.sweep(..., after=100)`. The others run a random sample of it, point by point, which",
+            "adds a millisecond",
+            "per point. Errors are those of the sample, compared with the motion that has settled to",
+            "rounding. Shooting",
+            "is `hs.steady_state`, which finds the orbit without a long run and also determines its kind.",
             "",
-            "| method | ms a point | points | median error of A | largest of A | largest of E | time, of `exact` = 1 |",
+            "| method | ms per point | points | median error of A | largest of A | of E | time, `exact` = 1 |",
             "| --- | --- | --- | --- | --- | --- | --- |",
             *rows,
             "",
@@ -228,14 +240,16 @@ def _timed_map(study: Study, picture: str) -> str:
 
 
 def _how(study: Study) -> str:
-    seconds = ", ".join(f"{name} {value:g} s" for name, value in study.seconds.items())
     return "\n".join(
         [
-            "## How it was done",
+            "## Size of the study",
             "",
-            f"Size: {study.size.name}; runs of {study.size.periods} periods from rest, A and E over the "
-            f"last {study.size.last} of",
-            "them: without stick the motion does not repeat, so that one period says little. " + _PAIR,
-            f"On {study.workers} threads: {seconds}.",
+            f"The size is {study.size.name}. Runs have {study.size.periods} periods from rest, and A and E are",
+            f"those of the last {study.size.last} of them. Without stick the motion does not repeat, so that one",
+            f"period is not enough. {_PAIR} The study ran on {study.workers} threads.",
+            "",
+            "| part | seconds |",
+            "| --- | --- |",
+            *(f"| {name} | {value:g} |" for name, value in study.seconds.items()),
         ]
-    )  # fmt: skip
+    )

@@ -147,18 +147,16 @@ def claim(found: Reduction) -> Claim:
     verdict = Verdict.REPRODUCED if both and to_rounding else Verdict.SHAPE if to_rounding else Verdict.NOT
     literal, stribeck = ours[LITERAL.name], float(found.spread(STRIBECK).max())
     why = (
-        f"With `exact` A, E and the stick fraction depend on (r, F0/N) alone, to "
-        f"{max(found.rounding.values()):.0e} "
-        f"over {_SAMPLES} points and three loads; without stick likewise, but for the chatter; it fails "
-        f"where a velocity is "
-        f"given in m/s: with eps_v = 8e-4 and v kept A/A0 varies by {100 * literal['spread of A/A0']:.2g} "
-        f"% over "
-        f"F0 = {FORCES[0]:g} to {FORCES[-1]:g} N, and with a Stribeck velocity by {100 * stribeck:.2g} %."
+        f"With `exact` A, E and the stick fraction depend only on (r, F0/N), to {max(found.rounding.values()):.0e} "
+        f"over {_SAMPLES} points and three loads. Without stick the same is true, except for chatter. The reduction "
+        f"fails if a velocity is given in m/s. With eps_v = 8e-4 and v kept, A/A0 varies by "
+        f"{100 * literal['spread of A/A0']:.2g} % over F0 = {FORCES[0]:g} to {FORCES[-1]:g} N. With a Stribeck "
+        f"velocity it varies by {100 * stribeck:.2g} %."
     )
     return Claim(
         "figures 8, 9",
         "8, 9",
-        "A/A0 and E/E0 are constant at fixed F0/N as F0 varies, with and without stick: "
+        "A/A0 and E/E0 are constant at fixed F0/N as F0 varies, with and without stick, so that "
         "(r, N, F0) reduces to (r, F0/N)",
         {"spread": "constant"},
         ours,

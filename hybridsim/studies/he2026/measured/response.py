@@ -17,6 +17,7 @@ from hybridsim.studies.he2026.measured.settings import (
     Point,
     Size,
     Variant,
+    described,
 )
 from hybridsim.studies.he2026.measured.steady import CONTACT, declared, settling_periods, solve_by_steps
 from hybridsim.studies.he2026.measured.step_study import LOADS_AND_RATIOS, STEPS, StepStudy
@@ -116,15 +117,14 @@ def claim_figure_3(runs: dict[str, Response]) -> Claim:
     verdict = Verdict.REPRODUCED if exact["holds"] and keeps else Verdict.NOT
     third, fifth = exact["third"], exact["fifth"]
     why = (
-        f"The exact motion repeats with the forcing's period, its even harmonics are below "
-        f"{exact['even']:.0e} and its "
-        f"third and fifth are {100 * third:.1f} % and {100 * fifth:.1f} % of the first; "
+        f"The exact motion has the period of the forcing. Its even harmonics are below {exact['even']:.0e}. Its "
+        f"third and fifth harmonics are {100 * third:.1f} % and {100 * fifth:.1f} % of the first. "
         f"{len(keeps)} of the {len(ours)} readings of the method show the same to 0.1 %."
     )
     return Claim(
         "figure 3",
         "3",
-        "periodic with the forcing's period; only odd harmonics of w; high harmonics are significant",
+        "the motion has the period of the forcing and only odd harmonics of w, and high harmonics are significant",
         {"period": "T", "harmonics": "odd", "high harmonics": "significant"},
         ours,
         min(ours, key=lambda name: ours[name]["even"] + ours[name]["between"]),
@@ -160,17 +160,16 @@ def claim_figure_12(runs: dict[str, Response], study: StepStudy) -> Claim:
     chatter = max(runs[v.name].jumps for v in SIGNS)
     numbers = " and ".join(f"{100 * row[first]:.2g} % to {100 * row[-1]:.2g} %" for row in falls.values())
     why = (
-        f"The force does jump between its limits without stick, up to {chatter:.0f} times a period where "
-        f"the exact "
-        f"motion sticks for {100 * runs[EXACT].stick:.0f} % of it; the closest reading ({closest}) has A_D = "
-        f"{100 * ours[closest]['A_D']:.1f} %, but against the exact motion it falls from {numbers} (sign "
-        f"by step, by "
-        f"stage) as h0 goes from {STEPS_PER_PERIOD} to {STEPS[-1]}."
+        f"Without stick the force jumps between its limits, up to {chatter:.0f} times per period. The exact motion "
+        f"sticks for {100 * runs[EXACT].stick:.0f} % of the period. The closest reading ({described(closest)}) "
+        f"has A_D = {100 * ours[closest]['A_D']:.1f} %. The deviation from the exact motion decreases from "
+        f"{numbers} (sign by step, by stage) as h0 increases from {STEPS_PER_PERIOD} to {STEPS[-1]}."
     )
     return Claim(
         "figure 12",
         "12",
-        "F0/N = 0.54, r = 0.55: A_D = 15 %; without stick the friction force jumps between its limits around v = 0",
+        "A_D is 15 % at F0/N = 0.54, r = 0.55, and without stick the friction force "
+        "jumps between its limits around v = 0",
         {"A_D": 0.15},
         ours,
         closest,
@@ -191,14 +190,13 @@ def claim_figure_13(runs: dict[str, Response], figure_12: dict[str, Response]) -
     verdict = Verdict.REPRODUCED if near and less else Verdict.SHAPE if less else Verdict.NOT
     why = (
         f"The deviation is smaller than in Figure 12, as claimed, but no reading gives more than "
-        f"{100 * greatest:.2g} %: the exact motion sticks for {100 * runs[EXACT].stick:.2g} % of the "
-        f"period here, so that "
-        f"there is nothing to leave out."
+        f"{100 * greatest:.2g} %. The exact motion sticks for {100 * runs[EXACT].stick:.2g} % of the period here, "
+        f"so that a method without stick has no error."
     )
     return Claim(
         "figure 13",
         "13",
-        "F0/N = 0.80, r = 1.0: A_D = 2 %; less stick, less deviation",
+        "A_D is 2 % at F0/N = 0.80, r = 1.0, and less stick causes less deviation",
         {"A_D": 0.02},
         ours,
         closest,

@@ -87,6 +87,12 @@ SIGNS = tuple(
 )
 
 
+def described(pair: str) -> str:
+    """Return the name of a pair of methods, one without and one with stick, as words."""
+    without, _, with_ = pair.partition("; ")
+    return f"{without} without stick, and {with_} with stick"
+
+
 @dataclass(frozen=True)
 class Size:
     """The amount of computation: numbers of points, periods and repetitions.

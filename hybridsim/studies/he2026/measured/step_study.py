@@ -61,14 +61,13 @@ class StepStudy:
         )
 
     def sentence(self, quantity: str) -> str:
-        """Return the result of the step study as text for the middle of a sentence."""
+        """Return the result of the step study as a sentence."""
         first = STEPS.index(STEPS_PER_PERIOD)
         values = [self.along(v.name, quantity) for v in SIGNS]
         parts = " and ".join(f"from {100 * a[first]:.2g} % to {100 * a[-1]:.2g} %" for a in values)
         return (
-            f"along it the deviation from the exact motion (sign by step and by stage) falls {parts} as h0 "
-            f"goes from "
-            f"{STEPS_PER_PERIOD} to {STEPS[-1]}"
+            f"Along the ridge the deviation from the exact motion (sign by step and by stage) decreases {parts} as "
+            f"h0 increases from {STEPS_PER_PERIOD} to {STEPS[-1]}."
         )
 
     def to_plain(self, quantity: str) -> dict[str, Any]:

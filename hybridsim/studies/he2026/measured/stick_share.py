@@ -37,18 +37,16 @@ def claim(maps: Maps, study: StepStudy, truth: Truth) -> Claim:
     stage = study.along(SIGNS[-1].name, "A")
     one, five = truth.harmless(0.01), truth.harmless(0.05)
     why = (
-        f"A_D does grow with the stick share (rank correlation {ours[closest][key]:.2f}), but the step "
-        f"decides as much: at "
-        f"the same shares it falls from {100 * stage[first]:.2g} % to {100 * stage[-1]:.2g} % with the "
-        f"step; what does depend "
-        f"on the share alone is the error of the closed form without stops: below 1 % where less than "
-        f"{100 * one:.2g} % of "
-        f"the period, and below 5 % where less than {100 * five:.2g} % of it, is spent in stick."
+        f"A_D grows with the stick fraction (rank correlation {ours[closest][key]:.2f}), but the step has the same "
+        f"influence. At the same stick fractions A_D decreases from {100 * stage[first]:.2g} % to "
+        f"{100 * stage[-1]:.2g} % with the step. The error of the closed form without stops depends only on the "
+        f"stick fraction. It is below 1 % for stick fractions below {100 * one:.2g} %, and below 5 % for those "
+        f"below {100 * five:.2g} %."
     )
     return Claim(
         "text",
         "",
-        "the share of the period spent in stick decides the deviation; where it is small, stick-slip need not be "
+        "the stick fraction of the period determines the deviation, and if it is small, stick-slip need not be "
         "considered",
         {"deviation": "grows with the share of the period in stick"},
         ours,

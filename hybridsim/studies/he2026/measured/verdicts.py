@@ -14,7 +14,7 @@ class Verdict(Enum):
     REPRODUCED = "reproduced"
     SHAPE = "reproduced in shape only"
     NOT = "not reproduced"
-    ARTEFACT = "an artefact of discretisation"
+    ARTEFACT = "an artefact of discretization"
 
     def __str__(self) -> str:
         return self.value
@@ -33,8 +33,8 @@ class Claim:
     ours : our numbers for every variant that the paper leaves open.
     closest : the variant that is nearest to the paper.
     exact : the exact counterpart.
-    why : the reason for the verdict in one sentence.
-    step_study : for an artefact of discretisation, the effect of the step on it.
+    why : the reason for the verdict.
+    step_study : for an artefact of discretization, the effect of the step on it.
     """
 
     name: str
