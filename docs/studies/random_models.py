@@ -142,8 +142,7 @@ def proportions(count: int, seed: int) -> dict[str, list[float]]:
 
 HEAD = """# Random models against references
 
-Are runs as accurate as the tolerance requests? Of {runs} runs of random models, {faults} are not within the
-tolerance as defined below.
+Are runs as accurate as the tolerance requests? Of {runs} runs of random models, {faults} exceed the allowed error.
 
 `python docs/studies/random_models.py` runs 200 random structures with {draws} draws of parameters and initial values
 each. It compares every run with a reference at four times. They are the end and three times between steps, which

@@ -11,6 +11,7 @@ from rivals.race import Line, Times
 
 Found = Mapping[str, Sequence[Line]]
 _BOUND = 1e-11
+EQUAL_ERROR = "SciPy restarted over `dop853`, equal error"
 _LINEAR, _SMOOTH = ("P1", "P2", "two-masses"), ("P1", "P2", "belt", "stribeck")  # scenes that have an aim
 
 
@@ -86,7 +87,7 @@ def ratios(found: Found) -> list[Ratio]:
             middle, _ = _at_error(scans, dop853.errors.states, lambda times: times.middle)
             result.append(
                 Ratio(
-                    "SciPy restarted over `dop853`, equal error",
+                    EQUAL_ERROR,
                     scene,
                     dop853.events.least,
                     seconds,
