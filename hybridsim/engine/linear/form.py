@@ -14,23 +14,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from hybridsim.engine.linear.recipe import Traced, computed
-from hybridsim.engine.series.tape import (
-    ABS,
-    ADD,
-    COPY,
-    DIV,
-    EXP,
-    MUL,
-    NEG,
-    NOT,
-    SELECT,
-    SIGN,
-    SINCOS,
-    SINHCOSH,
-    SQRT,
-    SUB,
-    TANGENT,
-)
+from hybridsim.engine.series import operations as ops
 from hybridsim.engine.system.failures import StepFailure
 
 TIME, VALUE, ANGLE, GROWTH = range(4)  # kinds of atoms
@@ -41,8 +25,8 @@ Form = dict[Key, float]
 Read = Form | float  # a register that is a plain number is stored as a float
 
 _ONE: Monomial = ()
-_PAIRED = (SINCOS, SINHCOSH, TANGENT)
-_SINGLE = (NEG, ABS, SIGN, NOT, EXP, SQRT, SINCOS, SINHCOSH, TANGENT)
+_PAIRED = (ops.SINCOS, ops.SINHCOSH, ops.TANGENT)
+_SINGLE = (ops.NEG, ops.ABS, ops.SIGN, ops.NOT, ops.EXP, ops.SQRT, ops.SINCOS, ops.SINHCOSH, ops.TANGENT)
 _HIGHEST = 8  # largest degree of a monomial; the closure under derivatives would be large beyond it
 
 
@@ -143,7 +127,7 @@ class LinearReader:
     def read(self, rows: Iterable[tuple[int, ...]]) -> None:
         """Process rows of the tape; for a nonlinear result, store the reason."""
         for op, a, b, c, out in rows:
-            if op == COPY:
+            if op == ops.COPY:
                 self.forms[out] = self.forms[a]
                 continue
             try:
@@ -169,7 +153,7 @@ class LinearReader:
 
     def _apply(self, op: int, a: int, b: int, c: int) -> tuple[Read, ...]:
         first = self._read(a)
-        if op == SELECT:
+        if op == ops.SELECT:
             if isinstance(first, dict) or (self.is_open and math.isnan(first)):
                 raise NotLinear("a condition on a state or on time")
             return (self._read(b) if first != 0.0 else self._read(c),)
@@ -179,14 +163,14 @@ class LinearReader:
             return self._of_form(op, first)
         second = self._read(b)
         if isinstance(first, float) and isinstance(second, float):
-            if op in _ARITHMETIC and (op != DIV or second != 0.0):
+            if op in _ARITHMETIC and (op != ops.DIV or second != 0.0):
                 return (_ARITHMETIC[op](first, second),)
             return self._evaluated(op, b, c, first, second)
-        if op in (ADD, SUB):
-            return (_plain(_sum(_form(first), _form(second), 1.0 if op == ADD else -1.0)),)
-        if op == MUL:
+        if op in (ops.ADD, ops.SUB):
+            return (_plain(_sum(_form(first), _form(second), 1.0 if op == ops.ADD else -1.0)),)
+        if op == ops.MUL:
             return (_plain(_product(_form(first), _form(second))),)
-        if op == DIV and isinstance(first, dict) and isinstance(second, float):
+        if op == ops.DIV and isinstance(first, dict) and isinstance(second, float):
             if second == 0.0:
                 raise DividesByZero("a division by zero")
             return (_plain({key: weight / second for key, weight in first.items()}),)
@@ -194,18 +178,18 @@ class LinearReader:
 
     def _of_form(self, op: int, form: Form) -> tuple[Read, ...]:
         """Apply an operation to one operand that is a linear form and not a number."""
-        if op == NEG:
+        if op == ops.NEG:
             return ({key: -weight for key, weight in form.items()},)
-        if op == SINCOS:
+        if op == ops.SINCOS:
             number = self.atoms.number(_linear_atom(ANGLE, form, self.atoms))
             return {((number, 0),): 1.0}, {((number, 1),): 1.0}
-        if op == EXP:
+        if op == ops.EXP:
             return ({((self.atoms.number(_linear_atom(GROWTH, form, self.atoms)), 0),): 1.0},)
         raise NotLinear(_IN_THE_WAY.get(op, _OTHER))
 
     def _evaluated(self, op: int, b: int, c: int, *values: float) -> tuple[Read, ...]:
         """Apply an operation to numbers."""
-        if op == NEG:
+        if op == ops.NEG:
             return (-values[0],)
         if self.is_open and any(map(math.isnan, values)):
             return (math.nan, math.nan) if op in _PAIRED else (math.nan,)
@@ -217,13 +201,13 @@ class LinearReader:
         return (first, second) if op in _PAIRED else (first,)
 
 
-_ARITHMETIC = {ADD: operator.add, SUB: operator.sub, MUL: operator.mul, DIV: operator.truediv}
+_ARITHMETIC = {ops.ADD: operator.add, ops.SUB: operator.sub, ops.MUL: operator.mul, ops.DIV: operator.truediv}
 _OTHER = "a corner, a jump or another nonlinear function of a state or of time"
 _IN_THE_WAY = {
-    DIV: "a division by a state or by a function of time",
-    SQRT: "a square root of a state or of a function of time",
-    SINHCOSH: "a hyperbolic function of a state or of time",
-    TANGENT: "a tangent or a tanh of a state or of time",
+    ops.DIV: "a division by a state or by a function of time",
+    ops.SQRT: "a square root of a state or of a function of time",
+    ops.SINHCOSH: "a hyperbolic function of a state or of time",
+    ops.TANGENT: "a tangent or a tanh of a state or of time",
 }
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from hybridsim.engine.native.kernels import kernel
 from hybridsim.engine.series.interpreter import advance
-from hybridsim.engine.series.tape import ADD, DIV, MUL, NEG, SUB
+from hybridsim.engine.series.operations import ADD, DIV, MUL, NEG, SUB
 
 _PLAIN = {ADD: operator.add, SUB: operator.sub, MUL: operator.mul}  # equal results in Python, and faster
 

@@ -12,43 +12,7 @@ from typing import Any
 from hybridsim.engine.native.constants import EXACTLY
 from hybridsim.engine.native.constants import UNIT as UNIT
 from hybridsim.engine.native.kernels import call_noinline, inlined, kernel
-from hybridsim.engine.series.optimise import (
-    ADD_CONSTANT,
-    CONSTANT_SUB,
-    DIVIDE_BY,
-    SCALE,
-    SINCOS_LINEAR,
-)
-from hybridsim.engine.series.tape import (
-    ABS,
-    ACOS,
-    ADD,
-    AND,
-    ANGLE,
-    ASIN,
-    ATAN,
-    COPY,
-    DIV,
-    EQUAL,
-    EXP,
-    INTEGRAL,
-    LESS,
-    LESS_EQUAL,
-    LOG,
-    MAX,
-    MIN,
-    MUL,
-    NEG,
-    NOT,
-    OR,
-    SELECT,
-    SIGN,
-    SINCOS,
-    SINHCOSH,
-    SQRT,
-    SUB,
-    TANGENT,
-)
+from hybridsim.engine.series import operations as ops
 
 ORDER = EXACTLY
 
@@ -151,34 +115,34 @@ def _multiply(V: Any, E: Any, out: int, k: int, factor: float, error: float, b: 
 def _leading(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int) -> None:
     """Compute coefficient 0 of operations whose other coefficients follow from a differential equation."""
     u, du = V[a, 0], E[a, 0]
-    if op == EXP:
+    if op == ops.EXP:
         y = math.inf if u >= 709.0 else math.exp(u)  # math.exp raises an exception if it overflows
         _put(V, E, out, 0, y, abs(y) * (du + 2.0 * UNIT))
-    elif op == SINCOS:
+    elif op == ops.SINCOS:
         s, co = math.sin(u), math.cos(u)
         _put(V, E, out, 0, s, abs(co) * du + 0.5 * du * du + 2.0 * UNIT * abs(s))
         _put(V, E, out + 1, 0, co, abs(s) * du + 0.5 * du * du + 2.0 * UNIT * abs(co))
-    elif op == SINHCOSH:
+    elif op == ops.SINHCOSH:
         s, co = math.sinh(u), math.cosh(u)
         _put(V, E, out, 0, s, abs(co) * du + 2.0 * UNIT * abs(s))
         _put(V, E, out + 1, 0, co, abs(s) * du + 2.0 * UNIT * abs(co))
-    elif op == TANGENT:
+    elif op == ops.TANGENT:
         sign = 1.0 if b == 0 else -1.0  # tan: w = 1 + y^2; tanh: w = 1 - y^2
         y = math.tan(u) if b == 0 else math.tanh(u)
         w = 1.0 + sign * y * y
         _put(V, E, out, 0, y, abs(w) * du + 2.0 * UNIT * abs(y))
         _put(V, E, out + 1, 0, w, 2.0 * abs(y) * E[out, 0] + 3.0 * UNIT * (1.0 + y * y))
-    elif op == INTEGRAL:
+    elif op == ops.INTEGRAL:
         v, dv = V[b, 0], E[b, 0]
         y = 0.0
         slope = dv / abs(u) if u != 0.0 else math.inf
-        if c == LOG:
+        if c == ops.LOG:
             y = math.log(v) if v > 0.0 else math.nan
-        elif c == ASIN:
+        elif c == ops.ASIN:
             y = math.asin(v) if abs(v) <= 1.0 else math.nan
-        elif c == ACOS:
+        elif c == ops.ACOS:
             y = math.acos(v) if abs(v) <= 1.0 else math.nan
-        elif c == ATAN:
+        elif c == ops.ATAN:
             y = math.atan(v)
         else:
             y = math.atan2(v, u)
@@ -191,30 +155,30 @@ def _leading(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int) -> None:
 def _higher(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) -> None:
     """Compute coefficient k >= 1 of operations whose coefficients follow from a differential equation."""
     part = 1.0 / k
-    if op == EXP:
+    if op == ops.EXP:
         y, e = _slope(V, E, a, out, k)
         _put(V, E, out, k, y * part, (e + 2.0 * UNIT * abs(y)) * part)
-    elif op == SINCOS:
+    elif op == ops.SINCOS:
         s, e = _slope(V, E, a, out + 1, k)
         co, d = _slope(V, E, a, out, k)
         _put(V, E, out, k, s * part, (e + 2.0 * UNIT * abs(s)) * part)
         _put(V, E, out + 1, k, -(co * part), (d + 2.0 * UNIT * abs(co)) * part)
-    elif op == SINHCOSH:
+    elif op == ops.SINHCOSH:
         s, e = _slope(V, E, a, out + 1, k)
         co, d = _slope(V, E, a, out, k)
         _put(V, E, out, k, s * part, (e + 2.0 * UNIT * abs(s)) * part)
         _put(V, E, out + 1, k, co * part, (d + 2.0 * UNIT * abs(co)) * part)
-    elif op == TANGENT:
+    elif op == ops.TANGENT:
         y, e = _slope(V, E, a, out + 1, k)
         _put(V, E, out, k, y * part, (e + 2.0 * UNIT * abs(y)) * part)
         w, d = _product(V, E, out, out, k)
         _put(V, E, out + 1, k, w if b == 0 else -w, d)
-    elif op == INTEGRAL and c != ANGLE:
+    elif op == ops.INTEGRAL and c != ops.ANGLE:
         # y' a = b'  =>  k y_k a_0 = k b_k - sum_{j<k} j y_j a_{k-j}
         s, e = call_noinline(_inner, (V, E, out, a, k, True))
         n = V[b, k] - s * part
         _divide(V, E, out, k, n, E[b, k] + (e + 2.0 * UNIT * abs(s)) * part + UNIT * abs(n), a)
-    elif op == INTEGRAL:
+    elif op == ops.INTEGRAL:
         # y = angle of (a, b):  y' (a^2 + b^2) = a b' - b a'
         left, e = _slope(V, E, b, a, k)
         right, d = _slope(V, E, a, b, k)
@@ -233,34 +197,34 @@ def _higher(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) -
 @kernel
 def _logic(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) -> None:
     """Compute coefficient k of comparisons, choices and corners, on the side to which the argument moves."""
-    if op == ABS:
+    if op == ops.ABS:
         sign = _first_sign(V, a, k)
         _put(V, E, out, k, sign * V[a, k], E[a, k])
-    elif op in (MIN, MAX):
+    elif op in (ops.MIN, ops.MAX):
         difference = _first_difference(V, a, b, k)
-        take_a = (difference <= 0.0) == (op == MIN)
+        take_a = (difference <= 0.0) == (op == ops.MIN)
         source = a if take_a else b
         _put(V, E, out, k, V[source, k], max(E[a, k], E[b, k]))
-    elif op == SELECT:
+    elif op == ops.SELECT:
         source = b if V[a, 0] != 0.0 else c
         _put(V, E, out, k, V[source, k], E[source, k])
     elif k > 0:
         _put(V, E, out, k, 0.0, 0.0)
     else:
         value = 0.0
-        if op == SIGN:
+        if op == ops.SIGN:
             value = 1.0 if V[a, 0] > 0.0 else (-1.0 if V[a, 0] < 0.0 else 0.0)
-        elif op == LESS:
+        elif op == ops.LESS:
             value = 1.0 if V[a, 0] < V[b, 0] else 0.0
-        elif op == LESS_EQUAL:
+        elif op == ops.LESS_EQUAL:
             value = 1.0 if V[a, 0] <= V[b, 0] else 0.0
-        elif op == EQUAL:
+        elif op == ops.EQUAL:
             value = 1.0 if V[a, 0] == V[b, 0] else 0.0
-        elif op == AND:
+        elif op == ops.AND:
             value = 1.0 if V[a, 0] != 0.0 and V[b, 0] != 0.0 else 0.0
-        elif op == OR:
+        elif op == ops.OR:
             value = 1.0 if V[a, 0] != 0.0 or V[b, 0] != 0.0 else 0.0
-        elif op == NOT:
+        elif op == ops.NOT:
             value = 1.0 if V[a, 0] == 0.0 else 0.0
         _put(V, E, out, k, value, 0.0)
 
@@ -269,16 +233,16 @@ def _logic(op: int, V: Any, E: Any, a: int, b: int, c: int, out: int, k: int) ->
 def _with_constant(op: int, V: Any, E: Any, a: int, b: int, out: int, k: int) -> None:
     """Compute coefficient k of an operation on a Taylor series and a constant."""
     u, du, v, dv = V[a, k], E[a, k], V[b, 0], E[b, 0]
-    if op == SCALE:
+    if op == ops.SCALE:
         y = u * v
         _put(V, E, out, k, y, abs(u) * dv + du * (abs(v) + dv) + UNIT * abs(y))
-    elif op == DIVIDE_BY and k == 0:
+    elif op == ops.DIVIDE_BY and k == 0:
         _divide(V, E, out, 0, u, du, b)
-    elif op == DIVIDE_BY:
+    elif op == ops.DIVIDE_BY:
         _multiply(V, E, out, k, u, du, b)
-    elif op == SINCOS_LINEAR and k == 0:
-        _leading(SINCOS, V, E, a, b, 0, out)
-    elif op == SINCOS_LINEAR:
+    elif op == ops.SINCOS_LINEAR and k == 0:
+        _leading(ops.SINCOS, V, E, a, b, 0, out)
+    elif op == ops.SINCOS_LINEAR:
         rate, e = V[a, 1], E[a, 1]
         s, ds, co, dco = V[out, k - 1], E[out, k - 1], V[out + 1, k - 1], E[out + 1, k - 1]
         part = 1.0 / k
@@ -288,9 +252,9 @@ def _with_constant(op: int, V: Any, E: Any, a: int, b: int, out: int, k: int) ->
         y = -(rate * s)
         _put(V, E, out + 1, k, y, abs(rate) * ds + e * (abs(s) + ds) + UNIT * abs(y))
     elif k > 0:
-        _put(V, E, out, k, -u if op == CONSTANT_SUB else u, du)
+        _put(V, E, out, k, -u if op == ops.CONSTANT_SUB else u, du)
     else:
-        y = v - u if op == CONSTANT_SUB else (u + v if op == ADD_CONSTANT else u - v)
+        y = v - u if op == ops.CONSTANT_SUB else (u + v if op == ops.ADD_CONSTANT else u - v)
         _put(V, E, out, 0, y, du + dv + UNIT * abs(y))
 
 
@@ -298,29 +262,29 @@ def _with_constant(op: int, V: Any, E: Any, a: int, b: int, out: int, k: int) ->
 def _advance(row: Any, V: Any, E: Any, k: int) -> None:
     """Compute coefficient k of one operation, with its error bound."""
     op, a, b, c, out = row[0], row[1], row[2], row[3], row[4]
-    if op == COPY:
+    if op == ops.COPY:
         _put(V, E, out, k, V[a, k], E[a, k])
-    elif op == ADD:
+    elif op == ops.ADD:
         y = V[a, k] + V[b, k]
         _put(V, E, out, k, y, E[a, k] + E[b, k] + UNIT * abs(y))
-    elif op == SUB:
+    elif op == ops.SUB:
         y = V[a, k] - V[b, k]
         _put(V, E, out, k, y, E[a, k] + E[b, k] + UNIT * abs(y))
-    elif op == NEG:
+    elif op == ops.NEG:
         _put(V, E, out, k, -V[a, k], E[a, k])
-    elif op == MUL:
+    elif op == ops.MUL:
         y, e = _product(V, E, a, b, k)
         _put(V, E, out, k, y, e)
-    elif op == DIV and k == 0:
+    elif op == ops.DIV and k == 0:
         _divide(V, E, out, 0, V[a, 0], E[a, 0], b)
-    elif op == DIV:
+    elif op == ops.DIV:
         y, e = call_noinline(_inner, (V, E, out, b, k, False))
         first = V[out, 0] * V[b, k]
         e += abs(V[out, 0]) * E[b, k] + E[out, 0] * (abs(V[b, k]) + E[b, k]) + UNIT * abs(first)
         y += first
         n = V[a, k] - y
         _multiply(V, E, out, k, n, E[a, k] + e + UNIT * (abs(y) + abs(n)), b)
-    elif op == SQRT:
+    elif op == ops.SQRT:
         if k == 0:
             y = math.sqrt(V[a, 0]) if V[a, 0] >= 0.0 else math.nan
             e = E[a, 0] / (2.0 * y) if y > 0.0 else math.sqrt(E[a, 0])
@@ -332,9 +296,9 @@ def _advance(row: Any, V: Any, E: Any, k: int) -> None:
                 _put(V, E, out, k, 0.0, 0.0)
             else:
                 _divide(V, E, out, k, n, 0.5 * (E[a, k] + e) + UNIT * abs(n), out)
-    elif op >= ADD_CONSTANT:
+    elif op >= ops.ADD_CONSTANT:
         _with_constant(op, V, E, a, b, out, k)
-    elif op >= ABS:
+    elif op >= ops.ABS:
         _logic(op, V, E, a, b, c, out, k)
     elif k == 0:
         _leading(op, V, E, a, b, c, out)

@@ -20,7 +20,7 @@ from hybridsim.engine.native.llvm_text import DECLARATIONS, function, number
 from hybridsim.engine.series import bounded
 from hybridsim.engine.series.bounded import ORDER, UNIT
 from hybridsim.engine.series.emit_series import KNOWN, ModeTape
-from hybridsim.engine.series.tape import LESS, LESS_EQUAL
+from hybridsim.engine.series.operations import LESS, LESS_EQUAL
 from hybridsim.engine.series.trace import Coefficients, Size, Trace, Value, written
 
 _ASKED = frozenset((LESS, LESS_EQUAL))  # comparisons, here only between constants

@@ -27,37 +27,18 @@ import numpy as np
 from hybridsim.engine.native.llvm_text import DECLARATIONS, Lines, function
 from hybridsim.engine.native.simd_series import Powers
 from hybridsim.engine.series import interpreter
-from hybridsim.engine.series.optimise import (
-    ADD_CONSTANT,
-    CONSTANT_SUB,
-    DIVIDE_BY,
-    SCALE,
-    SINCOS_LINEAR,
-    SUB_CONSTANT,
-    live_rows,
-)
-from hybridsim.engine.series.tape import (
-    ADD,
-    COPY,
-    DIV,
-    EXP,
-    LESS,
-    MUL,
-    NEG,
-    SELECT,
-    SINCOS,
-    SQRT,
-    SUB,
-    TANGENT,
-)
+from hybridsim.engine.series import operations as ops
+from hybridsim.engine.series.optimise import live_rows
 from hybridsim.engine.series.trace import Coefficients, Trace, Value, written
 
-WITH_COMPANION = (SINCOS, SINCOS_LINEAR, TANGENT)  # operations with a companion series in the next register
-_COSTLY = (*WITH_COMPANION, EXP)  # order 0 of these takes as long as all other orders
+# operations with a companion series in the next register
+WITH_COMPANION = (ops.SINCOS, ops.SINCOS_LINEAR, ops.TANGENT)
+_COSTLY = (*WITH_COMPANION, ops.EXP)  # order 0 of these takes as long as all other orders
 KNOWN = frozenset(
     (
-        COPY, ADD, SUB, NEG, MUL, DIV, SQRT, EXP, SINCOS, TANGENT, SELECT, LESS,
-        ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB, SCALE, DIVIDE_BY, SINCOS_LINEAR,
+        ops.COPY, ops.ADD, ops.SUB, ops.NEG, ops.MUL, ops.DIV, ops.SQRT, ops.EXP, ops.SINCOS, ops.TANGENT,
+        ops.SELECT, ops.LESS, ops.ADD_CONSTANT, ops.SUB_CONSTANT, ops.CONSTANT_SUB, ops.SCALE, ops.DIVIDE_BY,
+        ops.SINCOS_LINEAR,
     )
 )  # fmt: skip
 
@@ -112,7 +93,7 @@ class _Expansion(Trace):
             if k == 0 and op in _COSTLY and self.is_known:
                 for register in (out, out + 1)[: _results(op)]:
                     V[register, 0] = self.read("%c", register * self.stride)
-            elif op == SELECT and a in self.tape.holding:
+            elif op == ops.SELECT and a in self.tape.holding:
                 V[out, k] = V[b, k]
             else:
                 self.on_all_paths(self.run.advance, rows[r : r + 1], (V,), k)

@@ -13,18 +13,8 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from hybridsim.engine.series.optimise import (
-    ADD_CONSTANT,
-    CONSTANT_SUB,
-    DIVIDE_BY,
-    PAIRED,
-    SCALE,
-    SINCOS_LINEAR,
-    SUB_CONSTANT,
-    arguments_of,
-    live_rows,
-)
-from hybridsim.engine.series.tape import ADD, DIV, NEG, SQRT, SUB
+from hybridsim.engine.series import operations as ops
+from hybridsim.engine.series.optimise import PAIRED, arguments_of, live_rows
 
 # Operations at orders k > 0 alone, each with flags: out_k = a_k f, and a_{k+1} of a state out, a_k f / (k + 1), where
 # f is the product of the constants b and c, or of their reciprocals, and a sign.
@@ -35,9 +25,12 @@ RECIPROCAL = 128
 HAS_B, OVER_B, HAS_C, OVER_C, NEGATIVE = 1, 2, 4, 8, 16
 
 Row = tuple[int, ...]
-_SAME, _TURNED = (ADD_CONSTANT, SUB_CONSTANT), (NEG, CONSTANT_SUB)  # copies and negations at high orders
+_SAME, _TURNED = (
+    (ops.ADD_CONSTANT, ops.SUB_CONSTANT),
+    (ops.NEG, ops.CONSTANT_SUB),
+)  # copies and negations at high orders
 # latency in cycles; operations that are not listed are sums of products
-_WAITS = {ADD: 3, SUB: 3, NEG: 1, SCALE: 3, DIVIDE_BY: 3, DIV: 12, SQRT: 15}
+_WAITS = {ops.ADD: 3, ops.SUB: 3, ops.NEG: 1, ops.SCALE: 3, ops.DIVIDE_BY: 3, ops.DIV: 12, ops.SQRT: 15}
 _PRODUCT = 6
 _MAX_FACTOR_CONSTANTS = 2  # constants of a factor
 _EARLY = -(10**6)  # cycle of a value that does not depend on a state
@@ -58,7 +51,7 @@ class _Scaled:
             operands[i] = register
             flags |= (HAS_B, HAS_C)[i] | ((OVER_B, OVER_C)[i] if divides else 0)
         if kind == FACTOR and not self.constants:
-            return (NEG if self.is_negative else ADD_CONSTANT, self.base, 0, 0, out)
+            return (ops.NEG if self.is_negative else ops.ADD_CONSTANT, self.base, 0, 0, out)
         return (kind + flags, self.base, *operands, out)
 
 
@@ -90,7 +83,11 @@ class _Rewriting:
         self._free_registers: set[int] = set()  # registers of inner sums, available for reuse
         self._sums: dict[int, tuple[list[tuple[int, bool]], list[int]]] = {}
         for row in reversed(rows):
-            if row[0] in (ADD, SUB) and row not in self._unchanged and row[4] not in self._free_registers:
+            if (
+                row[0] in (ops.ADD, ops.SUB)
+                and row not in self._unchanged
+                and row[4] not in self._free_registers
+            ):
                 self._take_apart(row)
         self.rows: list[Row] = []
         for row in rows:
@@ -104,26 +101,26 @@ class _Rewriting:
         """Return the processor cycle at which each register is computed, given the cycles of the states."""
         for row in self._of.values():
             op, out = row[0], row[4]
-            wait = _EARLY if op == SINCOS_LINEAR else 0 if op in _SAME else _WAITS.get(op, _PRODUCT)
+            wait = _EARLY if op == ops.SINCOS_LINEAR else 0 if op in _SAME else _WAITS.get(op, _PRODUCT)
             cycles[out] = max([cycles.get(a, _EARLY) for a in arguments_of(row)]) + wait
-            if op in (*PAIRED, SINCOS_LINEAR):
+            if op in (*PAIRED, ops.SINCOS_LINEAR):
                 cycles[out + 1] = cycles[out]
         return cycles
 
     def _rewrite(self, row: Row) -> None:
         op, a, b, _, out = row
-        if op in (*_SAME, *_TURNED, SCALE, DIVIDE_BY):
+        if op in (*_SAME, *_TURNED, ops.SCALE, ops.DIVIDE_BY):
             form = self.scaled(a)
             if op in _TURNED:
                 form = replace(form, is_negative=not form.is_negative)
             elif op not in _SAME:
                 form = form if len(form.constants) < _MAX_FACTOR_CONSTANTS else _Scaled(a)
-                form = replace(form, constants=(*form.constants, (b, op == DIVIDE_BY)))
+                form = replace(form, constants=(*form.constants, (b, op == ops.DIVIDE_BY)))
             self._forms[out] = form
             self.rows.append(row if row in self._unchanged else form.row(FACTOR, out))
         elif out in self._sums:
             self._sum(out, *self._sums[out])
-        elif op == DIV and row not in self._unchanged and a not in self._of and a not in self._states:
+        elif op == ops.DIV and row not in self._unchanged and a not in self._of and a not in self._states:
             self.rows.append(self._reciprocal(b, out))
         elif out not in self._free_registers:
             self.rows.append(row)
@@ -143,10 +140,10 @@ class _Rewriting:
         (total, is_negative), *others = sorted(terms, key=lambda term: self._cycles.get(term[0], _EARLY))
         for (register, turns), to in zip(others, (*inner, out), strict=True):
             if turns == is_negative:
-                self.rows.append((ADD, total, register, 0, to))
+                self.rows.append((ops.ADD, total, register, 0, to))
             else:
                 first, second = (register, total) if is_negative else (total, register)
-                self.rows.append((SUB, first, second, 0, to))
+                self.rows.append((ops.SUB, first, second, 0, to))
                 is_negative = False
             total = to
 
@@ -157,15 +154,15 @@ class _Rewriting:
         """
         found: list[tuple[int, bool]] = []
         inner: list[int] = []
-        waiting = [(row[2], row[0] == SUB), (row[1], False)]
+        waiting = [(row[2], row[0] == ops.SUB), (row[1], False)]
         while waiting:
             r, turns = waiting.pop()
             while self._is_inner(r, (*_SAME, *_TURNED)):
                 r, turns = self._of[r][1], turns != (self._of[r][0] in _TURNED)
-            if self._is_inner(r, (ADD, SUB)):
+            if self._is_inner(r, (ops.ADD, ops.SUB)):
                 op, a, b, *_ = self._of[r]
                 inner.append(r)
-                waiting += [(b, turns != (op == SUB)), (a, turns)]
+                waiting += [(b, turns != (op == ops.SUB)), (a, turns)]
             else:
                 found.append((r, turns))
         if not all(is_negative for _, is_negative in found):

@@ -27,6 +27,7 @@ from hybridsim.engine.native.kernels import (
     kernel,
     polynomial_kernel,
 )
+from hybridsim.engine.series import operations as ops
 from hybridsim.engine.series.high_orders import (
     FACTOR,
     HAS_B,
@@ -36,43 +37,6 @@ from hybridsim.engine.series.high_orders import (
     OVER_B,
     OVER_C,
     RECIPROCAL,
-)
-from hybridsim.engine.series.optimise import (
-    ADD_CONSTANT,
-    CONSTANT_SUB,
-    DIVIDE_BY,
-    SCALE,
-    SINCOS_LINEAR,
-    SUB_CONSTANT,
-)
-from hybridsim.engine.series.tape import (
-    ABS,
-    ACOS,
-    ADD,
-    AND,
-    ANGLE,
-    ASIN,
-    ATAN,
-    DIV,
-    EQUAL,
-    EXP,
-    INTEGRAL,
-    LESS,
-    LESS_EQUAL,
-    LOG,
-    MAX,
-    MIN,
-    MUL,
-    NEG,
-    NOT,
-    OR,
-    SELECT,
-    SIGN,
-    SINCOS,
-    SINHCOSH,
-    SQRT,
-    SUB,
-    TANGENT,
 )
 
 # Step control: the last two coefficients of each state and each guard stay below the tolerance at the end of a step.
@@ -148,26 +112,26 @@ def _slope(V: Any, a: int, b: int, k: int) -> float:
 def _leading(op: int, V: Any, a: int, b: int, c: int, out: int) -> None:
     """Compute coefficient 0 of operations whose other coefficients follow from a differential equation."""
     u = V[a, 0]
-    if op == EXP:
+    if op == ops.EXP:
         V[out, 0] = math.inf if u >= 709.0 else math.exp(u)  # math.exp raises an exception if it overflows
-    elif op in (SINCOS, SINCOS_LINEAR):
+    elif op in (ops.SINCOS, ops.SINCOS_LINEAR):
         V[out, 0], V[out + 1, 0] = math.sin(u), math.cos(u)
-    elif op == SINHCOSH:
+    elif op == ops.SINHCOSH:
         V[out, 0], V[out + 1, 0] = math.sinh(u), math.cosh(u)
-    elif op == TANGENT:
+    elif op == ops.TANGENT:
         y = math.tan(u) if b == 0 else math.tanh(u)
         V[out, 0], V[out + 1, 0] = y, 1.0 + (y * y if b == 0 else -y * y)
-    elif op == INTEGRAL:
+    elif op == ops.INTEGRAL:
         v, y = V[b, 0], math.nan
-        if c == LOG and v > 0.0:
+        if c == ops.LOG and v > 0.0:
             y = math.log(v)
-        elif c == ASIN and abs(v) <= 1.0:
+        elif c == ops.ASIN and abs(v) <= 1.0:
             y = math.asin(v)
-        elif c == ACOS and abs(v) <= 1.0:
+        elif c == ops.ACOS and abs(v) <= 1.0:
             y = math.acos(v)
-        elif c == ATAN:
+        elif c == ops.ATAN:
             y = math.atan(v)
-        elif c == ANGLE:
+        elif c == ops.ANGLE:
             y = math.atan2(v, u)
         V[out, 0] = y
 
@@ -175,21 +139,21 @@ def _leading(op: int, V: Any, a: int, b: int, c: int, out: int) -> None:
 @kernel
 def _higher(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
     """Compute coefficient k >= 1 of operations whose coefficients follow from a differential equation."""
-    if op == EXP:
+    if op == ops.EXP:
         V[out, k] = _rise(V, a, out, k)
-    elif op == SINCOS:
+    elif op == ops.SINCOS:
         V[out, k] = _rise(V, a, out + 1, k)
         V[out + 1, k] = -_rise(V, a, out, k)
-    elif op == SINHCOSH:
+    elif op == ops.SINHCOSH:
         V[out, k] = _rise(V, a, out + 1, k)
         V[out + 1, k] = _rise(V, a, out, k)
-    elif op == TANGENT:
+    elif op == ops.TANGENT:
         V[out, k] = _rise(V, a, out + 1, k)
         w = _product(V, out, out, k)
         V[out + 1, k] = w if b == 0 else -w
-    elif op == INTEGRAL and c != ANGLE:
+    elif op == ops.INTEGRAL and c != ops.ANGLE:
         V[out, k] = (V[b, k] - call_noinline(_weighted, (V, out, a, k)) * (1.0 / k)) / V[a, 0]
-    elif op == INTEGRAL:
+    elif op == ops.INTEGRAL:
         total = _slope(V, b, a, k) - _slope(V, a, b, k)
         for j in range(1, k):
             total -= j * V[out, j] * (_product(V, a, a, k - j) + _product(V, b, b, k - j))
@@ -199,38 +163,38 @@ def _higher(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
 @kernel
 def _logic(op: int, V: Any, a: int, b: int, c: int, out: int, k: int) -> None:
     """Compute coefficient k of comparisons, choices and corners, on the side to which the argument moves."""
-    if op in (ABS, MIN, MAX):
+    if op in (ops.ABS, ops.MIN, ops.MAX):
         sign = 0.0
         for i in range(k + 1):
-            difference = V[a, i] if op == ABS else V[a, i] - V[b, i]
+            difference = V[a, i] if op == ops.ABS else V[a, i] - V[b, i]
             if difference != 0.0:
                 sign = 1.0 if difference > 0.0 else -1.0
                 break
-        if op == ABS:
+        if op == ops.ABS:
             V[out, k] = sign * V[a, k]
         else:
-            V[out, k] = V[a, k] if (sign <= 0.0) == (op == MIN) else V[b, k]
-    elif op == SELECT:
+            V[out, k] = V[a, k] if (sign <= 0.0) == (op == ops.MIN) else V[b, k]
+    elif op == ops.SELECT:
         V[out, k] = V[b, k] if V[a, 0] != 0.0 else V[c, k]
     elif k > 0:
         V[out, k] = 0.0
     else:
         u, v = V[a, 0], V[b, 0]
         truth = False
-        if op == SIGN:
+        if op == ops.SIGN:
             V[out, 0] = 1.0 if u > 0.0 else (-1.0 if u < 0.0 else 0.0)
             return
-        if op == LESS:
+        if op == ops.LESS:
             truth = u < v
-        elif op == LESS_EQUAL:
+        elif op == ops.LESS_EQUAL:
             truth = u <= v
-        elif op == EQUAL:
+        elif op == ops.EQUAL:
             truth = u == v
-        elif op == AND:
+        elif op == ops.AND:
             truth = u != 0.0 and v != 0.0
-        elif op == OR:
+        elif op == ops.OR:
             truth = u != 0.0 or v != 0.0
-        elif op == NOT:
+        elif op == ops.NOT:
             truth = u == 0.0
         V[out, 0] = 1.0 if truth else 0.0
 
@@ -251,27 +215,27 @@ def advance(rows: Any, V: Any, k: int) -> None:
     """Compute Taylor coefficient k of every operation, in order."""
     for r in range(rows.shape[0]):
         op, a, b, c, out = rows[r, 0], rows[r, 1], rows[r, 2], rows[r, 3], rows[r, 4]
-        if op == SCALE:
+        if op == ops.SCALE:
             V[out, k] = V[a, k] * V[b, 0]
-        elif op == ADD:
+        elif op == ops.ADD:
             V[out, k] = V[a, k] + V[b, k]
-        elif op == SUB:
+        elif op == ops.SUB:
             V[out, k] = V[a, k] - V[b, k]
-        elif op == ADD_CONSTANT:
+        elif op == ops.ADD_CONSTANT:
             V[out, k] = V[a, k] + V[b, 0] if k == 0 else V[a, k]
-        elif op == SUB_CONSTANT:
+        elif op == ops.SUB_CONSTANT:
             V[out, k] = V[a, k] - V[b, 0] if k == 0 else V[a, k]
-        elif op == CONSTANT_SUB:
+        elif op == ops.CONSTANT_SUB:
             V[out, k] = V[b, 0] - V[a, 0] if k == 0 else -V[a, k]
-        elif op == SINCOS_LINEAR and k > 0:
+        elif op == ops.SINCOS_LINEAR and k > 0:
             rate = V[a, 1] * (1.0 / k)
             V[out, k] = rate * V[out + 1, k - 1]
             V[out + 1, k] = -(rate * V[out, k - 1])
-        elif op == MUL:
+        elif op == ops.MUL:
             V[out, k] = _product(V, a, b, k)
-        elif op == DIVIDE_BY:
+        elif op == ops.DIVIDE_BY:
             V[out, k] = V[a, k] / V[b, 0] if k == 0 else V[a, k] * (1.0 / V[b, 0])
-        elif op == DIV:
+        elif op == ops.DIV:
             if k == 0:
                 V[out, 0] = V[a, 0] / V[b, 0]
             else:
@@ -281,9 +245,9 @@ def advance(rows: Any, V: Any, k: int) -> None:
                 else:
                     rest = fused(-V[out, 0], V[b, k], V[a, k] - inner)
                 V[out, k] = rest * (1.0 / V[b, 0])
-        elif op == NEG:
+        elif op == ops.NEG:
             V[out, k] = -V[a, k]
-        elif op == SQRT:
+        elif op == ops.SQRT:
             if k == 0:
                 V[out, 0] = math.sqrt(V[a, 0]) if V[a, 0] >= 0.0 else math.nan
             else:
@@ -298,7 +262,7 @@ def advance(rows: Any, V: Any, k: int) -> None:
                 V[out, k + 1] = V[a, k] * (_factor(op - INTEGRATE, V, b, c) * (1.0 / (k + 1)))
         elif op >= FACTOR:
             V[out, k] = V[a, k] * _factor(op - FACTOR, V, b, c)
-        elif op >= ABS and op <= EQUAL:
+        elif op >= ops.ABS and op <= ops.EQUAL:
             _logic(op, V, a, b, c, out, k)
         elif k == 0:
             _leading(op, V, a, b, c, out)

@@ -15,44 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.series.tape import (
-    ABS,
-    ADD,
-    AGREEING,
-    COPY,
-    DIV,
-    EXP,
-    LESS,
-    MUL,
-    NEG,
-    NOT,
-    SELECT,
-    SIGN,
-    SINCOS,
-    SINHCOSH,
-    SQRT,
-    SUB,
-    TANGENT,
-)
-
-# Additional operations of the optimised tape, on a series a and a constant b.
-ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB, SCALE, DIVIDE_BY, SINCOS_LINEAR = range(40, 46)
+from hybridsim.engine.series import operations as ops
 
 CONSTANT, LINEAR, SERIES = range(3)  # dependence of a register on time
-PAIRED = (SINCOS, SINHCOSH, TANGENT)  # operations with a companion in the next register
-_ONE = (
-    COPY,
-    NEG,
-    ABS,
-    SIGN,
-    NOT,
-    EXP,
-    SQRT,
-    SINCOS,
-    SINHCOSH,
-    TANGENT,
-)  # operations on one register; the others use two
-_LINEAR_OPERATIONS = (ADD, SUB, NEG)
+PAIRED = (ops.SINCOS, ops.SINHCOSH, ops.TANGENT)  # operations with a companion in the next register
+# operations on one register; the others use two
+_ONE = (ops.COPY, ops.NEG, ops.ABS, ops.SIGN, ops.NOT, ops.EXP, ops.SQRT, *PAIRED)
+_LINEAR_OPERATIONS = (ops.ADD, ops.SUB, ops.NEG)
 
 
 @dataclass(frozen=True)
@@ -127,7 +96,7 @@ def optimised(
     for op, *operands, out in rows:
         count = _registers(op)
         a, b, c = (same.get(r, r) if i < count else r for i, r in enumerate(operands))
-        if op == COPY:
+        if op == ops.COPY:
             same[out] = a
             continue
         kinds = [kind.get(r, CONSTANT) for r in (a, b, c)[:count]]
@@ -162,12 +131,12 @@ def has_corners(tape: dict[str, Any]) -> bool:
     for _, branches in tape["parts"]:
         for op, *operands, out in (row for branch in branches for row in branch):
             kinds = [kind.get(r, CONSTANT) for r in operands[: _registers(op)]]
-            deciding = kinds[:1] if op == SELECT else kinds
-            if op == LESS and operands[2] == AGREEING:
+            deciding = kinds[:1] if op == ops.SELECT else kinds
+            if op == ops.LESS and operands[2] == ops.AGREEING:
                 agreeing.add(out)
-            elif op == SELECT and operands[0] in agreeing:
+            elif op == ops.SELECT and operands[0] in agreeing:
                 pass
-            elif op >= ABS and max(deciding) != CONSTANT:
+            elif op >= ops.ABS and max(deciding) != CONSTANT:
                 return True
             kind[out] = max(_kind(op, kinds), kind.get(out, CONSTANT))
             if op in PAIRED:
@@ -181,33 +150,38 @@ def _array(rows: list[tuple[int, ...]]) -> np.ndarray:
 
 def _registers(op: int) -> int:
     """Return how many of a, b and c in a row are registers; the others are flags of the operation."""
-    return 1 if op in _ONE else 3 if op == SELECT else 2
+    return 1 if op in _ONE else 3 if op == ops.SELECT else 2
 
 
 def _kind(op: int, kinds: list[int]) -> int:
     highest = max(kinds)
     if highest == LINEAR:
-        scaled = (op == MUL and min(kinds) == CONSTANT) or (op == DIV and kinds[1] == CONSTANT)
+        scaled = (op == ops.MUL and min(kinds) == CONSTANT) or (op == ops.DIV and kinds[1] == CONSTANT)
         return LINEAR if scaled or op in _LINEAR_OPERATIONS else SERIES
     return highest
 
 
 def _special(op: int, a: int, b: int, c: int, kinds: list[int]) -> tuple[int, int, int, int]:
     """Return a cheaper operation for a constant operand or an angle linear in time."""
-    if op == SINCOS and kinds[0] == LINEAR:
-        return SINCOS_LINEAR, a, b, c
+    if op == ops.SINCOS and kinds[0] == LINEAR:
+        return ops.SINCOS_LINEAR, a, b, c
     if len(kinds) == 2 and kinds[1] == CONSTANT:
-        cheap = {ADD: ADD_CONSTANT, SUB: SUB_CONSTANT, MUL: SCALE, DIV: DIVIDE_BY}
+        cheap = {
+            ops.ADD: ops.ADD_CONSTANT,
+            ops.SUB: ops.SUB_CONSTANT,
+            ops.MUL: ops.SCALE,
+            ops.DIV: ops.DIVIDE_BY,
+        }
         return cheap.get(op, op), a, b, c
     if len(kinds) == 2 and kinds[0] == CONSTANT:
-        cheap = {ADD: ADD_CONSTANT, SUB: CONSTANT_SUB, MUL: SCALE}
+        cheap = {ops.ADD: ops.ADD_CONSTANT, ops.SUB: ops.CONSTANT_SUB, ops.MUL: ops.SCALE}
         return (cheap[op], b, a, c) if op in cheap else (op, a, b, c)
     return op, a, b, c
 
 
 def arguments_of(row: tuple[int, ...]) -> tuple[int, ...]:
     """Return the registers whose Taylor series a row reads."""
-    return row[1 : 2 if row[0] >= ADD_CONSTANT else 1 + _registers(row[0])]
+    return row[1 : 2 if row[0] >= ops.ADD_CONSTANT else 1 + _registers(row[0])]
 
 
 def live_rows(rows: list[tuple[int, ...]], live: set[int]) -> list[tuple[int, ...]]:
@@ -216,7 +190,7 @@ def live_rows(rows: list[tuple[int, ...]], live: set[int]) -> list[tuple[int, ..
     selected = []
     for row in reversed(rows):
         out = row[4]
-        if out in live or (row[0] in (*PAIRED, SINCOS_LINEAR) and out + 1 in live):
+        if out in live or (row[0] in (*PAIRED, ops.SINCOS_LINEAR) and out + 1 in live):
             selected.append(row)
             live |= set(row[1:4])  # flags among them can only keep an unneeded row
     return selected[::-1]

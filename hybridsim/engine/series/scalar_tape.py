@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from hybridsim.engine.series.operations import ABS, ANGLE, EQUAL, INTEGRAL
 from hybridsim.engine.series.optimise import optimised
-from hybridsim.engine.series.tape import ABS, ANGLE, EQUAL, INTEGRAL, TapeBuilder
+from hybridsim.engine.series.tape import TapeBuilder
 from hybridsim.errors import ModelError
 from hybridsim.expr import Expression
 from hybridsim.expr.symbolic import to_sympy

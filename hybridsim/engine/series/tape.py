@@ -12,15 +12,8 @@ from collections.abc import Mapping, Set
 from typing import Any
 
 from hybridsim.engine.native.constants import UNIT
+from hybridsim.engine.series import operations as ops
 from hybridsim.expr.grammar import WHOLE_POWERS
-
-# Operations. INTEGRAL gives y with y' * a = b' (log, atan, asin: the derivative is a quotient).
-COPY, ADD, SUB, MUL, DIV, NEG, SQRT, EXP, SINCOS, INTEGRAL = range(10)
-SINHCOSH, TANGENT, ABS, SIGN, MIN, MAX, LESS, LESS_EQUAL, AND, OR, NOT, SELECT, EQUAL = range(10, 23)
-# c of a LESS whose two choices are the same function
-AGREEING = 1
-# how INTEGRAL computes its leading coefficient from the argument c
-LOG, ASIN, ACOS, ATAN, ANGLE = range(30, 35)
 
 # Twelve squarings; beyond it exp(n log u), which is undefined for u < 0
 _MAX_INTEGER_POWER = 4096
@@ -51,7 +44,7 @@ class TapeBuilder:
         rows: list[tuple[int, ...]] = []
         for name, expression in assignments:
             source = self._emit(expression, known, rows)
-            rows.append((COPY, source, 0, 0, self.register(name)))
+            rows.append((ops.COPY, source, 0, 0, self.register(name)))
         return rows
 
     def _new(self) -> int:
@@ -65,7 +58,7 @@ class TapeBuilder:
 
     def _op(self, rows: list[tuple[int, ...]], op: int, a: int, b: int = 0, c: int = 0) -> int:
         out = self._new()
-        if op in (SINCOS, SINHCOSH, TANGENT):
+        if op in (ops.SINCOS, ops.SINHCOSH, ops.TANGENT):
             self._new()  # these operations keep a companion series in the next register
         rows.append((op, a, b, c, out))
         return out
@@ -108,12 +101,12 @@ class TapeBuilder:
             if saturating or (denominator != 1 and not denominator.is_number):
                 out = self._emit(numerator, known, rows)
                 for a in saturating:
-                    out = self._op(rows, MUL, out, self._emit(a, known, rows))
+                    out = self._op(rows, ops.MUL, out, self._emit(a, known, rows))
                 if denominator == 1:
                     return out
-                return self._op(rows, DIV, out, self._emit(denominator, known, rows))
+                return self._op(rows, ops.DIV, out, self._emit(denominator, known, rows))
             if e.could_extract_minus_sign() and e.args[0] is sp.S.NegativeOne:
-                return self._op(rows, NEG, self._emit(-e, known, rows))
+                return self._op(rows, ops.NEG, self._emit(-e, known, rows))
         out = -1
         for argument in e.args:
             subtract = e.is_Add and out >= 0 and argument.could_extract_minus_sign()
@@ -121,7 +114,7 @@ class TapeBuilder:
             if out < 0:
                 out = value
             else:
-                out = self._op(rows, SUB if subtract else (ADD if e.is_Add else MUL), out, value)
+                out = self._op(rows, ops.SUB if subtract else (ops.ADD if e.is_Add else ops.MUL), out, value)
         return out
 
     def _emit_power(
@@ -137,15 +130,15 @@ class TapeBuilder:
         if twice.is_integer() and abs(twice) <= 2 * _MAX_INTEGER_POWER:
             n, odd = divmod(int(twice), 2)
             if odd:
-                n, root = int(twice), self._op(rows, SQRT, source)
+                n, root = int(twice), self._op(rows, ops.SQRT, source)
                 source = (
                     self._unless_zero(rows, root, source, self._constant(1.0)) if base.has(sp.Abs) else root
                 )
             power = self._products(source, abs(n), known, rows)
-            return power if n > 0 else self._op(rows, DIV, self._constant(1.0), power)
-        logarithm = self._op(rows, INTEGRAL, source, source, LOG)
+            return power if n > 0 else self._op(rows, ops.DIV, self._constant(1.0), power)
+        logarithm = self._op(rows, ops.INTEGRAL, source, source, ops.LOG)
         number = self._emit(exponent, known, rows)
-        power = self._op(rows, EXP, self._op(rows, MUL, number, logarithm))
+        power = self._op(rows, ops.EXP, self._op(rows, ops.MUL, number, logarithm))
         if base.has(sp.Abs):
             power = self._unless_zero(rows, power, source, number)
         if (
@@ -159,27 +152,29 @@ class TapeBuilder:
     def _unless_zero(self, rows: list[tuple[int, ...]], power: int, base: int, exponent: int) -> int:
         """Emit a power that is 0 at a zero base if the exponent is positive."""
         nothing = self._constant(0.0)
-        value_at_0 = self._op(rows, SELECT, self._op(rows, LESS, nothing, exponent), nothing, power)
-        return self._op(rows, SELECT, self._op(rows, LESS, nothing, base), power, value_at_0)
+        value_at_0 = self._op(rows, ops.SELECT, self._op(rows, ops.LESS, nothing, exponent), nothing, power)
+        return self._op(rows, ops.SELECT, self._op(rows, ops.LESS, nothing, base), power, value_at_0)
 
     def _over(self, base: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
         """Emit 1/(c + d e^u) and 1/cosh(u) without overflow of the exponential."""
         found = _with_exponential(base)
         rest, factor, u = found or (None, None, base.args[0])
         exponent, one = self._emit(u, known, rows), self._constant(1.0)
-        is_large = self._op(rows, LESS, self._constant(0.0), exponent, AGREEING)
-        q = self._op(rows, EXP, self._op(rows, SELECT, is_large, self._op(rows, NEG, exponent), exponent))
-        if found is None:
-            below = self._op(rows, ADD, one, self._op(rows, MUL, q, q))
-            return self._op(rows, DIV, self._op(rows, ADD, q, q), below)
-        c, d = self._emit(rest, known, rows), self._emit(factor, known, rows)
-        large = self._op(rows, ADD, self._op(rows, MUL, c, q), d)
-        small = self._op(rows, ADD, c, self._op(rows, MUL, d, q))
-        above, below = (
-            self._op(rows, SELECT, is_large, q, one),
-            self._op(rows, SELECT, is_large, large, small),
+        is_large = self._op(rows, ops.LESS, self._constant(0.0), exponent, ops.AGREEING)
+        q = self._op(
+            rows, ops.EXP, self._op(rows, ops.SELECT, is_large, self._op(rows, ops.NEG, exponent), exponent)
         )
-        return self._op(rows, DIV, above, below)
+        if found is None:
+            below = self._op(rows, ops.ADD, one, self._op(rows, ops.MUL, q, q))
+            return self._op(rows, ops.DIV, self._op(rows, ops.ADD, q, q), below)
+        c, d = self._emit(rest, known, rows), self._emit(factor, known, rows)
+        large = self._op(rows, ops.ADD, self._op(rows, ops.MUL, c, q), d)
+        small = self._op(rows, ops.ADD, c, self._op(rows, ops.MUL, d, q))
+        above, below = (
+            self._op(rows, ops.SELECT, is_large, q, one),
+            self._op(rows, ops.SELECT, is_large, large, small),
+        )
+        return self._op(rows, ops.DIV, above, below)
 
     def _whole(
         self, source: int, exponent: int, power: int, known: dict[Any, int], rows: list[tuple[int, ...]]
@@ -188,9 +183,9 @@ class TapeBuilder:
         one = self._constant(1.0)
         for n in WHOLE_POWERS:
             product = self._products(source, abs(n), known, rows) if n else one
-            whole = self._op(rows, DIV, one, product) if n < 0 else product
-            is_so = self._op(rows, EQUAL, exponent, self._constant(float(n)))
-            power = self._op(rows, SELECT, is_so, whole, power)
+            whole = self._op(rows, ops.DIV, one, product) if n < 0 else product
+            is_so = self._op(rows, ops.EQUAL, exponent, self._constant(float(n)))
+            power = self._op(rows, ops.SELECT, is_so, whole, power)
         return power
 
     def _products(self, source: int, n: int, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
@@ -200,8 +195,8 @@ class TapeBuilder:
         key = ("power", source, n)
         if key not in known:
             half = self._products(source, n // 2, known, rows)
-            out = self._op(rows, MUL, half, half)
-            known[key] = self._op(rows, MUL, out, source) if n % 2 else out
+            out = self._op(rows, ops.MUL, half, half)
+            known[key] = self._op(rows, ops.MUL, out, source) if n % 2 else out
         return known[key]
 
     def _emit_piecewise(self, e: Any, known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
@@ -209,7 +204,7 @@ class TapeBuilder:
         for pair in reversed(e.args[:-1]):
             condition = self._emit(pair.cond, known, rows)
             value = self._emit(pair.expr, known, rows)
-            out = self._op(rows, SELECT, condition, value, out)
+            out = self._op(rows, ops.SELECT, condition, value, out)
         return out
 
     def _emit_function(self, e: Any, a: list[int], known: dict[Any, int], rows: list[tuple[int, ...]]) -> int:
@@ -217,21 +212,21 @@ class TapeBuilder:
 
         one = self._constant(1.0)
         simple: Mapping[Any, int] = {
-            sp.Abs: ABS,
-            sp.sign: SIGN,
-            sp.Not: NOT,
-            sp.tan: TANGENT,
+            sp.Abs: ops.ABS,
+            sp.sign: ops.SIGN,
+            sp.Not: ops.NOT,
+            sp.tan: ops.TANGENT,
         }
-        chained: Mapping[Any, int] = {sp.Min: MIN, sp.Max: MAX, sp.And: AND, sp.Or: OR}
+        chained: Mapping[Any, int] = {sp.Min: ops.MIN, sp.Max: ops.MAX, sp.And: ops.AND, sp.Or: ops.OR}
         ordered: Mapping[Any, tuple[int, bool]] = {
-            sp.StrictLessThan: (LESS, False),
-            sp.StrictGreaterThan: (LESS, True),
-            sp.LessThan: (LESS_EQUAL, False),
-            sp.GreaterThan: (LESS_EQUAL, True),
+            sp.StrictLessThan: (ops.LESS, False),
+            sp.StrictGreaterThan: (ops.LESS, True),
+            sp.LessThan: (ops.LESS_EQUAL, False),
+            sp.GreaterThan: (ops.LESS_EQUAL, True),
         }
         kind = e.func
         if isinstance(e, sp.exp):
-            return self._op(rows, EXP, a[0])
+            return self._op(rows, ops.EXP, a[0])
         if kind in simple:
             return self._op(rows, simple[kind], a[0])
         if kind in chained:
@@ -243,40 +238,44 @@ class TapeBuilder:
             op, swap = ordered[kind]
             return self._op(rows, op, a[1] if swap else a[0], a[0] if swap else a[1])
         if kind is sp.Eq:
-            return self._op(rows, EQUAL, a[0], a[1])
+            return self._op(rows, ops.EQUAL, a[0], a[1])
         if kind is sp.ITE:
-            return self._op(rows, SELECT, a[0], a[1], a[2])
+            return self._op(rows, ops.SELECT, a[0], a[1], a[2])
         if kind is sp.cot:  # SymPy rewrites tan(u + pi/2) as cot(u)
-            return self._op(rows, DIV, one, self._op(rows, TANGENT, a[0]))
+            return self._op(rows, ops.DIV, one, self._op(rows, ops.TANGENT, a[0]))
         if kind is sp.Ne:
-            return self._op(rows, NOT, self._op(rows, EQUAL, a[0], a[1]))
+            return self._op(rows, ops.NOT, self._op(rows, ops.EQUAL, a[0], a[1]))
         if kind in (sp.sin, sp.cos):
             pair = ("sincos", e.args[0])
             if pair not in known:
-                known[pair] = self._op(rows, SINCOS, a[0])
+                known[pair] = self._op(rows, ops.SINCOS, a[0])
             return known[pair] + (0 if kind is sp.sin else 1)
         if isinstance(e, (sp.sinh, sp.cosh)):
             pair = ("sinhcosh", e.args[0])
             if pair not in known:
-                known[pair] = self._op(rows, SINHCOSH, a[0])
+                known[pair] = self._op(rows, ops.SINHCOSH, a[0])
             return known[pair] + (0 if isinstance(e, sp.sinh) else 1)
         if isinstance(e, sp.tanh):
             # (e^u - e^-u)/(e^u + e^-u) overflows; 1 - 2/(e^{2u} + 1) loses digits at 0: use y' = (1 - y^2) u'
-            return self._op(rows, TANGENT, a[0], 1)
+            return self._op(rows, ops.TANGENT, a[0], 1)
         if kind is sp.log:
-            return self._op(rows, INTEGRAL, a[0], a[0], LOG)
+            return self._op(rows, ops.INTEGRAL, a[0], a[0], ops.LOG)
         if kind in (sp.asin, sp.acos):
-            root = self._op(rows, SQRT, self._op(rows, SUB, one, self._op(rows, MUL, a[0], a[0])))
+            root = self._op(rows, ops.SQRT, self._op(rows, ops.SUB, one, self._op(rows, ops.MUL, a[0], a[0])))
             if kind is sp.asin:
-                return self._op(rows, INTEGRAL, root, a[0], ASIN)
-            return self._op(rows, INTEGRAL, self._op(rows, NEG, root), a[0], ACOS)
+                return self._op(rows, ops.INTEGRAL, root, a[0], ops.ASIN)
+            return self._op(rows, ops.INTEGRAL, self._op(rows, ops.NEG, root), a[0], ops.ACOS)
         if kind is sp.atan:
             return self._op(
-                rows, INTEGRAL, self._op(rows, ADD, one, self._op(rows, MUL, a[0], a[0])), a[0], ATAN
+                rows,
+                ops.INTEGRAL,
+                self._op(rows, ops.ADD, one, self._op(rows, ops.MUL, a[0], a[0])),
+                a[0],
+                ops.ATAN,
             )
         if kind is sp.atan2:
             # after a rotation by the leading angle the rest is an ordinary arc tangent
-            return self._op(rows, INTEGRAL, a[1], a[0], ANGLE)
+            return self._op(rows, ops.INTEGRAL, a[1], a[0], ops.ANGLE)
         raise NotImplementedError(f"no Taylor recurrence for {kind}")
 
 

@@ -11,35 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.native.kernels import inlined, kernel
+from hybridsim.engine.series import operations as ops
 from hybridsim.engine.series.interpreter import advance
-from hybridsim.engine.series.optimise import (
-    ADD_CONSTANT,
-    CONSTANT_SUB,
-    DIVIDE_BY,
-    SCALE,
-    SINCOS_LINEAR,
-    SUB_CONSTANT,
-    live_rows,
-)
-from hybridsim.engine.series.tape import (
-    ABS,
-    ADD,
-    ANGLE,
-    DIV,
-    EQUAL,
-    EXP,
-    INTEGRAL,
-    MAX,
-    MIN,
-    MUL,
-    NEG,
-    SELECT,
-    SINCOS,
-    SINHCOSH,
-    SQRT,
-    SUB,
-    TANGENT,
-)
+from hybridsim.engine.series.optimise import live_rows
 from hybridsim.engine.system.system import System
 
 
@@ -59,46 +33,46 @@ def _combine(D: Any, out: int, first: float, a: int, second: float, b: int) -> N
 def _tangent(op: int, a: int, b: int, c: int, out: int, V: Any, D: Any) -> None:
     """Apply the differentiation rule of one operation; all values V[register, 0] are known."""
     u, v, y = V[a, 0], V[b, 0], V[out, 0]
-    if op in (ADD, ADD_CONSTANT):
+    if op in (ops.ADD, ops.ADD_CONSTANT):
         _combine(D, out, 1.0, a, 1.0, b)
-    elif op in (SUB, SUB_CONSTANT):
+    elif op in (ops.SUB, ops.SUB_CONSTANT):
         _combine(D, out, 1.0, a, -1.0, b)
-    elif op == CONSTANT_SUB:
+    elif op == ops.CONSTANT_SUB:
         _combine(D, out, -1.0, a, 1.0, b)
-    elif op == NEG:
+    elif op == ops.NEG:
         _combine(D, out, -1.0, a, 0.0, a)
-    elif op in (MUL, SCALE):
+    elif op in (ops.MUL, ops.SCALE):
         _combine(D, out, v, a, u, b)
-    elif op in (DIV, DIVIDE_BY):
+    elif op in (ops.DIV, ops.DIVIDE_BY):
         _combine(D, out, 1.0 / v, a, -y / v, b)
-    elif op == SQRT:
+    elif op == ops.SQRT:
         _combine(D, out, 0.5 / y, a, 0.0, a)
-    elif op == EXP:
+    elif op == ops.EXP:
         _combine(D, out, y, a, 0.0, a)
-    elif op in (SINCOS, SINCOS_LINEAR):
+    elif op in (ops.SINCOS, ops.SINCOS_LINEAR):
         _combine(D, out, V[out + 1, 0], a, 0.0, a)
         _combine(D, out + 1, -y, a, 0.0, a)
-    elif op == SINHCOSH:
+    elif op == ops.SINHCOSH:
         _combine(D, out, V[out + 1, 0], a, 0.0, a)
         _combine(D, out + 1, y, a, 0.0, a)
-    elif op == TANGENT:  # tan and 1 + tan^2; tanh and 1 - tanh^2
+    elif op == ops.TANGENT:  # tan and 1 + tan^2; tanh and 1 - tanh^2
         _combine(D, out, V[out + 1, 0], a, 0.0, a)
         _combine(D, out + 1, 2.0 * y if b == 0 else -2.0 * y, out, 0.0, a)
-    elif op == INTEGRAL and c == ANGLE:
+    elif op == ops.INTEGRAL and c == ops.ANGLE:
         square = u * u + v * v
         _combine(D, out, -v / square, a, u / square, b)
-    elif op == INTEGRAL:  # y' a = b'
+    elif op == ops.INTEGRAL:  # y' a = b'
         _combine(D, out, 0.0, a, 1.0 / u, b)
-    elif op == ABS:
+    elif op == ops.ABS:
         _combine(D, out, 1.0 if u >= 0.0 else -1.0, a, 0.0, a)
-    elif op in (MIN, MAX):
-        takes_a = (u <= v) == (op == MIN)
+    elif op in (ops.MIN, ops.MAX):
+        takes_a = (u <= v) == (op == ops.MIN)
         _combine(D, out, 1.0 if takes_a else 0.0, a, 0.0 if takes_a else 1.0, b)
-    elif op == SELECT:
+    elif op == ops.SELECT:
         source = b if u != 0.0 else c
         for j in range(D.shape[1]):  # equality at one point does not hold next to it
             D[out, j] = D[c, j] if u != 0.0 and D[a, j] != 0.0 else D[source, j]
-    elif op == EQUAL:
+    elif op == ops.EQUAL:
         _combine(D, out, 1.0, a, -1.0, b)
     else:  # other comparisons and logic
         _combine(D, out, 0.0, a, 0.0, a)

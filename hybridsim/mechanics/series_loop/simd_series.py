@@ -12,32 +12,8 @@ from typing import Any
 
 from hybridsim.engine.native.kernels import inlined, kernel
 from hybridsim.engine.native.simd_vectors import WIDTH, load, splat, store
-from hybridsim.engine.series.optimise import (
-    ADD_CONSTANT,
-    CONSTANT_SUB,
-    DIVIDE_BY,
-    PAIRED,
-    SCALE,
-    SINCOS_LINEAR,
-    SUB_CONSTANT,
-)
-from hybridsim.engine.series.tape import (
-    ACOS,
-    ADD,
-    ASIN,
-    ATAN,
-    DIV,
-    EXP,
-    INTEGRAL,
-    LOG,
-    MUL,
-    NEG,
-    SINCOS,
-    SINHCOSH,
-    SQRT,
-    SUB,
-    TANGENT,
-)  # fmt: skip
+from hybridsim.engine.series import operations as ops
+from hybridsim.engine.series.optimise import PAIRED
 
 
 @inlined
@@ -77,26 +53,26 @@ def _leading(op: int, V: Any, a: int, b: int, flag: int, kind: int, o: int, o2: 
     """Compute coefficient 0 of the operations that are defined by a differential equation."""
     for j in range(WIDTH):
         u = V[a + j]
-        if op == EXP:
+        if op == ops.EXP:
             V[o + j] = math.inf if u >= 709.0 else math.exp(u)
-        elif op in (SINCOS, SINCOS_LINEAR):
+        elif op in (ops.SINCOS, ops.SINCOS_LINEAR):
             V[o + j], V[o2 + j] = math.sin(u), math.cos(u)
-        elif op == SINHCOSH:
+        elif op == ops.SINHCOSH:
             V[o + j], V[o2 + j] = math.sinh(u), math.cosh(u)
-        elif op == TANGENT:
+        elif op == ops.TANGENT:
             y = math.tan(u) if flag == 0 else math.tanh(u)
             V[o + j], V[o2 + j] = y, 1.0 + (y * y if flag == 0 else -y * y)
-        elif op == SQRT:
+        elif op == ops.SQRT:
             V[o + j] = math.sqrt(u) if u >= 0.0 else math.nan
-        elif op == INTEGRAL:
+        elif op == ops.INTEGRAL:
             v, y = V[b + j], math.nan
-            if kind == LOG and v > 0.0:
+            if kind == ops.LOG and v > 0.0:
                 y = math.log(v)
-            elif kind == ASIN and abs(v) <= 1.0:
+            elif kind == ops.ASIN and abs(v) <= 1.0:
                 y = math.asin(v)
-            elif kind == ACOS and abs(v) <= 1.0:
+            elif kind == ops.ACOS and abs(v) <= 1.0:
                 y = math.acos(v)
-            elif kind == ATAN:
+            elif kind == ops.ATAN:
                 y = math.atan(v)
             V[o + j] = y
 
@@ -105,23 +81,23 @@ def _leading(op: int, V: Any, a: int, b: int, flag: int, kind: int, o: int, o2: 
 def _higher(op: int, V: Any, a: int, b: int, flag: int, out: int, out2: int, k: int) -> None:
     """Compute coefficient k >= 1 of the operations that are defined by a differential equation."""
     o, o2, share = out + k * WIDTH, out2 + k * WIDTH, splat(1.0 / k)
-    if op == EXP:
+    if op == ops.EXP:
         store(V, o, share * _weighted(V, a, out, k, k))
-    elif op == INTEGRAL:
+    elif op == ops.INTEGRAL:
         store(V, o, (load(V, b + k * WIDTH) - share * _weighted(V, out, a, k, k - 1)) / load(V, a))
-    elif op == SQRT:
+    elif op == ops.SQRT:
         half = splat(0.5)
         store(V, o, half * load(V, a + k * WIDTH) - half * _product(V, out + WIDTH, o - WIDTH, 1, k - 1))
         for j in range(WIDTH):
             V[o + j] = 0.0 if V[out + j] == 0.0 and V[o + j] == 0.0 else V[o + j] / V[out + j]
     else:
         store(V, o, share * _weighted(V, a, out2, k, k))
-        if op == TANGENT:
+        if op == ops.TANGENT:
             square = _product(V, out, o, 0, k)
             store(V, o2, square if flag == 0 else splat(-1.0) * square)
         else:
             change = share * _weighted(V, a, out, k, k)
-            store(V, o2, change if op == SINHCOSH else splat(-1.0) * change)
+            store(V, o2, change if op == ops.SINHCOSH else splat(-1.0) * change)
 
 
 @inlined
@@ -142,9 +118,9 @@ def _quotient(V: Any, x: int, out: int, b: int, k: int) -> Any:
 @inlined
 def _with_constant(op: int, x: Any, c: Any) -> Any:
     """Return coefficient 0 of an operation on a Taylor series and a constant."""
-    if op == ADD_CONSTANT:
+    if op == ops.ADD_CONSTANT:
         return x + c
-    return x - c if op == SUB_CONSTANT else c - x
+    return x - c if op == ops.SUB_CONSTANT else c - x
 
 
 @kernel
@@ -161,26 +137,26 @@ def advance_simd_series(
             op = rows[r, 0]
             a, b, out = base + rows[r, 1] * length, base + rows[r, 2] * length, base + rows[r, 4] * length
             z, x, y = out + k * WIDTH, a + k * WIDTH, b + k * WIDTH
-            if op == SCALE:
+            if op == ops.SCALE:
                 store(V, z, load(V, x) * load(V, b))
-            elif ADD_CONSTANT <= op <= CONSTANT_SUB:
+            elif ops.ADD_CONSTANT <= op <= ops.CONSTANT_SUB:
                 value = load(V, x)
                 if k == 0:
                     value = _with_constant(op, value, load(V, b))
-                elif op == CONSTANT_SUB:
+                elif op == ops.CONSTANT_SUB:
                     value = splat(-1.0) * value
                 store(V, z, value)
-            elif op == DIV:
+            elif op == ops.DIV:
                 store(V, z, _quotient(V, x, out, b, k))
-            elif op == MUL:
+            elif op == ops.MUL:
                 store(V, z, _product(V, a, y, 0, k))
-            elif op == ADD:
+            elif op == ops.ADD:
                 store(V, z, load(V, x) + load(V, y))
-            elif op == SUB:
+            elif op == ops.SUB:
                 store(V, z, load(V, x) - load(V, y))
-            elif op == DIVIDE_BY:
+            elif op == ops.DIVIDE_BY:
                 store(V, z, load(V, x) / load(V, b))
-            elif op == NEG:
+            elif op == ops.NEG:
                 store(V, z, splat(-1.0) * load(V, x))
             elif k == 0:
                 _leading(op, V, a, b, rows[r, 2], rows[r, 3], out, out + length)

@@ -18,8 +18,7 @@ from hybridsim.engine.series.high_orders import (
     high_rows,
 )
 from hybridsim.engine.series.interpreter import expand
-from hybridsim.engine.series.optimise import ADD_CONSTANT, DIVIDE_BY, SCALE
-from hybridsim.engine.series.tape import ADD, DIV, EXP, MUL, NEG, SUB
+from hybridsim.engine.series.operations import ADD, ADD_CONSTANT, DIV, DIVIDE_BY, EXP, MUL, NEG, SCALE, SUB
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.series_at import SeriesRun
 from hybridsim.engine.system.system import System

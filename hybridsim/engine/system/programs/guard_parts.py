@@ -7,15 +7,17 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridsim.engine.native.struct_pack import packed
-from hybridsim.engine.series.optimise import (
+from hybridsim.engine.series.operations import (
+    ADD,
     ADD_CONSTANT,
     CONSTANT_SUB,
     DIVIDE_BY,
+    NEG,
     SCALE,
+    SUB,
     SUB_CONSTANT,
-    live_rows,
 )
-from hybridsim.engine.series.tape import ADD, NEG, SUB
+from hybridsim.engine.series.optimise import live_rows
 from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.programs.mode_tables import Tapes, in_a_row
 from hybridsim.engine.system.system import System

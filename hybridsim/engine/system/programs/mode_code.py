@@ -15,8 +15,8 @@ from hybridsim.engine.native.kernels import ENABLED, compile_series, is_stored
 from hybridsim.engine.native.llvm_text import TooLong
 from hybridsim.engine.series.emit_bounds import ConstantSources
 from hybridsim.engine.series.emit_series import ModeTape
+from hybridsim.engine.series.operations import EXP, LESS, MUL, SELECT, SINHCOSH, SQRT, TANGENT
 from hybridsim.engine.series.optimise import PAIRED, arguments_of
-from hybridsim.engine.series.tape import EXP, LESS, MUL, SELECT, SINHCOSH, SQRT, TANGENT
 from hybridsim.engine.series.vanishing_kinds import (
     EXPONENTIAL,
     HYPERBOLIC,
