@@ -73,7 +73,7 @@ def to_ivp(
     >>> float(round(release.t[-1], 6))  # asin(mu*N/F0)/omega
     0.00172
     """
-    from hybridsim.engine.native.kernels import announce_compilation
+    from hybridsim.engine.native.compiler import announce_compilation
     from hybridsim.engine.record.counters import Counters
     from hybridsim.engine.run.stepping import Flow
     from hybridsim.engine.system.instant import Instant

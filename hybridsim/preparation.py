@@ -14,7 +14,7 @@ import numpy as np
 
 from hybridsim import arguments
 from hybridsim.engine.events.dissipation_check import require_dissipation
-from hybridsim.engine.native.kernels import announce_compilation
+from hybridsim.engine.native.compiler import announce_compilation
 from hybridsim.engine.record.trajectory import Task
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System

@@ -73,7 +73,7 @@ def run_for_ever(name: str) -> None:
 
 def _generated() -> dict[int, str]:
     """Machine code that is made for a model, with its names, as it is made."""
-    from hybridsim.engine.native import kernels, llvm
+    from hybridsim.engine.native import llvm, model_functions
 
     found: dict[int, str] = {}
     make = llvm.load_or_compile
@@ -83,7 +83,7 @@ def _generated() -> dict[int, str]:
         found.update(zip(addresses, (f"generated {name}" for name in names), strict=True))
         return addresses, engine
 
-    llvm.load_or_compile = kernels.load_or_compile = load_or_compile  # type: ignore[attr-defined, assignment]  # to hear of each
+    llvm.load_or_compile = model_functions.load_or_compile = load_or_compile  # type: ignore[attr-defined, assignment]  # to hear of each
     return found
 
 

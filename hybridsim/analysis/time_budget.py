@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-from hybridsim.engine.native.kernels import seconds_compiling
+from hybridsim.engine.native.compiler import seconds_compiling
 
 
 class OutOfTime(Exception):

@@ -7,7 +7,7 @@ from typing import Any
 
 from hybridsim.engine.linear.motion import functions_of_time, to_modal
 from hybridsim.engine.native.kernels import call, kernel
-from hybridsim.engine.native.simd_products import LANES
+from hybridsim.engine.native.simd.products import LANES
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.programs.modes_index import find_modes
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.native.kernels import inlined, kernel
-from hybridsim.engine.native.simd_vectors import WIDTH, load, splat, store
+from hybridsim.engine.native.simd.vectors import WIDTH, load, splat, store
 
 TERMS = 32  # the largest number of terms: 31 for a relative tolerance of 1e-15
 _CHOICES = np.array([[float(comb(i, k)) for k in range(TERMS)] for i in range(TERMS)])

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim import arguments
-from hybridsim.engine.native.kernels import announce_compilation
+from hybridsim.engine.native.compiler import announce_compilation
 from hybridsim.engine.record.retention import ALL
 from hybridsim.errors import UsageError, nearest
 from hybridsim.integrators.registry import integrator_class, keyword_elsewhere

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from hybridsim.engine.events.due_changes import apply_crossed
 from hybridsim.engine.events.input_jumps import vectors_jump
 from hybridsim.engine.events.monitor_sides import MonitorSides
 from hybridsim.engine.events.outcome import Outcome, Situation
@@ -34,7 +35,7 @@ class InputChange(ModeLoop):
         self._go_on_from(self.record.checkpoint)
         before, system = self.outcome, self.system
         monitors = MonitorSides.of(system.model.monitors, before.monitor_sides)
-        outcome = self._apply_crossed(self._changed(before), 0.0, monitors)
+        outcome = apply_crossed(system, self.forward, self._changed(before), 0.0, monitors)
         if (
             not self._adopt(self.origin, outcome, before.x, (), monitors)
             or self.record.status == "terminated"

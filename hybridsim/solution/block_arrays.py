@@ -10,7 +10,7 @@ import numpy as np
 
 from hybridsim.engine.linear.closed_form_block import ClosedFormBlock
 from hybridsim.engine.linear.tables import LinearTables, no_tables
-from hybridsim.engine.native.simd_products import row_blocks_of
+from hybridsim.engine.native.simd.products import row_blocks_of
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.record.array_forms import (
     Form,

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
-from hybridsim.engine.native.kernels import seconds_compiling
+from hybridsim.engine.native.compiler import seconds_compiling
 from hybridsim.engine.record.trajectory import Trajectory
 from hybridsim.engine.run.single_call import LazyTrajectory
 from hybridsim.engine.system.user_functions.code import PythonCode

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from hybridsim.analysis.time_budget import OutOfTime, Stopwatch, TimeBudget
-from hybridsim.engine.native import kernels
+from hybridsim.engine.native import compiler, kernels, notices
 
 
 def _twice(x: float) -> float:
@@ -17,10 +17,10 @@ def _twice(x: float) -> float:
 
 @pytest.mark.skipif(not kernels.ENABLED, reason="the compiler is switched off")
 def test_a_stopwatch_stands_still_while_a_kernel_is_compiled() -> None:
-    before, began, watch = kernels.seconds_compiling(), time.perf_counter(), Stopwatch()
+    before, began, watch = compiler.seconds_compiling(), time.perf_counter(), Stopwatch()
     assert kernels.kernel(_twice)(1.0) == 2.0
     seconds, spent = watch.seconds, time.perf_counter() - began
-    compiled = kernels.seconds_compiling() - before
+    compiled = compiler.seconds_compiling() - before
     assert 0.0 < compiled < spent
     assert seconds <= spent - compiled
 
@@ -37,8 +37,8 @@ def test_an_allowance_is_looked_at_until_it_is_over() -> None:
 def test_compiling_that_takes_a_while_is_said_once(
     capsys: pytest.CaptureFixture[str], monkeypatch: Any
 ) -> None:
-    monkeypatch.setattr(kernels, "_announced", set())
-    monkeypatch.setattr(kernels, "_NOTICED", 0.0)
+    monkeypatch.setattr(notices, "_announced", set())
+    monkeypatch.setattr(compiler, "_NOTICED", 0.0)
     numba = pytest.importorskip("numba")  # the compiler that is listened to
     for module in ("somebody.else", "hybridsim.engine.mine", "hybridsim.engine.mine"):
 

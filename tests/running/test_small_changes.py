@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.native.kernels import seconds_compiling
+from hybridsim.engine.native.compiler import seconds_compiling
 from hybridsim.engine.system.system_cache import system_of
 from hybridsim.reference.multiple_precision import multiple_precision_trajectory
 

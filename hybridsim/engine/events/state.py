@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.events.outcome import Outcome
-from hybridsim.engine.native.simd_products import filled_up
+from hybridsim.engine.native.simd.products import filled_up
 from hybridsim.engine.native.struct_pack import packed
 
 _NO_MONITORS, _NO_MONITOR_FLOORS = np.zeros(0, dtype=np.int64), np.zeros(0)  # compiled loops have no monitors

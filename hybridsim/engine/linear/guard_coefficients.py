@@ -9,7 +9,7 @@ from typing import Any
 
 from hybridsim.engine.native.kernels import call_noinline, inlined, kernel
 from hybridsim.engine.native.loop_hints import short_loop
-from hybridsim.engine.native.simd_products import LANES, dot
+from hybridsim.engine.native.simd.products import LANES, dot
 from hybridsim.engine.series.bounded import ORDER, UNIT
 
 # A row's rounding is at least ten units of its absolute values: the effect of errors of y, relative to that.

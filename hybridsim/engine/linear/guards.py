@@ -7,7 +7,7 @@ from typing import Any
 
 from hybridsim.engine.native.constants import BOUND_TERMS
 from hybridsim.engine.native.kernels import kernel
-from hybridsim.engine.native.simd_products import LANES
+from hybridsim.engine.native.simd.products import LANES
 from hybridsim.engine.series.bounded import ORDER, UNIT
 
 _FACTORIAL = float(math.factorial(BOUND_TERMS))

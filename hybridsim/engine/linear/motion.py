@@ -15,8 +15,8 @@ from hybridsim.engine.linear.guards import FARTHEST
 from hybridsim.engine.native.constants import BOUND_TERMS
 from hybridsim.engine.native.kernels import allocating_kernel, call_noinline, inlined, kernel
 from hybridsim.engine.native.loop_hints import index, short_loop
-from hybridsim.engine.native.simd_products import product, times
-from hybridsim.engine.native.simd_vectors import WIDTH, load, splat, store
+from hybridsim.engine.native.simd.products import product, times
+from hybridsim.engine.native.simd.vectors import WIDTH, load, splat, store
 from hybridsim.engine.roots.certify import (
     falls_over,
     past_dip,

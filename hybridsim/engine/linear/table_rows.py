@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from hybridsim.engine.native.kernels import kernel
-from hybridsim.engine.native.simd_products import LANES
+from hybridsim.engine.native.simd.products import LANES
 
 _LARGEST = 1e150  # its square is still finite
 _MAX_GROWTH_EXPONENT = 300.0  # exponent within a segment: doubles go from exp(-745) to exp(709)

@@ -15,7 +15,7 @@ from hybridsim.engine.linear.units import scaled_modals, units_of
 from hybridsim.engine.native.array_layout import ArrayLayout
 from hybridsim.engine.native.constants import BOUND_TERMS
 from hybridsim.engine.native.kernels import ENABLED, Precompiled
-from hybridsim.engine.native.simd_products import LANES, filled_up
+from hybridsim.engine.native.simd.products import LANES, filled_up
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.bounded import ORDER
 from hybridsim.engine.system.per_structure import per_structure, spare_scratch
@@ -33,7 +33,7 @@ class LinearTables(NamedTuple):
     """Arrays of linear modes for compiled loops, with one row per combination of modes.
 
     Shapes: K mode vectors, A atoms, M monomials, G guards, J modal coordinates (even). Rows over y are padded
-    with zeros behind states and monomials. Blocks of rows are made by `hybridsim.engine.native.simd_products`.
+    with zeros behind states and monomials. Blocks of rows are made by `hybridsim.engine.native.simd.products`.
 
     The motion is followed from one point only for a limited time (`lasting`). For example, exp(2*(t - 400))
     underflows at t = 0 and could not grow to one from there.

@@ -9,7 +9,7 @@ import numpy as np
 from hybridsim.engine.linear.form import TIME, VALUE
 from hybridsim.engine.linear.modal import Modals, modals
 from hybridsim.engine.native.constants import BOUND_TERMS
-from hybridsim.engine.native.simd_products import LANES
+from hybridsim.engine.native.simd.products import LANES
 from hybridsim.engine.series.layout import SIGNAL_SLOTS
 from hybridsim.engine.system.known_times import START
 

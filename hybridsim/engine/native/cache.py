@@ -67,14 +67,10 @@ def _is_usable(folder: Path) -> bool:
     return reason is None
 
 
-_noted: set[str] = set()  # messages that this process has printed already
-
-
+@cache
 def note(text: str, remedy: str) -> None:
     """Print once, on stderr, why compiled code is not cached."""
-    if text not in _noted:
-        _noted.add(text)
-        print(f"hybridsim: {text}; compiled code is not stored ({remedy})", file=sys.stderr, flush=True)
+    print(f"hybridsim: {text}; compiled code is not stored ({remedy})", file=sys.stderr, flush=True)
 
 
 @cache

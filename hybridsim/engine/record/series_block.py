@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.native.kernels import allocating_kernel, call, inlined, kernel
-from hybridsim.engine.native.simd_vectors import WIDTH, load, splat, store
+from hybridsim.engine.native.simd.vectors import WIDTH, load, splat, store
 from hybridsim.engine.record.blocks import SegmentBlock
 from hybridsim.engine.record.segments import Dense, PiecewiseDense
 from hybridsim.engine.series.interpreter import polynomials

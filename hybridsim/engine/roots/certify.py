@@ -12,7 +12,7 @@ import numpy as np
 
 from hybridsim.engine.native.constants import BOUND_TERMS
 from hybridsim.engine.native.kernels import inlined, polynomial_kernel
-from hybridsim.engine.native.simd_vectors import WIDTH, all_larger, load, splat
+from hybridsim.engine.native.simd.vectors import WIDTH, all_larger, load, splat
 from hybridsim.engine.series.bounded import UNIT
 
 _ITERATIONS = 100

@@ -8,10 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.engine.events.backward import cross_backward
 from hybridsim.engine.events.choice.verdict import side_after, side_before
 from hybridsim.engine.events.compiled.after_segment import spread
+from hybridsim.engine.events.input_jumps import surfaces_jump
 from hybridsim.engine.events.monitor_sides import MonitorSides
 from hybridsim.engine.events.outcome import Outcome, Situation
+from hybridsim.engine.events.resolve import EventResolution
 from hybridsim.engine.run.segment_run import Arrival, SegmentRun
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.instant import Instant
@@ -87,6 +90,28 @@ class Located:
     def scope(self, system: System) -> set[int]:
         """Return the components whose modes are chosen before schedules are applied."""
         return set(range(len(system.automata))) - self.waiting
+
+    def is_event(self, system: System) -> bool:
+        """Return whether an event happens at the end of the run; changes of side at corners do not count."""
+        owners = set(system.owner[list(self.fired)].tolist())
+        return bool(owners.difference(system.led)) or bool(self.monitors.leads.any())
+
+    def resolved(
+        self,
+        system: System,
+        instant: Instant,
+        forward: bool,
+        fired: dict[int, int],
+        resets: list[tuple[object, ...]],
+    ) -> Outcome:
+        """Resolve guards and resets of monitors on a copy of the state."""
+        at = replace(self.at, x=self.at.x.copy(), z=self.at.z.copy())
+        if fired and not forward:
+            return cross_backward(system, at, tuple(fired))
+        scope = self.scope(system)
+        resolution = EventResolution(system, at, at.z.copy(), forward, scope, self.inputs)
+        resolution.jumped = self.inputs is not None and surfaces_jump(system, instant, at, True)
+        return resolution.run(fired, resets)
 
 
 def coincident(
@@ -242,23 +267,6 @@ def errors_when_due(
     at.x_error = at.x_error + 4.0 * UNIT * scale + math.ulp(float(target)) * slopes
     add_steps(system, at, scale, steps, rounding * way)
     return at.x_error
-
-
-def with_evaluated(
-    system: System, before: np.ndarray, x: np.ndarray, p: np.ndarray, z: np.ndarray, error: np.ndarray
-) -> np.ndarray:
-    """Return the state errors at a scheduled time, including the errors of held states.
-
-    Held states were evaluated at a local time of the run-time vector `before`, and are judged at the origin of p. Both
-    times are rounded.
-    """
-    held, error = system.evaluated(z), error.copy()
-    if held:
-        origin, now = before[system.layout.origin_at], p[system.layout.origin_at]
-        rounding = 2.0 * math.ulp(max(abs(origin), abs(now)))
-        early, late = (system.project(now - origin + d, x, before, z) for d in (-rounding, rounding))
-        error[held] = UNIT * np.abs(x[held]) + np.abs(late - early)[held]
-    return error
 
 
 def add_steps(system: System, at: Situation, scale: np.ndarray, steps: int, stages: np.ndarray) -> None:

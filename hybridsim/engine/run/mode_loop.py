@@ -8,14 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from hybridsim.engine.events.backward import cross_backward, has_no_past, held, message_on_direction
+from hybridsim.engine.events.backward import has_no_past, held, message_on_direction
 from hybridsim.engine.events.compiled.known_time import has_known_times
 from hybridsim.engine.events.diagnosis import advice_on_sizes, in_the_way, name_vanished_load
+from hybridsim.engine.events.due_changes import apply_crossed, resolve_schedules
 from hybridsim.engine.events.fatal_guards import is_only_fatal
-from hybridsim.engine.events.input_jumps import surfaces_jump
 from hybridsim.engine.events.monitor_sides import MonitorSides
-from hybridsim.engine.events.outcome import Outcome, Situation
-from hybridsim.engine.events.resolve import EventResolution
+from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.events.zeno.accumulation import NOBODY, Accumulation, Limit, accumulated
 from hybridsim.engine.events.zeno.hidden_bounces import bounces_of, last_bounces, limit_of_hidden
 from hybridsim.engine.events.zeno.limits import behind, closed_now, holds_several
@@ -31,7 +30,6 @@ from hybridsim.engine.run.located import (
     errors_when_due,
     located,
     located_backward,
-    with_evaluated,
     without_fatal,
 )
 from hybridsim.engine.run.notices import Notices
@@ -75,7 +73,6 @@ class ModeLoop:
         self.compiled_loop = compiled_loop or setup.compiled_loop()
         if self.compiled_loop is not None and has_known_times(system):
             self.compiled_loop.times_ahead = TimesAhead(system, self.timetable, self.end)
-        self._led = set(system.led)
         is_replaceable = task.successor is not None and method is not task.successor
         stiffness_monitor = self.headway if is_replaceable else None
         self.notices = Notices(
@@ -203,7 +200,7 @@ class ModeLoop:
                     at_target = at_target or found.is_met
                     if at_target and appointment is None:
                         found = without_fatal(self.system, found)
-                        found = found if self._is_event(found) else None
+                        found = found if found.is_event(self.system) else None
             finally:
                 self._store(segment)
                 self.notices.look()
@@ -341,11 +338,6 @@ class ModeLoop:
             self.adopted, outcome = target, self.outcome
             outcome.sides[:], outcome.orders[:], outcome.guard_floors[:] = 1, 0, 0.0
 
-    def _is_event(self, found: Located) -> bool:
-        """Return whether an event happens at the end of the run; changes of side at corners do not count."""
-        owners = set(self.system.owner[list(found.fired)].tolist())
-        return bool(owners - self._led) or bool(found.monitors.leads.any())
-
     def _segment_run(self) -> SegmentRun:
         system, outcome = self.system, self.outcome
         numbers = np.flatnonzero(system.active(outcome.z))
@@ -407,13 +399,15 @@ class ModeLoop:
             found = events_before_appointment(self.system, instant, found, schedules, self.forward)
             monitors, s_error = found.monitors, math.ulp(float(instant))
         # corners need no decision: at a scheduled instant they take their sides together with it
-        has_only_corners = appointment is not None and set(self.system.owner[list(found.fired)]) <= self._led
+        has_only_corners = appointment is not None and set(self.system.owner[list(found.fired)]) <= set(
+            self.system.led
+        )
         if has_only_corners:  # or no guard, if the located ones only touch zero
             error = np.maximum(error, found.at.x_error)
         fired = {} if has_only_corners else found.fired
         resets = self._resets_of_monitors(instant, found, fired, appointment, error, s_error)
         if fired or resets or appointment is None:
-            outcome = self._resolve_located(instant, found, fired, resets)
+            outcome = found.resolved(self.system, instant, self.forward, fired, resets)
             # surfaces held together within rounding, just before their crossings accumulate
             is_early = appointment is None and holds_several(self.system, outcome)
             limit = self.accumulation.expected(instant) if is_early else None
@@ -421,7 +415,7 @@ class ModeLoop:
             if stop is not None:
                 return stop
             if appointment is None:
-                outcome = self._apply_crossed(outcome, found.at.s, monitors)
+                outcome = apply_crossed(self.system, self.forward, outcome, found.at.s, monitors)
             if self._adopt(instant, outcome, x_minus, (), monitors, appointment is None):
                 return True
             x_minus, error = outcome.x, outcome.x_error
@@ -430,7 +424,7 @@ class ModeLoop:
                 self.timetable.mark_done(appointment)
             # located events come first, because they belong to the signals before the instant
             outcome = self._resolve_appointment(instant, self.outcome, x_minus, schedules, error, s_error)
-            outcome = self._apply_crossed(outcome, 0.0, monitors)
+            outcome = apply_crossed(self.system, self.forward, outcome, 0.0, monitors)
             return self._adopt(instant, outcome, x_minus, schedules, monitors)
         return self._accumulated(instant, found.at.x, arrival.fired)
 
@@ -452,7 +446,7 @@ class ModeLoop:
         if self.forward and (fired or appointment):
             if not acting:
                 return []
-            outcome = self._resolve_located(instant, found, fired, []) if fired else self.outcome
+            outcome = found.resolved(self.system, instant, self.forward, fired, []) if fired else self.outcome
             if appointment and not outcome.status:
                 x, error = (outcome.x, outcome.x_error) if fired else (found.at.x, error)
                 outcome = self._resolve_appointment(
@@ -460,31 +454,6 @@ class ModeLoop:
                 )
         firing = monitors.fire(outcome)
         return [("monitor", k) for k in firing if k in acting]
-
-    def _resolve_located(
-        self, instant: Instant, found: Located, fired: dict[int, int], resets: list[tuple[object, ...]]
-    ) -> Outcome:
-        """Resolve the located guards and the resets of monitors on a copy of the state."""
-        at = replace(found.at, x=found.at.x.copy(), z=found.at.z.copy())
-        if fired and not self.forward:
-            return cross_backward(self.system, at, tuple(fired))
-        scope = found.scope(self.system)
-        resolution = EventResolution(self.system, at, at.z.copy(), self.forward, scope, found.inputs)
-        resolution.jumped = found.inputs is not None and surfaces_jump(self.system, instant, at, True)
-        return resolution.run(fired, resets)
-
-    def _apply_crossed(self, outcome: Outcome, s: float, monitors: MonitorSides) -> Outcome:
-        """Apply the resets of monitors whose side was changed by an event or by another such reset."""
-        changes = list(outcome.changes)
-        while not outcome.status and self.forward and (due := monitors.fire(outcome, "reset")):
-            monitors.fire(outcome)
-            at = Situation(s, outcome.x.copy(), outcome.p, outcome.z.copy(), outcome.x_error, math.ulp(s))
-            resets = [("monitor", k) for k in due]
-            outcome = EventResolution(self.system, at, at.z.copy(), self.forward).run((), resets)
-            changes += outcome.changes
-            outcome.continuous = False
-        outcome.changes = changes
-        return outcome
 
     def _resolve_appointment(
         self,
@@ -495,22 +464,13 @@ class ModeLoop:
         error: np.ndarray,
         s_error: float = 0.0,
     ) -> Outcome:
-        """Resolve a scheduled event, with the values of the inputs after it.
-
-        before: the outcome that holds until then. s_error: error of the times of zeros located there. An event that was
-        resolved within two roundings of the instant has its zero there as well.
-        """
-        system, z, discrete = self.system, before.z, self.system.discrete(before.p)
+        """Resolve a scheduled event; an event resolved within two roundings of it has its zero there as well."""
         rounding = math.ulp(float(instant))
         if self.adopted is not None and abs(instant.minus(self.adopted)) <= 2.0 * rounding:
             s_error = max(s_error, rounding)
-        p = system.vector(instant, discrete, self.forward)
-        error = with_evaluated(system, before.p, x_minus, p, z, error)
-        at = Situation(0.0, x_minus.copy(), p, z.copy(), error, max(s_error, math.ulp(0.0)))
-        resets = [("schedule", k) for k in schedules]
-        resolution = EventResolution(system, at, z.copy(), self.forward)
-        resolution.jumped = surfaces_jump(system, instant, at, self.forward)
-        return resolution.run((), resets)
+        return resolve_schedules(
+            self.system, self.forward, instant, before, x_minus, schedules, error, s_error
+        )
 
     def _accumulated(self, instant: Instant, x_minus: np.ndarray, fired: tuple[int, ...]) -> bool:
         """Detect an accumulation of events; return whether the run ends there."""
@@ -559,7 +519,7 @@ class ModeLoop:
         self.accumulation.forget(tuple(ended))
         self.last_limits.update(dict.fromkeys(ended, limit.time))
         monitors = MonitorSides.of(self.system.model.monitors, before.monitor_sides)
-        found = self._apply_crossed(found, ahead, monitors)
+        found = apply_crossed(self.system, self.forward, found, ahead, monitors)
         instant = target if ahead == available else self.origin.plus(ahead)
         stop = self._adopt(instant, found, before.x, (), monitors)
         if stop or appointment is None or ahead < available:
@@ -592,7 +552,7 @@ class ModeLoop:
         recorder = Recorder(record, system, instant, x_minus, outcome.x)
         recorder.changes(outcome.changes)
         terminated = recorder.schedules(schedules)
-        ended = self._fired_monitors(recorder, outcome, monitors, is_last) if monitors else []
+        ended = recorder.fired(outcome, monitors, is_last) if monitors else []
         # a run that ends here needs no admissible modes after it
         is_end = self.forward and instant == self.end and not self.task.is_stepped
         is_over = is_end and is_only_fatal(system, outcome)
@@ -610,21 +570,3 @@ class ModeLoop:
             record.message = f"at t = {float(instant):.9g}: {held(system, outcome.z)}"
             return True
         return False
-
-    def _fired_monitors(
-        self, recorder: Recorder, outcome: Outcome, monitors: MonitorSides, is_last: bool
-    ) -> list[str]:
-        """Record the monitors that fire at an instant, and return those that end the run."""
-        is_last = is_last or bool(outcome.status)
-        if is_last:
-            monitors.fire(outcome)
-            monitors.restore_hidden_sides(outcome)
-        ended = []
-        for k, direction in sorted(monitors.fired.items()):
-            monitor = monitors.monitors[k]
-            if k in monitors.recorded or not (is_last or monitor.action == "reset"):
-                continue
-            monitors.recorded.add(k)
-            recorder.monitors([(monitor.name, direction)])
-            ended += [monitor.name] if monitor.action == "terminate" else []
-        return ended

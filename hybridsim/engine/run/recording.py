@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hybridsim.engine.events.outcome import Change
+from hybridsim.engine.events.monitor_sides import MonitorSides
+from hybridsim.engine.events.outcome import Change, Outcome
 from hybridsim.engine.events.zeno.accumulation import Accumulation
 from hybridsim.engine.record.segments import Occurrence
 from hybridsim.engine.record.trajectory import Trajectory
@@ -38,6 +39,25 @@ class Recorder:
         for schedule in declared:
             self._append("scheduled", schedule.name, 0)
         return [schedule.name for schedule in declared if schedule.terminate]
+
+    def fired(self, outcome: Outcome, monitors: MonitorSides, is_last: bool) -> list[str]:
+        """Record the monitors that fire at an instant, and return those that end the run.
+
+        is_last: nothing else follows at this instant. Otherwise only monitors whose resets were applied are recorded.
+        """
+        is_last = is_last or bool(outcome.status)
+        if is_last:
+            monitors.fire(outcome)
+            monitors.restore_hidden_sides(outcome)
+        ended = []
+        for k, direction in sorted(monitors.fired.items()):
+            monitor = monitors.monitors[k]
+            if k in monitors.recorded or not (is_last or monitor.action == "reset"):
+                continue
+            monitors.recorded.add(k)
+            self.monitors([(monitor.name, direction)])
+            ended += [monitor.name] if monitor.action == "terminate" else []
+        return ended
 
     def monitors(self, seen: Sequence[tuple[str, int]]) -> None:
         """Record the monitors that fired, with the direction in which each one crossed zero."""

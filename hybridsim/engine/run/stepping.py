@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
-from hybridsim.engine.native.rows import evaluate, evaluate_rows
+from hybridsim.engine.native.model_functions import evaluate, evaluate_rows
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.segments import Dense
 from hybridsim.engine.system.system import System

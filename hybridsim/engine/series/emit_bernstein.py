@@ -10,8 +10,8 @@ from functools import cache
 from typing import Any
 
 from hybridsim.engine.native.cache import model_folder
-from hybridsim.engine.native.kernels import compile_series
 from hybridsim.engine.native.llvm_text import Lines, function, number
+from hybridsim.engine.native.model_functions import compile_series
 
 LEADING = 4  # number of cases for the count of leading coefficients set to zero
 

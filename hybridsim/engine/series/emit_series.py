@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hybridsim.engine.native.llvm_text import DECLARATIONS, Lines, function
-from hybridsim.engine.native.simd_series import Powers
+from hybridsim.engine.native.simd.series import Powers
 from hybridsim.engine.series import interpreter
 from hybridsim.engine.series import operations as ops
 from hybridsim.engine.series.optimise import live_rows

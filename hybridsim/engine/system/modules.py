@@ -40,14 +40,14 @@ class Compiled:
 
     def lengths_to_compile(self) -> list[int]:
         """Return the source lengths of the functions that have no machine code yet."""
-        from hybridsim.engine.native.kernels import texts_to_compile
+        from hybridsim.engine.native.model_functions import texts_to_compile
 
         return [len(text) for text in texts_to_compile(self.module)]
 
     def address(self, name: str) -> Any:
         """Return the address of a compiled function by its name, such as flow or guards."""
         if name not in self._compiled:
-            from hybridsim.engine.native.kernels import compile_model_function
+            from hybridsim.engine.native.model_functions import compile_model_function
 
             # another thread may have been first; its code is in use and must be kept
             self._compiled.setdefault(name, compile_model_function(self.module, name))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.engine.native.kernels import Precompiled
-from hybridsim.engine.native.rows import evaluate, evaluate_rows
+from hybridsim.engine.native.model_functions import evaluate, evaluate_rows
 from hybridsim.engine.series.bounded import ORDER, run_series
 from hybridsim.engine.series.high_orders import high_rows
 from hybridsim.engine.series.layout import SIGNAL_SLOTS, Layout

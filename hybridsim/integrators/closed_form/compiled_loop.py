@@ -14,7 +14,7 @@ from hybridsim.engine.linear.closed_form_block import ClosedFormBlock
 from hybridsim.engine.linear.tables import LinearTables, tables_of
 from hybridsim.engine.linear.units import horizon_class
 from hybridsim.engine.native.constants import BOUND_TERMS
-from hybridsim.engine.native.simd_products import vector_of
+from hybridsim.engine.native.simd.products import vector_of
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.record.array_forms import check_modes
 from hybridsim.engine.record.checkpoint import damaged

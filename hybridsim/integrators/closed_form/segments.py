@@ -35,7 +35,7 @@ from hybridsim.engine.linear.motion import (
 from hybridsim.engine.native.constants import BOUND_TERMS
 from hybridsim.engine.native.kernels import call, call_noinline, inline_always, inlined
 from hybridsim.engine.native.loop_hints import index, put
-from hybridsim.engine.native.simd_products import dot
+from hybridsim.engine.native.simd.products import dot
 from hybridsim.engine.roots.first_exit import FOUND, OPEN
 from hybridsim.engine.run.event_loop import (
     FOLLOWED,

@@ -17,7 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.native.kernels import ENABLED, compile_model_function, compile_series
+from hybridsim.engine.native.kernels import ENABLED
+from hybridsim.engine.native.model_functions import compile_model_function, compile_series
 from hybridsim.engine.system.modules import module_of
 from hybridsim.expr.python_tree import python_tree
 

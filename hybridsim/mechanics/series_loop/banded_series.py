@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from hybridsim.engine.native.kernels import inlined, kernel
-from hybridsim.engine.native.simd_vectors import (
+from hybridsim.engine.native.simd.vectors import (
     WIDTH,
     choose,
     larger,

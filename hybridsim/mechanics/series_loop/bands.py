@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.native.simd_vectors import WIDTH
+from hybridsim.engine.native.simd.vectors import WIDTH
 
 # rows: w; M^-1 w; 1/(w M^-1 w); base; acceleration; constants of laws
 WEIGHT, MOBILITY, HOLDING, BASE, STILL, VALUES = range(6)

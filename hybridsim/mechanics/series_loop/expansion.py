@@ -11,7 +11,7 @@ import math
 from typing import Any
 
 from hybridsim.engine.native.kernels import call_kernel, inlined, kernel
-from hybridsim.engine.native.simd_vectors import WIDTH, whole_vectors
+from hybridsim.engine.native.simd.vectors import WIDTH, whole_vectors
 from hybridsim.mechanics.arrays import AT, CONS, COUNT, DOFS, EXPAND, FIRST, ORDER, STICK
 from hybridsim.mechanics.polynomials import shift, state_at
 from hybridsim.mechanics.series_loop.banded_series import clear_beside, expand_run

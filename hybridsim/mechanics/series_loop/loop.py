@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 from hybridsim.engine.native.kernels import kernel
-from hybridsim.engine.native.simd_vectors import WIDTH, load, store
+from hybridsim.engine.native.simd.vectors import WIDTH, load, store
 from hybridsim.engine.system.instant import phase_of, two_sum
 from hybridsim.mechanics.arrays import CASCADE, DONE, FULL, LOST, OPEN_END
 from hybridsim.mechanics.polynomials import shift, states_at

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_array
 
+from hybridsim.engine.native.compiler import seconds_compiling
 from hybridsim.engine.native.constants import TIGHTEST
-from hybridsim.engine.native.kernels import ENABLED, call_kernel, kernel, kernel_address, seconds_compiling
-from hybridsim.engine.native.simd_vectors import WIDTH, padded_rows
+from hybridsim.engine.native.kernels import ENABLED, call_kernel, kernel, kernel_address
+from hybridsim.engine.native.simd.vectors import WIDTH, padded_rows
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.limits import UNLIMITED, LimitMonitor, LimitReached, Limits

@@ -11,7 +11,7 @@ import math
 from typing import Any
 
 from hybridsim.engine.native.kernels import inlined, kernel
-from hybridsim.engine.native.simd_vectors import WIDTH, load, splat, store
+from hybridsim.engine.native.simd.vectors import WIDTH, load, splat, store
 from hybridsim.engine.series import operations as ops
 from hybridsim.engine.series.optimise import PAIRED
 

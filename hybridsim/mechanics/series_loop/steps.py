@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from hybridsim.engine.native.kernels import call_kernel, inlined, kernel
-from hybridsim.engine.native.simd_vectors import (
+from hybridsim.engine.native.simd.vectors import (
     WIDTH,
     choose,
     larger,

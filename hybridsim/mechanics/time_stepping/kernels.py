@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybridsim.engine.native.kernels import inlined, kernel
-from hybridsim.engine.native.simd_vectors import WIDTH, whole_vectors
+from hybridsim.engine.native.simd.vectors import WIDTH, whole_vectors
 from hybridsim.mechanics.series_loop.simd_series import advance_simd_series, clear_constants, lane_place
 
 HOLDS, ABOVE, BELOW = (

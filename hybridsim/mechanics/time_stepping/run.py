@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybridsim.engine.native.kernels import seconds_compiling
-from hybridsim.engine.native.simd_vectors import WIDTH, padded_rows
+from hybridsim.engine.native.compiler import seconds_compiling
+from hybridsim.engine.native.simd.vectors import WIDTH, padded_rows
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.limits import UNLIMITED, LimitMonitor, LimitReached, Limits

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from hybridsim.engine.events.due_changes import situation_when_due
 from hybridsim.engine.events.input_jumps import surfaces_jump
 from hybridsim.engine.events.monitor_sides import MonitorSides
 from hybridsim.engine.events.outcome import Situation
-from hybridsim.engine.native.rows import evaluate_rows
+from hybridsim.engine.native.model_functions import evaluate_rows
 from hybridsim.engine.run.appointment_events import events_before_appointment
-from hybridsim.engine.run.located import Located, with_evaluated
+from hybridsim.engine.run.located import Located
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.integrators.contract import Integrator
 from hybridsim.solution.explain.one_instant import LOCATED
@@ -165,9 +166,7 @@ class _Instant:
         z = segment.z if stage is None else stage.outcome.z
         before = segment.p if stage is None else stage.outcome.p
         error = situation(system, segment, []).x_error
-        p = system.vector(self.instant, system.discrete(before), self.task.forward)
-        error = with_evaluated(system, before, x, p, z, error)
-        at = Situation(0.0, x.copy(), p, z.copy(), error, math.ulp(0.0))
+        at = situation_when_due(system, self.task.forward, self.instant, before, x, z, error)
         found = self._settled(self._nothing(at), (), self.schedules, begins=True)
         crossed = self.crossed(found)
         return [found] if crossed is None else [found, crossed]

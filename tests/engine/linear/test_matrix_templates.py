@@ -11,7 +11,7 @@ import hybridsim as hs
 from hybridsim.engine.linear.matrix_template import templates_of
 from hybridsim.engine.linear.modes import what_is_not_linear
 from hybridsim.engine.linear.tables import linear_tables
-from hybridsim.engine.native.simd_products import rows_of
+from hybridsim.engine.native.simd.products import rows_of
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
 

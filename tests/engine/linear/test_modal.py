@@ -15,7 +15,7 @@ from hybridsim.engine.linear.modal import Modal, modal
 from hybridsim.engine.linear.motion import moved, states_of, to_modal
 from hybridsim.engine.linear.tables import LinearTables, no_tables
 from hybridsim.engine.native.kernels import kernel
-from hybridsim.engine.native.simd_products import filled_up, row_blocks_of, vector_of
+from hybridsim.engine.native.simd.products import filled_up, row_blocks_of, vector_of
 from hybridsim.engine.native.struct_pack import packed
 
 UNIT = 2.0**-53

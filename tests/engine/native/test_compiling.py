@@ -10,14 +10,14 @@ import numba
 import numpy as np
 import pytest
 
-from hybridsim.engine.native import kernel_cache, kernels
+from hybridsim.engine.native import compiler, kernel_cache, kernels
 
 pytestmark = pytest.mark.skipif(not kernels.ENABLED, reason="nothing is compiled")
 
 
 def settings() -> tuple[Any, Any]:
     """Level of LLVM's passes, and the machine whose costs they go by."""
-    found = kernels._settings()
+    found = compiler._settings()
     assert None not in found  # this version of numba tells both
     return found
 
@@ -52,13 +52,13 @@ def test_a_kernel_has_settings_of_its_own(
 ) -> None:
     monkeypatch.setattr(kernel_cache, "kernel_folder", lambda: tmp_path)  # where nothing is kept yet
     before = settings()
-    assert kernels._ours() != before
-    assert kernels.kernel_address(one, np.zeros(1)) and set(met) == {kernels._ours()}
+    assert compiler._ours() != before
+    assert kernels.kernel_address(one, np.zeros(1)) and set(met) == {compiler._ours()}
     assert settings() == before
     met.clear()
     kernel = numba.njit(lambda given: 2)
     kernel.py_func.__module__ = "hybridsim.engine.of_a_test"  # ours are known by it
-    assert kernel(np.zeros(1)) == 2 and set(met) == {kernels._ours()}
+    assert kernel(np.zeros(1)) == 2 and set(met) == {compiler._ours()}
     assert settings() == before
     met.clear()
     assert numba.njit(lambda given: 3)(np.zeros(1)) == 3 and set(met) == {before}

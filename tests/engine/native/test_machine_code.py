@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hybridsim.engine.native import kernels
+from hybridsim.engine.native import kernels, model_functions
 from hybridsim.engine.native.kernels import ENABLED
 
 pytestmark = pytest.mark.skipif(not ENABLED, reason="the compiler is switched off")
@@ -62,7 +62,7 @@ def _through(address: int, t: float, x: np.ndarray, p: np.ndarray, z: np.ndarray
 def test_every_operation_to_the_last_bit(tmp_path: Path) -> None:
     lines = [f"    out[{i}] = {e}" for i, e in enumerate(EXPRESSIONS)]
     made = module("\n".join(["def f(t, x, p, z, out):", *lines, "    return 0"]), tmp_path, "every")
-    address, _alive = kernels.compile_model_function(made, "f")
+    address, _alive = model_functions.compile_model_function(made, "f")
     for x in POINTS:
         for z in (0, 1):
             expected = [0.0] * len(EXPRESSIONS)
@@ -87,21 +87,21 @@ def test_branches_on_modes(tmp_path: Path) -> None:
         b = 1.0
     out[0] = a + b
     return 0"""
-    address, _alive = kernels.compile_model_function(module(text, tmp_path, "branches"), "f")
+    address, _alive = model_functions.compile_model_function(module(text, tmp_path, "branches"), "f")
     assert [called(address, 0.0, (3.0,), (), z, 1)[0] for z in (0, 1, 2)] == [9.0, -6.0, 1.0]
 
 
 def test_what_has_no_value_is_nan_or_infinite(tmp_path: Path) -> None:
     text = "def f(t, x, p, z, out):\n    out[0] = 1.0/x[0]\n    out[1] = log(-1.0 - x[0])\n    return 0"
-    address, _alive = kernels.compile_model_function(module(text, tmp_path, "none"), "f")
+    address, _alive = model_functions.compile_model_function(module(text, tmp_path, "none"), "f")
     got = called(address, 0.0, (0.0,), (), 0, 2)
     assert got[0] == math.inf and math.isnan(got[1])
 
 
 def test_a_damaged_file_is_compiled_anew(tmp_path: Path) -> None:
     made = module("def f(t, x, p, z, out):\n    out[0] = x[0] + 1.0\n    return 0", tmp_path, "damaged")
-    kernels.compile_model_function(made, "f")
+    model_functions.compile_model_function(made, "f")
     (kept,) = tmp_path.glob("damaged.f.*.o")
     kept.write_bytes(kept.read_bytes()[:100])
-    address, _alive = kernels.compile_model_function(made, "f")
+    address, _alive = model_functions.compile_model_function(made, "f")
     assert called(address, 0.0, (1.0,), (), 0, 1)[0] == 2.0

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.native.kernels import as_compiled
+from hybridsim.engine.native.model_functions import as_compiled
 
 
 def held(t: float, x: Any, p: Any, z: Any, out: Any) -> int:

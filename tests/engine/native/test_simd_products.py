@@ -9,7 +9,7 @@ import pytest
 from engine.uncompiled import uncompiled
 
 from hybridsim.engine.native.kernels import kernel
-from hybridsim.engine.native.simd_products import (
+from hybridsim.engine.native.simd.products import (
     dot,
     filled_up,
     product,

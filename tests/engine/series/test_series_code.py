@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 import hybridsim as hs
-from hybridsim.engine.native.kernels import ENABLED, call_series, compile_series, kernel
+from hybridsim.engine.native.kernels import ENABLED, call_series, kernel
+from hybridsim.engine.native.model_functions import compile_series
 from hybridsim.engine.roots.defect_check import ahead_size, look_ahead
 from hybridsim.engine.roots.dense_guards import guards_at, series_along
 from hybridsim.engine.roots.first_exit import to_bernstein

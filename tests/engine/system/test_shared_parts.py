@@ -35,7 +35,7 @@ def test_code_that_a_thread_runs_is_not_let_go_by_another(monkeypatch: pytest.Mo
     compile_function = interrupted_once(
         lambda module, name: (object(), name), lambda: overtaking.append(code.address("flow"))
     )
-    monkeypatch.setattr("hybridsim.engine.native.kernels.compile_model_function", compile_function)
+    monkeypatch.setattr("hybridsim.engine.native.model_functions.compile_model_function", compile_function)
     late = code.address("flow")
     assert overtaking == [late] == [code._compiled["flow"][0]]
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from hybridsim.engine.events.choice.verdict import NO_SIDE
 from hybridsim.engine.native.kernels import ENABLED, inline_always, inlined
-from hybridsim.engine.native.simd_products import vector_of
+from hybridsim.engine.native.simd.products import vector_of
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.bounded import ORDER
 from hybridsim.engine.system.per_structure import per_structure

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.native.kernels import ENABLED, compile_series, is_stored
+from hybridsim.engine.native.kernels import ENABLED
 from hybridsim.engine.native.llvm_text import TooLong
+from hybridsim.engine.native.model_functions import compile_series, is_stored
 from hybridsim.engine.series.emit_bounds import ConstantSources
 from hybridsim.engine.series.emit_series import ModeTape
 from hybridsim.engine.series.operations import EXP, LESS, MUL, SELECT, SINHCOSH, SQRT, TANGENT

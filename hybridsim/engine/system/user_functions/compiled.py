@@ -14,7 +14,7 @@ import numpy as np
 from numba import NumbaError, literal_unroll, types
 from numba.extending import intrinsic, overload
 
-from hybridsim.engine.native.kernels import SIGNATURE
+from hybridsim.engine.native.model_functions import SIGNATURE
 from hybridsim.engine.system.user_functions.forms import Failures, Parts, Scalar, number, rates
 from hybridsim.engine.system.user_functions.helpers import compiled_with_helpers
 from hybridsim.expr import function_name

@@ -1,0 +1,1 @@
+"""This folder computes with vectors of several numbers at once; start with `vectors`."""
