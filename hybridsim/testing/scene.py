@@ -130,3 +130,8 @@ class Scene:
         unknown = set(self.needs) - set(VOCABULARY)
         if unknown:
             raise ValueError(f"scene {self.name} needs {sorted(unknown)}, which are unknown capabilities")
+
+
+def named(name: str, span: tuple[float, float], truth: Truth, *rest: Any, **more: Any) -> Scene:
+    """Return a scene with the name of its model file; the other arguments are those of `Scene`."""
+    return Scene(name, name, span, truth, *rest, **more)

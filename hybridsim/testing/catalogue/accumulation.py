@@ -7,7 +7,7 @@ from typing import Any
 
 from hybridsim.testing.checks import at_times, equals
 from hybridsim.testing.facts import CASES
-from hybridsim.testing.scene import Scene, Truth, needs
+from hybridsim.testing.scene import Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
@@ -37,8 +37,7 @@ def _twisting() -> Scene:
         )
 
     states = ((1.0, (0.5, -1.0)), (first, (-1 / 3, 0.0)), (second, (1 / 9, 0.0)))
-    return Scene(
-        "twisting",
+    return named(
         "twisting",
         (0.0, 5.0),
         Truth(None, states, checks=(("", rests), ("located", begins))),
@@ -72,14 +71,7 @@ def _tanks() -> tuple[Scene, ...]:
 
     common: dict[str, Any] = {"unit": 4.0, "tol_t": 1e-9, "tol_x": 1e-9}
     return (
-        Scene(
-            "water-tanks",
-            "water-tanks",
-            (0.0, 4.4),
-            Truth(tuple(events), tuple(states)),
-            needs("transitions"),
-            **common,
-        ),
+        named("water-tanks", (0.0, 4.4), Truth(tuple(events), tuple(states)), needs("transitions"), **common),
         Scene(
             "water-tanks-endless",
             "water-tanks",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from hybridsim.testing.checks import at_times, equals, says
-from hybridsim.testing.scene import END, Scene, Truth, needs
+from hybridsim.testing.scene import END, Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
@@ -41,15 +41,13 @@ def scenes() -> tuple[Scene, ...]:
             needs("transitions"),
             tol_t=1e-12,
         ),
-        Scene(
-            "past-the-guard",
+        named(
             "past-the-guard",
             (0.0, 1.0),
             Truth(((0.0, "mode:rest"),), ((1.0, (1.0, 0.0)),), checks=(("", equals(1.0, h=1.0, w=0.0)),)),
             needs("transitions"),
         ),
-        Scene(
-            "flat-guard",
+        named(
             "flat-guard",
             (0.0, 2.0),
             Truth(None, ((0.5, (0.0,)), (2.0, (-1.0,))), checks=(("", left_once),)),

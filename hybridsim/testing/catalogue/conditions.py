@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from hybridsim.testing.scene import Scene, Truth, needs
+from hybridsim.testing.scene import Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
@@ -15,19 +15,19 @@ def scenes() -> tuple[Scene, ...]:
 def _pulses() -> Scene:
     """Return the scene of pulses in a rate; the solution is the sum of their widths times their heights."""
     states = ((20.0, (0.0, 0.0, 0.0, 20.0, -10.0)), (100.0, (1000.0, 40.0, 10.0, 50.0, -80.0)))
-    return Scene("conditions", "conditions", (0.0, 100.0), Truth((), states), unit=10.0)
+    return named("conditions", (0.0, 100.0), Truth((), states), unit=10.0)
 
 
 def _region() -> Scene:
     """Return the scene of a condition on x = t - 1, y = t - 2 and x + y, which holds from t = 2 to 5.5."""
     states = ((4.0, (3.0, 2.0, 2.0, 2.0)), (10.0, (9.0, 8.0, 3.5, 6.5)))
-    return Scene("region", "region", (0.0, 10.0), Truth(None, states), needs("sliding"))
+    return named("region", (0.0, 10.0), Truth(None, states), needs("sliding"))
 
 
 def _held_in_part() -> Scene:
     """Return the scene of a state x that reaches zero at t = 3, stays there until t = 5, and then grows."""
     states = ((2.0, (-1.0, 1.0)), (4.0, (0.0, 1.0)), (5.0, (0.0, 0.0)), (10.0, (5.0, -5.0)))
-    return Scene("held-in-part", "held-in-part", (0.0, 10.0), Truth(None, states), needs("sliding"))
+    return named("held-in-part", (0.0, 10.0), Truth(None, states), needs("sliding"))
 
 
 def _load() -> Scene:
@@ -41,14 +41,7 @@ def _load() -> Scene:
         (5.0, (2 - amplitude, 0.0)),
     )
     truth = Truth(((stop, "f:stick"),), states)
-    return Scene(
-        "stepped-load",
-        "stepped-load",
-        (0.0, 5.0),
-        truth,
-        needs("contacts", "scheduled", "exact-stick"),
-        speed=3.0,
-    )
+    return named("stepped-load", (0.0, 5.0), truth, needs("contacts", "scheduled", "exact-stick"), speed=3.0)
 
 
 def _belt() -> Scene:
@@ -56,18 +49,12 @@ def _belt() -> Scene:
     events = ((1.0, "f:slip-"), (3.0, "f:stick"), (8.0, "f:slip+"), (10.0, "f:stick"))
     states = ((2.0, (0.5,)), (5.0, (1.0,)), (9.0, (0.5,)), (12.0, (0.0,)))
     truth = Truth(events, states)
-    return Scene(
-        "stepped-belt", "stepped-belt", (0.0, 12.0), truth, needs("contacts", "scheduled", "exact-stick")
-    )
+    return named("stepped-belt", (0.0, 12.0), truth, needs("contacts", "scheduled", "exact-stick"))
 
 
 def _guards() -> Scene:
     """Return the scene of a tank whose guards jump, at the border of a condition or at a known time."""
     states = ((3.0, (2.0, 0.0)), (6.0, (5.0, 3.0)), (10.0, (9.0, -1.0)))
-    return Scene(
-        "stepped-guard",
-        "stepped-guard",
-        (0.0, 10.0),
-        Truth(None, states),
-        needs("sliding", "transitions", "scheduled"),
+    return named(
+        "stepped-guard", (0.0, 10.0), Truth(None, states), needs("sliding", "transitions", "scheduled")
     )

@@ -7,7 +7,7 @@ from typing import Any
 
 from hybridsim.testing.checks import exact_stick
 from hybridsim.testing.facts import CASES, recomputed
-from hybridsim.testing.scene import Scene, Truth, needs
+from hybridsim.testing.scene import Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
@@ -68,8 +68,7 @@ def tied() -> Scene:
         return x, own * (v0 * c - x0 * s) + 4 * forced * math.cos(4 * t)
 
     states = tuple((t, (0.0, 0.0, *after(t))) for t in (0.15, 0.2))
-    return Scene(
-        "tied-limits",
+    return named(
         "tied-limits",
         (0.0, 0.2),
         Truth(((release, "b:slip+"),), states),
@@ -83,8 +82,7 @@ def turning_belt() -> Scene:
     """Return the scene of a belt whose speed jumps, so that the body slips."""
     turns = ["f:stick", "f:slip+", "f:slip-"]
     states = ((0.5, (0.5,)), (1.5, (1.0,)), (3.25, (-0.5,)), (4.5, (0.25,)))
-    return Scene(
-        "turning-belt",
+    return named(
         "turning-belt",
         (0.0, 5.0),
         Truth(None, states, checks=(("", sequence(turns)),)),

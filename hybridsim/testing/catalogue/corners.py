@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from hybridsim.testing.facts import TRUTHS
-from hybridsim.testing.scene import Scene, Truth, needs
+from hybridsim.testing.scene import Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
@@ -24,7 +24,7 @@ def _bilinear() -> Scene:
         (4 * period + quarter + 0.75 * math.pi, (-2 * root, 2 * root)),
         (6 * period, (1.0, 0.0)),
     )
-    return Scene("bilinear", "bilinear", (0.0, 6 * period), Truth((), states), unit=period, speed=2.0)
+    return named("bilinear", (0.0, 6 * period), Truth((), states), unit=period, speed=2.0)
 
 
 def _backlash() -> Scene:
@@ -37,7 +37,7 @@ def _backlash() -> Scene:
         (3 + half + half / 2, (-1.5, 0.0)),
         (5 * (4 + 2 * half), (0.0, 1.0)),
     )
-    return Scene("backlash", "backlash", (0.0, 5 * (4 + 2 * half)), Truth((), states), unit=7.0, speed=1.0)
+    return named("backlash", (0.0, 5 * (4 + 2 * half)), Truth((), states), unit=7.0, speed=1.0)
 
 
 def _saturation() -> Scene:
@@ -51,9 +51,7 @@ def _saturation() -> Scene:
         (math.pi, (top + rise,)),
         (6 * math.pi, (0.0,)),
     )
-    return Scene(
-        "saturation", "saturation", (0.0, 6 * math.pi), Truth((), states), unit=2 * math.pi, speed=3.0
-    )
+    return named("saturation", (0.0, 6 * math.pi), Truth((), states), unit=2 * math.pi, speed=3.0)
 
 
 def _drag() -> Scene:
@@ -68,35 +66,23 @@ def _drag() -> Scene:
         (top + 0.5, (-terminal * math.tanh(rate * 0.5),)),
         (top + 2.0, (-terminal * math.tanh(rate * 2.0),)),
     )
-    return Scene("drag", "drag", (0.0, top + 2.0), Truth((), states), unit=1.0, speed=6.0)
+    return named("drag", (0.0, top + 2.0), Truth((), states), unit=1.0, speed=6.0)
 
 
 def _hinge() -> Scene:
     states = tuple((t, (math.exp(-t), -math.exp(t), 0.0)) for t in (0.5, 2.0, 5.0))
-    return Scene("hinge", "hinge", (0.0, 5.0), Truth((), states), speed=100.0)
+    return named("hinge", (0.0, 5.0), Truth((), states), speed=100.0)
 
 
 def _elastogap() -> Scene:
     """Return the scene of the motion MSL-elastogap, declared with corners instead of modes."""
     states = tuple((row[0], tuple(row[1:])) for row in TRUTHS["MSL-elastogap"]["states"])
-    return Scene(
-        "elastogap-clipped",
-        "elastogap-clipped",
-        (0.0, 5.0),
-        Truth((), states),
-        unit=2.0,
-        speed=3.0,
-        tol_x=1e-7,
-    )
+    return named("elastogap-clipped", (0.0, 5.0), Truth((), states), unit=2.0, speed=3.0, tol_x=1e-7)
 
 
 def _sizes() -> Scene:
     """Return the scene of nested absolute values with known zeros: x = 1.06, y = -0.86 and z = -1.75."""
     events = ((0.04, "second:off"), (0.16, "first:off"), (0.25, "third:off"))
-    return Scene(
-        "sizes-of-sizes",
-        "sizes-of-sizes",
-        (0.0, 1.0),
-        Truth(events, ((1.0, (1.9, 0.1, -1.0)),)),
-        needs("transitions"),
+    return named(
+        "sizes-of-sizes", (0.0, 1.0), Truth(events, ((1.0, (1.9, 0.1, -1.0)),)), needs("transitions")
     )

@@ -7,7 +7,7 @@ from typing import Any
 
 from hybridsim.testing.checks import at_times, equals
 from hybridsim.testing.facts import CASES, recomputed
-from hybridsim.testing.scene import END, Scene, Truth, needs
+from hybridsim.testing.scene import END, Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
@@ -131,13 +131,8 @@ def monitored() -> tuple[Scene, ...]:
             needs("monitors", "multiple-roots"),
             **exact,
         ),
-        Scene(
-            "cubic-modes",
-            "cubic-modes",
-            (-8.0, 4.0),
-            Truth(sides, values),
-            needs("transitions", "multiple-roots"),
-            **exact,
+        named(
+            "cubic-modes", (-8.0, 4.0), Truth(sides, values), needs("transitions", "multiple-roots"), **exact
         ),
         Scene(
             "double-root",
@@ -194,8 +189,7 @@ def monitored() -> tuple[Scene, ...]:
             tol_t=1e-12,
             floor=1e-13,
         ),
-        Scene(
-            "order-modes",
+        named(
             "order-modes",
             (0.0, 10.0),
             Truth(((0.5, "mode:early"),), ((10.0, (10.0,)),)),
@@ -221,8 +215,7 @@ def monitored() -> tuple[Scene, ...]:
             needs("monitors"),
             start={"x": 1.0},
         ),
-        Scene(
-            "last-moment",
+        named(
             "last-moment",
             (0.0, 1.0),
             Truth(((1.0, "mode:after"),), ((1.0, (5.0,)),), checks=(("", equals(1.0, x=5.0)),)),

@@ -7,7 +7,7 @@ from typing import Any
 
 from hybridsim.testing.checks import at_times, equals
 from hybridsim.testing.facts import TRUTHS
-from hybridsim.testing.scene import END, Scene, Truth, needs
+from hybridsim.testing.scene import END, Scene, Truth, named, needs
 
 G, E, H0 = 10.0, 0.5, 1.25  # of bounce.toml and bar.toml: a fall of half a second, and 5 m/s at its end
 FALL = math.sqrt(2 * H0 / G)
@@ -66,8 +66,7 @@ def _bounce() -> Scene:
     """Return the scene of a ball that bounces from t = 0.5 on, and comes to rest at t = 1.5."""
     states = (*((t, _height(t)) for t in (0.3, 0.8, 1.1, 1.3)), (END, (0.0, 0.0)))
     checks = (("", closes("p")), ("located", rests("p")), ("", equals(2.0, h=0.0, w=0.0)))
-    return Scene(
-        "bounce",
+    return named(
         "bounce",
         (0.0, 2.0),
         Truth(None, states, checks=checks),
@@ -103,8 +102,7 @@ def _table() -> Scene:
     end = 0.25  # a rest and a throw; later periods are the same
     states = tuple((float(row[0]), tuple(row[1:])) for row in truth["states"] if row[0] < end)
     period = math.pi / 20
-    return Scene(
-        "vibrating-table",
+    return named(
         "vibrating-table",
         (0.0, end),
         Truth(None, states),

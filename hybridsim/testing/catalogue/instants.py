@@ -7,7 +7,7 @@ from itertools import pairwise
 from typing import Any
 
 from hybridsim.testing.checks import at_times, equals
-from hybridsim.testing.scene import Scene, Truth, needs
+from hybridsim.testing.scene import Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
@@ -136,8 +136,7 @@ def _copied() -> Scene:
         copies = (0.7 - since, 1.4 - since, -since) if since >= 0.0 else (-t, -t, -t)
         return (10.0 - 11.3 * math.cos(phase), 11.3 * math.sqrt(3.0) * math.sin(phase), *copies)
 
-    return Scene(
-        "copied-value",
+    return named(
         "copied-value",
         (0.0, end),
         Truth(((at, "s:after"),), tuple((t, state(t)) for t in (0.2, 0.6, end))),
@@ -149,8 +148,7 @@ def _copied() -> Scene:
 def _successive_zeros() -> Scene:
     """Return the scene of three successive modes, each with a guard that is zero at t = 0.87/0.7."""
     at = 0.87 / 0.7
-    return Scene(
-        "chain-of-zeros",
+    return named(
         "chain-of-zeros",
         (0.0, 3.0),
         Truth(

@@ -7,7 +7,7 @@ import math
 from scipy.optimize import brentq
 
 from hybridsim.testing.checks import no_transition, says
-from hybridsim.testing.scene import END, Scene, Truth, needs
+from hybridsim.testing.scene import END, Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
@@ -38,8 +38,7 @@ def _floor() -> Scene:
     lasts = float(brentq(depth, 0.9 * math.pi / own, 1.3 * math.pi / own, xtol=1e-15))
     left = end - start - lasts
     state = (down * left - g * left**2 / 2, down - g * left, 3.0 - mu * (2 * down + g * lasts))
-    return Scene(
-        "elastic-floor",
+    return named(
         "elastic-floor",
         (0.0, end),
         Truth(None, ((END, state),), checks=(("located", no_transition),)),
@@ -51,8 +50,7 @@ def _floor() -> Scene:
 
 def _touching() -> Scene:
     """Return the scene of a load that touches zero; the friction impulse is the area under the load."""
-    return Scene(
-        "touching-load",
+    return named(
         "touching-load",
         (0.0, 2.0),
         Truth(None, ((END, (1.0, 3.0 - 0.3 * 2.0)),), checks=(("located", no_transition),)),
@@ -63,8 +61,7 @@ def _touching() -> Scene:
 
 def _waves() -> Scene:
     """Return the scene of a triangular load that touches zero, with a known friction impulse."""
-    return Scene(
-        "load-of-waves",
+    return named(
         "load-of-waves",
         (0.0, 2.0),
         Truth(
@@ -79,8 +76,7 @@ def _waves() -> Scene:
 
 def _ending() -> Scene:
     """Return the scene of two loads that decrease to zero: one body slides on, the other starts to slide."""
-    return Scene(
-        "load-that-ends",
+    return named(
         "load-that-ends",
         (0.0, 3.0),
         Truth(
@@ -131,8 +127,7 @@ def _stop_off_zero() -> Scene:
     left = end - began
     v = math.cos(began) - math.cos(end) - 0.5 * left
     x = 0.5 + math.cos(began) * left - (math.sin(end) - math.sin(began)) - 0.25 * left**2
-    return Scene(
-        "stop-off-zero",
+    return named(
         "stop-off-zero",
         (0.0, end),
         Truth(((began, "p:open"),), ((END, (x, v)),)),
@@ -153,8 +148,7 @@ def _moving_floor() -> Scene:
 
     lands = float(brentq(gap, 0.1, again, xtol=1e-15))
     left = end - again
-    return Scene(
-        "moving-floor",
+    return named(
         "moving-floor",
         (0.0, end),
         Truth(
@@ -178,8 +172,7 @@ def _kinked_floors() -> Scene:
             return 0.0, 0.0, 0.0, 0.0
         return 0.75 * since - 5 * since**2, 0.75 - 10 * since, -5 * since**2, -10 * since
 
-    return Scene(
-        "kinked-floors",
+    return named(
         "kinked-floors",
         (0.0, end),
         Truth(((began, "p:open"), (began, "q:open")), tuple((t, state(t)) for t in (0.05, 0.12, end))),
@@ -199,8 +192,7 @@ def _own_speed() -> Scene:
             return (limit - 0.2) * math.exp(-0.48 * t) - limit
         return -0.85 - (2.0 - 0.48 * 0.85) * (t - reached)
 
-    return Scene(
-        "own-speed-in-load",
+    return named(
         "own-speed-in-load",
         (0.0, 1.0),
         Truth((), tuple((t, (speed(t),)) for t in (0.2, 0.6, 1.0))),

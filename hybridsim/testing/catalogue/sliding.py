@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from hybridsim.testing.checks import at_times, equals, says
 from hybridsim.testing.facts import CASES, TRUTHS
-from hybridsim.testing.scene import END, Check, Scene, Truth
+from hybridsim.testing.scene import END, Check, Scene, Truth, named
 
 NEEDS = frozenset({"sliding"})
 SLIDING = "sliding"
@@ -150,8 +150,7 @@ def _circle() -> Scene:
         return t, (math.exp(log_r) * math.cos(t), math.exp(log_r) * math.sin(t))
 
     states = (at(0.5, math.log(2) + 1 / 32 - 0.5), at(2.0, 0.0), at(4.0, 0.0), at(5.0, 1 / 8), at(6.0, 1 / 2))
-    return Scene(
-        "sliding-circle",
+    return named(
         "sliding-circle",
         (0.0, 6.0),
         Truth(((onto, "u:sliding"), (off, "u:above")), states, checks=(("", stays("u", "x 2", "y 2")),)),
@@ -166,8 +165,7 @@ def _decay() -> Scene:
     onto = math.sqrt(3) - 1
     states = [(0.5, (0.875, -0.5))]
     states += [(t, (onto * math.exp(onto - t), -onto * math.exp(onto - t))) for t in (1.0, 2.0, 5.0)]
-    return Scene(
-        "sliding-mode",
+    return named(
         "sliding-mode",
         (0.0, 5.0),
         Truth(((onto, "u:sliding"),), tuple(states), checks=(("", stays("u", "x 1", "v 1")),)),
@@ -188,8 +186,7 @@ def _rubbing_servo() -> Scene:
     onto = brentq(lambda t: place(t) - 1.0 + speed(t), 0.0, 1.0, xtol=1e-15)
     left = [(t, speed(onto) * math.exp(onto - t)) for t in (1.0, 5.0, 20.0, 40.0)]
     states = ((0.3, (place(0.3), speed(0.3))), *((t, (1.0 - v, v)) for t, v in left))
-    return Scene(
-        "rubbing-servo",
+    return named(
         "rubbing-servo",
         (0.0, 40.0),
         Truth(((onto, "u:sliding"),), states, checks=(("", stays("u", "x 1", "v 1", to_one=True)),)),
@@ -207,8 +204,7 @@ def _two_relays() -> Scene:
         return t**2 / 2 - 1.5 * t + 0.75
 
     states = ((0.1, (0.705, -0.2)), (0.4, (x(0.4), 0.0)), (1.0, (0.0, 0.0)), (2.5, (0.5, 0.0)))
-    return Scene(
-        "two-relays",
+    return named(
         "two-relays",
         (0.0, 2.5),
         Truth(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from hybridsim.testing.scene import Scene, Truth, needs
+from hybridsim.testing.scene import Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
@@ -26,8 +26,7 @@ def _walls() -> Scene:
         (8 + 4 * contact, (0.0, 1.0)),
         (10.0, (5 * contact, -1.0)),
     )
-    return Scene(
-        "stiff-walls",
+    return named(
         "stiff-walls",
         (0.0, 10.0),
         Truth(tuple(events), states),

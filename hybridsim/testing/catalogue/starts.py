@@ -7,7 +7,7 @@ from functools import partial
 from typing import Any
 
 from hybridsim.testing.checks import exact_stick
-from hybridsim.testing.scene import Scene, Truth, needs
+from hybridsim.testing.scene import Scene, Truth, named, needs
 
 _SUMS = (
     (-1.57, 0.265),
@@ -37,13 +37,7 @@ def _guards() -> Scene:
         (0.75, (0.25, -2.25, -1.75, 1.15, 0.75, -5.0)),
         (6.0, (-5.0, 3.0, -7.0, -0.1, 6.0, 5.0)),
     )
-    return Scene(
-        "sides-of-guards",
-        "sides-of-guards",
-        (0.0, 6.0),
-        Truth(events, states),
-        needs("transitions", "scheduled"),
-    )
+    return named("sides-of-guards", (0.0, 6.0), Truth(events, states), needs("transitions", "scheduled"))
 
 
 def _contacts() -> Scene:
@@ -53,8 +47,7 @@ def _contacts() -> Scene:
         (1.0, (-1.0, 0.0, -2.0, 0.0, 0.0, 0.0, -1.0, 0.5)),
         (3.0, (-1.0, 0.0, -2.0, 0.0, 0.0, 1.7, -1.0, 1.5)),
     )
-    return Scene(
-        "sides-of-contacts",
+    return named(
         "sides-of-contacts",
         (0.0, 3.0),
         Truth(events, states),
@@ -63,12 +56,8 @@ def _contacts() -> Scene:
 
 
 def _relay() -> Scene:
-    return Scene(
-        "sides-of-a-relay",
-        "sides-of-a-relay",
-        (0.0, 4.0),
-        Truth((), ((1.0, (0.0, -0.5)), (4.0, (0.0, 1.0)))),
-        needs("sliding"),
+    return named(
+        "sides-of-a-relay", (0.0, 4.0), Truth((), ((1.0, (0.0, -0.5)), (4.0, (0.0, 1.0)))), needs("sliding")
     )
 
 
@@ -77,12 +66,8 @@ def _gap() -> Scene:
     lifted = 0.5 + 2.0 + 1.0 / 3.0
     rise = 4.0 - lifted
     states = ((0.25, (0.0, 0.0, -0.75)), (2.5, (0.0, 0.0, 0.0)), (4.0, (0.5 * rise**3, 1.5 * rise**2, 1.5)))
-    return Scene(
-        "sides-of-a-gap",
-        "sides-of-a-gap",
-        (0.0, 4.0),
-        Truth(((lifted, "p:open"),), states),
-        needs("impacts", "scheduled"),
+    return named(
+        "sides-of-a-gap", (0.0, 4.0), Truth(((lifted, "p:open"),), states), needs("impacts", "scheduled")
     )
 
 
@@ -96,8 +81,7 @@ def _sampled() -> Scene:
         )
         for name, value in values.items()
     )
-    return Scene(
-        "sampled-start",
+    return named(
         "sampled-start",
         (0.0, 1.5),
         Truth(None, ((0.5, (2.875, -0.5, -0.45)), (1.25, (3.0 - 0.5 * 1.25**2, -1.25, -0.075))), read),
@@ -111,8 +95,7 @@ def _read(name: str, t: float, solution: Any) -> float:
 
 def _order() -> Scene:
     events = ((1.0, "few:second"), (1.0, "few:third"), (1.0, "more:second"), (1.0, "more:third"))
-    return Scene(
-        "order-of-guards",
+    return named(
         "order-of-guards",
         (0.0, 2.0),
         Truth(events, ((2.0, (-3.0, -3.4)),)),
@@ -123,8 +106,7 @@ def _order() -> Scene:
 
 def _flat() -> Scene:
     """Return the scene of a corner with zero slope on both sides; the solution is c = 9 + cos(t)."""
-    return Scene(
-        "flat-corner",
+    return named(
         "flat-corner",
         (0.0, 2.0),
         Truth(
@@ -137,8 +119,7 @@ def _flat() -> Scene:
 def _zeros() -> Scene:
     """Return the scene of states that start at zeros of their guards and change at rate one."""
     starts = tuple(a + b for a, b in _SUMS)
-    return Scene(
-        "starts-at-zeros",
+    return named(
         "starts-at-zeros",
         (0.0, 1.0),
         Truth((), tuple((t, tuple(start + t for start in starts)) for t in (0.5, 1.0))),
@@ -149,8 +130,7 @@ def _zeros() -> Scene:
 def _held() -> Scene:
     """Return the scene of three bodies that start at the speeds of their belts and stay in stick."""
     starts = {f"v{k}": a + b for k, (a, b) in enumerate(_SUMS[:3])}
-    return Scene(
-        "starts-at-belt-speeds",
+    return named(
         "starts-at-belt-speeds",
         (0.0, 1.0),
         Truth(

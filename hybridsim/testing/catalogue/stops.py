@@ -7,7 +7,7 @@ from typing import Any
 
 from hybridsim.testing.catalogue.impacts import closed, closes
 from hybridsim.testing.checks import at_times
-from hybridsim.testing.scene import END, Scene, Truth, needs
+from hybridsim.testing.scene import END, Scene, Truth, named, needs
 
 # of rubbing-stop.toml, mass 1: what drives the block in and what brakes it on its way out, less and plus its friction
 PUSH, LIMIT, E, START, RISE = 10.0, 2.0, 0.5, 1.0, 5.0
@@ -65,8 +65,7 @@ def _stop() -> Scene:
     times = (0.3, 0.6, 0.8, 1.0, 1.05, 2.0, 4.0, 5.2, 5.7)
     states = (*((t, _motion(t)) for t in times), (END, _motion(LAST)))
     checks = (("located", closes("p")), ("located", _rests), ("located", _pulled_off))
-    return Scene(
-        "rubbing-stop",
+    return named(
         "rubbing-stop",
         (0.0, LAST),
         Truth(None, states, checks=checks),

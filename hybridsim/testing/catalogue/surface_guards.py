@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from hybridsim.testing.checks import exact_stick
-from hybridsim.testing.scene import Scene, Truth, needs
+from hybridsim.testing.scene import Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
@@ -31,8 +31,7 @@ def _speeds() -> Scene:
         (2.0, (-0.5 * (2.0 - turn), 0.0, 2.0, (1.0 - back**2) / 2)),
     )
     checks = (("exact-stick", exact_stick("g", {"w": 0.0})),)
-    return Scene(
-        "guards-on-speeds",
+    return named(
         "guards-on-speeds",
         (0.0, 2.0),
         Truth(events, states, checks=checks),
@@ -50,8 +49,7 @@ def _gaps() -> Scene:
         (1.25, (0.1875, 0.5, 2 - 1.25**2, -2.5, 0.0)),
         (1.75, (0.1875, -0.5, 0.0, 0.0, 0.0)),
     )
-    return Scene(
-        "guards-on-gaps",
+    return named(
         "guards-on-gaps",
         (0.0, 1.75),
         Truth(((1.0, "p:open"), (rest, "q:closed")), states),

@@ -9,7 +9,7 @@ from typing import Any
 from hybridsim.testing.catalogue.oscillators import STUCK, at, closed_form, events, states
 from hybridsim.testing.checks import exact_stick, no_transition
 from hybridsim.testing.facts import recomputed
-from hybridsim.testing.scene import Scene, Truth, needs
+from hybridsim.testing.scene import Scene, Truth, named, needs
 
 STICK = needs("contacts", "exact-stick")
 
@@ -62,8 +62,7 @@ def _fading() -> Scene:
     """Return the scene of a stick limit that decreases to the force at t = 5, where slip begins."""
     samples = tuple((t, ((t - 5) ** 3 / 30, (t - 5) ** 2 / 10)) for t in (5.5, 7.0, 9.0))
     checks = (("exact-stick", exact_stick("f", {"v": 0.0}, rest=("x",))),)
-    return Scene(
-        "fading-load",
+    return named(
         "fading-load",
         (0.0, 9.0),
         Truth(((5.0, "f:slip+"),), ((3.0, (0.0, 0.0)), *samples), checks=checks),
