@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 
 from hybridsim.errors import UsageError
 from hybridsim.plot import style
-from hybridsim.plot.sweep_readings import label_parameter, positions
+from hybridsim.plot.sweep_readings import NO_COLOUR, draw_map
 
 if TYPE_CHECKING:
     from hybridsim.analysis import Advice
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 _NEAR, _FAR, _MARGIN = 30.0, 1e5, 2.0
 _TOP_LINE = -0.75  # above the first rung, in rungs
 _BESIDE = (1.03, 1.17)  # places of the columns of error and cost, in widths of the axes
-_NOTHING = "#d8d8d8"  # grey is not the colour of any rung
 # Distinguishable with every kind of colour vision: Okabe and Ito's palette, two of Tol's colours and dark grey.
 _COLOURS = {
     "at-rest": "#4d4d4d", "no-friction": "#56b4e9", "viscous": "#0072b2", "no-stop": "#009e73",
@@ -117,28 +116,14 @@ def _map(found: Advice, axes: Axes) -> None:
     numbers = np.full(region.status.shape, len(names), dtype=float)
     for k, name in enumerate(names):
         numbers[(region["simplest"] == name) & ~region.failed] = k
-    coordinates = []
-    up, across = region.axes
-    for dimension, parameter in enumerate((up, across)):
-        where = positions(region.axes[parameter])
-        order = np.argsort(where, kind="stable")
-        numbers = np.take(numbers, order, axis=dimension)
-        coordinates.append(where[order])
-    colours = ListedColormap([*(_COLOURS[name] for name in names), _NOTHING])
-    axes.pcolormesh(
-        coordinates[1], coordinates[0], numbers, cmap=colours, vmin=-0.5, vmax=len(names) + 0.5, shading="nearest",
-        rasterized=True,
-    )  # fmt: skip
-    label_parameter(axes.yaxis, region, up)
-    label_parameter(axes.xaxis, region, across)
-    axes.tick_params(color=style.GREY, labelsize=9)
-    axes.spines[:].set_color(style.GREY)
+    colours = ListedColormap([*(_COLOURS[name] for name in names), NO_COLOUR])
+    draw_map(axes, region, numbers, cmap=colours, vmin=-0.5, vmax=len(names) + 0.5)
     shown = [
         Patch(color=_COLOURS[name], label=style.literal(name))
         for k, name in enumerate(names)
         if (numbers == k).any()
     ]
     if (numbers == len(names)).any():
-        shown.append(Patch(color=_NOTHING, label="no answer"))
+        shown.append(Patch(color=NO_COLOUR, label="no answer"))
     axes.legend(handles=shown, fontsize=8, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False)
     style.head(axes, f"Simplest model for {found.quantity} within {found.tol:g}")

@@ -11,15 +11,14 @@ from matplotlib.axes import Axes
 from hybridsim.arguments import known_name
 from hybridsim.errors import UsageError
 from hybridsim.plot import style
-from hybridsim.plot.scale import label_axis
 from hybridsim.plot.sweep_readings import (
     NO_RESULT,
     chosen_names,
-    label_of,
     label_parameter,
+    label_result,
     numbers_of,
     positions,
-    range_of,
+    require_one_axes_each,
     setting,
     show_range,
     title_of,
@@ -61,10 +60,7 @@ def sweep_lines(
         figure = style.figure(_WIDTH, _HEIGHT * len(found) + _MORE)
         axes = tuple(figure.subplots(len(found), 1, sharex=True, squeeze=False)[:, 0])
         style.head(axes[0], title_of(result))
-    if len(axes) != len(found):
-        raise UsageError(
-            f"{len(axes)} axes were passed for {len(found)} results", remedy="use one axes per result"
-        )
+    require_one_axes_each(axes, found)
     others = [name for name in dimensions if name != across]
     for panel, name in zip(axes, found, strict=True):
         _draw(panel, result, name, across, others[0] if others else None, dimensions)
@@ -106,9 +102,7 @@ def _draw(
         )  # fmt: skip
         if other is None:
             panel.legend(handles=panel.lines[-1:], fontsize=8, frameon=False)
-    label = label_of(result, name)
-    title = label if " " in label else ""
-    label_axis(panel.yaxis, label, result.units.get(name, ""), *range_of(values), title=title)
+    label_result(panel.yaxis, result, name, values)
     show_range(panel.yaxis, values)
 
 

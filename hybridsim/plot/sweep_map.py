@@ -12,15 +12,14 @@ from matplotlib.patches import Patch
 
 from hybridsim.errors import UsageError
 from hybridsim.plot import style
-from hybridsim.plot.scale import label_axis
 from hybridsim.plot.sweep_readings import (
+    NO_COLOUR,
     NO_RESULT,
     chosen_names,
-    label_of,
-    label_parameter,
+    draw_map,
+    label_result,
     numbers_of,
-    positions,
-    range_of,
+    require_one_axes_each,
     title_of,
 )
 
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
 _COLUMNS = 3
 _WIDTH, _HEIGHT, _MORE = 4.6, 3.4, 0.5  # inches of a map with its colour bar, and of the title
 _BETWEEN = 0.12  # inches on each side, so that the label of a colour bar is not read as that of the next map
-_NOTHING = "#d8d8d8"  # not a colour of the scale
 
 
 def sweep_map(result: Sweep, *names: str, axes: tuple[Axes, ...] | None = None) -> tuple[Axes, ...]:
@@ -59,10 +57,7 @@ def sweep_map(result: Sweep, *names: str, axes: tuple[Axes, ...] | None = None) 
         for empty in panels[len(found) :]:
             empty.remove()
         axes = tuple(panels[: len(found)])
-    if len(axes) != len(found):
-        raise UsageError(
-            f"{len(axes)} axes were passed for {len(found)} results", remedy="use one axes per result"
-        )
+    require_one_axes_each(axes, found)
     for panel, name in zip(axes, found, strict=True):
         _draw(panel, result, name)
     return axes
@@ -70,31 +65,11 @@ def sweep_map(result: Sweep, *names: str, axes: tuple[Axes, ...] | None = None) 
 
 def _draw(panel: Axes, result: Sweep, name: str) -> None:
     values = numbers_of(result, name)
-    up, across = result.axes
-    coordinates = []
-    for dimension, parameter in enumerate((up, across)):
-        numbers = positions(result.axes[parameter])
-        order = np.argsort(numbers, kind="stable")
-        values = np.take(values, order, axis=dimension)
-        coordinates.append(numbers[order])
-    shades = matplotlib.colormaps["viridis"].with_extremes(bad=_NOTHING)
-    mesh = panel.pcolormesh(
-        coordinates[1],
-        coordinates[0],
-        np.ma.masked_invalid(values),
-        cmap=shades,
-        shading="nearest",
-        rasterized=True,
-    )
-    label_parameter(panel.yaxis, result, up)
-    label_parameter(panel.xaxis, result, across)
-    panel.tick_params(color=style.GREY, labelsize=9)
-    panel.spines[:].set_color(style.GREY)
+    shades = matplotlib.colormaps["viridis"].with_extremes(bad=NO_COLOUR)
+    mesh = draw_map(panel, result, np.ma.masked_invalid(values), cmap=shades)
     bar = panel.figure.colorbar(mesh, ax=panel, pad=0.02)
     bar.outline.set_visible(False)
     bar.ax.tick_params(color=style.GREY, labelsize=9)
-    label = label_of(result, name)
-    title = label if " " in label else ""
-    label_axis(bar.ax.yaxis, label, result.units.get(name, ""), *range_of(values), title=title)
+    label_result(bar.ax.yaxis, result, name, values)
     if not np.isfinite(values).all():
-        panel.legend(handles=[Patch(color=_NOTHING, label=NO_RESULT)], fontsize=8, loc="upper right")
+        panel.legend(handles=[Patch(color=NO_COLOUR, label=NO_RESULT)], fontsize=8, loc="upper right")

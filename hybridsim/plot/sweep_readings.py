@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.axis import Axis
+from matplotlib.collections import QuadMesh
 
 from hybridsim.errors import UsageError
+from hybridsim.plot import style
 from hybridsim.plot.scale import label_axis
 from hybridsim.plot.style import literal
 from hybridsim.plot.symbols import symbol_of, unit_text
@@ -25,6 +28,7 @@ _RATHER = (
     "dissipated",
 )  # preferred if not all can be drawn
 NO_RESULT = "no result"
+NO_COLOUR = "#d8d8d8"  # grey for points without a result, which no scale of colours contains
 
 
 def chosen_names(result: Sweep, names: Sequence[str], arrays: bool) -> tuple[str, ...]:
@@ -112,6 +116,38 @@ def label_parameter(axis: Axis, result: Sweep, name: str) -> None:
     else:
         axis.set_ticks(np.arange(len(values)), [literal(str(value)) for value in values])
         axis.set_label_text(symbol_of(name))
+
+
+def label_result(axis: Axis, result: Sweep, name: str, values: np.ndarray) -> None:
+    """Label an axis with the name and unit of a result."""
+    label = label_of(result, name)
+    title = label if " " in label else ""
+    label_axis(axis, label, result.units.get(name, ""), *range_of(values), title=title)
+
+
+def draw_map(panel: Axes, result: Sweep, values: np.ndarray, **colours: Any) -> QuadMesh:
+    """Draw a value for each point of two parameters: the first is vertical, the second horizontal."""
+    coordinates = []
+    for dimension, parameter in enumerate(result.axes):
+        numbers = positions(result.axes[parameter])
+        order = np.argsort(numbers, kind="stable")
+        values = np.take(values, order, axis=dimension)
+        coordinates.append(numbers[order])
+    up, across = coordinates
+    mesh = panel.pcolormesh(across, up, values, shading="nearest", rasterized=True, **colours)
+    for axis, parameter in zip((panel.yaxis, panel.xaxis), result.axes, strict=True):
+        label_parameter(axis, result, parameter)
+    panel.tick_params(color=style.GREY, labelsize=9)
+    panel.spines[:].set_color(style.GREY)
+    return mesh
+
+
+def require_one_axes_each(axes: Sequence[Axes], names: Sequence[str]) -> None:
+    """Raise an error if the number of axes is not that of the results."""
+    if len(axes) != len(names):
+        raise UsageError(
+            f"{len(axes)} axes were passed for {len(names)} results", remedy="use one axes per result"
+        )
 
 
 def setting(result: Sweep, name: str, value: object) -> str:
