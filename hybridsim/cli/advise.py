@@ -35,41 +35,33 @@ def add_to(commands: Any) -> None:
         "within a tolerance. Compare integrator settings likewise. All errors and run times are measured.",
         epilog=_EXAMPLES,
     )
-    values.add_model_arguments(parser)
-    parser.add_argument("--quantity", metavar="Q", required=True, help="the quantity to compute (see below)")
-    parser.add_argument(
-        "--tol",
-        metavar="TOL",
-        type=values.positive,
-        default=0.01,
-        help="largest relative error (default: 0.01)",
+    options.add_model_arguments(parser)
+    options.add(parser, "--quantity", "Q", "the quantity to compute (see below)", required=True)
+    options.add(
+        parser, "--tol", "TOL", "largest relative error (default: 0.01)", values.positive, default=0.01
     )
-    parser.add_argument(
-        "--t-end", metavar="TIME", help="evaluate a run from 0 to this time instead of the steady motion"
-    )
-    parser.add_argument(
+    options.add(parser, "--t-end", "TIME", "evaluate a run from 0 to this time instead of the steady motion")
+    options.add(
+        parser,
         "--over",
-        metavar="NAME=VALUES",
+        "NAME=VALUES",
+        "compute a map over parameter values, written FROM:TO:COUNT or A,B,C as in sweep",
+        values.assignment,
         nargs="+",
-        type=values.assignment,
-        help="compute a map over parameter values, written FROM:TO:COUNT or A,B,C as in sweep",
     )
-    parser.add_argument(
+    options.add_repeated(
+        parser,
         "--uncertain",
-        metavar="NAME=LOW:HIGH",
-        type=values.assignment,
-        action="append",
-        default=[],
-        help="range of an uncertain parameter; the report compares its effect with the tolerance",
+        "NAME=LOW:HIGH",
+        "range of an uncertain parameter; the report compares its effect with the tolerance",
     )
-    parser.add_argument(
-        "--rungs", metavar="A,B", type=values.names, help="simpler models to try (default: all)"
-    )
-    parser.add_argument(
+    options.add(parser, "--rungs", "A,B", "simpler models to try (default: all)", values.names)
+    options.add(
+        parser,
         "--v0",
-        metavar="SPEED",
-        type=values.positive,
-        help="velocity width of the regularised forces (default: 1 %% of the largest sliding speed)",
+        "SPEED",
+        "velocity width of the regularised forces (default: 1 %% of the largest sliding speed)",
+        values.positive,
     )
     parser.add_argument("--no-integrators", action="store_true", help="skip the integrator settings")
     options.add_workers(parser, " for --over")

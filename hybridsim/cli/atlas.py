@@ -32,25 +32,19 @@ def add_to(commands: Any) -> None:
         "class. A full run takes about ten minutes on two processors.",
     )
     parser.add_argument("scenes", metavar="SCENE", nargs="*", help="run only these scenes (default: all)")
-    parser.add_argument(
-        "--class", dest="trouble", metavar="CLASS", default="", help="run only the scenes of this class"
-    )
+    options.add(parser, "--class", "CLASS", "run only the scenes of this class", default="", dest="trouble")
     parser.add_argument("--list", action="store_true", help="print the scenes by class and exit")
-    parser.add_argument(
+    options.add(
+        parser,
         "--integrators",
-        metavar="A,B",
-        type=values.names,
-        help="run only these integrators with their variants, or single variants such as 'rk4 tanh' (default: all)",
+        "A,B",
+        "run only these integrators with their variants, or single variants such as 'rk4 tanh' (default: all)",
+        values.names,
     )
     parser.add_argument(
         "--quick", action="store_true", help="run only the loosest setting, which finds gross failures"
     )
-    parser.add_argument(
-        "--workers",
-        metavar="N",
-        type=values.workers,
-        help="number of processes (default: one per processor)",
-    )
+    options.add(parser, "--workers", "N", "number of processes (default: one per processor)", values.workers)
     options.add_out(parser, "atlas")
     options.add_json(parser, "all verdicts")
     parser.set_defaults(execute=execute, lighter="fewer scenes at a time or fewer --workers")

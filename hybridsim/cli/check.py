@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from hybridsim.cli import values
+from hybridsim.cli import options, values
 from hybridsim.cli.output import complain, print_json, print_table, say
 from hybridsim.cli.session import Session
 from hybridsim.presentation.automaton import lines_of
@@ -28,7 +28,7 @@ def add_to(commands: Any) -> None:
         description="Read a model, report every error, warn about suspicious parts (guards that never fire, pulses "
         "that a step may miss, units that are missing or disagree), and print the hybrid automaton of the model.",
     )
-    values.add_model_arguments(parser)
+    options.add_model_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
     parser.add_argument(
         "--flat",

@@ -28,50 +28,39 @@ def add_to(commands: Any) -> None:
         "write a chart and the data.",
         epilog="The folder receives chart.png (or suite.png), table.csv and comparison.json.",
     )
-    values.add_model_arguments(parser, optional=True)
-    values.add_span_argument(parser, values.COMPARED_PERIODS)
+    options.add_model_arguments(parser, optional=True)
+    options.add_span_argument(parser, values.COMPARED_PERIODS)
     parser.add_argument(
         "--suite", action="store_true", help="run the scenes of the suite instead of one model"
     )
-    parser.add_argument(
-        "--scenes", metavar="A,B", type=values.names, help="scenes of the suite to run (default: all)"
-    )
-    parser.add_argument(
+    options.add(parser, "--scenes", "A,B", "scenes of the suite to run (default: all)", values.names)
+    options.add(
+        parser,
         "--integrators",
-        metavar="A,B",
-        type=values.names,
-        help="integrators to compare (default: all that support the model)",
+        "A,B",
+        "integrators to compare (default: all that support the model)",
+        values.names,
     )
-    parser.add_argument(
-        "--rtol",
-        metavar="TOL,TOL",
-        type=values.positives,
-        help="relative tolerances of the adaptive integrators",
+    options.add(
+        parser, "--rtol", "TOL,TOL", "relative tolerances of the adaptive integrators", values.positives
     )
-    parser.add_argument(
-        "--steps",
-        metavar="N,N",
-        type=values.counts,
-        help="steps per period of the fixed-step integrators",
-    )
-    parser.add_argument(
+    options.add(parser, "--steps", "N,N", "steps per period of the fixed-step integrators", values.counts)
+    options.add(
+        parser,
         "--regularized",
-        metavar="KIND,KIND",
-        type=values.names,
-        help="also compare these regularised friction laws (tanh, arctan, karnopp)",
+        "KIND,KIND",
+        "also compare these regularised friction laws (tanh, arctan, karnopp)",
+        values.names,
     )
-    parser.add_argument(
+    options.add(
+        parser,
         "--v0",
-        metavar="V,V",
-        type=values.positives,
-        help="velocity widths of the regularised laws (default: 1e-1 to 1e-4 of the nominal velocity)",
+        "V,V",
+        "velocity widths of the regularised laws (default: 1e-1 to 1e-4 of the nominal velocity)",
+        values.positives,
     )
-    parser.add_argument(
-        "--repeat",
-        metavar="N",
-        type=values.count,
-        default=3,
-        help="timed repetitions of every run (default: 3)",
+    options.add(
+        parser, "--repeat", "N", "timed repetitions of every run (default: 3)", values.count, default=3
     )
     options.add_budget(parser, "120; 600 with --suite")
     options.add_out(parser, "compare-MODEL")

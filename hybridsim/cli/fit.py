@@ -30,41 +30,34 @@ def add_to(commands: Any) -> None:
         "t and quantities of the model. Each file is one experiment.",
         epilog=_EXAMPLES,
     )
-    values.add_model_arguments(parser)
+    options.add_model_arguments(parser)
     parser.add_argument(
         "data", metavar="DATA.csv", nargs="+", type=Path, help="measurements, one file per experiment"
     )
-    parser.add_argument(
+    options.add_repeated(
+        parser,
         "--unknown",
-        metavar="NAME=LOW:HIGH[:log]",
-        type=values.assignment,
-        action="append",
+        "NAME=LOW:HIGH[:log]",
+        "an unknown parameter, or the start value NAME(0), between two bounds; with :log its logarithm is varied",
         required=True,
-        help="an unknown parameter, or the start value NAME(0), between two bounds; with :log its logarithm is varied",
     )
-    parser.add_argument(
+    options.add_repeated(
+        parser,
         "--column",
-        metavar="COLUMN=QUANTITY",
-        type=values.assignment,
-        action="append",
-        default=[],
-        help="the quantity of the model in a column with another name; other columns are then ignored",
+        "COLUMN=QUANTITY",
+        "the quantity of the model in a column with another name; other columns are then ignored",
     )
-    parser.add_argument(
+    options.add_repeated(
+        parser,
         "--noise",
-        metavar="QUANTITY=SIZE",
-        type=values.assignment,
-        action="append",
-        default=[],
-        help="standard deviation of a quantity (default: estimated from the residuals)",
+        "QUANTITY=SIZE",
+        "standard deviation of a quantity (default: estimated from the residuals)",
     )
     parser.add_argument(
         "--loss", choices=("linear", "soft_l1", "huber", "cauchy"), default="linear",
         help="how far-off samples count (default: linear)",
     )  # fmt: skip
-    parser.add_argument(
-        "--starts", metavar="N", type=values.count, default=1, help="number of first guesses (default: 1)"
-    )
+    options.add(parser, "--starts", "N", "number of first guesses (default: 1)", values.count, default=1)
     options.add_integrator(parser)
     options.add_rtol(parser, "1e-9")
     options.add_plot(parser, "data, fitted runs and residuals")

@@ -25,35 +25,35 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options for output files of a run."""
     options.add_plot(parser, "the run")
-    parser.add_argument(
+    options.add(
+        parser,
         "--animate",
-        metavar="FILE",
-        type=Path,
-        help="animate the drawing of the model in a .gif, .html or .mp4 file (.mp4 needs ffmpeg)",
+        "FILE",
+        "animate the drawing of the model in a .gif, .html or .mp4 file (.mp4 needs ffmpeg)",
+        Path,
     )
-    parser.add_argument("--csv", metavar="FILE", type=Path, help="write the time series as a CSV table")
-    parser.add_argument(
-        "--npz", metavar="FILE", type=Path, help="write the time series and the events for numpy.load"
-    )
-    parser.add_argument(
+    options.add(parser, "--csv", "FILE", "write the time series as a CSV table", Path)
+    options.add(parser, "--npz", "FILE", "write the time series and the events for numpy.load", Path)
+    options.add(
+        parser,
         "--points",
-        metavar="N",
-        type=values.count,
-        help="number of equally spaced times in --csv and --npz (default: all steps, and both sides of events)",
+        "N",
+        "number of equally spaced times in --csv and --npz (default: all steps, and both sides of events)",
+        values.count,
     )
-    parser.add_argument(
+    options.add(
+        parser,
         "--save",
-        metavar="FILE",
-        type=Path,
-        help="write the whole solution (.hsol) for hybridsim resume and hs.load_solution",
+        "FILE",
+        "write the whole solution (.hsol) for hybridsim resume and hs.load_solution",
+        Path,
     )
-    parser.add_argument(
+    options.add_repeated(
+        parser,
         "--explain",
-        metavar="N",
-        type=int,
-        action="append",
-        default=[],
-        help="explain event number N, counted from 0; repeat the option for more events",
+        "N",
+        "explain event number N, counted from 0; repeat the option for more events",
+        int,
     )
     options.add_json(parser, "the result", "the summary")
 

@@ -28,9 +28,7 @@ def add_to(commands: Any) -> None:
         epilog=_EXAMPLES,
     )
     parser.add_argument("solution", metavar="FILE", type=Path, help="file of the saved run (.hsol)")
-    parser.add_argument(
-        "--t-end", metavar="TIME", help="new end time (default: the end time of the saved run)"
-    )
+    options.add(parser, "--t-end", "TIME", "new end time (default: the end time of the saved run)")
     options.add_limit(parser)
     outcome.add_arguments(parser)
     parser.set_defaults(

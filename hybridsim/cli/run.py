@@ -36,10 +36,11 @@ def add_to(commands: Any) -> None:
         epilog=_EXAMPLES,
     )
     add_settings(parser)
-    parser.add_argument(
+    options.add(
+        parser,
         "--keep",
-        metavar="WHAT",
-        help="parts of the run to store; the run does not change. all (default): everything. events: the "
+        "WHAT",
+        "parts of the run to store; the run does not change. all (default): everything. events: the "
         "events, but no states between them. last-period, or a number: the last period, or the last units of time. "
         "nothing: only the final state. --plot, --animate, --csv and --npz need all, last-period or a number; "
         "--explain needs all",
@@ -50,25 +51,19 @@ def add_to(commands: Any) -> None:
 
 def add_settings(parser: argparse.ArgumentParser) -> None:
     """Add the options for the model, the span, the integrator and the limits of one run."""
-    values.add_model_arguments(parser)
-    values.add_span_argument(parser)
+    options.add_model_arguments(parser)
+    options.add_span_argument(parser)
     options.add_integrator(parser)
     options.add_rtol(parser, "1e-9")
-    parser.add_argument(
+    options.add(
+        parser,
         "--atol",
-        metavar="TOL",
-        type=values.positive,
-        help="absolute tolerance of every state (default: rtol * 1e-3 * the state's nominal size)",
+        "TOL",
+        "absolute tolerance of every state (default: rtol * 1e-3 * the state's nominal size)",
+        values.positive,
     )
-    parser.add_argument("--max-step", metavar="TIME", type=values.positive, help="largest step size")
-    parser.add_argument(
-        "--option",
-        metavar="NAME=VALUE",
-        type=values.assignment,
-        action="append",
-        default=[],
-        help="set an option of the integrator itself",
-    )
+    options.add(parser, "--max-step", "TIME", "largest step size", values.positive)
+    options.add_repeated(parser, "--option", "NAME=VALUE", "set an option of the integrator itself")
     options.add_limit(parser)
 
 

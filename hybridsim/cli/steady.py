@@ -33,34 +33,33 @@ def add_to(commands: Any) -> None:
         "amplitudes, energies, stick fractions and Floquet multipliers.",
         epilog=_EXAMPLES,
     )
-    values.add_model_arguments(parser)
+    options.add_model_arguments(parser)
     options.add_integrator(parser)
-    parser.add_argument(
+    options.add(
+        parser,
         "--tol",
-        metavar="TOL",
-        type=values.positive,
+        "TOL",
+        "largest difference after one period, relative to the size of each state (default: 1e-10)",
+        values.positive,
         default=1e-10,
-        help="largest difference after one period, relative to the size of each state (default: 1e-10)",
     )
-    parser.add_argument(
+    options.add(
+        parser,
         "--period",
-        metavar="TIME",
-        type=values.positive,
-        help="forcing period, if it cannot be determined from the model",
+        "TIME",
+        "forcing period, if it cannot be determined from the model",
+        values.positive,
     )
-    parser.add_argument(
+    options.add(
+        parser,
         "--max-periods",
-        metavar="N",
-        type=values.count,
+        "N",
+        "give up after N periods and classify the motion (default: 4096)",
+        values.count,
         default=4096,
-        help="give up after N periods and classify the motion (default: 4096)",
     )
-    parser.add_argument(
-        "--harmonics",
-        metavar="N",
-        type=values.count,
-        default=5,
-        help="number of harmonics to print (default: 5)",
+    options.add(
+        parser, "--harmonics", "N", "number of harmonics to print (default: 5)", values.count, default=5
     )
     options.add_plot(parser, "one period")
     options.add_json(parser, "the result")

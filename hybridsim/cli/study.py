@@ -35,11 +35,8 @@ def add_to(commands: Any) -> None:
         "--quick", action="store_true", help="use coarser grids and shorter runs (a few minutes)"
     )
     options.add_out(parser, "study-NAME")
-    parser.add_argument(
-        "--images",
-        metavar="FOLDER",
-        type=Path,
-        help="folder for the pictures (default: the folder of the results)",
+    options.add(
+        parser, "--images", "FOLDER", "folder for the pictures (default: the folder of the results)", Path
     )
     options.add_json(parser, "the verdicts")
     parser.set_defaults(execute=execute, lighter="--quick")

@@ -45,7 +45,7 @@ def add_to(commands: Any) -> None:
         + "\nThe folder receives sweep.csv, sweep.json and sweep.png. Finished points are recorded in sweep.journal: "
         "after Ctrl-C or a crash the same command continues from there.",
     )
-    values.add_model_arguments(parser)
+    options.add_model_arguments(parser)
     parser.add_argument(
         "axes",
         metavar="NAME=VALUES",
@@ -53,26 +53,28 @@ def add_to(commands: Any) -> None:
         type=values.assignment,
         help="a parameter, or a state for its initial value, with the values to use",
     )
-    parser.add_argument(
+    options.add(
+        parser,
         "--measure",
-        metavar="A,B",
-        type=values.names,
-        default=("steady",),
-        help="quantities of the steady state: steady (default) for the usual ones, or amplitude.x, energy.x, "
+        "A,B",
+        "quantities of the steady state: steady (default) for the usual ones, or amplitude.x, energy.x, "
         "harmonic.x.1, stick_fraction.f, period, kind, ...; or the states at --t-end: final, final.x",
+        values.names,
+        default=("steady",),
     )
     parser.add_argument(
         "--list",
         action="store_true",
         help="take the k-th values of all parameters together, instead of all combinations",
     )
-    parser.add_argument("--t-end", metavar="TIME", help="end time of each run, for --measure final")
-    parser.add_argument(
+    options.add(parser, "--t-end", "TIME", "end time of each run, for --measure final")
+    options.add(
+        parser,
         "--after",
-        metavar="PERIODS",
-        type=values.count,
-        help="measure one period after this number of forcing periods, even if the motion is not yet periodic; "
+        "PERIODS",
+        "measure one period after this number of forcing periods, even if the motion is not yet periodic; "
         "useful for maps of many points",
+        values.count,
     )
     parser.add_argument(
         "--warm-start",
@@ -82,7 +84,7 @@ def add_to(commands: Any) -> None:
     options.add_integrator(parser)
     options.add_rtol(parser, "depends on the measure")
     options.add_workers(parser)
-    parser.add_argument("--over", metavar="NAME", help="plot lines over this parameter instead of a map")
+    options.add(parser, "--over", "NAME", "plot lines over this parameter instead of a map")
     options.add_out(parser, "sweep-MODEL")
     options.add_json(parser, "the data")
     parser.set_defaults(execute=execute, lighter="fewer values at a time, fewer --workers or a looser --rtol")

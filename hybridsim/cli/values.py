@@ -85,45 +85,6 @@ def names(text: str) -> tuple[str, ...]:
     return found
 
 
-def add_model_arguments(parser: argparse.ArgumentParser, optional: bool = False) -> None:
-    """Add the arguments for a model, its parameters and its initial values."""
-    parser.add_argument(
-        "model",
-        metavar="MODEL",
-        nargs="?" if optional else None,
-        help="name of a model (see: hybridsim models) or path of a .toml file",
-    )
-    parser.add_argument(
-        "-p",
-        "--param",
-        metavar="NAME=VALUE",
-        type=assignment,
-        action="append",
-        default=[],
-        help="set a parameter (for a state or a held input use --x0); VALUE may be an expression of other parameters, "
-        "such as 'omega=0.6*sqrt(k/m)'",
-    )
-    parser.add_argument(
-        "--x0",
-        metavar="NAME=VALUE",
-        type=assignment,
-        action="append",
-        default=[],
-        help="set the initial value of a state or of a held input; VALUE may be an expression of parameters",
-    )
-
-
-def add_span_argument(parser: argparse.ArgumentParser, periods: int = DEFAULT_PERIODS) -> None:
-    """Add the option for the end time."""
-    parser.add_argument(
-        "--t-end",
-        metavar="TIME",
-        help="end of the run: a time, an expression of parameters, or '100T' for 100 forcing periods (default: the "
-        f"duration in the model file, otherwise {periods}T; without a forcing period the end of the longest table or "
-        f"chirp, otherwise {DEFAULT_SECONDS:g})",
-    )
-
-
 def changed_model(args: argparse.Namespace) -> Model:
     """Return the model with the parameters and initial values of the command line."""
     model: Model = hybridsim.load(args.model)
