@@ -27,16 +27,10 @@ def slope(expr: Expression, name: str) -> Expression:
 
 
 def _printer() -> Any:
-    from sympy.printing.pycode import PythonCodePrinter
+    from hybridsim.expr.printer import PythonPrinter
 
-    class Printer(PythonCodePrinter):
+    class Printer(PythonPrinter):
         """Prints SymPy expressions with the function names of expressions and with all digits."""
-
-        def __init__(self) -> None:
-            super().__init__({"fully_qualified_modules": False, "standard": "python3"})
-
-        def _print_Float(self, e: Any) -> str:
-            return repr(float(e))
 
         def _print_sign(self, e: Any) -> str:
             return f"sign({self._print(e.args[0])})"

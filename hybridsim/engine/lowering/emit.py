@@ -32,16 +32,10 @@ from math import (acos, asin, atan, atan2, copysign, cos, cosh, exp, inf, log, n
 
 
 def _printer() -> Any:
-    from sympy.printing.pycode import PythonCodePrinter
+    from hybridsim.expr.printer import PythonPrinter
 
-    class Printer(PythonCodePrinter):
+    class Printer(PythonPrinter):
         """Prints SymPy expressions as plain Python, with all digits, and with powers that stay real."""
-
-        def __init__(self) -> None:
-            super().__init__({"fully_qualified_modules": False, "standard": "python3"})
-
-        def _print_Float(self, e: Any) -> str:
-            return repr(float(e))
 
         def _print_Integer(self, e: Any) -> str:
             return f"{e.p}.0"

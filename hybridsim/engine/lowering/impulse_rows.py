@@ -7,7 +7,7 @@ force k per unit of load d at the onset of slip, forward and backward, (m, m) ea
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from hybridsim.engine.lowering.lower import Lowering
@@ -15,6 +15,7 @@ from hybridsim.expr.symbolic import to_sympy
 from hybridsim.model.parts.impact import SPEED
 
 Rows = list[tuple[str, Any]]
+Force = Callable[[Lowering, Any, int], Any]
 
 
 def speed_name(k: int) -> str:
@@ -26,7 +27,7 @@ def impulses(lowering: Lowering) -> Rows:
     """Return the text of the function ``impulses``, or nothing without unilateral contacts."""
     if not _unilateral(lowering):
         return []
-    return [(f"out[{i}]", value) for i, value in enumerate(_values(lowering))]
+    return numbered(slopes_and_growth(lowering, _onset, 2))
 
 
 def gap_slopes(lowering: Lowering) -> Rows:
@@ -56,26 +57,34 @@ def _unilateral(lowering: Lowering) -> list[tuple[int, int]]:
     return [(k, c) for k, c in order if lowering.components[c].surface.is_unilateral]
 
 
-def _values(lowering: Lowering) -> Iterator[Any]:
+def numbered(values: Iterable[Any]) -> Rows:
+    """Return the rows that write values one after the other."""
+    return [(f"out[{i}]", value) for i, value in enumerate(values)]
+
+
+def slopes_and_growth(lowering: Lowering, force: Force, count: int) -> Iterator[Any]:
+    """Return d(u_k)/dx and d(rates)/d(unknown_k), then how friction forces grow with the loads of others.
+
+    force : a friction force by component, surface and number, from 0 to `count`.
+    """
     sp = lowering.sp
     for rate in lowering.held_rates.values():
         yield from (sp.diff(rate, x) for x in lowering.states)
     for u in lowering.unknown.values():
         yield from (sp.diff(rate, u) for rate in lowering.open_rates)
-    for backward in (False, True):
-        for c in lowering.held_rates:
-            onset = _onset(lowering, c, backward)
+    for number in range(count):
+        for c in lowering.unknown:
+            component = lowering.components[c]
+            has_friction = not (component.surface.unique or component.surface.is_unilateral)
+            found = force(lowering, component, number) if has_friction else sp.Integer(0)
             for d, u in lowering.unknown.items():
                 is_load = c != d and lowering.components[d].surface.is_unilateral
-                yield sp.diff(onset, u) if is_load else sp.Integer(0)
+                yield sp.diff(found, u) if is_load else sp.Integer(0)
 
 
-def _onset(lowering: Lowering, c: int, backward: bool) -> Any:
-    """Return the friction force at the onset of slip, as a function of the load."""
-    component = lowering.components[c]
+def _onset(lowering: Lowering, component: Any, number: int) -> Any:
+    """Return the friction force at the onset of slip, forward and backward, as a function of the load."""
     surface = component.surface
-    if surface.unique or surface.is_unilateral:
-        return lowering.sp.Integer(0)
     guards = component.mode(surface.hold).guards
-    jump = lowering.inlined(surface.jump_below if backward else surface.jump_above)
-    return lowering.inlined(guards[1 if backward else 0].expr) + (jump if backward else -jump)
+    jump = lowering.inlined(surface.jump_below if number else surface.jump_above)
+    return lowering.inlined(guards[number].expr) + (jump if number else -jump)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import cache
 from math import comb
 from typing import Any, NamedTuple
@@ -167,6 +168,12 @@ def _evaluate(
             elif s[m] == s1:
                 out[m, i] = right[i, 0]
     return out
+
+
+def on_first_use(make: Callable[[], Dense]) -> Dense:
+    """Return dense output that is made when it is first evaluated."""
+    made = cache(make)
+    return lambda s: made()(s)
 
 
 def hermite(s0: float, s1: float, left: np.ndarray, right: np.ndarray) -> Dense:

@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from hybridsim.engine.events.jumps.impact import message_on_restitution
-from hybridsim.engine.record.trajectory import Task, Trajectory
+from hybridsim.engine.record.trajectory import Task
 from hybridsim.engine.system.system import System
 from hybridsim.errors import UsageError
-from hybridsim.integrators.contract import Integrator
+from hybridsim.integrators.fixed_step.method import FixedStepMethod
 from hybridsim.integrators.fixed_step.moreau_impacts import UNILATERAL
 from hybridsim.integrators.fixed_step.moreau_kernels import moreau_step, moreau_steps, scratch_for
 from hybridsim.integrators.fixed_step.moreau_loads import refuse_loads_of_friction
-from hybridsim.integrators.fixed_step.run import FixedStepRun, surface_table
-from hybridsim.integrators.fixed_step.step_length import fixed_step_length, refuse_longer
+from hybridsim.integrators.fixed_step.run import surface_table
 from hybridsim.model.parts.impact import ROUNDING
 
 _HALVINGS = 16  # halvings of a step in which a declared guard or monitor crosses zero
 
 
 @dataclass(frozen=True)
-class Moreau(Integrator):
+class Moreau(FixedStepMethod):
     """Moreau-Jean time stepping: a fixed step, implicit in the contact forces, without located events.
 
             X = x + h (theta a(t + h, X) + (1 - theta) a(t, x)) + h sum_k B_k f_k,   f_k in the law of contact
@@ -84,9 +82,6 @@ class Moreau(Integrator):
         "functions": "it separates the forces of contacts from the rates, which have to be expressions",
     }
 
-    steps_per_period: float = 1200.0
-    period: float | None = None
-    step: float | None = None
     theta: float = 0.5
     tolerance: float = 1e-12
     iterations: int = 50
@@ -105,13 +100,10 @@ class Moreau(Integrator):
             if not good:
                 raise UsageError(f"{self.name}: `{option}` cannot be {value!r}", remedy=remedy)
 
-    def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
-        """Run a task with steps of fixed length."""
-        step = fixed_step_length(system, self.step, self.period, self.steps_per_period, self.name)
-        refuse_longer(step, task.tolerances.max_step, self.name)
+    def march(self, system: System, task: Task, step: float) -> MoreauMarch:
+        """Return the kernels of the method for one run."""
         refuse_loads_of_friction(system.model, self.name)
-        march = MoreauMarch(system, step, (self.theta, self.tolerance, self.iterations), task.x0.copy())
-        return FixedStepRun(system, task, march, progress).run()
+        return MoreauMarch(system, step, (self.theta, self.tolerance, self.iterations), task.x0.copy())
 
 
 class MoreauMarch:

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from hybridsim.engine.record.trajectory import Task, Trajectory
+from hybridsim.engine.record.trajectory import Task
 from hybridsim.engine.system.system import System
 from hybridsim.errors import UsageError
-from hybridsim.integrators.contract import Integrator
+from hybridsim.integrators.fixed_step.method import FixedStepMethod
 from hybridsim.integrators.fixed_step.rk4_march import FixedStep, Rk4March
-from hybridsim.integrators.fixed_step.run import FixedStepRun
 from hybridsim.integrators.fixed_step.step_code import SIGN, ZONE
-from hybridsim.integrators.fixed_step.step_length import fixed_step_length, refuse_longer
 
 _PAPER = "He et al. 2026, doi:10.3390/sym18010057"
 _FIXED = {
@@ -29,7 +26,7 @@ _FIXED = {
 
 
 @dataclass(frozen=True)
-class Rk4Dichotomy(Integrator):
+class Rk4Dichotomy(FixedStepMethod):
     """The published method: classic RK4 with bisection of steps in which a velocity changes its sign.
 
     The friction force follows Eq. 4 of the paper: outside the zero-velocity interval it is the slip force;
@@ -64,9 +61,6 @@ class Rk4Dichotomy(Integrator):
         "exact-stick": "with stick_velocity='kept' a sticking body creeps at up to eps_v",
     }
 
-    steps_per_period: float = 1200.0
-    period: float | None = None
-    step: float | None = None
     eps_v: float = 8e-4
     max_bisections: int = 16
     stick_velocity: Literal["kept", "zero"] = "kept"
@@ -87,10 +81,8 @@ class Rk4Dichotomy(Integrator):
                 remedy="use a positive whole number",
             )
 
-    def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
-        """Run a task with steps of fixed length."""
-        step = fixed_step_length(system, self.step, self.period, self.steps_per_period, self.name)
-        refuse_longer(step, task.tolerances.max_step, self.name)
+    def march(self, system: System, task: Task, step: float) -> Rk4March:
+        """Return the kernels of the method for one run."""
         settings = FixedStep(
             step,
             ZONE,
@@ -102,11 +94,11 @@ class Rk4Dichotomy(Integrator):
             self.eps_v,
             self.max_bisections,
         )
-        return FixedStepRun(system, task, Rk4March(system, settings), progress).run()
+        return Rk4March(system, settings)
 
 
 @dataclass(frozen=True)
-class Rk4Sign(Integrator):
+class Rk4Sign(FixedStepMethod):
     """Classic RK4 with the force mu N sgn(v) and without stick, for comparison with the published method.
 
     Parameters
@@ -130,20 +122,15 @@ class Rk4Sign(Integrator):
         "exact-stick": "it does not model stick: the velocity chatters around zero",
     }
 
-    steps_per_period: float = 1200.0
-    period: float | None = None
-    step: float | None = None
     friction: Literal["step", "stage"] = "stage"
 
     def __post_init__(self) -> None:
         _one_of(self.name, "friction", self.friction, ("step", "stage"))
 
-    def run(self, system: System, task: Task, progress: Callable[[float], None] | None = None) -> Trajectory:
-        """Run a task with steps of fixed length."""
-        step = fixed_step_length(system, self.step, self.period, self.steps_per_period, self.name)
-        refuse_longer(step, task.tolerances.max_step, self.name)
+    def march(self, system: System, task: Task, step: float) -> Rk4March:
+        """Return the kernels of the method for one run."""
         settings = FixedStep(step, SIGN, self.friction == "stage", False, False, False, False, 0.0, 16)
-        return FixedStepRun(system, task, Rk4March(system, settings), progress).run()
+        return Rk4March(system, settings)
 
 
 def _one_of(integrator: str, option: str, value: str, known: tuple[str, ...]) -> None:

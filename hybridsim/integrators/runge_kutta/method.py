@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from hybridsim.engine.record.hermite import hermite, holds_between, middle_weights
+from hybridsim.engine.record.hermite import hermite, holds_between, middle_weights, on_first_use
 from hybridsim.engine.record.segments import Dense
 from hybridsim.engine.run.compiled_loop import CompiledLoop, compile_loops
 from hybridsim.engine.run.stepping import Flow, Stepper, Watch
@@ -71,14 +71,7 @@ class RungeKuttaStepper(OneStepStepper):
         )
 
     def dense(self, start: Point, end: Point, trial: Trial) -> Dense:
-        made: list[Dense] = []
-
-        def dense(s: np.ndarray) -> np.ndarray:
-            if not made:
-                made.append(hermite(start.s, end.s, start.series, end.series))
-            return made[0](s)
-
-        return dense
+        return on_first_use(lambda: hermite(start.s, end.s, start.series, end.series))
 
 
 @dataclass(frozen=True)

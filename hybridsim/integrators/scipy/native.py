@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.record.segments import Dense
 from hybridsim.engine.run.stepping import Flow, Root, Step, Watch
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.period import system_period
 from hybridsim.engine.system.tolerances import Tolerances
+from hybridsim.integrators.scipy.stepper import dense_of
 
 # While a mode holds all states, only the event functions depend on the forcing, and a step may grow over
 # whole periods of it. Experienced users limit the step; this class does so, too.
@@ -128,10 +128,10 @@ class NativeStepper:
                     "solve_ivp stops at an event at which it restarts: its sign test includes both ends of a step, "
                     "so a function that is zero at the restart and does not rise fires at once"
                 )
-            steps.append(Step(0.0, 0.0, x0, x0, _dense(result.sol), tuple(found[0.0])))
+            steps.append(Step(0.0, 0.0, x0, x0, dense_of(result.sol), tuple(found[0.0])))
         for s1 in map(float, ends):
             x1 = result.sol(s1)
-            steps.append(Step(s0, s1, x0, x1, _dense(result.sol), tuple(found.get(s1, ()))))
+            steps.append(Step(s0, s1, x0, x1, dense_of(result.sol), tuple(found.get(s1, ()))))
             s0, x0 = s1, x1
         return steps
 
@@ -153,7 +153,3 @@ class NativeStepper:
     def restep(self, step: Step, s: float) -> Step:
         """Raise NotImplementedError; a step of `solve_ivp` already ends at its event."""
         raise NotImplementedError("solve_ivp already ends at its event")
-
-
-def _dense(solution: Any) -> Dense:
-    return lambda s: solution(s).T

@@ -16,7 +16,8 @@ _RETRIES, _SHORTER = 25, 0.25  # retries, and step factor, if a solver gives up 
 _SMALLEST = 1e-12  # shortest useful first step, as a share of the segment
 
 
-def _dense(interpolant: Any) -> Dense:
+def dense_of(interpolant: Any) -> Dense:
+    """Return an interpolant of SciPy as dense output, with times as rows."""
     return lambda s: interpolant(s).T
 
 
@@ -110,7 +111,7 @@ class SolverStepper:
         stages = getattr(solver, "n_stages", 0)
         if stages:
             self.flow.counters.rejected += max((solver.nfev - before) // stages - 1, 0)
-        return Step(float(s0), float(solver.t), x0, solver.y, _dense(solver.dense_output()))
+        return Step(float(s0), float(solver.t), x0, solver.y, dense_of(solver.dense_output()))
 
 
 def series_step(flow: Flow, x0: np.ndarray, bound: float, tolerances: Tolerances) -> float:

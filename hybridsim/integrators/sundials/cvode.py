@@ -11,7 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from hybridsim.engine.record.hermite import hermite
+from hybridsim.engine.record.hermite import hermite, on_first_use
 from hybridsim.engine.record.segments import Dense
 from hybridsim.engine.run.stepping import Flow, Step, Stepper, Watch
 from hybridsim.engine.system.failures import StepFailure
@@ -112,23 +112,20 @@ class CvodeStepper:
 
     def _dense(self, s0: float, s1: float, x0: np.ndarray, x1: np.ndarray) -> Dense:
         """Return dense output that is computed on first use."""
-        made: list[Dense] = []
         self.past_times, self.past_states = (
             [*self.past_times, s1][-MAX_PAST_POINTS:],
             [*self.past_states, x1][-MAX_PAST_POINTS:],
         )
         times, states = np.array(self.past_times), np.array(self.past_states)
 
-        def dense(s: np.ndarray) -> np.ndarray:
-            if not made:
-                left = self._series(s0, x0) if self.last_series[0] != s0 else self.last_series[1]
-                right = self._series(s1, x1)
-                self.last_series = s1, right
-                smooth = converges(left, s1 - s0, x1) and converges(right, s0 - s1, x0)
-                made.append(hermite(s0, s1, left, right) if smooth else through(times, states))
-            return made[0](s)
+        def make() -> Dense:
+            left = self._series(s0, x0) if self.last_series[0] != s0 else self.last_series[1]
+            right = self._series(s1, x1)
+            self.last_series = s1, right
+            smooth = converges(left, s1 - s0, x1) and converges(right, s0 - s1, x0)
+            return hermite(s0, s1, left, right) if smooth else through(times, states)
 
-        return dense
+        return on_first_use(make)
 
     def _series(self, s: float, x: np.ndarray) -> np.ndarray:
         zero = np.zeros(self.flow.n)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from hybridsim.errors import nearest
-from hybridsim.expr import Expression
 from hybridsim.model.parts.shape import KINDS, Point, Shape
 from hybridsim.model.toml.table import Table
 
@@ -15,12 +13,7 @@ _TEXTS = ("mode_of", "text")
 
 def read_drawing(root: Table) -> Iterable[Shape]:
     """Yield the shapes of a file."""
-    for name, table in root.entries("drawing", "shape"):
-        kind = table.text("kind")
-        if kind not in KINDS:
-            what = f"unknown kind '{kind}'" if kind else "'kind' is missing"
-            table.fail(what, nearest(kind, KINDS, kind="kinds"), "kind")
-            continue
+    for name, kind, table in root.of_kinds("drawing", "shape", KINDS):
         required, optional = KINDS[kind]
         known = (*required, *optional)
         table.only("kind", *known)
@@ -58,11 +51,7 @@ def _field(table: Table, key: str) -> Any:
 
 def _point(table: Table, value: Any, *keys: str | int) -> Point | None:
     if isinstance(value, list) and len(value) == 2:
-        first, second = (_coordinate(table, item, *keys, index) for index, item in enumerate(value))
+        first, second = (table.parsed(item, *keys, index) for index, item in enumerate(value))
         return first, second
     table.fail(f"'{keys[0]}' cannot contain {value!r}", "use a point [x, y]", *keys)
     return None
-
-
-def _coordinate(table: Table, value: Any, *keys: str | int) -> Expression:
-    return table.parsed(value, *keys)

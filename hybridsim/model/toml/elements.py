@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from hybridsim.errors import nearest
 from hybridsim.model.elements.element import KINDS, Element
 from hybridsim.model.toml.table import Table
 
@@ -14,12 +13,7 @@ _TEXTS = ("initial", "clock")
 
 def read_elements(root: Table) -> Iterable[Element]:
     """Yield the elements of a file."""
-    for name, table in root.entries("elements", "element"):
-        kind = table.text("kind")
-        if kind not in KINDS:
-            what = f"unknown kind '{kind}'" if kind else "'kind' is missing"
-            table.fail(what, nearest(kind, KINDS, kind="kinds"), "kind")
-            continue
+    for name, kind, table in root.of_kinds("elements", "element", KINDS):
         required, optional = KINDS[kind]
         table.only("kind", *required, *optional)
         missing = [key for key in required if key not in table.data]

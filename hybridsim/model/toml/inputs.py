@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from hybridsim.errors import nearest
 from hybridsim.model.parts.inputs import KINDS, OPTIONAL, REQUIRED, Input
 from hybridsim.model.toml.table import Table
 from hybridsim.model.toml.table_file import numbers_from_file
@@ -17,12 +16,7 @@ _NUMBERS = ("times", "values")
 
 def read_inputs(root: Table, folder: Path) -> Iterable[Input]:
     """Yield the inputs of a file; paths of tables are relative to ``folder``."""
-    for name, table in root.entries("inputs", "input"):
-        kind = table.text("kind")
-        if kind not in KINDS:
-            what = f"unknown kind '{kind}'" if kind else "'kind' is missing"
-            table.fail(what, nearest(kind, KINDS, kind="kinds"), "kind")
-            continue
+    for name, kind, table in root.of_kinds("inputs", "input", KINDS):
         known = (*REQUIRED[kind], *OPTIONAL[kind])
         extra = ("file", "columns") if kind == "table" else ()
         table.only("kind", *known, *extra)

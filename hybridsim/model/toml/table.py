@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -152,6 +152,16 @@ class Table:
             table = self.sub(value, f"{kind} {name}", shorthand, key, name)
             if table is not None:
                 yield name, table
+
+    def of_kinds(self, key: str, kind: str, known: Collection[str]) -> Iterator[tuple[str, str, Table]]:
+        """Yield named sub-tables with their values of the key ``kind``; an unknown kind is reported."""
+        for name, table in self.entries(key, kind):
+            found = table.text("kind")
+            if found in known:
+                yield name, found, table
+            else:
+                what = f"unknown kind '{found}'" if found else "'kind' is missing"
+                table.fail(what, nearest(found, known, kind="kinds"), "kind")
 
     def sub(self, value: Any, kind: str, shorthand: str | None, *keys: str | int) -> Table | None:
         """Return the sub-table at a key, or None after reporting a wrong type."""
