@@ -27,7 +27,7 @@ def slope(expr: Expression, name: str) -> Expression:
 
 
 def _printer() -> Any:
-    from hybridsim.expr.printer import PythonPrinter
+    from hybridsim.expr.symbolic import PythonPrinter
 
     class Printer(PythonPrinter):
         """Prints SymPy expressions with the function names of expressions and with all digits."""

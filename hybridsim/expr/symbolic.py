@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import sympy
+from sympy.printing.pycode import PythonCodePrinter
 
 from hybridsim.expr import hyperbolic
 from hybridsim.expr.parse import Expression, require_names
@@ -150,3 +151,13 @@ def _binary(op: ast.operator, left: Any, right: Any) -> Any:
         # exact powers of fractions could become arbitrarily long
         return sympy.Float(float(left) ** float(right), precision=53)
     return left**right
+
+
+class PythonPrinter(PythonCodePrinter):
+    """Prints SymPy expressions as plain Python, with all digits of numbers."""
+
+    def __init__(self) -> None:
+        super().__init__({"fully_qualified_modules": False, "standard": "python3"})
+
+    def _print_Float(self, e: Any) -> str:
+        return repr(float(e))

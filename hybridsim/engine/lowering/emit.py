@@ -32,7 +32,7 @@ from math import (acos, asin, atan, atan2, copysign, cos, cosh, exp, inf, log, n
 
 
 def _printer() -> Any:
-    from hybridsim.expr.printer import PythonPrinter
+    from hybridsim.expr.symbolic import PythonPrinter
 
     class Printer(PythonPrinter):
         """Prints SymPy expressions as plain Python, with all digits, and with powers that stay real."""

@@ -75,8 +75,8 @@ def slopes_and_growth(lowering: Lowering, force: Force, count: int) -> Iterator[
     for number in range(count):
         for c in lowering.unknown:
             component = lowering.components[c]
-            has_friction = not (component.surface.unique or component.surface.is_unilateral)
-            found = force(lowering, component, number) if has_friction else sp.Integer(0)
+            is_chosen = not (component.surface.unique or component.surface.is_unilateral)
+            found = force(lowering, component, number) if is_chosen else sp.Integer(0)
             for d, u in lowering.unknown.items():
                 is_load = c != d and lowering.components[d].surface.is_unilateral
                 yield sp.diff(found, u) if is_load else sp.Integer(0)
