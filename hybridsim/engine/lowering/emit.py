@@ -19,7 +19,7 @@ from hybridsim.engine.lowering.stop_coupling import reported_forces
 from hybridsim.engine.series.layout import SIGNAL_SLOTS
 from hybridsim.engine.series.tape import TapeBuilder
 from hybridsim.expr import parse
-from hybridsim.expr.symbolic import derivative
+from hybridsim.expr.symbolic import PythonPrinter, derivative
 from hybridsim.model.smoothing.jumps import SIGN
 from hybridsim.model.smoothing.rewriting import VARIABLE
 
@@ -32,8 +32,6 @@ from math import (acos, asin, atan, atan2, copysign, cos, cosh, exp, inf, log, n
 
 
 def _printer() -> Any:
-    from hybridsim.expr.symbolic import PythonPrinter
-
     class Printer(PythonPrinter):
         """Prints SymPy expressions as plain Python, with all digits, and with powers that stay real."""
 
