@@ -12,45 +12,124 @@ _AGREE = 1e-7  # of their sizes: derivatives on both sides that differ by less a
 _ROUNDING = 1e-11  # of the states' sizes, for a change of everything by its own size
 
 
-def agreed(
-    carrier: Carrier, directions: Directions, carried: Carried
-) -> tuple[np.ndarray, np.ndarray, list[tuple[str, np.ndarray]]]:
-    """Return derivatives at the end (n + d, M) and of event times (E, M), and why some of them are NaN.
+class OneSide:
+    """Derivatives of a run; exactly on a guard or surface, those on the side of the run."""
 
-    carried: the derivatives on the side of the run, with the functions that are exactly at zero. Each
-    direction that moves one of these off zero is carried forward and backward, on its own side. The last part
-    of the result names these functions, with a mask (M,) of the directions along which the sides differ.
+    def __init__(self, carrier: Carrier, directions: Directions) -> None:
+        self._carrier, self._directions = carrier, directions
+        self._carried = carrier.carry(directions)
+
+    def at_end(self) -> np.ndarray:
+        """Return the derivatives (n + d, M) of the states and discrete states at the end of the run."""
+        return np.concatenate([self._carried.x, self._carried.discrete])
+
+    def of_times(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the times (E,) of the events, and their derivatives (E, M)."""
+        return _times(self._carried, self._directions.parameters.shape[1])
+
+    def within(self, number: int, stops: np.ndarray, is_after: bool) -> np.ndarray:
+        """Return the derivatives (k, n + d, M) at ascending local times (k,) of the segment with this number.
+
+        is_after : whether a time of an event means the state after it.
+        """
+        return self._carrier.between(self._carried, self._directions, number, stops)
+
+    def differing(self) -> list[tuple[str, np.ndarray]]:
+        """Return names of functions at zero, each with the mask (M,) of the directions in which the sides differ."""
+        return []
+
+
+class BothSides(OneSide):
+    """Derivatives of a run, with NaN where the two sides of a guard or surface at zero differ.
+
+    Each direction that moves a function off its zero is carried forward and backward, on its own side.
     """
-    end = np.concatenate([carried.x, carried.discrete])
-    width = end.shape[1]
-    times = np.array([shift for _, shift in carried.times]).reshape(len(carried.times), width)
-    moves = np.any([one.moves for one in carried.off], axis=0) if carried.off else np.zeros(width, dtype=bool)
-    chosen = np.flatnonzero(moves)
-    if not len(chosen):
-        return end, times, []
-    count = len(chosen)
-    try:
-        both = carrier.carry(directions.both_ways(chosen), sided=True)
-    except UsageError:  # one event on the side of the run is several events on the other side
-        end[:, chosen], times[:, chosen] = np.nan, np.nan
-    else:
-        lost = np.minimum(both.lost[:count], both.lost[count:])
-        ends = np.concatenate([both.x, both.discrete])
-        shifts = np.array([shift for _, shift in both.times]).reshape(len(times), 2 * count)
-        sizes = carrier.sizes() / carrier.own_sizes(directions)[chosen]
-        end[:, chosen] = _agreeing(ends[:, :count], -ends[:, count:], _ROUNDING * sizes, lost < np.inf)
-        length = carrier.solution.t_end - carrier.solution.t_start
-        at = np.array([t for t, _ in carried.times])
-        least = _ROUNDING * length / carrier.own_sizes(directions)[chosen]
-        times[:, chosen] = _agreeing(shifts[:, :count], -shifts[:, count:], least, at[:, None] > lost)
-    differs = np.isnan(end).any(axis=0) | np.isnan(times).any(axis=0)
-    parted = [
-        (f"at t = {one.t:.9g} {one.name} is exactly at its zero", one.moves & differs) for one in carried.off
-    ]
-    return end, times, [(name, mask) for name, mask in parted if mask.any()]
+
+    def __init__(self, carrier: Carrier, directions: Directions) -> None:
+        super().__init__(carrier, directions)
+        off = self._carried.off
+        width = directions.parameters.shape[1]
+        moves = np.any([one.moves for one in off], axis=0) if off else np.zeros(width, dtype=bool)
+        self._chosen = np.flatnonzero(moves)
+        self._sides, self._both = directions.both_ways(self._chosen), None
+        self._first = min((one.t for one in off), default=np.inf)
+        if len(self._chosen):
+            try:
+                self._both = carrier.carry(self._sides, sided=True)
+            except UsageError:  # one event on the side of the run is several events on the other side
+                self._both = None
+
+    def at_end(self) -> np.ndarray:
+        end = super().at_end()
+        if len(self._chosen):
+            if self._both is None:
+                end[:, self._chosen] = np.nan
+            else:
+                sides = np.concatenate([self._both.x, self._both.discrete])
+                end[:, self._chosen] = self._agreeing_states(sides, self._lost(self._both) < np.inf)
+        return end
+
+    def of_times(self) -> tuple[np.ndarray, np.ndarray]:
+        at, shifts = super().of_times()
+        if not len(self._chosen):
+            return at, shifts
+        if self._both is None:
+            shifts[:, self._chosen] = np.nan
+            return at, shifts
+        _, sides = _times(self._both, 2 * len(self._chosen))
+        solution = self._carrier.solution
+        least = _ROUNDING * (solution.t_end - solution.t_start) / self._own_sizes()
+        lost = at[:, None] > self._lost(self._both)
+        shifts[:, self._chosen] = self._agreeing(sides, least, lost)
+        return at, shifts
+
+    def within(self, number: int, stops: np.ndarray, is_after: bool) -> np.ndarray:
+        found = super().within(number, stops, is_after)
+        if not len(self._chosen):
+            return found
+        found = found.copy()
+        times = float(self._carrier.solution._segments[number].origin) + stops
+
+        def passed(lost: np.ndarray | float) -> np.ndarray:
+            return times[:, None] >= lost if is_after else times[:, None] > lost
+
+        if self._both is None:
+            found[:, :, self._chosen] = np.where(
+                passed(self._first)[:, :, None], np.nan, found[:, :, self._chosen]
+            )
+            return found
+        sides = self._carrier.between(self._both, self._sides, number, stops)
+        for k, lost in enumerate(passed(self._lost(self._both))):
+            found[k][:, self._chosen] = self._agreeing_states(sides[k], lost)
+        return found
+
+    def differing(self) -> list[tuple[str, np.ndarray]]:
+        differs = np.isnan(self.at_end()).any(axis=0) | np.isnan(self.of_times()[1]).any(axis=0)
+        parted = [
+            (f"at t = {one.t:.9g} {one.name} is exactly at its zero", one.moves & differs)
+            for one in self._carried.off
+        ]
+        return [(name, mask) for name, mask in parted if mask.any()]
+
+    def _lost(self, both: Carried) -> np.ndarray:
+        count = len(self._chosen)
+        return np.minimum(both.lost[:count], both.lost[count:])
+
+    def _own_sizes(self) -> np.ndarray:
+        own: np.ndarray = self._carrier.own_sizes(self._directions)[self._chosen]
+        return own
+
+    def _agreeing_states(self, sides: np.ndarray, lost: np.ndarray) -> np.ndarray:
+        return self._agreeing(sides, _ROUNDING * self._carrier.sizes() / self._own_sizes(), lost)
+
+    def _agreeing(self, sides: np.ndarray, least: np.ndarray, lost: np.ndarray) -> np.ndarray:
+        """Return the derivatives at which forward and backward directions agree, and NaN elsewhere."""
+        count = len(self._chosen)
+        one, other = sides[:, :count], -sides[:, count:]
+        apart = np.abs(one - other) > _AGREE * (np.abs(one) + np.abs(other)) + least
+        return np.where(apart | lost, np.nan, 0.5 * (one + other))
 
 
-def _agreeing(one: np.ndarray, other: np.ndarray, least: np.ndarray, lost: np.ndarray) -> np.ndarray:
-    """Return the derivatives at which forward and backward directions agree, and NaN elsewhere."""
-    apart = np.abs(one - other) > _AGREE * (np.abs(one) + np.abs(other)) + least
-    return np.where(apart | lost, np.nan, 0.5 * (one + other))
+def _times(carried: Carried, width: int) -> tuple[np.ndarray, np.ndarray]:
+    at = np.array([t for t, _ in carried.times])
+    return at, np.array([shift for _, shift in carried.times]).reshape(len(at), width)

@@ -14,13 +14,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
-
 import numpy as np
 
 from hybridsim.analysis.variations.changes import Changes, Place
 from hybridsim.analysis.variations.directions import Carried, Directions
 from hybridsim.analysis.variations.event_times import EventTimes
+from hybridsim.analysis.variations.flow_derivatives import FlowDerivatives
 from hybridsim.analysis.variations.off_zero import (
     OffZero,
     beyond,
@@ -37,9 +36,8 @@ from hybridsim.analysis.variations.rounds import (
     component_of,
     is_knot,
     is_recorded,
-    lifted_vector,
 )
-from hybridsim.analysis.variations.seeds import rate_slopes, seeds
+from hybridsim.analysis.variations.seeds import rate_slopes
 from hybridsim.analysis.variations.segment_events import (
     Last,
     SegmentEvents,
@@ -48,11 +46,8 @@ from hybridsim.analysis.variations.segment_events import (
     time_rounding,
 )
 from hybridsim.analysis.variations.sizes import sizes
-from hybridsim.analysis.variations.smooth import transition
 from hybridsim.engine.record.segments import Segment
-from hybridsim.engine.series.dual_numbers import differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.system.system import System
-from hybridsim.engine.system.tangents import TangentTape
 from hybridsim.errors import UsageError
 from hybridsim.solution import Solution
 
@@ -76,11 +71,10 @@ class Carrier:
                 f"model {solution.model.name} has impacts, for which derivatives are not supported",
                 remedy="write impacts as a guard and a reset, or compare runs with different parameters",
             )
-        module: Any = self.system.code.module
-        self._project = differentiated(module.project)
-        self._rates = rate_slopes(self.system, solution._segments[0].origin)
         largest = sizes(solution)
         self._scale = np.where(largest > 0.0, largest, 1.0)
+        self._rates = rate_slopes(self.system, solution._segments[0].origin)
+        self._flow = FlowDerivatives(self.system, self._scale, self._rates)
 
     def carry(self, directions: Directions, *, sided: bool = False) -> Carried:
         """Compute the derivatives along M directions of change from the start of the run to its end.
@@ -95,6 +89,7 @@ class Carrier:
         self._off: list[OffZero] = []
         event_times, last = EventTimes(self._changes), None
         times: list[tuple[float, np.ndarray]] = []
+        starts: list[tuple[np.ndarray, np.ndarray]] = []
         all_segment_events = list(segment_events_of(self.solution))
         if any(not is_recorded(self.system, one) for one in all_segment_events[-1].happened):
             whole = all_segment_events[-1].segment  # at the end, and left the states and modes as they were
@@ -104,12 +99,13 @@ class Carrier:
             all_segment_events, [*all_segment_events[1:], None], strict=True
         ):
             segment, s = segment_events.segment, float(segment_events.segment.s[0])
+            starts.append((Y, Yd))
             for one in segment_events.recorded:
                 here = one.instant.minus(segment.origin)
-                Y, s = self._over(segment, Y, Yd, G, s, here), here
+                Y, s = self._flow.at_end(segment, Y, Yd, G, s, here), here
                 x = segment.dense(np.array([here]))[0]
                 times.append((float(one.instant), event_times.recorded(segment, one, here, x, Y, Yd)))
-            Y = self._over(segment, Y, Yd, G, s, float(segment.s[-1]))
+            Y = self._flow.at_end(segment, Y, Yd, G, s, float(segment.s[-1]))
             if following is None:
                 break
             behind = self._through(segment_events, following.segment, Y, Yd, G, event_times)
@@ -120,7 +116,15 @@ class Carrier:
                 times.append((float(following.segment.start), shift))
         if last is not None:
             Y, Yd = self._at_end(last, all_segment_events[-1].segment, Y, Yd)
-        return Carried(Y, Yd, times, self._off, self._lost)
+            starts[-1] = Y, Yd
+        return Carried(Y, Yd, times, self._off, self._lost, starts)
+
+    def between(self, carried: Carried, directions: Directions, number: int, stops: np.ndarray) -> np.ndarray:
+        """Return the derivatives (k, n + d, M) at ascending local times (k,) of the segment with this number."""
+        Y, Yd = carried.starts[number]
+        segment = self.solution._segments[number]
+        x = self._flow.over(segment, Y, Yd, directions.parameters, float(segment.s[0]), stops)
+        return np.concatenate([x, np.broadcast_to(Yd, (len(stops), *Yd.shape))], axis=1)
 
     def _is_end(self, segment: Segment) -> bool:
         """Return whether a segment begins at the end of the run, within rounding."""
@@ -208,7 +212,7 @@ class Carrier:
         later = replace(at, s=float(segment.s[:2][-1]), x=segment.x[:2][-1])
         off = monitors_reached(self._changes, at, later)
         Y = self._settled(rounds, segment, x, before) + self._note(off)
-        return self._projected(segment, Y, rounds.Yd, G), rounds.Yd
+        return self._flow.projected(segment, Y, rounds.Yd, G), rounds.Yd
 
     def _rounds(
         self,
@@ -221,32 +225,6 @@ class Carrier:
         is_start: bool = False,
     ) -> Rounds:
         return Rounds(self.system, *before, Y, Yd, self._changes, shift, large, loose, is_start, self._sided)
-
-    # -- between events -------------------------------------------------------------------------------------
-
-    def _over(
-        self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, begin: float, end: float
-    ) -> np.ndarray:
-        """Continue the derivatives over a segment from one local time to another."""
-        if end <= begin or not self.system.n:
-            return Y
-        tape, directions = (
-            TangentTape(self.system, segment.z),
-            seeds(self.system, float(segment.origin), self._rates),
-        )
-        n = self.system.n
-        constant = np.concatenate([Yd, G])
-        moving = [k for k in range(len(constant)) if constant[k].any()]
-        chosen = [*range(n), *(n + 1 + k for k in moving)]
-
-        def slopes(s: np.ndarray) -> np.ndarray:
-            return tape(s, segment.dense(s), segment.p, directions[:, chosen]).slopes
-
-        values = np.abs(np.concatenate([self.system.discrete(segment.p), segment.p[: len(G)]]))[moving]
-        inner = segment.s[(segment.s > begin) & (segment.s < end)]
-        knots = np.concatenate([[begin], inner, [end]])
-        total = transition(slopes, knots, self._scale, np.where(values > 0.0, values, 1.0))
-        return self._projected(segment, total[:, :n] @ Y + total[:, n:] @ constant[moving], Yd, G, end)
 
     # -- at events ------------------------------------------------------------------------------------------
 
@@ -301,7 +279,7 @@ class Carrier:
                 else 0.0
             )
             Y = rounds.Y + more - np.outer(self._rates_at_start(following), rounds.shift)
-        Y = self._projected(following, Y, Yd, G)
+        Y = self._flow.projected(following, Y, Yd, G)
         return np.where(self._is_end(following) & ~self._moves(shift), immediate, Y), Yd, shift
 
     def _rates_at_start(self, segment: Segment) -> np.ndarray:
@@ -318,21 +296,6 @@ class Carrier:
         if rounds.has_reset or (after.x != x).any() or differ(before, rates):
             off = [*rounds.off, *off]
         return Y + self._note([*rounds.overtaken, *off]) - np.outer(rates, rounds.shift)
-
-    def _projected(
-        self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, s: float | None = None
-    ) -> np.ndarray:
-        """Return the derivatives with held states on their constraints, at a local time or at the start."""
-        system = self.system
-        if not system.holds(segment.z):
-            return Y
-        here = float(segment.s[0]) if s is None else s
-        at = segment.x[0] if s is None else segment.dense(np.array([s]))[0]
-        by_angles = self._rates @ G * float(segment.origin)
-        p = lifted_vector(system.layout, segment.p, G, by_angles, system.discrete(segment.p), Yd)
-        out: list[Any] = [0.0] * system.n
-        self._project(here, with_slopes(at, Y), p, segment.z, out)
-        return values_and_slopes(out, Y.shape[1])[1]
 
 
 def _place(rounds: Rounds, following: Segment) -> Place:

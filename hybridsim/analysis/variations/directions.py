@@ -32,7 +32,8 @@ class Carried:
 
     x (n, M), discrete (d, M); times: each instant with an event, and its derivatives (M,);
     off: functions exactly at zero that some directions move off zero;
-    lost: times (M,) from which on directions lead to another run, or infinity.
+    lost: times (M,) from which on directions lead to another run, or infinity;
+    starts: derivatives of states and discrete states at the start of each segment.
     """
 
     x: np.ndarray
@@ -40,3 +41,4 @@ class Carried:
     times: list[tuple[float, np.ndarray]]
     off: list[OffZero]
     lost: np.ndarray
+    starts: list[tuple[np.ndarray, np.ndarray]]

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
 
 import numpy as np
 
 from hybridsim.analysis.compare.comparison_request import checked_names
-from hybridsim.analysis.variations.both_sides import agreed
+from hybridsim.analysis.variations.both_sides import BothSides, OneSide
 from hybridsim.analysis.variations.carried import Carrier
-from hybridsim.analysis.variations.directions import Carried, Directions
+from hybridsim.analysis.variations.directions import Directions
+from hybridsim.analysis.variations.over_time import Derivatives, OverTime
 from hybridsim.analysis.variations.parameters import start_slopes, value_slopes
 from hybridsim.analysis.variations.refused import refuse_limits
 from hybridsim.arguments import cannot_be, flag
@@ -25,7 +26,7 @@ from hybridsim.solution import Solution
 
 @dataclass(frozen=True)
 class Sensitivities(Readable):
-    """The derivatives of a run's end and event times by its initial state and parameters.
+    """The derivatives of a run and its event times by its initial state and parameters.
 
     Parameters
     ----------
@@ -60,6 +61,38 @@ class Sensitivities(Readable):
     times_by_start: np.ndarray
     times_by_parameter: np.ndarray
     warnings: tuple[str, ...] = ()
+    _over_time: OverTime | None = field(default=None, repr=False, compare=False)
+
+    @refusing
+    def at(self, t: Any, names: str | Sequence[str] | None = None, side: str = "+") -> Derivatives:
+        """Return the derivatives of states or other quantities at fixed times.
+
+        Parameters
+        ----------
+        t : float or sequence of float
+            A time or k times of the run.
+        names : str or sequence of str, optional
+            Names of m states or quantities, as for `Solution.output`; the default is `states`.
+        side : str, optional
+            At an event, "-" gives the derivatives just before it and "+" those just after it.
+
+        Returns
+        -------
+        Derivatives
+            Arrays ``by_start`` (m, n + d) and ``by_parameter`` (m, P); for k times they are (k, m, n + d) and (k, m, P).
+
+        Examples
+        --------
+        >>> import hybridsim as hs
+        >>> found = hs.sensitivities(hs.simulate("dfcs", (0, 0.05)), ["mu", "N"])
+        >>> found.at(0.03).by_parameter.shape
+        (2, 2)
+        >>> found.at([0.01, 0.02, 0.03], "f").by_parameter.shape
+        (3, 1, 2)
+        """
+        assert self._over_time is not None
+        chosen = self.states if names is None else checked_names(names, "names")
+        return self._over_time.at(t, chosen, side)
 
     def plot(self, *names: str) -> Any:
         """Draw the derivatives of the event times, dt/dp, over these times; see `hybridsim.plot.event_slopes`.
@@ -90,7 +123,7 @@ class Sensitivities(Readable):
 def sensitivities(
     solution: Solution, parameters: Sequence[str] | None = None, *, starts_follow: bool = True
 ) -> Sensitivities:
-    """Differentiate a run's end and event times with respect to its initial state and parameters.
+    """Differentiate a run and its event times with respect to its initial state and parameters.
 
     The variational equations Y' = f_x Y + f_p are integrated along the dense output and carried through each event by
     its saltation matrix (`hybridsim.analysis.variations.carried`), including a contact's loss of rank in stick. The
@@ -125,31 +158,21 @@ def sensitivities(
     >>> hs.sensitivities(sol, ["mu"]).by_parameter.shape
     (2, 1)
     """
-    return _found(solution, parameters, starts_follow, agreed)
+    return _found(solution, parameters, starts_follow, BothSides)
 
 
 def derivatives(
     solution: Solution, parameters: Sequence[str] | None = None, *, starts_follow: bool = True
 ) -> Sensitivities:
     """Return the derivatives of a run; on a guard or surface, the derivatives on the run's own side."""
-    return _found(solution, parameters, starts_follow, _own_side)
-
-
-def _own_side(
-    _: Carrier, __: Directions, carried: Carried
-) -> tuple[np.ndarray, np.ndarray, list[tuple[str, np.ndarray]]]:
-    end = np.concatenate([carried.x, carried.discrete])
-    shifts = np.array([shift for _, shift in carried.times])
-    return end, shifts.reshape(len(carried.times), end.shape[1]), []
+    return _found(solution, parameters, starts_follow, OneSide)
 
 
 def _found(
     solution: Solution,
     parameters: Sequence[str] | None,
     starts_follow: bool,
-    combine: Callable[
-        [Carrier, Directions, Carried], tuple[np.ndarray, np.ndarray, list[tuple[str, np.ndarray]]]
-    ],
+    sides: type[OneSide],
 ) -> Sensitivities:
     if not hasattr(solution, "_segments"):
         raise cannot_be("solution", solution, "use the result of hs.simulate")
@@ -176,9 +199,8 @@ def _found(
         np.concatenate([np.zeros((d, n)), np.eye(d), discrete_starts], axis=1),
         np.concatenate([np.zeros((len(names), n + d)), by_parameter], axis=1),
     )
-    carrier = Carrier(solution)
-    carried = carrier.carry(directions)
-    end, shifts, parted = combine(carrier, directions, carried)
+    found = sides(Carrier(solution), directions)
+    end, (times, shifts) = found.at_end(), found.of_times()
     states = (*solution.names, *(q.name for q in model.discrete))
     changed = [*(f"the start of {name}" for name in states), *chosen]
     return Sensitivities(
@@ -186,15 +208,16 @@ def _found(
         chosen,
         end[:, : n + d],
         end[:, n + d :],
-        np.array([t for t, _ in carried.times]),
+        times,
         shifts[:, : n + d],
         shifts[:, n + d :],
         tuple(
             f"{name}, but a change of {' or '.join(np.array(changed)[mask])} moves it off zero: "
             "derivatives that "
             "differ on the two sides are NaN"
-            for name, mask in parted
+            for name, mask in found.differing()
         ),
+        OverTime(solution, directions, found),
     )
 
 

@@ -66,46 +66,62 @@ Slopes = Callable[[np.ndarray], np.ndarray]
 """The type of derivatives (m, n, n + q) of the rates at local times (m,), by n states and q constants."""
 
 
-def transition(slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: np.ndarray) -> np.ndarray:
-    """Return d(states at the last knot)/d(states at the first knot, constants) as an array (n, n + q).
+def transitions(
+    slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: np.ndarray, stops: np.ndarray
+) -> np.ndarray:
+    """Return d(states at the stops)/d(states at the first knot, constants) as an array (k, n, n + q).
 
     knots: ascending local times, between which the flow is smooth. scale (n,), constants (q,): sizes of the
-    states and of the constants, all positive.
+    states and of the constants, all positive. stops (k,): ascending local times, each of which is a knot.
     """
     begins, ends = knots[:-1], knots[1:]
     fades, turns = _work(slopes, begins, ends)
     if fades > _FADES * len(begins) + 2**12:
-        return stiff_transition(slopes, knots, scale, constants)
+        return stiff_transitions(slopes, knots, scale, constants, stops)
     if turns > _FADES * len(begins) + _MAX_RADIANS:
         raise UsageError(
             f"derivatives between t = {knots[0]:.9g} and {knots[-1]:.9g} (since the last event) oscillate over about "
             f"{turns:.1g} radians: the computation takes minutes or longer",
             remedy="simulate a shorter time, or choose parameters for which the motion is slower",
         )
-    found_parts: list[tuple[np.ndarray, np.ndarray]] = []
+    found_parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     before = np.full(len(begins), np.inf)
     for halving in range(_HALVINGS):
         count = 1 + len(begins) * (_STAGES * len(scale)) ** 2 // _ENTRIES_PER_BATCH
         parts = np.array_split(np.arange(len(begins)), count)
-        done = [_transitions(slopes, begins[part], ends[part], scale, constants) for part in parts]
+        done = [_over_pieces(slopes, begins[part], ends[part], scale, constants) for part in parts]
         found, tails = (np.concatenate(each) for each in zip(*done, strict=True))
         is_rounding = (tails <= _NOISE) & (tails >= 0.7 * before)
         good = (tails <= _RESOLVED) | is_rounding | (halving == _HALVINGS - 1)
-        found_parts.append((begins[good], found[good]))
+        found_parts.append((begins[good], ends[good], found[good]))
         if good.all():
             break
         begins, ends, before = begins[~good], ends[~good], tails[~good]
         middle = 0.5 * (begins + ends)
         begins, ends = np.concatenate([begins, middle]), np.concatenate([middle, ends])
         before = np.concatenate([before, before])
-    starts = np.concatenate([b for b, _ in found_parts])
-    matrices = np.concatenate([m for _, m in found_parts])[np.argsort(starts, kind="stable")]
-    n = matrices.shape[1]
-    total = np.eye(n, matrices.shape[2])
-    for matrix in matrices:
+    starts, until, matrices = (np.concatenate(each) for each in zip(*found_parts, strict=True))
+    order = np.argsort(starts, kind="stable")
+    n, q = len(scale), len(constants)
+    total = np.eye(n, n + q)
+    wanted = _Wanted(stops, knots[0], total)
+    for end, matrix in zip(until[order].tolist(), matrices[order], strict=True):
         total = matrix[:, :n] @ total
         total[:, n:] += matrix[:, n:]
-    return total
+        wanted.add(end, total)
+    return np.array(wanted.found)
+
+
+class _Wanted:
+    """Collects the derivatives at the stops, which are ascending."""
+
+    def __init__(self, stops: np.ndarray, begin: float, total: np.ndarray) -> None:
+        self._stops, self.found = stops.tolist(), list[np.ndarray]()
+        self.add(begin, total)
+
+    def add(self, s: float, total: np.ndarray) -> None:
+        while len(self.found) < len(self._stops) and self._stops[len(self.found)] <= s:
+            self.found.append(total)
 
 
 def _work(slopes: Slopes, begins: np.ndarray, ends: np.ndarray) -> tuple[float, float]:
@@ -122,8 +138,8 @@ def _work(slopes: Slopes, begins: np.ndarray, ends: np.ndarray) -> tuple[float, 
     return float(fastest[0] @ lengths[finite]), float(fastest[1] @ lengths[finite])
 
 
-def stiff_transition(
-    slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: np.ndarray
+def stiff_transitions(
+    slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: np.ndarray, stops: np.ndarray
 ) -> np.ndarray:
     """Return the derivatives of a stiff segment by Radau's formula, which allows longer pieces.
 
@@ -131,6 +147,7 @@ def stiff_transition(
     """
     n = len(scale)
     Y = np.eye(n, n + len(constants))
+    wanted = _Wanted(stops, knots[0], Y)
     # in units of the states; the first n columns have the size of the largest, the others each their own
     units = np.concatenate([scale, np.ones(len(constants))]) / scale[:, None]
     least = np.concatenate([np.ones(n), _CANCELS / constants])
@@ -138,7 +155,7 @@ def stiff_transition(
     most = 16 * len(waiting) + 2**14
     for _ in range(most):
         if not waiting:
-            return Y
+            return np.array(wanted.found)
         begin, end, before = waiting.pop()
         length, middle = end - begin, 0.5 * (begin + end)
         rates = _rates(RADAU, slopes, np.array([begin]), np.array([length]), Y)[0]
@@ -151,6 +168,7 @@ def stiff_transition(
         is_rounding = 0.7 * before <= tail <= _STIFF_NOISE
         if tail <= _STIFF_RESOLVED or is_rounding or not begin < middle < end:
             Y = Y + length * np.einsum("i,iab->ab", RADAU.b, rates)
+            wanted.add(end, Y)
         else:
             waiting += [(middle, end, tail), (begin, middle, tail)]
     raise UsageError(
@@ -160,7 +178,7 @@ def stiff_transition(
     )
 
 
-def _transitions(
+def _over_pieces(
     slopes: Slopes, begins: np.ndarray, ends: np.ndarray, scale: np.ndarray, constants: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the derivatives over each piece, and a measure of how well each piece is resolved."""

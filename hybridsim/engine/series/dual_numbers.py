@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from types import FunctionType
+from types import FunctionType, SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -59,31 +59,38 @@ class Dual:
         return Dual(-self.value, -self.slope)
 
     def __abs__(self) -> Dual:
-        return Dual(abs(self.value), self.slope if self.value >= 0.0 else -self.slope)
+        return Dual(abs(self.value), self.slope if self >= 0.0 else -self.slope)
 
     def __float__(self) -> float:
         return float(self.value)
 
     def __lt__(self, other: Any) -> bool:
-        return bool(self.value < _parts(other)[0])
+        return _held(self.value < _parts(other)[0])
 
     def __le__(self, other: Any) -> bool:
-        return bool(self.value <= _parts(other)[0])
+        return _held(self.value <= _parts(other)[0])
 
     def __gt__(self, other: Any) -> bool:
-        return bool(self.value > _parts(other)[0])
+        return _held(self.value > _parts(other)[0])
 
     def __ge__(self, other: Any) -> bool:
-        return bool(self.value >= _parts(other)[0])
+        return _held(self.value >= _parts(other)[0])
 
     def __eq__(self, other: object) -> bool:
-        return bool(self.value == _parts(other)[0])
+        return _held(self.value == _parts(other)[0])
 
     __hash__ = None  # type: ignore[assignment]  # as usual in Python for a class with ==
 
 
 def _parts(other: Any) -> tuple[float, Any]:
     return (other.value, other.slope) if isinstance(other, Dual) else (other, 0.0)
+
+
+def _held(condition: Any) -> bool:
+    """Return whether a condition holds, the same for all values."""
+    if np.ndim(condition) and not (condition.all() or not condition.any()):
+        raise ValueError("a condition holds at some of the values only")
+    return bool(np.all(condition))
 
 
 def _smooth(
@@ -100,39 +107,46 @@ def _smooth(
     return lifted
 
 
-def _atan2(y: Any, x: Any) -> Any:
-    (a, da), (b, db) = _parts(y), _parts(x)
-    return Dual(math.atan2(a, b), (b * da - a * db) / (a * a + b * b))
+def _functions(of: Any) -> dict[str, Any]:
+    """Return the functions of generated code for dual numbers, from those of the module `math` or of NumPy."""
+
+    def power(base: Any, exponent: Any) -> Any:
+        (u, du), (n, dn) = _parts(base), _parts(exponent)
+        y = of.pow(u, n)
+        by_exponent = y * of.log(u) * dn if isinstance(exponent, Dual) and np.any(dn) else 0.0
+        return Dual(y, n * of.pow(u, n - 1.0) * du + by_exponent)
+
+    def atan2(y: Any, x: Any) -> Any:
+        (a, da), (b, db) = _parts(y), _parts(x)
+        return Dual(of.atan2(a, b), (b * da - a * db) / (a * a + b * b))
+
+    def sign_of(size: Any, sign: Any) -> Any:
+        return of.copysign(size, _parts(sign)[0])  # generated code uses only the sign of the result
+
+    return {
+        "sqrt": _smooth(of.sqrt, lambda u, y: 0.5 / y),
+        "exp": _smooth(of.exp, lambda u, y: y),
+        "log": _smooth(of.log, lambda u, y: 1.0 / u),
+        "sin": _smooth(of.sin, lambda u, y: of.cos(u)),
+        "cos": _smooth(of.cos, lambda u, y: -of.sin(u)),
+        "tan": _smooth(of.tan, lambda u, y: 1.0 + y * y),
+        "asin": _smooth(of.asin, lambda u, y: 1.0 / of.sqrt(1.0 - u * u)),
+        "acos": _smooth(of.acos, lambda u, y: -1.0 / of.sqrt(1.0 - u * u)),
+        "atan": _smooth(of.atan, lambda u, y: 1.0 / (1.0 + u * u)),
+        "sinh": _smooth(of.sinh, lambda u, y: of.cosh(u)),
+        "cosh": _smooth(of.cosh, lambda u, y: of.sinh(u)),
+        "tanh": _smooth(of.tanh, lambda u, y: 1.0 - y * y),
+        "atan2": atan2,
+        "pow": power,
+        "copysign": sign_of,
+    }
 
 
-def _pow(base: Any, exponent: Any) -> Any:
-    (u, du), (n, dn) = _parts(base), _parts(exponent)
-    y = math.pow(u, n)
-    by_exponent = y * math.log(u) * dn if isinstance(exponent, Dual) and np.any(dn) else 0.0
-    return Dual(y, n * math.pow(u, n - 1.0) * du + by_exponent)
-
-
-def _copysign(size: Any, sign: Any) -> Any:
-    return math.copysign(size, float(sign))  # generated code uses only the sign of the result
-
-
-_FUNCTIONS: dict[str, Any] = {
-    "sqrt": _smooth(math.sqrt, lambda u, y: 0.5 / y),
-    "exp": _smooth(math.exp, lambda u, y: y),
-    "log": _smooth(math.log, lambda u, y: 1.0 / u),
-    "sin": _smooth(math.sin, lambda u, y: math.cos(u)),
-    "cos": _smooth(math.cos, lambda u, y: -math.sin(u)),
-    "tan": _smooth(math.tan, lambda u, y: 1.0 + y * y),
-    "asin": _smooth(math.asin, lambda u, y: 1.0 / math.sqrt(1.0 - u * u)),
-    "acos": _smooth(math.acos, lambda u, y: -1.0 / math.sqrt(1.0 - u * u)),
-    "atan": _smooth(math.atan, lambda u, y: 1.0 / (1.0 + u * u)),
-    "sinh": _smooth(math.sinh, lambda u, y: math.cosh(u)),
-    "cosh": _smooth(math.cosh, lambda u, y: math.sinh(u)),
-    "tanh": _smooth(math.tanh, lambda u, y: 1.0 - y * y),
-    "atan2": _atan2,
-    "pow": _pow,
-    "copysign": _copysign,
-}
+_ARRAYS = SimpleNamespace(
+    sqrt=np.sqrt, exp=np.exp, log=np.log, sin=np.sin, cos=np.cos, tan=np.tan, asin=np.arcsin, acos=np.arccos,
+    atan=np.arctan, sinh=np.sinh, cosh=np.cosh, tanh=np.tanh, atan2=np.arctan2, pow=np.power, copysign=np.copysign,
+)  # fmt: skip
+_OF_NUMBERS, _OF_ARRAYS = _functions(math), _functions(_ARRAYS)
 
 
 def with_slopes(values: Any, slopes: np.ndarray) -> list[Dual]:
@@ -142,7 +156,15 @@ def with_slopes(values: Any, slopes: np.ndarray) -> list[Dual]:
 
 def differentiated(function: FunctionType) -> Callable[..., Any]:
     """Return a generated function that accepts dual numbers."""
-    return FunctionType(function.__code__, function.__globals__ | _FUNCTIONS, function.__name__)
+    return FunctionType(function.__code__, function.__globals__ | _OF_NUMBERS, function.__name__)
+
+
+def differentiated_rows(function: FunctionType) -> Callable[..., Any]:
+    """Return a generated function that accepts dual numbers of k values each, with derivatives (D, k).
+
+    It raises `ValueError` if a condition does not hold for all k values or for none of them.
+    """
+    return FunctionType(function.__code__, function.__globals__ | _OF_ARRAYS, function.__name__)
 
 
 def values_and_slopes(numbers: list[Any], directions: int) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,73 @@
+"""This module evaluates the derivatives of a run's states and quantities at any time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybridsim.analysis.variations.directions import Directions
+from hybridsim.analysis.variations.quantities import QuantityDerivatives
+from hybridsim.arguments import as_times
+from hybridsim.errors import UsageError, nearest
+from hybridsim.presentation.readable import Readable
+from hybridsim.solution import Solution
+
+if TYPE_CHECKING:
+    from hybridsim.analysis.variations.both_sides import OneSide
+
+
+@dataclass(frozen=True)
+class Derivatives(Readable):
+    """Derivatives of m quantities of a run at fixed times, by the initial state and by parameters.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Names of the quantities.
+    by_start : array
+        (m, n + d) derivatives by the states and discrete states at the start, or (k, m, n + d) for k times.
+    by_parameter : array
+        (m, P) derivatives by the chosen parameters, or (k, m, P) for k times.
+    """
+
+    names: tuple[str, ...]
+    by_start: np.ndarray
+    by_parameter: np.ndarray
+
+    def __repr__(self) -> str:
+        shapes = f"by_start {self.by_start.shape}, by_parameter {self.by_parameter.shape}"
+        return f"Derivatives of {', '.join(self.names)}: {shapes}"
+
+
+class OverTime:
+    """Derivatives of one run at any time."""
+
+    def __init__(self, solution: Solution, directions: Directions, sides: OneSide) -> None:
+        self._solution, self._sides = solution, sides
+        self._quantities = QuantityDerivatives(solution, directions)
+        self._known = (*solution.names, *solution.quantities)
+        self._starts = len(directions.x) + len(directions.discrete)
+        self._width = directions.parameters.shape[1]
+
+    def at(self, t: Any, names: Sequence[str], side: str) -> Derivatives:
+        """Return the derivatives of some states or quantities at a time, or at several times."""
+        for name in names:
+            if name not in self._known:
+                raise UsageError(
+                    f"model {self._solution.model.name} has no quantity {name!r}",
+                    remedy=nearest(str(name), self._known, kind="quantities"),
+                )
+        times, side = self._solution._within(as_times(t), side)
+        index, s = self._solution._of_model.segment_at(times, side)
+        found = np.empty((len(times), len(names), self._width))
+        for number in np.unique(index).tolist():
+            chosen = np.flatnonzero(index == number)
+            chosen = chosen[np.argsort(s[chosen], kind="stable")]
+            Y = self._sides.within(number, s[chosen], side == "+")
+            found[chosen] = self._quantities.of(names, self._solution._segments[number], s[chosen], Y)
+        if np.ndim(t) == 0:
+            found = found[0]
+        return Derivatives(tuple(names), found[..., : self._starts], found[..., self._starts :])
