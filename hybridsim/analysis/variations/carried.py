@@ -66,11 +66,6 @@ class Carrier:
                 f"model {solution.model.name} consists of Python functions, whose derivatives are unknown",
                 remedy="write the model in expressions",
             )
-        if self.system.is_unilateral.any():
-            raise UsageError(
-                f"model {solution.model.name} has impacts, for which derivatives are not supported",
-                remedy="write impacts as a guard and a reset, or compare runs with different parameters",
-            )
         largest = sizes(solution)
         self._scale = np.where(largest > 0.0, largest, 1.0)
         self._rates = rate_slopes(self.system, solution._segments[0].origin)
@@ -272,7 +267,7 @@ class Carrier:
             changed = {
                 component_of(system, one)[0] for one in happened if one.kind not in ("monitor", "scheduled")
             }
-            surfaces = [c for c in sorted(changed) if system.automata[c].has_surface]
+            surfaces = [c for c in sorted(changed) if system.automata[c].below >= 0]  # not gaps
             more = (
                 self._note(limits_reached(self._changes, _place(rounds, following), surfaces))
                 if surfaces

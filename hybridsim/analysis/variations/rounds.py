@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.analysis.variations.changes import Changes, Place
+from hybridsim.analysis.variations.impacts import Impacts
 from hybridsim.analysis.variations.off_zero import OffZero, off_zero, rates_of
 from hybridsim.engine.events.zeno.limits import LIMIT
 from hybridsim.engine.lowering.reset_keys import added
@@ -85,6 +86,7 @@ class Rounds:
         self.overtaken: list[OffZero] = []  # other events, if a change delays a round
         self._later: list[np.ndarray] = []
         self._reset = differentiated(system.code.module.reset)
+        self._impacts = Impacts(system) if system.is_unilateral.any() else None
         self._names = [*system.names, *(v.name for v in system.model.discrete)]
 
     def at_end(self, segment: Segment, happened: Sequence[Occurrence]) -> None:
@@ -204,10 +206,22 @@ class Rounds:
                 for name in names:
                     k = self._names.index(name)
                     after[k] = out[k] if part is key else after[k] + out[k]
+        closing = [c for one in fired if (c := self._closing(one)) >= 0]
+        if self._impacts is not None and closing:
+            self.has_reset = self.has_jumped = True
+            time = Dual(s, self.shift)
+            after[:n] = self._impacts.after(closing, origin + s, time, after[:n], lifted, self._reading())
         found, slopes = values_and_slopes(after, width)
         self._has_moved = True
         self.x, self.d, self.Y, self.Yd = found[:n], found[n:], slopes[:n], slopes[n:]
         self.z = modes
+
+    def _closing(self, one: Occurrence) -> int:
+        """Return the component of a unilateral contact whose gap closes with an impact, or -1."""
+        if one.kind in ("monitor", "scheduled") or one.guard == LIMIT:
+            return -1
+        c, automaton = component_of(self.system, one)
+        return c if automaton.is_unilateral and automaton.modes.index(one.source) == automaton.above else -1
 
     def _lifted(self, p: np.ndarray, origin: float) -> tuple[list[Dual], list[Any]]:
         """Return the states and the run-time vector as dual numbers."""
