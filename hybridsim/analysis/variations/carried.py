@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+
 import numpy as np
 
 from hybridsim.analysis.variations.changes import Changes, Place
@@ -29,7 +30,6 @@ from hybridsim.analysis.variations.off_zero import (
     off_zero,
     rates_of,
 )
-from hybridsim.analysis.variations.refused import refuse_inputs
 from hybridsim.analysis.variations.rounds import (
     Rounds,
     batches,
@@ -37,7 +37,6 @@ from hybridsim.analysis.variations.rounds import (
     is_knot,
     is_recorded,
 )
-from hybridsim.analysis.variations.seeds import rate_slopes
 from hybridsim.analysis.variations.segment_events import (
     Last,
     SegmentEvents,
@@ -46,6 +45,7 @@ from hybridsim.analysis.variations.segment_events import (
     time_rounding,
 )
 from hybridsim.analysis.variations.sizes import sizes
+from hybridsim.analysis.variations.vector_slopes import VectorSlopes
 from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.system.system import System
 from hybridsim.errors import UsageError
@@ -68,8 +68,8 @@ class Carrier:
             )
         largest = sizes(solution)
         self._scale = np.where(largest > 0.0, largest, 1.0)
-        self._rates = rate_slopes(self.system, solution._segments[0].origin)
-        self._flow = FlowDerivatives(self.system, self._scale, self._rates)
+        self._vector = VectorSlopes(self.system, solution._segments[0].origin)
+        self._flow = FlowDerivatives(self.system, self._scale, self._vector)
 
     def carry(self, directions: Directions, *, sided: bool = False) -> Carried:
         """Compute the derivatives along M directions of change from the start of the run to its end.
@@ -78,9 +78,8 @@ class Carrier:
         """
         G = directions.parameters
         self._sided, self._lost = sided, np.full(G.shape[1], np.inf)
-        refuse_inputs(self.system.model, G)
         Y, Yd = directions.x.copy(), directions.discrete.copy()
-        self._changes = Changes(self.system, self._scale, self.own_sizes(directions), G, self._rates)
+        self._changes = Changes(self.system, self._scale, self.own_sizes(directions), G, self._vector)
         self._off: list[OffZero] = []
         event_times, last = EventTimes(self._changes), None
         times: list[tuple[float, np.ndarray]] = []
@@ -206,6 +205,9 @@ class Carrier:
         at = _place(rounds, segment)
         later = replace(at, s=float(segment.s[:2][-1]), x=segment.x[:2][-1])
         off = monitors_reached(self._changes, at, later)
+        for name, by in self._vector.knots(segment.start):
+            begins = by @ G  # a knot that moves off the start to a later time changes the run
+            off.append(OffZero(at.origin + at.s, name, begins != 0.0, begins > 0.0, np.zeros(Y.shape)))
         Y = self._settled(rounds, segment, x, before) + self._note(off)
         return self._flow.projected(segment, Y, rounds.Yd, G), rounds.Yd
 
@@ -236,7 +238,7 @@ class Carrier:
         system, s = self.system, float(segment.s[-1])
         x = segment.x[-1]
         happened = [one for one in segment_events.happened if not is_recorded(system, one)]
-        if not happened and segment_events.happened:
+        if not happened and segment_events.happened and not is_knot(system, following.start):
             return Y, Yd, event_times.recorded(segment, segment_events.happened[0], s, x, Y, Yd)
         shift = event_times.of(segment, happened, s, x, Y, Yd)
         before = rates_of(system, s, x, segment.p, segment.z)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hybridsim.analysis.variations.seeds import seeds
+from hybridsim.analysis.variations.vector_slopes import VectorSlopes
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tangents import TangentTape
 
@@ -72,20 +72,18 @@ class Changes:
     scale : (n,) sizes of the states.
     own : (M,) the change along each direction that is as large as the quantity that it changes.
     G : derivatives of the parameters (P, M).
-    rates : derivatives of the forcing's angular rates by the parameters.
+    vector : derivatives of the run-time vector.
     """
 
     def __init__(
-        self, system: System, scale: np.ndarray, own: np.ndarray, G: np.ndarray, rates: np.ndarray
+        self, system: System, scale: np.ndarray, own: np.ndarray, G: np.ndarray, vector: VectorSlopes
     ) -> None:
-        self.system, self.G, self.rates = system, G, rates
+        self.system, self.G, self.vector = system, G, vector
         self._scale, self.own = scale, own
 
     def flow(self, at: Place) -> tuple[np.ndarray, np.ndarray]:
         """Return the rates (n,) of the states, and their derivatives by all arguments of the rates."""
-        found = TangentTape(self.system, at.z)(
-            np.array([at.s]), at.x[None, :], at.p, seeds(self.system, at.origin, self.rates)
-        )
+        found = TangentTape(self.system, at.z)(np.array([at.s]), at.x[None, :], at.p, self.vector.seeds(at.p))
         return found.values[0], found.slopes[0]
 
     def of(
@@ -98,7 +96,7 @@ class Changes:
         """Return values and derivatives of the guards, monitors and surfaces with the given numbers."""
         system, n = self.system, self.system.n
         tape = TangentTape(system, at.z, guards, monitors, surfaces)
-        found = tape(np.array([at.s]), at.x[None, :], at.p, seeds(system, at.origin, self.rates))
+        found = tape(np.array([at.s]), at.x[None, :], at.p, self.vector.seeds(at.p))
         flow, changes = found.values[0, :n], np.concatenate([at.Y, at.Yd, self.G])
         sized = np.concatenate([np.maximum(np.abs(at.Y), at.large), np.abs(at.Yd), np.abs(self.G)])
         constants = np.abs(np.concatenate([system.discrete(at.p), at.p[: len(self.G)]]))

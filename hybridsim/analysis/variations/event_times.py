@@ -9,7 +9,7 @@ import numpy as np
 
 from hybridsim.analysis.variations.changes import Changes, Place
 from hybridsim.analysis.variations.parameters import expression_slope
-from hybridsim.analysis.variations.rounds import component_of, guard_number, is_knot
+from hybridsim.analysis.variations.rounds import component_of, guard_number
 from hybridsim.engine.record.segments import Occurrence, Segment
 from hybridsim.errors import UsageError
 from hybridsim.expr import evaluate
@@ -44,17 +44,17 @@ class EventTimes:
     ) -> np.ndarray:
         """Return the derivatives (M,) of the time at which all located events at local time `s` happen."""
         width = self._changes.G.shape[1]
-        if not happened:
-            return np.zeros(width)
         at = segment.origin.plus(s)
+        knots = self._changes.vector.knots(at)
+        if not happened and not knots:
+            return np.zeros(width)
         shifts = [
             Shift(row, np.abs(row))
             for one in happened
             if one.kind == "scheduled"
             for row in self.scheduled(one)
         ]
-        if is_knot(self.system, at):  # inputs whose knots move are refused
-            shifts.append(Shift(np.zeros(width), np.zeros(width)))
+        shifts += [Shift(row, np.abs(row)) for row in (knot @ self._changes.G for _, knot in knots)]
         for one in happened:
             if one.kind == "monitor" or one.guard:
                 shift = self._located(segment, one, s, x, Y, Yd, is_first=not shifts)
@@ -71,9 +71,10 @@ class EventTimes:
             for shift in shifts
         ):
             raise UsageError(
-                f"several events at t = {float(happened[0].instant):.9g} happen at different times after "
+                f"several events at t = {float(at):.9g} happen at different times after "
                 "a small change of the run "
-                f"({', '.join(sorted({o.component for o in happened}))}), so there is no derivative",
+                f"({', '.join(sorted({*(o.component for o in happened), *(name for name, _ in knots)}))}), so there is "
+                "no derivative",
                 remedy="use other parameters, or a run that ends before this time",
             )
         return first.values

@@ -6,9 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.analysis.variations.rounds import lifted_vector
-from hybridsim.analysis.variations.seeds import seeds
 from hybridsim.analysis.variations.smooth import transitions
+from hybridsim.analysis.variations.vector_slopes import VectorSlopes
 from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.series.dual_numbers import differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.system.system import System
@@ -21,12 +20,12 @@ class FlowDerivatives:
     Parameters
     ----------
     scale : (n,) sizes of the states.
-    rates : derivatives of the forcing's angular rates by the parameters.
+    vector : derivatives of the run-time vector.
     """
 
-    def __init__(self, system: System, scale: np.ndarray, rates: np.ndarray) -> None:
+    def __init__(self, system: System, scale: np.ndarray, vector: VectorSlopes) -> None:
         module: Any = system.code.module
-        self.system, self._scale, self._rates = system, scale, rates
+        self.system, self._scale, self._vector = system, scale, vector
         self._project = differentiated(module.project)
 
     def at_end(
@@ -47,7 +46,7 @@ class FlowDerivatives:
         if stops[-1] <= begin or not self.system.n:
             return np.broadcast_to(Y, (len(stops), *Y.shape))
         tape = TangentTape(self.system, segment.z)
-        directions = seeds(self.system, float(segment.origin), self._rates)
+        directions = self._vector.seeds(segment.p)
         n = self.system.n
         constant = np.concatenate([Yd, G])
         moving = [k for k in range(len(constant)) if constant[k].any()]
@@ -76,8 +75,7 @@ class FlowDerivatives:
             return Y
         here = float(segment.s[0]) if s is None else s
         at = segment.x[0] if s is None else segment.dense(np.array([s]))[0]
-        by_angles = self._rates @ G * float(segment.origin)
-        p = lifted_vector(system.layout, segment.p, G, by_angles, system.discrete(segment.p), Yd)
+        p = self._vector.lifted(segment.p, system.discrete(segment.p), Yd, G)
         out: list[Any] = [0.0] * system.n
         self._project(here, with_slopes(at, Y), p, segment.z, out)
         return values_and_slopes(out, Y.shape[1])[1]

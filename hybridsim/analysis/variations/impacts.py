@@ -42,19 +42,31 @@ class Impacts:
         return states
 
     def _cluster(
-        self, cluster: tuple[int, ...], closing: set[int], t: float, s: Dual, x: list[Dual], p: list[Any], z: np.ndarray
+        self,
+        cluster: tuple[int, ...],
+        closing: set[int],
+        t: float,
+        s: Dual,
+        x: list[Dual],
+        p: list[Any],
+        z: np.ndarray,
     ) -> list[Dual]:
         """Return the states just after the impact of the contacts of one cluster."""
         system, n, m, width = self.system, self.system.n, self._m, len(s.slope)
         out: list[Any] = [0.0] * (2 * m * (n + m))
         self._impulses(s, x, p, z, out)
         values, slopes = values_and_slopes(out, width)
-        changes, d_changes = values[m * n : 2 * m * n].reshape(m, n), slopes[m * n : 2 * m * n].reshape(m, n, width)
+        changes, d_changes = (
+            values[m * n : 2 * m * n].reshape(m, n),
+            slopes[m * n : 2 * m * n].reshape(m, n, width),
+        )
         rows, d_rows = values[: m * n].reshape(m, n), slopes[: m * n].reshape(m, n, width)
         loads, d_loads = values[2 * m * n :].reshape(2, m, m), slopes[2 * m * n :].reshape(2, m, m, width)
         place = {c: k for k, c in enumerate(system.surface_of)}
         automata = system.automata
-        normal = [c for c in cluster if c in closing or (automata[c].is_unilateral and z[c] == automata[c].hold)]
+        normal = [
+            c for c in cluster if c in closing or (automata[c].is_unilateral and z[c] == automata[c].hold)
+        ]
         normal_rows = [place[c] for c in normal]
         rubbing = [c for c in cluster if loads[:, place[c]][:, normal_rows].any()]
         members = np.array([place[c] for c in (*normal, *rubbing)])
@@ -76,14 +88,18 @@ class Impacts:
         matrix, answer = self._system(problem, names, t)
         d_right = -d_speeds.copy()
         approach = np.maximum(-speeds[:k], 0.0)
-        d_right[:k] += d_e * approach[:, None] + e[:, None] * np.where(approach > 0.0, 1.0, 0.0)[:, None] * -d_speeds[:k]
+        d_right[:k] += (
+            d_e * approach[:, None] + e[:, None] * np.where(approach > 0.0, 1.0, 0.0)[:, None] * -d_speeds[:k]
+        )
         d_left = np.einsum("ijw,j->iw", d_effects, answer.impulses)
         kinds = _kinds(problem, answer)
         d_right = np.where((kinds == 1)[:, None], d_right - d_left, 0.0)
         for i in range(k, len(members)):
             if kinds[i] > 1:
                 side = kinds[i] - 2
-                d_right[i] = (1.0, -1.0)[side] * np.einsum("jw,j->w", d_ends[side][i - k], answer.impulses[:k])
+                d_right[i] = (1.0, -1.0)[side] * np.einsum(
+                    "jw,j->w", d_ends[side][i - k], answer.impulses[:k]
+                )
         d_impulses = np.linalg.solve(matrix, d_right)
         _refuse_undecided(problem, answer, kinds, d_impulses, names, t)
         moved = changes[members].T @ d_impulses + np.einsum("inw,i->nw", d_changes[members], answer.impulses)
@@ -91,7 +107,14 @@ class Impacts:
         return [Dual(one.value + jump[i], one.slope + moved[i]) for i, one in enumerate(x)]
 
     def _restitution(
-        self, s: Dual, x: list[Dual], p: list[Any], z: np.ndarray, rows: list[int], speeds: np.ndarray, slopes: np.ndarray
+        self,
+        s: Dual,
+        x: list[Dual],
+        p: list[Any],
+        z: np.ndarray,
+        rows: list[int],
+        speeds: np.ndarray,
+        slopes: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the coefficients of restitution (k,) and their derivatives (k, M)."""
         width = len(s.slope)

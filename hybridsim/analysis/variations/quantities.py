@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.analysis.variations.directions import Directions
-from hybridsim.analysis.variations.rounds import lifted_vector
-from hybridsim.analysis.variations.seeds import rate_slopes
+from hybridsim.analysis.variations.vector_slopes import VectorSlopes
 from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.series.dual_numbers import Dual, differentiated, differentiated_rows, values_and_slopes
 from hybridsim.engine.system.system import System
@@ -27,7 +26,7 @@ class QuantityDerivatives:
     def __init__(self, solution: Solution, directions: Directions) -> None:
         self.system: System = solution._system
         self._trajectory, self._G = solution._of_model, directions.parameters
-        self._by_rates = rate_slopes(self.system, solution._segments[0].origin) @ self._G
+        self._vector = VectorSlopes(self.system, solution._segments[0].origin)
         self._velocities = list(self._trajectory._velocities)
 
     def of(self, names: Sequence[str], segment: Segment, s: np.ndarray, Y: np.ndarray) -> np.ndarray:
@@ -94,9 +93,7 @@ class QuantityDerivatives:
 
         states = [number(x[:, i], Y[:, i]) for i in range(n)]
         d = self.system.discrete(segment.p)
-        p = lifted_vector(
-            self.system.layout, segment.p, self._G, self._by_rates * float(segment.origin), d, Y[0, n:]
-        )
+        p = self._vector.lifted(segment.p, d, Y[0, n:], self._G)
         if not is_single:
             p = [Dual(one.value, one.slope[:, None]) if isinstance(one, Dual) else one for one in p]
         out: list[Any] = [0.0] * count
@@ -104,7 +101,9 @@ class QuantityDerivatives:
         if is_single:
             return values_and_slopes(out, width)[1][None]
         rows = [
-            np.broadcast_to(one.slope, (width, len(s))) if isinstance(one, Dual) else np.zeros((width, len(s)))
+            np.broadcast_to(one.slope, (width, len(s)))
+            if isinstance(one, Dual)
+            else np.zeros((width, len(s)))
             for one in out
         ]
         return np.array(rows).reshape(count, width, len(s)).transpose(2, 0, 1)

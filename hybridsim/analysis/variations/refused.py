@@ -1,14 +1,11 @@
-"""This module rejects runs and parameters for which derivatives are not computed."""
+"""This module rejects runs for which derivatives are not computed."""
 
 from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from hybridsim.engine.events.zeno.limits import LIMIT
 from hybridsim.errors import UsageError
-from hybridsim.model import Model
 from hybridsim.solution.solution import Solution
 
 # A series that was followed to its last thousand roundings of time has all its derivatives in the passed
@@ -41,19 +38,3 @@ def refuse_limits(solution: Solution) -> None:
                 )
         elif event.t > before:
             before = event.t
-
-
-def refuse_inputs(model: Model, G: np.ndarray) -> None:
-    """Reject parameters on which the shape of an input depends, because its derivatives are unknown."""
-    moving = {p.name for p, row in zip(model.parameters, G, strict=True) if row.any()}
-    starts = {part.name: part.start.names for part in model.discrete}
-    for declared in model.inputs:
-        names = {n for e in declared.expressions.values() for n in e.names}
-        used = sorted(moving & names.union(*(starts.get(name, ()) for name in names)))
-        if used:
-            raise UsageError(
-                f"{declared.subject} depends on {used[0]}, but its derivative with respect to {used[0]} is unknown",
-                remedy=f"do not request derivatives by {used[0]}, or write the input as an expression of t"
-                if declared.kind != "step"
-                else f"do not request derivatives by {used[0]}, or let a schedule reset a discrete state instead",
-            )

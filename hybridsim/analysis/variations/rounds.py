@@ -79,7 +79,7 @@ class Rounds:
     ) -> None:
         self.system, self.x, self.d, self.z, self.Y, self.Yd = system, x.copy(), d.copy(), z.copy(), Y, Yd
         self._changes, self.shift, self.large, self._sided = changes, shift, large, sided
-        self._G, self._by_rates = changes.G, changes.rates @ changes.G
+        self._G, self._vector = changes.G, changes.vector
         self._loose, self._has_moved = loose, is_start
         self.has_reset = self.has_jumped = False
         self.off: list[OffZero] = []
@@ -183,7 +183,7 @@ class Rounds:
         """Apply all resets of one round to the state before the round; additive resets are summed."""
         system, n = self.system, self.system.n
         values = self._with_discrete(p)
-        x, lifted = self._lifted(values, origin)
+        x, lifted = self._lifted(values)
         before = [*x, *lifted[system.layout.discrete_slice]]
         after, width = list(before), self.Y.shape[1]
         modes = self.z.copy()
@@ -223,12 +223,9 @@ class Rounds:
         c, automaton = component_of(self.system, one)
         return c if automaton.is_unilateral and automaton.modes.index(one.source) == automaton.above else -1
 
-    def _lifted(self, p: np.ndarray, origin: float) -> tuple[list[Dual], list[Any]]:
+    def _lifted(self, p: np.ndarray) -> tuple[list[Dual], list[Any]]:
         """Return the states and the run-time vector as dual numbers."""
-        layout = self.system.layout
-        return with_slopes(self.x, self.Y), lifted_vector(
-            layout, p, self._G, self._by_rates * origin, self.d, self.Yd
-        )
+        return with_slopes(self.x, self.Y), self._vector.lifted(p, self.d, self.Yd, self._G)
 
     def _key(self, one: Occurrence, p: np.ndarray, s: float) -> tuple[Any, ...]:
         system = self.system
@@ -245,18 +242,6 @@ class Rounds:
         m = automaton.modes.index(one.source)
         g = automaton.guard_names[m].index(one.guard)
         return "choice", c, m, g, system.choose(c, m, g, s, self.x, p, self.z)
-
-
-def lifted_vector(
-    layout: Any, p: np.ndarray, G: np.ndarray, by_angles: np.ndarray, d: np.ndarray, Yd: np.ndarray
-) -> list[Any]:
-    """Return the run-time vector as dual numbers, with derivatives of parameters, angles and discrete states."""
-    found: list[Any] = list(p)
-    P, at = layout.parameters, layout.phases_at
-    found[:P] = with_slopes(p[:P], G)
-    found[layout.discrete_slice] = with_slopes(d, Yd)
-    found[at : at + layout.phases] = with_slopes(p[at : at + layout.phases], by_angles)
-    return found
 
 
 def is_recorded(system: System, one: Occurrence) -> bool:

@@ -79,7 +79,7 @@ class Sensitivities(Readable):
         Returns
         -------
         Derivatives
-            Arrays ``by_start`` (m, n + d) and ``by_parameter`` (m, P); for k times they are (k, m, n + d) and (k, m, P).
+            Arrays ``by_start`` (m, n + d) and ``by_parameter`` (m, P), or (k, m, n + d) and (k, m, P) for k times.
 
         Examples
         --------
@@ -148,8 +148,8 @@ def sensitivities(
     Raises
     ------
     UsageError
-        For a run that was not kept completely, a model of Python functions, an unknown parameter, or an event
-        whose guard only touches zero.
+        For a run that was not kept completely, a model of Python functions, an unknown parameter, an event
+        whose guard only touches zero, or an impact without a unique outcome.
 
     Examples
     --------

@@ -15,11 +15,11 @@ import numpy as np
 
 
 class Dual:
-    """A dual number: a value with its derivatives (D,)."""
+    """A dual number: a value with its derivatives (D,), or k values (k,) with derivatives (D, k)."""
 
     __slots__ = ("slope", "value")
 
-    def __init__(self, value: float, slope: Any) -> None:
+    def __init__(self, value: Any, slope: Any) -> None:
         self.value, self.slope = value, slope
 
     def __add__(self, other: Any) -> Dual:

@@ -1,0 +1,91 @@
+"""This module computes derivatives of the run-time vector: of parameters, discrete states, angles and inputs."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from hybridsim.analysis.variations.parameters import start_slopes
+from hybridsim.analysis.variations.signal_slopes import SignalSlopes
+from hybridsim.engine.series.dual_numbers import differentiated, values_and_slopes, with_slopes
+from hybridsim.engine.series.layout import SIGNAL_SLOTS
+from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.system import System
+from hybridsim.model.smoothing.steps_in_time import constant_inputs
+
+
+class VectorSlopes:
+    """Derivatives of the run-time vector by the d discrete states and the P parameters."""
+
+    def __init__(self, system: System, at: Instant) -> None:
+        self.system = system
+        layout, module = system.layout, system.code.module
+        P = layout.parameters
+        p: list[Any] = list(system.vector(at, np.zeros(layout.discrete)))
+        p[:P] = with_slopes(p[:P], np.eye(P))
+        out: list[Any] = [0.0] * layout.phases
+        differentiated(module.rates)(0.0, [], p, [], out)
+        self._rates = values_and_slopes(out, P)[1]  # of the forcing's angular rates
+        self._signals = self._of_signals()
+
+    def _of_signals(self) -> list[SignalSlopes]:
+        model, width = self.system.model, self.system.layout.parameters
+        if not model.inputs:
+            return []
+        unit = np.eye(width)
+        starts = start_slopes([each.start for each in model.discrete], model, unit)
+        slopes = dict(zip((each.name for each in model.parameters), unit, strict=True))
+        slopes |= dict(zip((each.name for each in model.discrete), starts, strict=True))
+        values = {**model.discrete_values(), **constant_inputs(model), **self.system.values}
+        slopes = {name: np.zeros(width) for name in values} | slopes
+        return [
+            SignalSlopes(declared, signal, values, slopes, width)
+            for declared, signal in zip(model.inputs, self.system.signals, strict=True)
+        ]
+
+    def of(self, p: np.ndarray) -> np.ndarray:
+        """Return the derivatives (size of p, d + P) of a run-time vector."""
+        layout = self.system.layout
+        P, d, origin = layout.parameters, layout.discrete, float(p[layout.origin_at])
+        found = np.zeros((layout.size, d + P))
+        found[layout.discrete_slice, :d] = np.eye(d)
+        found[:P, d:] = np.eye(P)
+        found[layout.phases_at : layout.signals_at, d:] = origin * self._rates
+        for k, signal in enumerate(self._signals):
+            if not signal.is_fixed:
+                at = layout.signals_at + SIGNAL_SLOTS * k
+                found[at : at + SIGNAL_SLOTS, d:] = signal.coefficients(origin, p[at : at + SIGNAL_SLOTS])
+        return found
+
+    def seeds(self, p: np.ndarray) -> np.ndarray:
+        """Return derivatives of the formulas' arguments by states, local time, discrete states and parameters."""
+        n, below = self.system.n, self.of(p)
+        found = np.zeros((n + 1 + below.shape[0], n + 1 + below.shape[1]))
+        found[: n + 1, : n + 1] = np.eye(n + 1)
+        found[n + 1 :, n + 1 :] = below
+        return found
+
+    def lifted(self, p: np.ndarray, d: np.ndarray, Yd: np.ndarray, G: np.ndarray) -> list[Any]:
+        """Return the run-time vector as dual numbers in M directions.
+
+        d, Yd : values (d,) and derivatives (d, M) of the discrete states. G : derivatives (P, M) of the parameters.
+        """
+        layout = self.system.layout
+        values, slopes = p.copy(), self.of(p) @ np.concatenate([Yd, G])
+        values[layout.discrete_slice] = d
+        found: list[Any] = with_slopes(values, slopes)
+        for at in (layout.origin_at, layout.pin_at):
+            found[at] = float(p[at])
+        return found
+
+    def knots(self, t: Instant) -> list[tuple[str, np.ndarray]]:
+        """Return the inputs with a knot at an instant, within rounding, and the derivatives (P,) of its time."""
+        slack = 4.0 * math.ulp(float(t))
+        found = []
+        for one in self._signals:
+            knot = one.signal.next_knot(t.plus(-slack), True)
+            if knot is not None and abs(knot.minus(t)) <= slack:
+                found.append((one.declared.subject, one.knot(knot)))
+        return found
