@@ -52,7 +52,9 @@ class Dual:
 
     def __pow__(self, n: Any) -> Dual:
         if isinstance(n, Dual):
-            return _pow(self, n)
+            functions = _OF_ARRAYS if np.ndim(self.value) else _OF_NUMBERS
+            found: Dual = functions["pow"](self, n)
+            return found
         return Dual(self.value**n, n * self.value ** (n - 1.0) * self.slope)
 
     def __neg__(self) -> Dual:
