@@ -45,7 +45,7 @@ from hybridsim.analysis.variations.segment_events import (
     time_rounding,
 )
 from hybridsim.analysis.variations.sizes import sizes
-from hybridsim.analysis.variations.vector_slopes import VectorSlopes
+from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
 from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.system.system import System
 from hybridsim.errors import UsageError

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hybridsim.analysis.variations.vector_slopes import VectorSlopes
+from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.tangents import TangentTape
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from hybridsim.analysis.variations.changes import Changes, Place
-from hybridsim.analysis.variations.parameters import expression_slope
 from hybridsim.analysis.variations.rounds import component_of, guard_number
+from hybridsim.analysis.variations.values.parameters import expression_slope
 from hybridsim.engine.record.segments import Occurrence, Segment
 from hybridsim.errors import UsageError
 from hybridsim.expr import evaluate

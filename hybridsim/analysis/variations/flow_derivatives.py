@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.analysis.variations.smooth import transitions
-from hybridsim.analysis.variations.vector_slopes import VectorSlopes
+from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
 from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.series.dual_numbers import differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.system.system import System

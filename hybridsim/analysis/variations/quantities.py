@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.analysis.variations.directions import Directions
-from hybridsim.analysis.variations.vector_slopes import VectorSlopes
+from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
 from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.series.dual_numbers import Dual, differentiated, differentiated_rows, values_and_slopes
 from hybridsim.engine.system.system import System
@@ -45,10 +45,10 @@ class QuantityDerivatives:
                 others["surfaces"].append((k, self._trajectory._velocities[name]))
             else:
                 others["quantities"].append((k, self._place(name, segment.z)))
-        for function, places in others.items():
-            if places:
+        for function, columns in others.items():
+            if columns:
                 slopes = self._slopes(function, segment, s, Y)
-                found[:, [k for k, _ in places]] = slopes[:, [place for _, place in places]]
+                found[:, [k for k, _ in columns]] = slopes[:, [place for _, place in columns]]
         return found
 
     def _place(self, name: str, z: np.ndarray) -> int:

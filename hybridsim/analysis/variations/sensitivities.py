@@ -14,8 +14,8 @@ from hybridsim.analysis.variations.both_sides import BothSides, OneSide
 from hybridsim.analysis.variations.carried import Carrier
 from hybridsim.analysis.variations.directions import Directions
 from hybridsim.analysis.variations.over_time import Derivatives, OverTime
-from hybridsim.analysis.variations.parameters import start_slopes, value_slopes
 from hybridsim.analysis.variations.refused import refuse_limits
+from hybridsim.analysis.variations.values.parameters import start_slopes, value_slopes
 from hybridsim.arguments import cannot_be, flag
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
@@ -61,7 +61,7 @@ class Sensitivities(Readable):
     times_by_start: np.ndarray
     times_by_parameter: np.ndarray
     warnings: tuple[str, ...] = ()
-    _over_time: OverTime | None = field(default=None, repr=False, compare=False)
+    _over_time: OverTime = field(init=False, repr=False, compare=False)
 
     @refusing
     def at(self, t: Any, names: str | Sequence[str] | None = None, side: str = "+") -> Derivatives:
@@ -90,7 +90,6 @@ class Sensitivities(Readable):
         >>> found.at([0.01, 0.02, 0.03], "f").by_parameter.shape
         (3, 1, 2)
         """
-        assert self._over_time is not None
         chosen = self.states if names is None else checked_names(names, "names")
         return self._over_time.at(t, chosen, side)
 
@@ -203,7 +202,7 @@ def _found(
     end, (times, shifts) = found.at_end(), found.of_times()
     states = (*solution.names, *(q.name for q in model.discrete))
     changed = [*(f"the start of {name}" for name in states), *chosen]
-    return Sensitivities(
+    result = Sensitivities(
         states,
         chosen,
         end[:, : n + d],
@@ -217,8 +216,9 @@ def _found(
             "differ on the two sides are NaN"
             for name, mask in found.differing()
         ),
-        OverTime(solution, directions, found),
     )
+    object.__setattr__(result, "_over_time", OverTime(solution, directions, found))
+    return result
 
 
 def _refuse(solution: Solution) -> None:

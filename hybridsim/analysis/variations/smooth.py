@@ -89,7 +89,7 @@ def transitions(
     for halving in range(_HALVINGS):
         count = 1 + len(begins) * (_STAGES * len(scale)) ** 2 // _ENTRIES_PER_BATCH
         parts = np.array_split(np.arange(len(begins)), count)
-        done = [_over_pieces(slopes, begins[part], ends[part], scale, constants) for part in parts]
+        done = [_over_intervals(slopes, begins[part], ends[part], scale, constants) for part in parts]
         found, tails = (np.concatenate(each) for each in zip(*done, strict=True))
         is_rounding = (tails <= _NOISE) & (tails >= 0.7 * before)
         good = (tails <= _RESOLVED) | is_rounding | (halving == _HALVINGS - 1)
@@ -104,15 +104,15 @@ def transitions(
     order = np.argsort(starts, kind="stable")
     n, q = len(scale), len(constants)
     total = np.eye(n, n + q)
-    wanted = _Wanted(stops, knots[0], total)
+    reached = _Stops(stops, knots[0], total)
     for end, matrix in zip(until[order].tolist(), matrices[order], strict=True):
         total = matrix[:, :n] @ total
         total[:, n:] += matrix[:, n:]
-        wanted.add(end, total)
-    return np.array(wanted.found)
+        reached.add(end, total)
+    return np.array(reached.found)
 
 
-class _Wanted:
+class _Stops:
     """Collects the derivatives at the stops, which are ascending."""
 
     def __init__(self, stops: np.ndarray, begin: float, total: np.ndarray) -> None:
@@ -147,7 +147,7 @@ def stiff_transitions(
     """
     n = len(scale)
     Y = np.eye(n, n + len(constants))
-    wanted = _Wanted(stops, knots[0], Y)
+    reached = _Stops(stops, knots[0], Y)
     # in units of the states; the first n columns have the size of the largest, the others each their own
     units = np.concatenate([scale, np.ones(len(constants))]) / scale[:, None]
     least = np.concatenate([np.ones(n), _CANCELS / constants])
@@ -155,7 +155,7 @@ def stiff_transitions(
     most = 16 * len(waiting) + 2**14
     for _ in range(most):
         if not waiting:
-            return np.array(wanted.found)
+            return np.array(reached.found)
         begin, end, before = waiting.pop()
         length, middle = end - begin, 0.5 * (begin + end)
         rates = _rates(RADAU, slopes, np.array([begin]), np.array([length]), Y)[0]
@@ -168,7 +168,7 @@ def stiff_transitions(
         is_rounding = 0.7 * before <= tail <= _STIFF_NOISE
         if tail <= _STIFF_RESOLVED or is_rounding or not begin < middle < end:
             Y = Y + length * np.einsum("i,iab->ab", RADAU.b, rates)
-            wanted.add(end, Y)
+            reached.add(end, Y)
         else:
             waiting += [(middle, end, tail), (begin, middle, tail)]
     raise UsageError(
@@ -178,7 +178,7 @@ def stiff_transitions(
     )
 
 
-def _over_pieces(
+def _over_intervals(
     slopes: Slopes, begins: np.ndarray, ends: np.ndarray, scale: np.ndarray, constants: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the derivatives over each piece, and a measure of how well each piece is resolved."""

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from hybridsim.analysis.variations.parameters import expression_slope
+from hybridsim.analysis.variations.values.parameters import expression_slope
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.signals import Signal
 from hybridsim.expr import evaluate

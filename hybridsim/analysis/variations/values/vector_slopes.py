@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.analysis.variations.parameters import start_slopes
-from hybridsim.analysis.variations.signal_slopes import SignalSlopes
+from hybridsim.analysis.variations.values.parameters import start_slopes
+from hybridsim.analysis.variations.values.signal_slopes import SignalSlopes
 from hybridsim.engine.series.dual_numbers import differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.series.layout import SIGNAL_SLOTS
 from hybridsim.engine.system.instant import Instant
