@@ -198,6 +198,11 @@ def csv_records(path: str | PathLike[str], records: Sequence[Mapping[str, Any]])
             writer.writerow({**record, **texts})
 
 
+def fields_of(owner: object, *names: str) -> dict[str, Any]:
+    """Return attributes of an object by name, in this order, for a record."""
+    return {name: getattr(owner, name) for name in names}
+
+
 def plain(value: Any, digits: int | None = None) -> Any:
     """Return a value as lists, mappings, text and numbers, rounded to some digits; nan and inf become None."""
     if isinstance(value, Mapping):

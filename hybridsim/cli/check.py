@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 from hybridsim.cli import options, values
 from hybridsim.cli.output import complain, print_json, print_table, say
 from hybridsim.cli.session import Session
+from hybridsim.errors import Place
+from hybridsim.files import fields_of
 from hybridsim.presentation.automaton import lines_of
 
 if TYPE_CHECKING:
@@ -115,25 +117,13 @@ def _record(
 
 
 def _primitive_record(primitive: Primitive) -> dict[str, Any]:
-    place = primitive.place
-    return {
-        "text": primitive.text,
-        "where": primitive.where,
-        "became": primitive.became,
-        "remark": primitive.remark,
-        "file": place.file if place else None,
-        "line": place.line if place else None,
-    }
+    place = fields_of(primitive.place or Place(), "file", "line")
+    return fields_of(primitive, "text", "where", "became", "remark") | place
 
 
 def _caution_record(caution: Caution) -> dict[str, Any]:
-    place = caution.place
-    return {
-        "message": caution.message,
-        "file": place.file if place else None,
-        "line": place.line if place else None,
-        "remedy": caution.remedy,
-    }
+    place = fields_of(caution.place or Place(), "file", "line")
+    return {"message": caution.message, **place, "remedy": caution.remedy}
 
 
 def _mode_record(mode: Mode) -> dict[str, Any]:

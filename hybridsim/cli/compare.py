@@ -12,6 +12,7 @@ from hybridsim.cli.output import require_folder, say
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.errors import UsageError
+from hybridsim.files import fields_of
 
 if TYPE_CHECKING:
     from hybridsim.analysis import Comparison, SuiteComparison
@@ -96,14 +97,10 @@ def _model(args: argparse.Namespace, folder: Path | None, session: Session) -> i
         comparison = hybridsim.compare(
             model,
             t_span=span,
-            integrators=args.integrators,
-            rtols=args.rtol,
-            steps=args.steps,
-            repeat=args.repeat,
             regularized=args.regularized,
             v0=args.v0,
-            **({} if args.budget is None else {"budget": args.budget}),
             progress=progress.of_steps,
+            **_settings(args),
         )
     from hybridsim.plot import regularisation, work_precision
 
@@ -124,19 +121,17 @@ def _suite(args: argparse.Namespace, folder: Path, session: Session) -> int:
     require_folder(folder, "--out")
 
     with Progress(session) as progress:
-        suite = hybridsim.compare_suite(
-            scenes=args.scenes,
-            integrators=args.integrators,
-            rtols=args.rtol,
-            steps=args.steps,
-            repeat=args.repeat,
-            **({} if args.budget is None else {"budget": args.budget}),
-            progress=progress.of_steps,
-        )
+        suite = hybridsim.compare_suite(scenes=args.scenes, progress=progress.of_steps, **_settings(args))
     from hybridsim.plot import suite_page
 
     _write(suite, args.json, folder, "suite.png", suite_page, session)
     return 0
+
+
+def _settings(args: argparse.Namespace) -> dict[str, Any]:
+    """Return the arguments that a comparison of one model and the suite have in common."""
+    budget = {} if args.budget is None else {"budget": args.budget}
+    return {"rtols": args.rtol, **fields_of(args, "integrators", "steps", "repeat"), **budget}
 
 
 def _write(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from hybridsim.cli.output import print_json, print_table, say
 from hybridsim.cli.session import Session
+from hybridsim.files import fields_of
 
 if TYPE_CHECKING:
     from hybridsim.integrators.options import Option
@@ -39,10 +40,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         print_json(
             [
                 {
-                    "name": each.name,
-                    "title": each.title,
-                    "order": each.order,
-                    "when": each.when,
+                    **fields_of(each, "name", "title", "order", "when"),
                     "lacks": dict(each.lacks),
                     "reference": each.reference,
                     "options": [asdict(option) for option in options_of(each)],

@@ -15,6 +15,7 @@ from hybridsim.cli.output import complain, print_json, require_apart, require_wr
 from hybridsim.cli.progress import Progress
 from hybridsim.cli.session import Session
 from hybridsim.errors import RunInterrupted, SimulationError, UsageError
+from hybridsim.files import fields_of
 
 if TYPE_CHECKING:
     from hybridsim.model.parts.model import Model
@@ -282,16 +283,7 @@ def record(solution: Solution) -> dict[str, Any]:
         "events": None
         if not has_events
         else [
-            {
-                "t": event.t,
-                "kind": event.kind,
-                "component": event.component,
-                "guard": event.guard,
-                "source": event.source,
-                "target": event.target,
-                "x_minus": event.x_minus,
-                "x_plus": event.x_plus,
-            }
+            fields_of(event, "t", "kind", "component", "guard", "source", "target", "x_minus", "x_plus")
             for event in solution.events
         ],
         "stats": solution.stats,

@@ -14,6 +14,31 @@ _CELLS = 24  # characters of the bar
 _WIDTH = 79  # characters of the line
 
 
+class ProgressLine:
+    """One line on stderr that is written again and again, first after a number of seconds."""
+
+    def __init__(self, wait: float) -> None:
+        self.wait, self.began = wait, time.monotonic()
+        self._next = self.began + wait
+        self.shown = 0  # characters of the open line
+
+    def is_due(self) -> bool:
+        """Return whether it is time to write the line again."""
+        return time.monotonic() >= self._next
+
+    def write(self, text: str) -> None:
+        """Write the line over its former text; only its beginning is shown, because a wrapped line stays."""
+        line = text[:_WIDTH].rstrip()
+        print("\r" + line.ljust(self.shown), end="", file=sys.stderr, flush=True)
+        self.shown, self._next = len(line), time.monotonic() + _PAUSE
+
+    def leave(self, end: str) -> None:
+        """Leave the line with a final text, if it is open."""
+        if self.shown:
+            print(end, end="", file=sys.stderr, flush=True)
+            self.shown, self._next = 0, time.monotonic() + self.wait
+
+
 class ProgressBar:
     """A progress callback that shows a bar, the time left and the current step on stderr.
 
@@ -22,37 +47,26 @@ class ProgressBar:
     """
 
     def __init__(self) -> None:
-        self._began = time.monotonic()
-        self._next = self._began + _WAIT
-        self._shown = 0  # characters of the open line
+        self._line = ProgressLine(_WAIT)
 
     def __call__(self, done: float, total: float = 1.0, what: str = "") -> None:
-        now, fraction = time.monotonic(), min(max(done / total, 0.0), 1.0)
-        is_last = fraction == 1.0 and self._shown > 0
-        if not is_last and (now < self._next or not can_show()):
+        fraction, line = min(max(done / total, 0.0), 1.0), self._line
+        is_last = fraction == 1.0 and line.shown > 0
+        if not is_last and not (line.is_due() and can_show()):
             return
-        self._next = now + _PAUSE
-        filled = round(_CELLS * fraction)
-        left = (
-            ""
-            if is_last or fraction == 0.0
-            else _clock((now - self._began) * (1.0 - fraction) / fraction) + " left"
-        )
-        parts = f"{100 * fraction:5.1f} % |{'#' * filled}{' ' * (_CELLS - filled)}| {left}  {what}"
-        line = parts[:_WIDTH].rstrip()
-        print("\r" + line.ljust(self._shown), end="", file=sys.stderr, flush=True)
-        self._shown = len(line)
+        filled, left = round(_CELLS * fraction), ""
+        if not (is_last or fraction == 0.0):
+            left = _clock((time.monotonic() - line.began) * (1.0 - fraction) / fraction) + " left"
+        line.write(f"{100 * fraction:5.1f} % |{'#' * filled}{' ' * (_CELLS - filled)}| {left}  {what}")
         if is_last:
             self.close()
 
     def close(self) -> None:
         """End the line of the bar, if it is open."""
-        if self._shown:
-            self._shown, self._next = 0, time.monotonic() + _WAIT
-            print(file=sys.stderr, flush=True)
+        self._line.leave("\n")
 
     def __del__(self) -> None:
-        if getattr(self, "_shown", 0) and sys.stderr is not None:
+        if hasattr(self, "_line") and sys.stderr is not None:
             self.close()
 
 

@@ -14,6 +14,7 @@ from hybridsim.analysis.fit.record import Record
 from hybridsim.analysis.fit.unknown import Unknown, start_of
 from hybridsim.arguments import known_name, number, whole_number
 from hybridsim.errors import UsageError
+from hybridsim.files import fields_of
 from hybridsim.model import Model
 from hybridsim.presentation.readable import Readable, aligned
 from hybridsim.solution import Solution
@@ -158,8 +159,7 @@ class Fit(Readable):
         """Return values, errors, 95 % intervals, noise and warnings as plain values."""
         return {
             "model": self.model.name,
-            "success": self.success,
-            "message": self.message,
+            **fields_of(self, "success", "message"),
             "unknowns": {
                 name: {
                     "value": self.values[name],
@@ -170,9 +170,7 @@ class Fit(Readable):
             },
             "correlation": self.correlation.tolist(),
             "noise": dict(self.noise),
-            "cost": self.cost,
-            "samples": self.samples,
-            "runs": self.runs,
+            **fields_of(self, "cost", "samples", "runs"),
             "undetermined": list(self.undetermined),
             "warnings": list(self.warnings),
         }

@@ -16,6 +16,7 @@ from hybridsim.analysis.steady.shooting import Orbit, multipliers, rates_at_end
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.arguments import whole_number
 from hybridsim.errors import HybridsimError, UsageError
+from hybridsim.files import fields_of
 from hybridsim.model import Model
 from hybridsim.presentation.readable import Readable
 from hybridsim.solution import Solution
@@ -143,14 +144,8 @@ class SteadyState(Readable, Measures):
         record: dict[str, Any] = {
             "model": self.model.name,
             "parameters": self.model.parameter_values(),
-            "kind": self.kind,
-            "message": self.message,
-            "period": self.period,
-            "multiple": self.multiple,
-            "residual": self.residual,
-            "newton_steps": self.newton_steps,
-            "periods": self.periods,
-            "lyapunov": self.lyapunov,
+            **fields_of(self, "kind", "message", "period", "multiple"),
+            **fields_of(self, "residual", "newton_steps", "periods", "lyapunov"),
         }
         if not self.success:
             return record

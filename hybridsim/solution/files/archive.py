@@ -26,7 +26,7 @@ from hybridsim.engine.record.trajectory import Task, Trajectory
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.tolerances import Tolerances
 from hybridsim.errors import HybridsimError, UsageError
-from hybridsim.files import path_text, whole_file
+from hybridsim.files import fields_of, path_text, whole_file
 from hybridsim.integrators.registry import make_integrator
 from hybridsim.model import Model
 from hybridsim.solution.files.archive_checks import check_checkpoint, check_events, check_header, check_task
@@ -71,9 +71,7 @@ def _stored(solution: Solution) -> dict[str, np.ndarray]:
     run, trajectory = solution._run, solution._of_model.record
     task, counters = run.task, trajectory.counters
     arrays: dict[str, np.ndarray] = {
-        "x0": task.x0,
-        "z0": task.z0,
-        "discrete": task.discrete,
+        **fields_of(task, "x0", "z0", "discrete"),
         "atol": task.tolerances.atol,
     }
     if run.grid is not None:
@@ -97,17 +95,13 @@ def _stored(solution: Solution) -> dict[str, np.ndarray]:
         "model": run.model.to_toml(),
         "method": {"name": run.method.name, "options": vars(run.method)},
         "span": [task.t0, task.t1],
-        "tolerances": {n: getattr(task.tolerances, n) for n in ("rtol", "max_step", "first_step")},
+        "tolerances": fields_of(task.tolerances, "rtol", "max_step", "first_step"),
         "keep": list(task.retention),
         "save": run.save,
         "reason": run.reason,
         "kinds": kinds,
         "hidden": len(occurrences) - len(trajectory.occurrences),
-        "status": trajectory.status,
-        "message": trajectory.message,
-        "taken_over": trajectory.taken_over,
-        "warnings": trajectory.warnings,
-        "warnings_there": trajectory.warnings_there,
+        **fields_of(trajectory, "status", "message", "taken_over", "warnings", "warnings_there"),
         "counters": asdict(counters),
         "cost": list(solution._of_model.cost),
     }
@@ -115,7 +109,7 @@ def _stored(solution: Solution) -> dict[str, np.ndarray]:
         arrays |= {f"checkpoint/{name}": array for name, array in checkpoint.arrays.items()}
         header["checkpoint"] = {
             "names": list(checkpoint.arrays),
-            **{n: getattr(checkpoint, n) for n in ("instant", "settled", "segments", "occurrences")},
+            **fields_of(checkpoint, "instant", "settled", "segments", "occurrences"),
             "paces": list(checkpoint.paces.items()),
         }
     header["arrays"] = list(arrays)

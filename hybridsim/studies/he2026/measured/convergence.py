@@ -9,39 +9,28 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.studies.he2026.measured import settings as paper
 from hybridsim.studies.he2026.measured.pool import Pool
-from hybridsim.studies.he2026.measured.settings import (
-    EPS_V,
-    EPS_V_SMALL,
-    LITERAL,
-    MATTERING,
-    SIGNS,
-    STEPS_PER_PERIOD,
-    ZEROED,
-    Point,
-    Size,
-    Variant,
-)
 from hybridsim.studies.he2026.measured.steady import Periods, by_steps, exact
 from hybridsim.studies.he2026.measured.verdicts import Claim, Verdict
 
 # The paper varies r, N and F0 one by one without the base point. Here it is its own example, r = 0.6, N = 40,
 # F0 = 30.
 CASES = {
-    "r = 0.6": Point(0.6, 30.0 / 40.0),
-    "r = 0.8": Point(0.8, 30.0 / 40.0),
-    "r = 1.0": Point(1.0, 30.0 / 40.0),
-    "r = 1.2": Point(1.2, 30.0 / 40.0),
-    "N = 20": Point(0.6, 30.0 / 20.0, 20.0),
-    "N = 30": Point(0.6, 30.0 / 30.0, 30.0),
-    "N = 50": Point(0.6, 30.0 / 50.0, 50.0),
-    "F0 = 24": Point(0.6, 24.0 / 40.0),
-    "F0 = 40": Point(0.6, 40.0 / 40.0),
-    "F0 = 60": Point(0.6, 60.0 / 40.0),
+    "r = 0.6": paper.Point(0.6, 30.0 / 40.0),
+    "r = 0.8": paper.Point(0.8, 30.0 / 40.0),
+    "r = 1.0": paper.Point(1.0, 30.0 / 40.0),
+    "r = 1.2": paper.Point(1.2, 30.0 / 40.0),
+    "N = 20": paper.Point(0.6, 30.0 / 20.0, 20.0),
+    "N = 30": paper.Point(0.6, 30.0 / 30.0, 30.0),
+    "N = 50": paper.Point(0.6, 30.0 / 50.0, 50.0),
+    "F0 = 24": paper.Point(0.6, 24.0 / 40.0),
+    "F0 = 40": paper.Point(0.6, 40.0 / 40.0),
+    "F0 = 60": paper.Point(0.6, 60.0 / 40.0),
 }
 # the place of the paper's largest deviation, with the settings that the paper chooses here
 RIDGE = "F0/N = 0.55, r = 0.64"
-ALL_CASES = {**CASES, RIDGE: Point(0.64, 0.55)}
+ALL_CASES = {**CASES, RIDGE: paper.Point(0.64, 0.55)}
 LIMIT = 1e-3  # Eq. 6
 
 
@@ -71,30 +60,30 @@ class Curves:
         return float(abs(self.values[method][case][0, nearest] / self.exact[case][0] - 1.0))
 
 
-def over_steps(size: Size, pool: Pool) -> Curves:
+def over_steps(size: paper.Size, pool: Pool) -> Curves:
     """Compute figure 4: amplitude and energy as functions of the step, at eps_v = 1e-6 m/s."""
 
-    def run(point: Point, variant: Variant, steps: float) -> Periods:
-        eps = EPS_V_SMALL if variant.integrator == "rk4-dichotomy" else None
+    def run(point: paper.Point, variant: paper.Variant, steps: float) -> Periods:
+        eps = paper.EPS_V_SMALL if variant.integrator == "rk4-dichotomy" else None
         return by_steps(point, variant, size.periods, size.last, int(steps), eps)
 
-    return _curves("h0", size.steps, (LITERAL, ZEROED, *SIGNS), run, pool)
+    return _curves("h0", size.steps, (paper.LITERAL, paper.ZEROED, *paper.SIGNS), run, pool)
 
 
-def over_eps(size: Size, pool: Pool) -> Curves:
+def over_eps(size: paper.Size, pool: Pool) -> Curves:
     """Compute figure 5: amplitude and energy as functions of the velocity interval eps_v, at h0 = 1200."""
 
-    def run(point: Point, variant: Variant, eps: float) -> Periods:
-        return by_steps(point, variant, size.periods, size.last, STEPS_PER_PERIOD, eps)
+    def run(point: paper.Point, variant: paper.Variant, eps: float) -> Periods:
+        return by_steps(point, variant, size.periods, size.last, paper.STEPS_PER_PERIOD, eps)
 
-    return _curves("eps_v", size.eps, MATTERING, run, pool)
+    return _curves("eps_v", size.eps, paper.MATTERING, run, pool)
 
 
 def _curves(
     name: str,
     settings: Sequence[float],
-    methods: Sequence[Variant],
-    run: Callable[[Point, Variant, float], Periods],
+    methods: Sequence[paper.Variant],
+    run: Callable[[paper.Point, paper.Variant, float], Periods],
     pool: Pool,
 ) -> Curves:
     tasks = list(itertools.product(methods, ALL_CASES, settings))
@@ -111,10 +100,10 @@ def _curves(
 
 def claim_figure_4(curves: Curves) -> Claim:
     """Judge the claim that the results converge at a step of about T/1200, with and without stick."""
-    ours = {method: _row(curves, method, STEPS_PER_PERIOD) for method in curves.values}
-    with_ = {m: row for m, row in ours.items() if m in (LITERAL.name, ZEROED.name)}
+    ours = {method: _row(curves, method, paper.STEPS_PER_PERIOD) for method in curves.values}
+    with_ = {m: row for m, row in ours.items() if m in (paper.LITERAL.name, paper.ZEROED.name)}
     without = {m: row for m, row in ours.items() if m not in with_}
-    allowed = 1.1 * STEPS_PER_PERIOD
+    allowed = 1.1 * paper.STEPS_PER_PERIOD
     closest = min(with_, key=lambda m: _sortable(with_[m]["latest"], np.inf))
     enough = _sortable(with_[closest]["latest"], np.inf) <= allowed
     also = any(_sortable(row["latest"], np.inf) <= allowed for row in without.values())
@@ -130,7 +119,7 @@ def claim_figure_4(curves: Curves) -> Claim:
         "figure 4",
         "4",
         "A and E have converged (0.1 %) at about T/1200, with eps_v = 1e-6, and also without stick-slip",
-        {"h0": STEPS_PER_PERIOD, "criterion": LIMIT},
+        {"h0": paper.STEPS_PER_PERIOD, "criterion": LIMIT},
         ours,
         closest,
         {"h0": "none: no step enters", "error": 0.0},
@@ -141,12 +130,12 @@ def claim_figure_4(curves: Curves) -> Claim:
 
 def claim_figure_5(curves: Curves) -> Claim:
     """Judge the claim that the results converge at a velocity interval of about eps_v = 8e-4."""
-    ours = {method: _row(curves, method, EPS_V) for method in curves.values}
-    closest = min(ours, key=lambda m: abs(np.log(_sortable(ours[m]["latest"], 1e-9) / EPS_V)))
+    ours = {method: _row(curves, method, paper.EPS_V) for method in curves.values}
+    closest = min(ours, key=lambda m: abs(np.log(_sortable(ours[m]["latest"], 1e-9) / paper.EPS_V)))
     best = ours[closest]
-    ratio = _sortable(best["latest"], 1e-9) / EPS_V
+    ratio = _sortable(best["latest"], 1e-9) / paper.EPS_V
     verdict = Verdict.SHAPE if ratio < 0.5 else Verdict.REPRODUCED
-    literal = ours[LITERAL.name]
+    literal = ours[paper.LITERAL.name]
     why = (
         f"In the closest reading ({closest}) all {len(CASES)} cases have settled from eps_v = "
         f"{best['latest']:.1e} on. With v kept, as in Eq. 4, they settle from {literal['latest']:.1e} on. "
@@ -157,7 +146,7 @@ def claim_figure_5(curves: Curves) -> Claim:
         "figure 5",
         "5",
         "A and E have converged at about eps_v = 8e-4 m/s, with h0 = 1200",
-        {"eps_v": EPS_V, "criterion": LIMIT},
+        {"eps_v": paper.EPS_V, "criterion": LIMIT},
         ours,
         closest,
         {"eps_v": "none: no interval enters", "error": 0.0},

@@ -10,17 +10,8 @@ import numpy as np
 
 from hybridsim.reference.closed_forms.den_hartog import linear_amplitude
 from hybridsim.simulate import simulate
+from hybridsim.studies.he2026.measured import settings as paper
 from hybridsim.studies.he2026.measured.pool import Pool
-from hybridsim.studies.he2026.measured.settings import (
-    DAMPING_RATIO,
-    LITERAL,
-    SIGNS,
-    STIFFNESS,
-    ZEROED,
-    Point,
-    Size,
-    Variant,
-)
 from hybridsim.studies.he2026.measured.steady import ExactState, by_steps, declared, exact, measured
 from hybridsim.studies.he2026.measured.verdicts import Claim, Verdict
 
@@ -30,7 +21,7 @@ RATIOS = (0.6, 0.8, 1.0, 1.2, 1.5)
 FORCES = (3.0, 7.0, 15.0, 30.0, 50.0, 90.0, 170.0, 400.0)
 # The paper's own example has F0 = 30 N, and it does not state its range. These are plausible limits.
 _USUAL = (15.0, 170.0)
-METHODS: tuple[Variant, ...] = (*SIGNS, LITERAL, ZEROED)
+METHODS: tuple[paper.Variant, ...] = (*paper.SIGNS, paper.LITERAL, paper.ZEROED)
 EXACT, STRIBECK = "exact", "Stribeck law"
 # rest holds up to F0/N = 0.6 there; the decay is to 3e-6
 STRIBECK_RATIOS, _STRIBECK_PERIODS = (
@@ -63,19 +54,19 @@ class Reduction:
         return np.asarray((table.max(axis=1) - table.min(axis=1)) / table.mean(axis=1))
 
 
-def free_amplitude(point: Point) -> float:
+def free_amplitude(point: paper.Point) -> float:
     """Return A0, the steady amplitude without friction, in metres."""
-    return point.force / STIFFNESS * linear_amplitude(point.r, DAMPING_RATIO)
+    return point.force / paper.STIFFNESS * linear_amplitude(point.r, paper.DAMPING_RATIO)
 
 
-def free_energy(point: Point) -> float:
+def free_energy(point: paper.Point) -> float:
     """Return E0, the integral of x^2 over a period without friction."""
     return 0.5 * point.period * free_amplitude(point) ** 2
 
 
-def reduction(size: Size, pool: Pool) -> Reduction:
+def reduction(size: paper.Size, pool: Pool) -> Reduction:
     """Run all methods at several forces F0 with the same ratio F0/N."""
-    points = [Point(R, ratio, force / ratio) for ratio in RATIOS for force in FORCES]
+    points = [paper.Point(R, ratio, force / ratio) for ratio in RATIOS for force in FORCES]
     shape = (len(RATIOS), len(FORCES))
     tasks = list(itertools.product(METHODS, points))
     found = pool.map(lambda task: by_steps(task[1], task[0], size.periods, size.last), tasks, 0.0, 0.7)
@@ -88,7 +79,7 @@ def reduction(size: Size, pool: Pool) -> Reduction:
     states = pool.map(exact, points, 0.7, 0.72)
     A[EXACT] = (np.array([s.amplitude for s in states]) / A0).reshape(shape)
     E[EXACT] = (np.array([s.energy for s in states]) / E0).reshape(shape)
-    others = [Point(R, ratio, force / ratio) for ratio in STRIBECK_RATIOS for force in FORCES]
+    others = [paper.Point(R, ratio, force / ratio) for ratio in STRIBECK_RATIOS for force in FORCES]
     states = pool.map(_stribeck, others, 0.72, 0.95)
     A[STRIBECK] = np.array([s.amplitude / free_amplitude(p) for s, p in zip(states, others, strict=True)])
     E[STRIBECK] = np.array([s.energy / free_energy(p) for s, p in zip(states, others, strict=True)])
@@ -97,7 +88,7 @@ def reduction(size: Size, pool: Pool) -> Reduction:
     plane = [
         (0.05 + 1.95 * ((k * golden) % 1.0), 0.51 + 0.99 * (k + 0.5) / _SAMPLES) for k in range(_SAMPLES)
     ]
-    scaled = [Point(r, ratio, normal) for r, ratio in plane for normal in _SCALES]
+    scaled = [paper.Point(r, ratio, normal) for r, ratio in plane for normal in _SCALES]
     states = pool.map(exact, scaled, 0.95, 1.0)
     unit = np.array([p.normal for p in scaled]).reshape(_SAMPLES, -1)
     values = {
@@ -114,7 +105,7 @@ def reduction(size: Size, pool: Pool) -> Reduction:
     return Reduction(A, E, rounding)
 
 
-def _stribeck(point: Point) -> ExactState:
+def _stribeck(point: paper.Point) -> ExactState:
     """Return the exact motion with a Stribeck law, whose velocity is an additional scale."""
     solution = simulate(
         declared("dfcs-stribeck"),
@@ -139,13 +130,13 @@ def claim(found: Reduction) -> Claim:
         for name in (m.name for m in METHODS)
     }
     key = f"spread of A/A0, F0 from {_USUAL[0]:g} to {_USUAL[1]:g} N"
-    with_, without = (LITERAL.name, ZEROED.name), tuple(v.name for v in SIGNS)
+    with_, without = (paper.LITERAL.name, paper.ZEROED.name), tuple(v.name for v in paper.SIGNS)
     closest = f"{min(without, key=lambda m: ours[m][key])}; {min(with_, key=lambda m: ours[m][key])}"
     good = [name for name in ours if ours[name][key] <= _CONSTANT]
     both = any(m in good for m in with_) and any(m in good for m in without)
     to_rounding = max(found.rounding.values()) <= _ROUNDING
     verdict = Verdict.REPRODUCED if both and to_rounding else Verdict.SHAPE if to_rounding else Verdict.NOT
-    literal, stribeck = ours[LITERAL.name], float(found.spread(STRIBECK).max())
+    literal, stribeck = ours[paper.LITERAL.name], float(found.spread(STRIBECK).max())
     why = (
         f"With `exact` A, E and the stick fraction depend only on (r, F0/N), to {max(found.rounding.values()):.0e} "
         f"over {_SAMPLES} points and three loads. Without stick the same is true, except for chatter. The reduction "

@@ -9,16 +9,8 @@ from typing import Any
 import numpy as np
 
 from hybridsim.simulate import simulate
+from hybridsim.studies.he2026.measured import settings as paper
 from hybridsim.studies.he2026.measured.pool import Pool
-from hybridsim.studies.he2026.measured.settings import (
-    LITERAL,
-    SIGNS,
-    STEPS_PER_PERIOD,
-    ZEROED,
-    Point,
-    Size,
-    Variant,
-)
 from hybridsim.studies.he2026.measured.steady import declared, measured, periods_of, settling_periods
 
 TOLERANCE = 0.01
@@ -45,7 +37,7 @@ class RequiredSettings:
         """Return the maps as plain values, for a JSON file."""
         result: dict[str, Any] = {"tolerance": TOLERANCE, "finest h0": STEPS[-1], "finest eps_v": EPS[-1]}
         for name, table in (*self.steps.items(), *self.eps.items()):
-            published = STEPS_PER_PERIOD if name in self.steps else 8e-4
+            published = paper.STEPS_PER_PERIOD if name in self.steps else 8e-4
             enough = table <= published if name in self.steps else table >= 0.999 * published
             values = np.sort(np.nan_to_num(table.ravel(), nan=np.inf if name in self.steps else 0.0))
             result[name] = {
@@ -56,16 +48,18 @@ class RequiredSettings:
         return result
 
 
-def required_settings(size: Size, pool: Pool) -> RequiredSettings:
+def required_settings(size: paper.Size, pool: Pool) -> RequiredSettings:
     """Try the settings from coarse to fine at every point of the map."""
     ratios, r = np.linspace(*RATIO_SPAN, size.ladder_count), np.linspace(*R_SPAN, size.ladder_count)
-    points = [Point(float(b), float(a)) for a in ratios for b in r]
+    points = [paper.Point(float(b), float(a)) for a in ratios for b in r]
     starts = pool.map(_start, points, 0.0, 0.05)
-    jobs = list(itertools.product((*SIGNS, LITERAL, ZEROED), zip(points, starts, strict=True)))
+    jobs = list(
+        itertools.product((*paper.SIGNS, paper.LITERAL, paper.ZEROED), zip(points, starts, strict=True))
+    )
     found = pool.map(lambda job: _coarsest(job[0], *job[1]), jobs, 0.05, 1.0)
     table = np.array(found).reshape(-1, len(ratios), len(r))
-    names = [v.name for v in (*SIGNS, LITERAL, ZEROED)]
-    count = len(SIGNS)
+    names = [v.name for v in (*paper.SIGNS, paper.LITERAL, paper.ZEROED)]
+    count = len(paper.SIGNS)
     return RequiredSettings(
         ratios,
         r,
@@ -74,7 +68,7 @@ def required_settings(size: Size, pool: Pool) -> RequiredSettings:
     )
 
 
-def _start(point: Point) -> tuple[float, tuple[float, float]]:
+def _start(point: paper.Point) -> tuple[float, tuple[float, float]]:
     """Return the exact amplitude, and the state at which a period of the exact motion begins."""
     solution = simulate(
         declared("dfcs"),
@@ -87,9 +81,9 @@ def _start(point: Point) -> tuple[float, tuple[float, float]]:
     return measured(solution, point).amplitude, (x, v)
 
 
-def _coarsest(variant: Variant, point: Point, start: tuple[float, tuple[float, float]]) -> float:
+def _coarsest(variant: paper.Variant, point: paper.Point, start: tuple[float, tuple[float, float]]) -> float:
     amplitude, state = start
-    by_steps = variant in SIGNS
+    by_steps = variant in paper.SIGNS
     settings: tuple[float, ...] = STEPS if by_steps else EPS
     good = float("nan")
     for setting in settings:
@@ -103,7 +97,7 @@ def _coarsest(variant: Variant, point: Point, start: tuple[float, tuple[float, f
             x0=state,
             integrator=variant.integrator,
             keep=_LAST * point.period,
-            steps_per_period=float(setting if by_steps else STEPS_PER_PERIOD),
+            steps_per_period=float(setting if by_steps else paper.STEPS_PER_PERIOD),
             **options,
         )
         A = periods_of(solution, point, _PERIODS, _LAST).A

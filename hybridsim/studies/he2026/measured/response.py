@@ -8,26 +8,17 @@ from typing import Any
 import numpy as np
 
 from hybridsim.simulate import simulate
+from hybridsim.studies.he2026.measured import settings as paper
 from hybridsim.studies.he2026.measured.pool import Pool
-from hybridsim.studies.he2026.measured.settings import (
-    LITERAL,
-    SIGNS,
-    STEPS_PER_PERIOD,
-    ZEROED,
-    Point,
-    Size,
-    Variant,
-    described,
-)
 from hybridsim.studies.he2026.measured.steady import CONTACT, declared, settling_periods, solve_by_steps
 from hybridsim.studies.he2026.measured.step_study import LOADS_AND_RATIOS, STEPS, StepStudy
 from hybridsim.studies.he2026.measured.verdicts import Claim, Verdict
 
-FIGURE_3 = Point(0.6, 30.0 / 40.0)
-FIGURE_12 = Point(0.55, 0.54)
-FIGURE_13 = Point(1.0, 0.80)
+FIGURE_3 = paper.Point(0.6, 30.0 / 40.0)
+FIGURE_12 = paper.Point(0.55, 0.54)
+FIGURE_13 = paper.Point(1.0, 0.80)
 POINTS = (FIGURE_3, FIGURE_12, FIGURE_13)
-RUNS: tuple[Variant, ...] = (*SIGNS, LITERAL, ZEROED)
+RUNS: tuple[paper.Variant, ...] = (*paper.SIGNS, paper.LITERAL, paper.ZEROED)
 EXACT = "exact"
 
 _SHOWN = 2  # periods drawn
@@ -62,14 +53,14 @@ class Response:
     jumps: float
 
 
-def responses(point: Point, size: Size, pool: Pool) -> dict[str, Response]:
+def responses(point: paper.Point, size: paper.Size, pool: Pool) -> dict[str, Response]:
     """Compute the motion at a point by every method."""
     names = [EXACT, *(v.name for v in RUNS)]
     runs = (None, *RUNS)
     return dict(zip(names, pool.map(lambda v: _response(point, v, size), runs), strict=True))
 
 
-def _response(point: Point, variant: Variant | None, size: Size) -> Response:
+def _response(point: paper.Point, variant: paper.Variant | None, size: paper.Size) -> Response:
     last_periods = _HARMONIC_PERIODS
     if variant is None:
         periods = settling_periods(point) + last_periods
@@ -152,18 +143,18 @@ def claim_figure_12(runs: dict[str, Response], study: StepStudy) -> Claim:
     """Judge the claims of figure 12: A_D is 15 %, and the friction force jumps near zero velocity."""
     ours, exact, closest = _deviations(runs, 0.15)
     place = LOADS_AND_RATIOS.index((FIGURE_12.ratio, FIGURE_12.r))
-    falls = {v.name: study.by_step[v.name]["A"][place] for v in SIGNS}
-    first = STEPS.index(STEPS_PER_PERIOD)
+    falls = {v.name: study.by_step[v.name]["A"][place] for v in paper.SIGNS}
+    first = STEPS.index(paper.STEPS_PER_PERIOD)
     shrinks = all(row[-1] < 0.5 * max(row[first], 0.01) for row in falls.values())
     near = abs(ours[closest]["A_D"] - 0.15) <= 0.02
     verdict = Verdict.ARTEFACT if shrinks else Verdict.REPRODUCED if near else Verdict.SHAPE
-    chatter = max(runs[v.name].jumps for v in SIGNS)
+    chatter = max(runs[v.name].jumps for v in paper.SIGNS)
     numbers = " and ".join(f"{100 * row[first]:.2g} % to {100 * row[-1]:.2g} %" for row in falls.values())
     why = (
         f"Without stick the force jumps between its limits, up to {chatter:.0f} times per period. The exact motion "
-        f"sticks for {100 * runs[EXACT].stick:.0f} % of the period. The closest reading ({described(closest)}) "
+        f"sticks for {100 * runs[EXACT].stick:.0f} % of the period. The closest reading ({paper.described(closest)}) "
         f"has A_D = {100 * ours[closest]['A_D']:.1f} %. The deviation from the exact motion decreases from "
-        f"{numbers} (sign by step, by stage) as h0 increases from {STEPS_PER_PERIOD} to {STEPS[-1]}."
+        f"{numbers} (sign by step, by stage) as h0 increases from {paper.STEPS_PER_PERIOD} to {STEPS[-1]}."
     )
     return Claim(
         "figure 12",
@@ -216,15 +207,15 @@ def _deviations(
             "jumps a period": runs[sign.name].jumps,
             "stick": runs[with_.name].stick,
         }
-        for sign in SIGNS
-        for with_ in (LITERAL, ZEROED)
+        for sign in paper.SIGNS
+        for with_ in (paper.LITERAL, paper.ZEROED)
     }
     truth = runs[EXACT]
     off = {name: {"A_D": abs(run.amplitude / truth.amplitude - 1.0)} for name, run in runs.items()}
     exact = {
         "stick": truth.stick,
         "jumps a period": truth.jumps,
-        "deviation without stick": {v.name: off[v.name] for v in SIGNS},
-        "deviation with stick": {v.name: off[v.name] for v in (LITERAL, ZEROED)},
+        "deviation without stick": {v.name: off[v.name] for v in paper.SIGNS},
+        "deviation with stick": {v.name: off[v.name] for v in (paper.LITERAL, paper.ZEROED)},
     }
     return ours, exact, min(ours, key=lambda name: abs(ours[name]["A_D"] - published))

@@ -9,23 +9,14 @@ from statistics import fmean
 from typing import Any
 
 from hybridsim.simulate import simulate
+from hybridsim.studies.he2026.measured import settings as paper
 from hybridsim.studies.he2026.measured.convergence import CASES
 from hybridsim.studies.he2026.measured.pool import Pool
-from hybridsim.studies.he2026.measured.settings import (
-    EPS_V,
-    LITERAL,
-    SIGNS,
-    STEPS_PER_PERIOD,
-    ZEROED,
-    Point,
-    Size,
-    Variant,
-)
 from hybridsim.studies.he2026.measured.steady import declared
 from hybridsim.studies.he2026.measured.verdicts import Claim, Verdict
 
 EPS = (8e-4, 1e-4, 1e-5, 1e-6, 1e-7)
-WITH = (LITERAL, ZEROED)
+WITH = (paper.LITERAL, paper.ZEROED)
 
 
 @dataclass(frozen=True)
@@ -55,11 +46,11 @@ class RunTimes:
         return self.by_method[with_][case].seconds / self.by_method[without][case].seconds - 1.0
 
 
-def run_times(size: Size, pool: Pool) -> RunTimes:
+def run_times(size: paper.Size, pool: Pool) -> RunTimes:
     """Time the runs in rotation on one thread, so that disturbances affect all runs alike."""
     total = 2 * len(CASES)
     by_eps: dict[str, dict[str, tuple[Cost, ...]]] = {v.name: {} for v in WITH}
-    methods: tuple[Variant | None, ...] = (*SIGNS, *WITH, None)
+    methods: tuple[paper.Variant | None, ...] = (*paper.SIGNS, *WITH, None)
     by_method: dict[str, dict[str, Cost]] = {_name(v): {} for v in methods}
     for k, (case, point) in enumerate(CASES.items()):
         pool.tell(2 * k / total)
@@ -67,17 +58,19 @@ def run_times(size: Size, pool: Pool) -> RunTimes:
         for i, v in enumerate(WITH):
             by_eps[v.name][case] = tuple(costs[i * len(EPS) : (i + 1) * len(EPS)])
         pool.tell((2 * k + 1) / total)
-        costs = _mean(point, [(method, EPS_V) for method in methods], size)
+        costs = _mean(point, [(method, paper.EPS_V) for method in methods], size)
         for method, cost in zip(methods, costs, strict=True):
             by_method[_name(method)][case] = cost
     return RunTimes(by_eps, by_method, size.timed_periods, size.repeats)
 
 
-def _name(variant: Variant | None) -> str:
+def _name(variant: paper.Variant | None) -> str:
     return "exact" if variant is None else variant.name
 
 
-def _mean(point: Point, jobs: Sequence[tuple[Variant | None, float]], size: Size) -> list[Cost]:
+def _mean(
+    point: paper.Point, jobs: Sequence[tuple[paper.Variant | None, float]], size: paper.Size
+) -> list[Cost]:
     runs: list[list[Cost]] = [[] for _ in jobs]
     collecting = gc.isenabled()
     gc.disable()  # a collection in some of the runs would distort the comparison
@@ -92,10 +85,10 @@ def _mean(point: Point, jobs: Sequence[tuple[Variant | None, float]], size: Size
     return [Cost(fmean(c.seconds for c in row[1:]), row[-1].evaluations) for row in runs]
 
 
-def _run(point: Point, variant: Variant | None, eps: float, periods: int) -> Cost:
+def _run(point: paper.Point, variant: paper.Variant | None, eps: float, periods: int) -> Cost:
     options: dict[str, Any] = {} if variant is None else dict(variant.options)
     if variant is not None:
-        options["steps_per_period"] = float(STEPS_PER_PERIOD)
+        options["steps_per_period"] = float(paper.STEPS_PER_PERIOD)
     if variant in WITH:
         options["eps_v"] = eps
     solution = simulate(
@@ -148,7 +141,7 @@ def claim_figure_7(times: RunTimes) -> Claim:
     """Judge the claim that stick increases the run time by more than 225 %."""
     ours: dict[str, dict[str, Any]] = {}
     for with_ in WITH:
-        for sign in SIGNS:
+        for sign in paper.SIGNS:
             values = {case: times.t_D(with_.name, sign.name, case) for case in CASES}
             ours[f"{with_.name}; {sign.name}"] = {
                 "t_D, mean": fmean(values.values()),
@@ -163,7 +156,7 @@ def claim_figure_7(times: RunTimes) -> Claim:
             }
     closest = max(ours, key=lambda m: ours[m]["t_D, mean"])
     best = ours[closest]
-    against = [times.t_D("exact", sign.name, case) for sign in SIGNS for case in CASES]
+    against = [times.t_D("exact", sign.name, case) for sign in paper.SIGNS for case in CASES]
     verdict = (
         Verdict.REPRODUCED
         if best["t_D, mean"] >= 2.0

@@ -12,12 +12,7 @@ import numpy as np
 from hybridsim.model import Model, load
 from hybridsim.simulate import simulate
 from hybridsim.solution import Solution
-from hybridsim.studies.he2026.measured.settings import (
-    DAMPING_RATIO,
-    STEPS_PER_PERIOD,
-    Point,
-    Variant,
-)
+from hybridsim.studies.he2026.measured import settings as paper
 
 CONTACT = "f"
 # The free vibration decays by exp(-zeta wn t); exp(-30) is below rounding. Friction only adds decay.
@@ -63,12 +58,12 @@ def declared(name: str) -> Model:
     return load(name)
 
 
-def settling_periods(point: Point) -> int:
+def settling_periods(point: paper.Point) -> int:
     """Return the number of periods after which the free vibration has decayed below rounding."""
-    return max(_LEAST_PERIODS, math.ceil(_DECAYS * point.r / (2.0 * math.pi * DAMPING_RATIO)))
+    return max(_LEAST_PERIODS, math.ceil(_DECAYS * point.r / (2.0 * math.pi * paper.DAMPING_RATIO)))
 
 
-def exact(point: Point, periods: int | None = None) -> ExactState:
+def exact(point: paper.Point, periods: int | None = None) -> ExactState:
     """Compute the exact steady motion; by default the transients decay to rounding error."""
     count = settling_periods(point) if periods is None else periods
     solution = simulate(
@@ -81,7 +76,7 @@ def exact(point: Point, periods: int | None = None) -> ExactState:
     return measured(solution, point)
 
 
-def measured(solution: Solution, point: Point) -> ExactState:
+def measured(solution: Solution, point: paper.Point) -> ExactState:
     """Measure the last period of a run with located events, which include the extremes of x."""
     x = solution.y[0]
     amplitude = 0.5 * float(x.max() - x.min())
@@ -98,11 +93,11 @@ def measured(solution: Solution, point: Point) -> ExactState:
 
 
 def by_steps(
-    point: Point,
-    variant: Variant,
+    point: paper.Point,
+    variant: paper.Variant,
     periods: int,
     last: int,
-    steps: int = STEPS_PER_PERIOD,
+    steps: int = paper.STEPS_PER_PERIOD,
     eps_v: float | None = None,
 ) -> Periods:
     """Return amplitude A and energy E of each of the last periods of a fixed-step run."""
@@ -110,11 +105,11 @@ def by_steps(
 
 
 def solve_by_steps(
-    point: Point,
-    variant: Variant,
+    point: paper.Point,
+    variant: paper.Variant,
     periods: int,
     last: int,
-    steps: int = STEPS_PER_PERIOD,
+    steps: int = paper.STEPS_PER_PERIOD,
     eps_v: float | None = None,
 ) -> Solution:
     """Run a fixed-step method from rest, and keep the last periods."""
@@ -132,7 +127,7 @@ def solve_by_steps(
     )
 
 
-def periods_of(solution: Solution, point: Point, periods: int, last: int) -> Periods:
+def periods_of(solution: Solution, point: paper.Point, periods: int, last: int) -> Periods:
     """Return A and E of each period from the values at the steps, as in the paper."""
     t, (x, v) = solution.t, solution.y
     edges = point.period * np.arange(periods - last, periods + 1)
