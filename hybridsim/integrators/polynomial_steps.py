@@ -33,7 +33,7 @@ from hybridsim.engine.run.event_loop import (
     load_constants,
     not_followed,
 )
-from hybridsim.engine.run.method_kernels import MethodKernels
+from hybridsim.engine.run.method_kernels import MethodKernels, StepRows
 from hybridsim.engine.series.interpreter import advance
 from hybridsim.engine.system.programs.code_cache import ends_codes
 from hybridsim.engine.system.programs.guard_parts import guard_parts_of
@@ -46,13 +46,6 @@ TERMS = 3  # Taylor coefficients of guards at the end of a step: value, slope an
 CONTINUES = -1  # a segment takes another step
 TRIED, REJECTED, TAKEN = range(3)  # indices of `PolynomialArrays.counts`
 RTOL, MAX_STEP = range(2)  # indices of `PolynomialArrays.control`
-
-
-class PolynomialRows(NamedTuple):
-    """The committed steps."""
-
-    steps: np.ndarray  # start and length (S, 2) in local time
-    series: np.ndarray  # coefficients (S, n, degree + 1) of the states in powers of the time since the start
 
 
 class PolynomialArrays(NamedTuple):
@@ -91,7 +84,7 @@ class PolynomialArrays(NamedTuple):
 class PolynomialKernels(MethodKernels):
     """The kernels of a method whose steps have polynomials of one degree as dense output."""
 
-    rows = PolynomialRows
+    rows = StepRows
     degree: ClassVar[int]
 
     def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
@@ -156,9 +149,7 @@ class PolynomialKernels(MethodKernels):
         counters.rhs_evaluations += result[TRIED]
         counters.rejected += result[REJECTED]
 
-    def block(
-        self, result: Any, rows: PolynomialRows, last_steps: np.ndarray, *record: np.ndarray
-    ) -> SeriesBlock:
+    def block(self, result: Any, rows: StepRows, last_steps: np.ndarray, *record: np.ndarray) -> SeriesBlock:
         """Return the committed segments of a call."""
         return SeriesBlock(self.system, last_steps, *rows, *record)
 

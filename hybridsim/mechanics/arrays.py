@@ -6,28 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-# The mode of a contact at rest (+1, -1: slip forward, backward), and the time of an event that does not
-# exist.
-STICK, OPEN_END = (
-    0,
-    2.0**1000,
-)
-VELOCITY, UPPER, LOWER, EXPIRY = (
-    0,
-    1,
-    2,
-    3,
-)  # causes of the end of a mode; EXPIRY: the series reaches no further
-DONE, FULL, INCONSISTENT, NONUNIQUE, CASCADE, LOST, LIMITED = range(7)  # reasons for the return of the loop
-
-
-# Integer arguments of a kernel that is called by address; FIRST: start of a run of neighbours, or -1.
-COUNT, DOFS, CONS, ORDER, NODE, FIRED, FIRST = range(7)
-AT, LONGEST, RTOL, LENGTH = range(4)  # real arguments; LENGTH returns the length of a step
-# Indices of these kernels; BERNSTEIN and later: conversion to Bernstein form, for decreasing numbers of
-# terms.
-EXPAND, STEP_LENGTH, JOINT_CHOICE, BERNSTEIN = range(4)
-
 
 class State(NamedTuple):
     """The state of a run with n coordinates, m contacts and nn nodes; P1 is the order plus one."""

@@ -23,6 +23,15 @@ NOT_LINEAR = no_tables()  # for kernels without tables of linear modes
 STEPS_PER_LOOK = 500  # a method with `is_looked_at` is examined for stiffness after so many steps
 
 
+class StepRows(NamedTuple):
+    """The rows of the stored steps, for methods whose dense output is a polynomial in each step."""
+
+    steps: np.ndarray  # start and length (S, 2) in local time
+    series: (
+        np.ndarray
+    )  # coefficients (S, n, terms) of the states: from the start of the step, or from both ends
+
+
 class MethodKernels(ABC):
     """The parts that a method adds to the compiled event loop of one run; `longest` limits the segments.
 

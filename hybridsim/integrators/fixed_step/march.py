@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from abc import ABC, abstractmethod
 
 import numpy as np
 
 
-class March(Protocol):
+class March(ABC):
     """The kernels of one fixed-step method for one run.
 
     step, halvings: length of a step, and how often it is halved to locate the zero of a guard or monitor.
@@ -21,6 +21,7 @@ class March(Protocol):
     has_sides_only: bool
     counts: np.ndarray
 
+    @abstractmethod
     def run(
         self,
         guard_numbers: np.ndarray,
@@ -36,16 +37,15 @@ class March(Protocol):
         (times, states, modes) holds the start of step k and the modes during it; the last row is the end.
         Return (number of rows, reason).
         """
-        ...
 
+    @abstractmethod
     def trial(self, s: float, tau: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Return the state after one step of length `tau`."""
-        ...
 
     def refused(self) -> str:
-        """Return the message for a call that ended because a restitution is invalid."""
-        ...
+        """Return the message for a call that ended because a restitution is invalid; empty for methods without impacts."""
+        return ""
 
     def warnings(self) -> list[str]:
         """Return the warnings of this method about the run."""
-        ...
+        return []

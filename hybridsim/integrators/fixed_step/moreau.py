@@ -11,6 +11,7 @@ from hybridsim.engine.events.jumps.impact import message_on_restitution
 from hybridsim.engine.record.trajectory import Task
 from hybridsim.engine.system.system import System
 from hybridsim.errors import UsageError
+from hybridsim.integrators.fixed_step.march import March
 from hybridsim.integrators.fixed_step.method import FixedStepMethod
 from hybridsim.integrators.fixed_step.moreau_impacts import UNILATERAL
 from hybridsim.integrators.fixed_step.moreau_kernels import moreau_step, moreau_steps, scratch_for
@@ -106,7 +107,7 @@ class Moreau(FixedStepMethod):
         return MoreauMarch(system, step, (self.theta, self.tolerance, self.iterations), task.x0.copy())
 
 
-class MoreauMarch:
+class MoreauMarch(March):
     """The kernels of Moreau-Jean time stepping for one run."""
 
     halvings, pinned, has_sides_only = _HALVINGS, True, False

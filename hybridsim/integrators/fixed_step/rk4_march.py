@@ -10,6 +10,7 @@ import numpy as np
 
 from hybridsim.engine.native.kernels import ENABLED, Precompiled
 from hybridsim.engine.system.system import System
+from hybridsim.integrators.fixed_step.march import March
 from hybridsim.integrators.fixed_step.rk4_kernels import rk4_step, run_steps, workspace
 from hybridsim.integrators.fixed_step.run import ROWS, surface_table
 from hybridsim.integrators.fixed_step.step_code import SIGN, StepCode, step_functions
@@ -32,7 +33,7 @@ class FixedStep:
     halvings: int
 
 
-class Rk4March:
+class Rk4March(March):
     """The kernels of a published method for one run."""
 
     def __init__(self, system: System, settings: FixedStep) -> None:
@@ -85,11 +86,3 @@ class Rk4March:
         rk4_step(self._addresses[1], s, x, p, z, out)
         self.counts[0] += 4
         return out[: len(x)].copy()
-
-    def refused(self) -> str:
-        """Return an empty message, because these methods do not support impacts."""
-        return ""
-
-    def warnings(self) -> list[str]:
-        """Return no warnings, because the results show the errors of the published methods."""
-        return []

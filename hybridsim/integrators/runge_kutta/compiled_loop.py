@@ -17,7 +17,7 @@ from hybridsim.engine.record.hermite import (
     shift_matrix,
 )
 from hybridsim.engine.record.hermite_block import TERMS, HermiteBlock
-from hybridsim.engine.run.method_kernels import MethodKernels
+from hybridsim.engine.run.method_kernels import MethodKernels, StepRows
 from hybridsim.engine.system.programs.code_cache import ends_codes
 from hybridsim.engine.system.programs.guard_parts import guard_parts_of
 from hybridsim.engine.system.programs.mode_tables import Tapes, tape_cache_of
@@ -85,18 +85,11 @@ class RungeKuttaArrays(NamedTuple):
     counts: np.ndarray
 
 
-class RungeKuttaRows(NamedTuple):
-    """The rows of the stored steps."""
-
-    steps: np.ndarray  # start and length (S, 2)
-    series: np.ndarray  # Taylor coefficients (S, n, 2 TERMS) of the states at both ends
-
-
 class RungeKuttaKernels(MethodKernels):
     """The part of an explicit Runge-Kutta method in the compiled loop of a run."""
 
     loop = staticmethod(runge_kutta_loop)
-    rows = RungeKuttaRows
+    rows = StepRows
     is_looked_at: ClassVar[bool] = True  # whether stiffness is monitored
     remembers: ClassVar[bool] = True
 
@@ -192,8 +185,6 @@ class RungeKuttaKernels(MethodKernels):
         """Store the length of the next step if a call ended within a segment."""
         self.first_step = result[2]
 
-    def block(
-        self, result: Any, rows: RungeKuttaRows, last_steps: np.ndarray, *record: np.ndarray
-    ) -> HermiteBlock:
+    def block(self, result: Any, rows: StepRows, last_steps: np.ndarray, *record: np.ndarray) -> HermiteBlock:
         """Return the segments of a call as one block."""
         return HermiteBlock(self.system, last_steps, *rows, *record)

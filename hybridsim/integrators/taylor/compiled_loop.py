@@ -12,7 +12,7 @@ from hybridsim.engine.native.struct_pack import packed, replaced
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.series_block import SeriesBlock
 from hybridsim.engine.roots.defect_check import ahead_size
-from hybridsim.engine.run.method_kernels import MethodKernels
+from hybridsim.engine.run.method_kernels import MethodKernels, StepRows
 from hybridsim.engine.system.programs.code_cache import series_codes
 from hybridsim.engine.system.programs.mode_code import most_fading
 from hybridsim.engine.system.programs.mode_tables import Tapes, tape_cache_of
@@ -51,18 +51,11 @@ class TaylorArrays(NamedTuple):
     largest: np.ndarray  # largest values (G,) of the guards on the segment
 
 
-class TaylorRows(NamedTuple):
-    """The rows of the stored steps."""
-
-    steps: np.ndarray  # start and length (S, 2)
-    series: np.ndarray  # Taylor coefficients (S, n, order + 1)
-
-
 class TaylorKernels(MethodKernels):
     """The part of Taylor's method in the compiled loop of a run."""
 
     loop = staticmethod(taylor_loop)
-    rows = TaylorRows
+    rows = StepRows
 
     def __init__(self, system: System, tolerances: Tolerances, longest: float) -> None:
         super().__init__(system, longest)
@@ -112,8 +105,6 @@ class TaylorKernels(MethodKernels):
         """Add the cost of the steps to the counters of the run."""
         counters.rhs_evaluations += 2 * steps  # one series and one check per step
 
-    def block(
-        self, result: Any, rows: TaylorRows, last_steps: np.ndarray, *record: np.ndarray
-    ) -> SeriesBlock:
+    def block(self, result: Any, rows: StepRows, last_steps: np.ndarray, *record: np.ndarray) -> SeriesBlock:
         """Return the segments of a call as one block."""
         return SeriesBlock(self.system, last_steps, *rows, *record)

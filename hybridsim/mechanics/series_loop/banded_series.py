@@ -21,7 +21,7 @@ from hybridsim.engine.native.simd.vectors import (
     store,
     whole_vectors,
 )
-from hybridsim.mechanics.arrays import FIRST
+from hybridsim.mechanics.codes import FIRST
 from hybridsim.mechanics.polynomials import shift, state_at
 from hybridsim.mechanics.series_loop.bands import BASE, HOLDING, MOBILITY, STILL, VALUES, WEIGHT
 from hybridsim.mechanics.series_loop.simd_series import advance_simd_series, clear

@@ -11,7 +11,7 @@ from typing import Any
 
 from hybridsim.engine.native.kernels import inlined, kernel
 from hybridsim.engine.system.instant import two_product, two_sum
-from hybridsim.mechanics.arrays import STICK
+from hybridsim.mechanics.codes import STICK
 from hybridsim.mechanics.series_loop.expansion import base_speed
 
 # A pivot below this fraction of its diagonal, times the size, is a rounding error of zero in a positive

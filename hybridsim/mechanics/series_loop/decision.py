@@ -15,7 +15,7 @@ from typing import Any
 
 from hybridsim.engine.events.choice.verdict import open_question, side_after
 from hybridsim.engine.native.kernels import call_kernel, inlined, kernel
-from hybridsim.mechanics.arrays import AT, FIRED, INCONSISTENT, JOINT_CHOICE, NODE, STICK, UPPER, VELOCITY
+from hybridsim.mechanics.codes import AT, FIRED, INCONSISTENT, JOINT_CHOICE, NODE, STICK, UPPER, VELOCITY
 from hybridsim.mechanics.polynomials import state_at
 from hybridsim.mechanics.series_loop.clusters import factorise, project
 from hybridsim.mechanics.series_loop.expansion import base_coefficient, base_speed, expanded, gather

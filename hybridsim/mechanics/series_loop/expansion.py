@@ -12,7 +12,7 @@ from typing import Any
 
 from hybridsim.engine.native.kernels import call_kernel, inlined, kernel
 from hybridsim.engine.native.simd.vectors import WIDTH, whole_vectors
-from hybridsim.mechanics.arrays import AT, CONS, COUNT, DOFS, EXPAND, FIRST, ORDER, STICK
+from hybridsim.mechanics.codes import AT, CONS, COUNT, DOFS, EXPAND, FIRST, ORDER, STICK
 from hybridsim.mechanics.polynomials import shift, state_at
 from hybridsim.mechanics.series_loop.banded_series import clear_beside, expand_run
 from hybridsim.mechanics.series_loop.simd_series import advance_simd_series, clear_constants, lane_place

@@ -13,7 +13,7 @@ from typing import Any
 from hybridsim.engine.native.kernels import kernel
 from hybridsim.engine.native.simd.vectors import WIDTH, load, store
 from hybridsim.engine.system.instant import phase_of, two_sum
-from hybridsim.mechanics.arrays import CASCADE, DONE, FULL, LOST, OPEN_END
+from hybridsim.mechanics.codes import CASCADE, DONE, FULL, LOST, OPEN_END
 from hybridsim.mechanics.polynomials import shift, states_at
 from hybridsim.mechanics.series_loop.banded_series import gather_neighbours
 from hybridsim.mechanics.series_loop.clusters import project

@@ -21,24 +21,8 @@ from hybridsim.engine.series.emit_bernstein import LEADING, bernstein_code
 from hybridsim.engine.system.instant import phase_of
 from hybridsim.engine.system.series_at import series_order
 from hybridsim.errors import UsageError
-from hybridsim.mechanics.arrays import (
-    AT,
-    BERNSTEIN,
-    CASCADE,
-    DONE,
-    FIRED,
-    FULL,
-    INCONSISTENT,
-    JOINT_CHOICE,
-    LIMITED,
-    LOST,
-    NODE,
-    NONUNIQUE,
-    OPEN_END,
-    Record,
-    Scratch,
-    State,
-)  # fmt: skip
+from hybridsim.mechanics import codes
+from hybridsim.mechanics.arrays import Record, Scratch, State  # fmt: skip
 from hybridsim.mechanics.polynomials import TERMS
 from hybridsim.mechanics.series_loop.decision import choose_jointly
 from hybridsim.mechanics.series_loop.expansion import expand
@@ -47,8 +31,8 @@ from hybridsim.mechanics.series_loop.mechanical_arrays import Built
 from hybridsim.mechanics.series_loop.steps import step_length_kernel
 
 STATUS = {
-    DONE: "finished", INCONSISTENT: "inconsistent", NONUNIQUE: "nonunique", CASCADE: "cascade", LOST: "step-failure",
-    LIMITED: "limit",
+    codes.DONE: "finished", codes.INCONSISTENT: "inconsistent", codes.NONUNIQUE: "nonunique",
+    codes.CASCADE: "cascade", codes.LOST: "step-failure", codes.LIMITED: "limit",
 }  # fmt: skip
 _SERIES_DOUBLES = 1 << 20  # doubles for the series of one call
 _EVENTS = 4096  # events per call, in addition to those of one node
@@ -92,7 +76,7 @@ class MechanicalRun:
         self.events: list[np.ndarray] = []
         self.when: list[np.ndarray] = []
         self.first_modes = np.zeros(0, dtype=np.int64)
-        self.code, self.kernel_time, self.limit_message = DONE, 0.0, ""
+        self.code, self.kernel_time, self.limit_message = codes.DONE, 0.0, ""
         self.counters, self.compile_time = Counters(), 0.0
 
     def go(self, progress: Callable[[float], None] | None) -> None:
@@ -103,18 +87,18 @@ class MechanicalRun:
         limit_monitor = LimitMonitor(self.limits, self.counters)
         reach_kernels(self.state, arrays, laws, state, scratch)
         if ENABLED:
-            self.state.kernels[BERNSTEIN:], self._code = bernstein_code(self.order - 1)
+            self.state.kernels[codes.BERNSTEIN :], self._code = bernstein_code(self.order - 1)
         self.code = self._resolve_start(arrays, laws, state, scratch)
         self.first_modes = self.state.mode.copy()
         self.state.flags[FRESH], self.state.flags[RADIUS] = 1, _RADIUS
         target = np.array([self.span[1], 0.0])
-        while self.code in (DONE, FULL):
+        while self.code in (codes.DONE, codes.FULL):
             record = self._record()
             until = int(self.state.counts[:2].sum()) + max(_WORK // len(self.built.dofs), 16)
             control = (self.rtol, self.max_step, self.order, self.is_recorded, until)
             self.code = run(arrays, laws, state, scratch, packed(record), control, target)
             self._collect(record)
-            if self.code != FULL:
+            if self.code != codes.FULL:
                 break
             if progress is not None:
                 progress((self.time - self.span[0]) / (self.span[1] - self.span[0]))
@@ -122,7 +106,7 @@ class MechanicalRun:
             try:
                 limit_monitor.check()
             except LimitReached as reached:
-                self.code, self.limit_message = LIMITED, str(reached)
+                self.code, self.limit_message = codes.LIMITED, str(reached)
         self.compile_time = seconds_compiling() - compiled
         self.kernel_time = perf_counter() - began - self.compile_time
 
@@ -145,7 +129,7 @@ class MechanicalRun:
         if code := _resolve_nodes(*packs):
             return code
         state.x[:] = state.series[:2, : len(arrays.dof_node)]
-        return DONE
+        return codes.DONE
 
     @property
     def time(self) -> float:
@@ -201,17 +185,17 @@ class MechanicalRun:
 def _resolve_nodes(arrays: Any, laws: Any, state: Any, scratch: Any) -> int:
     """Choose the modes of the nodes at the start; stop at a node that has no admissible modes."""
     for j in range(arrays.node_dof.shape[0] - 1):
-        state.whole[NODE], state.whole[FIRED], state.real[AT] = j, -1, 0.0
-        code = call_kernel(state.kernels[JOINT_CHOICE], (arrays, laws, state, scratch))
+        state.whole[codes.NODE], state.whole[codes.FIRED], state.real[codes.AT] = j, -1, 0.0
+        code = call_kernel(state.kernels[codes.JOINT_CHOICE], (arrays, laws, state, scratch))
         if code != 0:
             state.flags[WHERE] = j
             return code
-    return DONE
+    return codes.DONE
 
 
 def reach_kernels(state: State, *packs: Any) -> None:
     """Compile the large kernels if necessary, and store their addresses for other kernels."""
-    state.kernels[:BERNSTEIN] = [
+    state.kernels[: codes.BERNSTEIN] = [
         kernel_address(function, *packs) for function in (expand, step_length_kernel, choose_jointly)
     ]
 
@@ -225,12 +209,12 @@ def new_state(built: Built, order: int) -> State:
     return State(
         x=np.zeros((2, n)), series=padded_rows(order + 1, -(-n // WIDTH) * WIDTH), origin=np.zeros(nodes),
         mode=np.zeros(m, **ints), held=np.zeros(m, **ints), decree=np.zeros((m, 2), **ints), stamp=np.full(m, -1.0),
-        until=np.full(m, OPEN_END), guard=np.zeros(m, **ints), pinv=np.zeros(max(len(arrays.g_val), 1)),
+        until=np.full(m, codes.OPEN_END), guard=np.zeros(m, **ints), pinv=np.zeros(max(len(arrays.g_val), 1)),
         holds=np.zeros(nodes, **ints), pin=np.full(n, -1, **ints), anchor=np.full(m, -1, **ints),
-        tree=np.full(2 * leaves, OPEN_END), clock=np.array([0.0, 0.0, 0.0, math.nan]),
+        tree=np.full(2 * leaves, codes.OPEN_END), clock=np.array([0.0, 0.0, 0.0, math.nan]),
         phase=np.zeros(len(arrays.rates)),
         flags=np.zeros(LAST + WHERE + 1, **ints), counts=np.zeros(6, **ints), tolerance=np.ones((2, n)),
-        kernels=np.zeros(BERNSTEIN + LEADING, **ints), whole=np.zeros(7, **ints), real=np.zeros(4),
+        kernels=np.zeros(codes.BERNSTEIN + LEADING, **ints), whole=np.zeros(7, **ints), real=np.zeros(4),
     )  # fmt: skip
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.errors import UsageError
-from hybridsim.mechanics.arrays import CASCADE, DONE, INCONSISTENT, LIMITED, LOST
 from hybridsim.mechanics.arrays_trajectory import ArraysTrajectory
+from hybridsim.mechanics.codes import CASCADE, DONE, INCONSISTENT, LIMITED, LOST
 from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.mechanics.powers import work_by_source
 from hybridsim.mechanics.series_loop.node_segments import NodeSegments, instants, quantities

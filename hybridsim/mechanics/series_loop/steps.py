@@ -17,23 +17,7 @@ from hybridsim.engine.native.simd.vectors import (
     whole_vectors,
 )
 from hybridsim.engine.roots.first_exit import FOUND, NEVER, OPEN, first_exit
-from hybridsim.mechanics.arrays import (
-    AT,
-    BERNSTEIN,
-    CONS,
-    DOFS,
-    FIRST,
-    LENGTH,
-    LONGEST,
-    LOWER,
-    OPEN_END,
-    ORDER,
-    RTOL,
-    STEP_LENGTH,
-    STICK,
-    UPPER,
-    VELOCITY,
-)  # fmt: skip
+from hybridsim.mechanics import codes  # fmt: skip
 from hybridsim.mechanics.series_loop.banded_series import law_holds_in_run
 from hybridsim.mechanics.series_loop.expansion import base_coefficient
 from hybridsim.mechanics.series_loop.simd_series import advance_simd_series, lane_place
@@ -113,7 +97,7 @@ def reach(
         scratch.sums[0, i] = 0.0
     for i in range(nc):
         c = scratch.cons[i]
-        if state.mode[c] == STICK:
+        if state.mode[c] == codes.STICK:
             most = max(arrays.limits[c, 0], arrays.limits[c, 1], abs(scratch.F[0, i]))
             scratch.sums[0, i] = 1.0 / (rtol * most) if most > 0.0 else 0.0
     for k in range(top - 3, top - 1):
@@ -137,7 +121,7 @@ def _reach_of_bases(
     h = longest
     for i in range(nc):
         c = scratch.cons[i]
-        if state.mode[c] == STICK or arrays.base_rate[c] < 0:
+        if state.mode[c] == codes.STICK or arrays.base_rate[c] < 0:
             continue
         permitted = rtol * max(abs(scratch.R[0, i]), math.hypot(arrays.base[c, 1], arrays.base[c, 2]))
         for k in range(top - 2, top):
@@ -171,7 +155,7 @@ def _exit_of(
     if omitted > max(scale, rounding):
         return OPEN, 0.0  # a sign within the omitted terms would be a guess
     error = omitted + rounding
-    form = BERNSTEIN + top - (terms - order)
+    form = codes.BERNSTEIN + top - (terms - order)
     code = state.kernels[form] if form < state.kernels.shape[0] else 0
     outcome, theta = first_exit(scratch.poly[:terms], error, 0.0, order, scratch.bern, scratch.stack, code)
     if outcome == OPEN and is_short and end > error:
@@ -188,7 +172,7 @@ def _bound_rest(arrays: Any, state: Any, scratch: Any, nc: int, top: int, h: flo
     R, F, sums = scratch.R, scratch.F, scratch.sums
     wide, step, zero = R.shape[1], splat(h), splat(0.0)
     for i in range(whole_vectors(nc)):
-        sums[0, i] = 1.0 if i < nc and state.mode[scratch.cons[i]] != STICK else 0.0
+        sums[0, i] = 1.0 if i < nc and state.mode[scratch.cons[i]] != codes.STICK else 0.0
     for i in range(0, nc, WIDTH):
         above, below, power, slips = zero, zero, step, load(sums, i)
         for k in range(1, top - 1):
@@ -222,9 +206,9 @@ def isolate(
     power = h ** (top - 2)
     for i in range(nc):
         c = scratch.cons[i]
-        scratch.exits[i], scratch.kinds[i] = OPEN_END, VELOCITY
+        scratch.exits[i], scratch.kinds[i] = codes.OPEN_END, codes.VELOCITY
         fresh, above, below = state.stamp[c] == tau, scratch.sums[1, i], scratch.sums[2, i]
-        if state.mode[c] != STICK:
+        if state.mode[c] != codes.STICK:
             sigma, order = float(state.mode[c]), state.decree[c, 0] if fresh else 0
             lead = sigma * scratch.R[0, i]
             fall = below if sigma > 0.0 else -above
@@ -255,7 +239,7 @@ def isolate(
                 if outcome == OPEN:
                     return OPEN, theta
                 if outcome == FOUND and theta * h < scratch.exits[i]:
-                    scratch.exits[i], scratch.kinds[i] = theta * h, UPPER if side == 0 else LOWER
+                    scratch.exits[i], scratch.kinds[i] = theta * h, codes.UPPER if side == 0 else codes.LOWER
     return FOUND, 1.0
 
 
@@ -287,7 +271,7 @@ def _law_holds(
 ) -> bool:
     """Return whether slip forces agree with their laws at the end of the series, or at the exits."""
     _at_ends(scratch, nc, h, top)
-    if state.whole[FIRST] >= 0:
+    if state.whole[codes.FIRST] >= 0:
         share = _DEFECT * rtol + 64.0 * _UNIT
         return laws.rows.shape[0] == 0 or law_holds_in_run(arrays, laws, scratch, nc, share)
     for t in range(laws.registers.shape[0]):
@@ -311,15 +295,15 @@ def _law_holds(
             i = scratch.lane[first + j]
             mode = state.mode[scratch.cons[i]]
             off = abs(scratch.sums[1, i] - mode * scratch.V[lane_place(at, block, laws.out[t], orders, 0, j)])
-            if mode != STICK and not off <= (_DEFECT * rtol + 64.0 * _UNIT) * scratch.sums[2, i]:
+            if mode != codes.STICK and not off <= (_DEFECT * rtol + 64.0 * _UNIT) * scratch.sums[2, i]:
                 return False
     return True
 
 
 def step_length_kernel(arrays: Any, laws: Any, state: Any, scratch: Any) -> int:
     """Call `step_length` with the arguments stored in the state."""
-    nd, nc, top = state.whole[DOFS], state.whole[CONS], state.whole[ORDER]
-    tau, longest, rtol = state.real[AT], state.real[LONGEST], state.real[RTOL]
+    nd, nc, top = state.whole[codes.DOFS], state.whole[codes.CONS], state.whole[codes.ORDER]
+    tau, longest, rtol = state.real[codes.AT], state.real[codes.LONGEST], state.real[codes.RTOL]
     h = reach(arrays, state, scratch, nd, nc, top, rtol, longest)
     scale = max(state.clock[2], longest)
     for _ in range(_SHRINKS):
@@ -332,10 +316,10 @@ def step_length_kernel(arrays: Any, laws: Any, state: Any, scratch: Any) -> int:
         if outcome == OPEN:  # a touch: an exit within rounding that is not certainly negative does not fire
             state.counts[5] += 1
         if _law_holds(arrays, laws, state, scratch, nc, h, top, rtol):
-            state.real[LENGTH] = h
+            state.real[codes.LENGTH] = h
             return 0
         h *= 0.5
-    state.real[LENGTH] = math.nan
+    state.real[codes.LENGTH] = math.nan
     return 0
 
 
@@ -345,6 +329,6 @@ def step_length(arrays: Any, laws: Any, state: Any, scratch: Any, longest: float
 
     NaN if there is no such length.
     """
-    state.real[LONGEST], state.real[RTOL] = longest, rtol
-    call_kernel(state.kernels[STEP_LENGTH], (arrays, laws, state, scratch))
-    return state.real[LENGTH]
+    state.real[codes.LONGEST], state.real[codes.RTOL] = longest, rtol
+    call_kernel(state.kernels[codes.STEP_LENGTH], (arrays, laws, state, scratch))
+    return state.real[codes.LENGTH]
