@@ -212,41 +212,28 @@ class EventResolution(ClusterChoice):
         monitor_orders = np.array([f[1] for f in found], dtype=np.int64)
         if not self.forward:
             monitor_sides = np.where(monitor_orders % 2 == 1, -monitor_sides, monitor_sides)
-        return Outcome(
-            at.x,
-            at.p,
-            at.z,
-            self.sides,
-            self.orders,
-            monitor_sides,
-            np.where(monitor_orders > ORDER, 0, monitor_orders),
-            at.x_error,
-            self.floors,
-            np.where(monitor_orders > 0, series.monitor_bounds[:, 0], 0.0),
-            self.changes,
-            not self.is_kinked and self.is_continuous(at.z, range(len(self.system.automata))),
-            "",
-            "",
-            self.warnings,
-        )
+        monitors = monitor_sides, np.where(monitor_orders > ORDER, 0, monitor_orders)
+        monitor_floors = np.where(monitor_orders > 0, series.monitor_bounds[:, 0], 0.0)
+        continuous = not self.is_kinked and self.is_continuous(at.z, range(len(self.system.automata)))
+        return self._outcome(monitors, self.floors, monitor_floors, continuous, "", "")
 
     def _stop(self, status: str, message: str) -> Outcome:
-        at = self.at
         none = np.zeros(len(self.system.monitor_names), dtype=np.int64)
+        floors = np.zeros(self.system.guard_count)
+        return self._outcome((none, none), floors, np.zeros(len(none)), False, status, message)
+
+    def _outcome(
+        self,
+        monitors: tuple[np.ndarray, np.ndarray],
+        floors: np.ndarray,
+        monitor_floors: np.ndarray,
+        continuous: bool,
+        status: str,
+        message: str,
+    ) -> Outcome:
+        """Return the present state as the outcome; `monitors` are the sides and orders of the monitors."""
+        at = self.at
         return Outcome(
-            at.x,
-            at.p,
-            at.z,
-            self.sides,
-            self.orders,
-            none,
-            none,
-            at.x_error,
-            np.zeros(self.system.guard_count),
-            np.zeros(len(none)),
-            self.changes,
-            False,
-            status,
-            message,
-            self.warnings,
-        )
+            at.x, at.p, at.z, self.sides, self.orders, *monitors, at.x_error, floors, monitor_floors,
+            self.changes, continuous, status, message, self.warnings,
+        )  # fmt: skip

@@ -66,6 +66,18 @@ class Numbers:
         return found
 
 
+def _operators(op: int) -> tuple[Any, Any]:
+    """Return the methods of `Traced` for an operation, and for one with its operands exchanged."""
+
+    def first(self: Traced, other: float) -> Traced:
+        return self.numbers.operation(op, (self, other))[0]
+
+    def second(self: Traced, other: float) -> Traced:
+        return self.numbers.operation(op, (other, self))[0]
+
+    return first, second
+
+
 class Traced(float):
     """A float that stores its register in the recorded computation."""
 
@@ -79,29 +91,10 @@ class Traced(float):
         self.numbers, self.register = numbers, register
         return self
 
-    def __add__(self, other: float) -> Traced:
-        return self.numbers.operation(ADD, (self, other))[0]
-
-    def __radd__(self, other: float) -> Traced:
-        return self.numbers.operation(ADD, (other, self))[0]
-
-    def __sub__(self, other: float) -> Traced:
-        return self.numbers.operation(SUB, (self, other))[0]
-
-    def __rsub__(self, other: float) -> Traced:
-        return self.numbers.operation(SUB, (other, self))[0]
-
-    def __mul__(self, other: float) -> Traced:
-        return self.numbers.operation(MUL, (self, other))[0]
-
-    def __rmul__(self, other: float) -> Traced:
-        return self.numbers.operation(MUL, (other, self))[0]
-
-    def __truediv__(self, other: float) -> Traced:
-        return self.numbers.operation(DIV, (self, other))[0]
-
-    def __rtruediv__(self, other: float) -> Traced:
-        return self.numbers.operation(DIV, (other, self))[0]
+    __add__, __radd__ = _operators(ADD)
+    __sub__, __rsub__ = _operators(SUB)
+    __mul__, __rmul__ = _operators(MUL)
+    __truediv__, __rtruediv__ = _operators(DIV)
 
     def __neg__(self) -> Traced:
         return self.numbers.operation(NEG, (self,))[0]

@@ -43,7 +43,7 @@ class March(ABC):
         """Return the state after one step of length `tau`."""
 
     def refused(self) -> str:
-        """Return the message for a call that ended because a restitution is invalid; empty for methods without impacts."""
+        """Return the message for a call that ended because a restitution is invalid."""
         return ""
 
     def warnings(self) -> list[str]:

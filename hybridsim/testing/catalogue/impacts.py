@@ -62,6 +62,12 @@ def rests(*names: str) -> Any:
     return check
 
 
+# on a fixed grid the delay of a bounce is arbitrary
+_BOUNCES: dict[str, Any] = {
+    "needs": needs("impacts", "accumulation", "located"), "speed": 5.0, "tol_x": 1e-9,
+}  # fmt: skip
+
+
 def _bounce() -> Scene:
     """Return the scene of a ball that bounces from t = 0.5 on, and comes to rest at t = 1.5."""
     states = (*((t, _height(t)) for t in (0.3, 0.8, 1.1, 1.3)), (END, (0.0, 0.0)))
@@ -70,9 +76,7 @@ def _bounce() -> Scene:
         "bounce",
         (0.0, 2.0),
         Truth(None, states, checks=checks),
-        needs("impacts", "accumulation", "located"),  # on a fixed grid the delay of a bounce is arbitrary
-        speed=5.0,
-        tol_x=1e-9,
+        **_BOUNCES,
     )
 
 
@@ -90,9 +94,7 @@ def _bar() -> Scene:
         "bar",
         (0.0, 2.0),
         Truth(None, states, checks=checks),
-        needs("impacts", "accumulation", "located"),  # on a fixed grid the delay of a bounce is arbitrary
-        speed=5.0,
-        tol_x=1e-9,
+        **_BOUNCES,
     )
 
 
