@@ -25,12 +25,12 @@ class LinearMode:
 
     def __init__(self, system: System, atoms: Atoms, z: np.ndarray, p: Sequence[float] | None) -> None:
         tape, reader = system.code.data["tape"], _reader(system, atoms, z, p)
-        self.rates: list[Form] = []
-        for name, register in zip(system.names, tape["derivatives"], strict=True):
-            self.rates.append(_named(reader, register, f"the rate of {name}"))
-        self.guards: dict[int, Form] = {}
-        for g in map(int, np.flatnonzero(system.active(z))):
-            self.guards[g] = _named(reader, tape["guards"][g], system.guard_title(g, z))
+        rates = zip(system.names, tape["derivatives"], strict=True)
+        self.rates = [_named(reader, register, f"the rate of {name}") for name, register in rates]
+        self.guards: dict[int, Form] = {
+            g: _named(reader, tape["guards"][g], system.guard_title(g, z))
+            for g in map(int, np.flatnonzero(system.active(z)))
+        }
 
     def monomials(self) -> set[Monomial]:
         """Return the functions of time in the forms."""

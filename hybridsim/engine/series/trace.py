@@ -33,6 +33,11 @@ def written(value: Any) -> str:
     return value.text if isinstance(value, Value) else number(value)
 
 
+def _compared(kind: str) -> Any:
+    """Return the method of `Value` for a comparison of LLVM."""
+    return lambda value, other: _Condition(kind, value, other)
+
+
 class Value:
     """A symbolic value in generated code; operands may be Python numbers."""
 
@@ -75,23 +80,8 @@ class Value:
     def __abs__(self) -> Size:
         return Size(self.code, self.code.call("llvm.fabs.f64", self.text))
 
-    def __lt__(self, other: Any) -> Any:
-        return _Condition("olt", self, other)
-
-    def __le__(self, other: Any) -> Any:
-        return _Condition("ole", self, other)
-
-    def __gt__(self, other: Any) -> Any:
-        return _Condition("ogt", self, other)
-
-    def __ge__(self, other: Any) -> Any:
-        return _Condition("oge", self, other)
-
-    def __eq__(self, other: object) -> Any:
-        return _Condition("oeq", self, other)
-
-    def __ne__(self, other: object) -> Any:
-        return _Condition("une", self, other)
+    __lt__, __le__, __gt__ = _compared("olt"), _compared("ole"), _compared("ogt")
+    __ge__, __eq__, __ne__ = _compared("oge"), _compared("oeq"), _compared("une")
 
 
 class Size(Value):

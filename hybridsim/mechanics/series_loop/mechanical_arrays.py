@@ -162,9 +162,8 @@ def _inverse(system: MechanicalSystem) -> Any:
         return sparse.csr_array(sparse.diags_array(1.0 / M.diagonal()))
     order = np.argsort(label, kind="stable")
     ends = np.concatenate([[0], np.cumsum(np.bincount(label))])
-    parts = []
-    for a, b in pairwise(ends):
-        parts.append(sparse.csr_array(np.linalg.inv(M[order[a:b]][:, order[a:b]].toarray())))
+    blocks = (M[order[a:b]][:, order[a:b]].toarray() for a, b in pairwise(ends))
+    parts = [sparse.csr_array(np.linalg.inv(block)) for block in blocks]
     back = np.argsort(order)
     return sparse.block_diag(parts, format="csr")[back][:, back]
 

@@ -63,9 +63,9 @@ def settling_periods(point: paper.Point) -> int:
     return max(_LEAST_PERIODS, math.ceil(_DECAYS * point.r / (2.0 * math.pi * paper.DAMPING_RATIO)))
 
 
-def exact(point: paper.Point, periods: int | None = None) -> ExactState:
-    """Compute the exact steady motion; by default the transients decay to rounding error."""
-    count = settling_periods(point) if periods is None else periods
+def exact(point: paper.Point) -> ExactState:
+    """Compute the exact steady motion, after the transients have decayed to rounding error."""
+    count = settling_periods(point)
     solution = simulate(
         declared("dfcs"),
         (0.0, count * point.period),
