@@ -29,7 +29,7 @@ FILES = {
     "engine/events/zeno/accumulation.py": 388,
     "engine/linear/motion.py": 370,
     "engine/linear/tables.py": 305,
-    "engine/lowering/emit.py": 366,
+    "engine/lowering/emit.py": 358,
     "engine/lowering/held_states.py": 303,
     "engine/lowering/lower.py": 373,
     "engine/roots/roots.py": 355,
@@ -44,7 +44,7 @@ FILES = {
     "integrators/runge_kutta/segments.py": 408,
     "mechanics/declaration/system.py": 350,
     "mechanics/series_loop/expansion.py": 312,
-    "mechanics/series_loop/steps.py": 350,
+    "mechanics/series_loop/steps.py": 334,
     "mechanics/time_stepping/kernels.py": 379,
     "model/parts/model.py": 525,
     "model/smoothing/rewriting.py": 420,
@@ -56,8 +56,8 @@ FUNCTIONS = {
     "integrators/runge_kutta/segments.py::runge_kutta_segment": 157,
     "integrators/taylor/segments.py::taylor_segment": 143,
     "mechanics/simulate.py::simulate_mechanical": 81,
-    "testing/catalogue/coincidences.py::scenes": 105,
-    "testing/catalogue/events.py::monitored": 120,
+    "testing/catalogue/coincidences.py::scenes": 103,
+    "testing/catalogue/events.py::monitored": 113,
 }
 ARGUMENTS = {
     "analysis/advise/advise.py::advise": 15,
