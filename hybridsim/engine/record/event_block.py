@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from copy import copy
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,30 +27,38 @@ def _taking_part(
     has_surface: Any,
     due_start: Any,
     due: Any,
+    recorded: Any,
     participants: Any,
 ) -> tuple[int, int, bool]:
-    """Return the numbers of participants and of schedules among them, and whether every event has one participant.
+    """Return the numbers of participants and of components among them, and whether every event has one participant.
 
-    A participant is a component that changes its mode or is reset, or a schedule that is due.
-    due_start, due: the schedules of each kind of known time. participants (2, m): receives event and component of each,
-    up to its length; a schedule follows the components.
+    A participant is a component that changes its mode or is reset, a monitor, or a schedule that is due.
+    due_start, due: the schedules of each kind of known time. recorded (2 M,): the directions, down and up, that each
+    monitor records. participants (2, m): receives event and number of each, up to its length; monitors follow the
+    components, and schedules follow the monitors.
     """
-    count, schedules, is_plain = 0, 0, True
+    count, others, is_plain = 0, 0, True
+    components, guards, monitors = before.shape[1], owner.shape[0], recorded.shape[0] // 2
     for e in range(fired.shape[0]):
-        for c in range(before.shape[1]):
-            is_owner = fired[e] >= 0 and c == owner[fired[e]]
+        for c in range(components):
+            is_owner = 0 <= fired[e] < guards and c == owner[fired[e]]
             if before[e, c] != after[e, c] or (is_owner and not has_surface[c]):
                 if count < participants.shape[1]:
                     participants[0, count], participants[1, count] = e, c
                 count += 1
+        if fired[e] >= guards and recorded[fired[e] - guards]:
+            if count < participants.shape[1]:
+                participants[0, count] = e
+                participants[1, count] = components + (fired[e] - guards) // 2
+            count, others = count + 1, others + 1
         if fired[e] <= AT_KNOWN_TIME:
             kind = AT_KNOWN_TIME - fired[e]
             for i in range(due_start[kind], due_start[kind + 1]):
                 if count < participants.shape[1]:
-                    participants[0, count], participants[1, count] = e, before.shape[1] + due[i]
-                count, schedules = count + 1, schedules + 1
+                    participants[0, count], participants[1, count] = e, components + monitors + due[i]
+                count, others = count + 1, others + 1
         is_plain = is_plain and count == e + 1
-    return count, schedules, is_plain
+    return count, count - others, is_plain
 
 
 @kernel
@@ -76,7 +85,8 @@ def _states_at(states: Any, participants: Any, first: int, component: int, side:
     return count
 
 
-SCHEDULED = "scheduled"  # kind of the event of a schedule
+SCHEDULED, MONITOR = "scheduled", "monitor"  # kinds of the events of schedules and monitors
+_DIRECTIONS = ("down", "up")  # of the two guards of a monitor
 _NO_KINDS = np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64)  # of known times, as arrays
 _take_part, _times_of_one = Precompiled(_taking_part), Precompiled(_times_at)
 
@@ -84,10 +94,13 @@ _take_part, _times_of_one = Precompiled(_taking_part), Precompiled(_times_at)
 class EventBlock(Sequence[Occurrence]):
     """Events in arrays, each with one entry for every component that changes its mode or is reset.
 
+    A monitor or a schedule has one entry as well.
+
     Parameters
     ----------
     instants : (E, 2), high and low.
-    fired : (E,), number of the guard that fired; -1 for none; AT_KNOWN_TIME - k for kind k of a known time.
+    fired : (E,), number of the guard that fired; -1 for none; AT_KNOWN_TIME - k for kind k of a known time. Beyond the
+        guards of the components, each monitor has two numbers, for its directions down and up.
     before, after : (E, C), modes on both sides.
     states : (E, 2, n), x- and x+.
     due : the schedules of each kind of known time.
@@ -106,17 +119,20 @@ class EventBlock(Sequence[Occurrence]):
         self._system, self._instants, self._fired = system, instants, fired
         self._before, self._after, self._states = before, after, states
         self._first = 0
+        self.changes: int  # number of changes of mode
         participants = np.empty((2, len(fired)), dtype=np.int64)
         kinds = _NO_KINDS
         if due:
             kinds = np.cumsum([0, *map(len, due)]), np.array([k for one in due for k in one], dtype=np.int64)
-        arrays = fired, before, after, system.owner, system.has_surface, *kinds
-        self._count, schedules, self._is_plain = _take_part(*arrays, participants)
+        recorded = [m.direction in ("both", way) for m in system.model.monitors for way in _DIRECTIONS]
+        arrays = (
+            fired, before, after, system.owner, system.has_surface, *kinds, np.array(recorded, dtype=np.bool_)
+        )  # fmt: skip
+        self._count, self.changes, self._is_plain = _take_part(*arrays, participants)
         if self._count != len(fired):
             participants = np.empty((2, self._count), dtype=np.int64)
             _take_part(*arrays, participants)
         self._all_participants = participants
-        self.changes = self._count - schedules  # number of changes of mode
 
     def __len__(self) -> int:
         return self._count - self._first
@@ -163,20 +179,21 @@ class EventBlock(Sequence[Occurrence]):
             found[kind] += count
         return +found
 
-    @property
+    @cached_property
     def _named(self) -> list[tuple[str, str]]:
-        """Return the names of components and schedules, each with the kind of its events."""
-        schedules = [(schedule.name, SCHEDULED) for schedule in self._system.model.schedules]
-        return [(automaton.name, automaton.kind) for automaton in self._system.automata] + schedules
+        """Return the names of components, monitors and schedules, each with the kind of its events."""
+        model, named = self._system.model, [(part.name, part.kind) for part in self._system.automata]
+        named += [(monitor.name, MONITOR) for monitor in model.monitors]
+        return named + [(schedule.name, SCHEDULED) for schedule in model.schedules]
 
     def transitions(self, first: int) -> tuple[np.ndarray, np.ndarray]:
         """Return instants (k, 2) and states (k, 2, n) of the transitions from a given event on."""
         has_corners = len(self._system.declared) < len(self._system.automata)
-        has_schedules = self.changes < self._count
-        if self._is_plain and not (has_corners or has_schedules):
+        has_others = self.changes < self._count
+        if self._is_plain and not (has_corners or has_others):
             return self._instants[self._first + first :], self._states[self._first + first :]
         events, components = self._participants[:, first:]
-        if has_schedules:
+        if has_others:
             is_change = components < len(self._system.automata)
             events, components = events[is_change], components[is_change]
         if has_corners:
@@ -227,12 +244,14 @@ class EventBlock(Sequence[Occurrence]):
         x_minus: np.ndarray,
         x_plus: np.ndarray,
     ) -> Occurrence:
-        at, number = Instant(*instant), component - len(self._system.automata)
-        if number >= 0:
-            name = self._system.model.schedules[number].name
-            return Occurrence(at, SCHEDULED, name, "", "", "", 0, x_minus, x_plus)
-        automaton, guard, modes = self._system.automata[component], "", self._system.automata[component].modes
-        if fired >= 0 and component == self._system.owner[fired]:
+        at, automata = Instant(*instant), self._system.automata
+        if component >= len(automata):
+            name, kind = self._named[component]
+            is_up = (fired - len(self._system.owner)) % 2 == 1
+            direction = 0 if kind == SCHEDULED else 1 if is_up else -1
+            return Occurrence(at, kind, name, "", "", "", direction, x_minus, x_plus)
+        automaton, guard, modes = automata[component], "", automata[component].modes
+        if 0 <= fired < len(self._system.owner) and component == self._system.owner[fired]:
             guard = automaton.guard_names[source][automaton.guards[source].index(fired)]
         return Occurrence(
             at, automaton.kind, automaton.name, guard, modes[source], modes[target], -1, x_minus, x_plus

@@ -20,6 +20,7 @@ from hybridsim.engine.events.compiled.known_time import (
     store_known_times,
 )
 from hybridsim.engine.events.compiled.scratch import functions_of, work_space
+from hybridsim.engine.events.monitor_corners import MonitorCorners
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.events.zeno.accumulation import MAX_EVENTS_PER_TURN, cannot_accumulate
@@ -130,6 +131,7 @@ class CompiledLoop:
 
     def __init__(self, kernels: MethodKernels) -> None:
         self.kernels, self.system = kernels, kernels.system
+        self.corners: MonitorCorners | None = None  # of the monitors that the loop passes
         self.tape_cache, layout = tape_cache_of(self.system), self.system.layout
         self.kernel_run: KernelRun | None = None  # a call made beforehand, which `advance` takes first
         self.times_ahead: TimesAhead | None = None  # known times of the run, which calls pass
@@ -140,6 +142,10 @@ class CompiledLoop:
             beside = (MAX_SEGMENTS + 1) * (layout.size + 1) + ALIGNED
             self.steps = max((_CALL_DOUBLES - beside) // kernels.columns, MIN_STEPS_IN_PART)
         self.renew()
+
+    def pass_monitors(self, corners: MonitorCorners) -> None:
+        """Make this loop, whose system has corners in place of monitors, the loop of the system with monitors."""
+        self.corners, self.system, self.kernels.recorded = corners, corners.plain, corners.plain
 
     def fresh_copy(self) -> CompiledLoop:
         """Return a copy of this loop for another run; the loop must not have been used."""
@@ -192,7 +198,7 @@ class CompiledLoop:
             key = self.steps, kernels.columns
             if key not in self._layouts:
                 kind = kernels.rows, kernels.keeps_starts, *kernels.fields()
-                self._layouts[key] = record_layout(self.system, self.steps, *kind)
+                self._layouts[key] = record_layout(kernels.system, self.steps, *kind)
             self.array_layout = self._layouts[key]
             self.memory = self.array_layout.blank()
         steps, first = self.used
@@ -233,15 +239,17 @@ class CompiledLoop:
         has_news = counts[SEGMENTS] > 0 and len(tape_cache.tapes.modes) != len(tapes.modes)
         return KernelRun(
             self.system, self.array_layout, self.memory, steps, first, code, counts[STEPS], counts[SEGMENTS],
-            clock, end, has_news, seconds, result, known, counts[KNOWN],
+            clock, end, has_news, seconds, result, known, counts[KNOWN], self.corners,
         )  # fmt: skip
 
     def advance(
         self, origin: Instant, outcome: Outcome, p: np.ndarray, target: Instant, record: Trajectory
     ) -> LoopResult:
         """Run until an event needs Python, the target is reached, or arrays are full; store the result."""
-        run = self.kernel_run or self.go(origin, HybridState.of(outcome, p), target)
-        self.kernel_run = None
+        run, self.kernel_run = self.kernel_run, None
+        if run is None:
+            state = HybridState.of(outcome, p) if self.corners is None else self.corners.state(outcome, p)
+            run = None if state is None else self.go(origin, state, target)
         if run is None:
             return LoopResult(
                 origin, outcome.copy, BEFORE_SOMETHING, np.zeros((0, 2)), _NO_OWNERS, None, None
@@ -255,7 +263,7 @@ class CompiledLoop:
         may_continue = run.is_full or run.has_news
         end = ARRIVED if run.is_at_target else PAUSED if may_continue else BEFORE_SOMETHING
         return LoopResult(
-            Instant(*run.clock), run.end.outcome, end, run.instants, run.owners, run.adopted, run.known_passed
+            Instant(*run.clock), run.outcome, end, run.instants, run.owners, run.adopted, run.known_passed
         )
 
     def count(self, run: KernelRun, counters: Counters) -> None:
@@ -284,7 +292,7 @@ class CompiledLoop:
             self.kernels.rows._make([array[steps] for array in rows[len(LoopRecord._fields) :]]),
             rows.last_steps[run.first : run.first + run.count + 1],
             rows.clocks[begun],
-            rows.modes[begun],
+            run.plain_modes(rows.modes[begun]),
             rows.vectors[begun],
             rows.jumps[begun],
         )

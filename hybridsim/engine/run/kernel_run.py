@@ -9,12 +9,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.events.monitor_corners import MonitorCorners
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.native.array_layout import ArrayLayout
 from hybridsim.engine.native.constants import MAX_SEGMENTS
 from hybridsim.engine.record.counters import Counters
-from hybridsim.engine.record.event_block import EventBlock
+from hybridsim.engine.record.event_block import AT_KNOWN_TIME, EventBlock
 from hybridsim.engine.record.segments import Segment, end_point
 from hybridsim.engine.run.event_loop import AT_TARGET, FULL, NO_GUARD, LoopRecord
 from hybridsim.engine.system.instant import Instant
@@ -95,6 +96,7 @@ class KernelRun:
     seconds : time in compiled code.
     result : further results of the method.
     known, passed : the known times ahead of the call, and how many it passed.
+    corners : the corners in place of monitors, if there are any.
     vector : the last run-time vector, if only the events are kept.
     """
 
@@ -113,6 +115,7 @@ class KernelRun:
     result: Any
     known: KnownTimes | None
     passed: int
+    corners: MonitorCorners | None = None
     vector: np.ndarray | None = None
 
     def __post_init__(self) -> None:
@@ -149,7 +152,7 @@ class KernelRun:
     def instants(self) -> np.ndarray:
         """Return the instants (E, 2) at which guards fired."""
         found = self._array("clocks")[self.first + 1 : self.first + 1 + self.events]
-        return found[self._have_fired] if self.passed else found
+        return found if self._has_guards_alone else found[self._have_fired]
 
     @property
     def owners(self) -> np.ndarray:
@@ -170,7 +173,7 @@ class KernelRun:
         if not self.passed:
             return KnownTimesPassed(None, 0, _NO_STATES, ahead)
         rows = self.rows
-        last = self.first + int(np.flatnonzero(~self._have_fired)[-1])
+        last = self.first + int(np.flatnonzero(self._fires[self._ended] <= AT_KNOWN_TIME)[-1])
         steps = self.steps - int(rows.last_steps[last + 1])
         return KnownTimesPassed(self.known.instant(self.passed - 1), steps, rows.jumps[last, -1], ahead)
 
@@ -178,25 +181,42 @@ class KernelRun:
     def fires(self) -> np.ndarray:
         """Return the indices (E,) of the guards that fired."""
         found = self._fires[self._ended]
-        return found[self._have_fired] if self.passed else found
+        return found if self._has_guards_alone else found[self._have_fired]
+
+    @property
+    def _has_guards_alone(self) -> bool:
+        """Return whether guards of the model ended all segments."""
+        return not self.passed and self.corners is None
 
     @property
     def _have_fired(self) -> np.ndarray:
-        """Return, for each segment, whether a guard ended it; otherwise a known time ended it."""
-        return np.asarray(self._fires[self._ended] >= 0)
+        """Return, for each segment, whether a guard ended it; otherwise a known time or a monitor ended it."""
+        fires = self._fires[self._ended]
+        return np.asarray((fires >= 0) & (fires < self.system.guard_count))
+
+    def plain_modes(self, modes: np.ndarray) -> np.ndarray:
+        """Return modes (k, C) without those of the corners of monitors."""
+        return modes if self.corners is None else np.ascontiguousarray(modes[:, : len(self.system.automata)])
+
+    def outcome(self) -> Outcome:
+        """Return the state at the end."""
+        return self.end.outcome() if self.corners is None else self.corners.outcome(self.end)
 
     @property
     def event_block(self) -> EventBlock | None:
         """Return the events as one block, or None if there are none."""
         if self._event_block is None and self.events:
             modes, ended = self._array("modes"), self._ended
+            fires = self._fires[ended]
+            if self.corners is not None:
+                fires = self.corners.numbered(fires, modes[ended])
             after = slice(ended.start + 1, ended.stop + 1)
             self._event_block = EventBlock(
                 self.system,
                 self._array("clocks")[after],
-                self._fires[ended],
-                modes[ended],
-                modes[after],
+                fires,
+                self.plain_modes(modes[ended]),
+                self.plain_modes(modes[after]),
                 self._array("jumps")[ended, -2:],  # the states at its end, after the state at its start
                 self.known.due if self.known is not None and self.passed else (),
             )
@@ -220,7 +240,10 @@ class KernelRun:
         last = self.first + self.count - 1
         vector = self.rows.vectors[last] if self.vector is None else self.vector
         return end_point(
-            Instant(*self.clock), self._array("modes")[last], vector, self._array("jumps")[last, -2]
+            Instant(*self.clock),
+            self.plain_modes(self._array("modes")[last : last + 1])[0],
+            vector,
+            self._array("jumps")[last, -2],
         )
 
     def forget_segments(self) -> None:

@@ -69,6 +69,7 @@ class MethodKernels(ABC):
 
     def __init__(self, system: System, longest: float) -> None:
         self.system, self.longest = system, longest
+        self.recorded = system  # the system of the segments, which may have monitors in place of corners
         self._reusable: tuple[Any, deque[Any]] | None = None
 
     def fresh_copy(self) -> MethodKernels:

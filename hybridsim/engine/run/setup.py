@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from hybridsim.engine.events.monitor_corners import corners_of_monitors
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.events.start import settled_start, start_by_kernel
 from hybridsim.engine.events.state import HybridState
@@ -78,11 +79,16 @@ class RunSetup:
             not self.method.has_compiled_loop
             or not task.forward
             or system.n == 0
-            or model.monitors
             or not all(signal.is_polynomial for signal in system.signals)
         ):
             return None
-        return self.method.compiled_loop(system, task.tolerances, self.renewal)
+        if not model.monitors:
+            return self.method.compiled_loop(system, task.tolerances, self.renewal)
+        corners = corners_of_monitors(system)
+        compiled_loop = self.method.compiled_loop(corners.system, task.tolerances, self.renewal)
+        if compiled_loop is not None:
+            compiled_loop.pass_monitors(corners)
+        return compiled_loop
 
     def compiled_loop(self) -> CompiledLoop | None:
         """Return a compiled loop for one run, or None."""

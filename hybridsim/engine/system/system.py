@@ -206,6 +206,7 @@ class System:
         self.signals = tuple(Signal(i, numbers) for i in model.inputs)
         self.starts: dict[tuple[Any, ...], Any] = {}  # cache of `hybridsim.engine.events.start`
         self.tables: dict[tuple[float, bool], Any] = {}  # cache of `hybridsim.engine.linear.tables`
+        self.with_corners: Any = None  # cache of `hybridsim.engine.events.monitor_corners`
         self.opposed: set[tuple[Any, ...]] = (
             set()
         )  # starts accepted by `hybridsim.engine.events.dissipation_check`

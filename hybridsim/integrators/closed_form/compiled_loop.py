@@ -114,7 +114,7 @@ class ClosedFormKernels(MethodKernels):
         *record: np.ndarray,
     ) -> ClosedFormBlock:
         """Return the segments of a call as one block."""
-        return ClosedFormBlock(self.system, result[0], rows.rows, rows.ends, rows.coordinates, *record)
+        return ClosedFormBlock(self.recorded, result[0], rows.rows, rows.ends, rows.coordinates, *record)
 
     @property
     def place(self) -> tuple[np.ndarray, ...]:

@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from hybridsim.engine.linear.modes import refuse_nonlinear
+from hybridsim.engine.linear.modes import refuse_nonlinear, what_is_not_linear
 from hybridsim.engine.native.constants import TIGHTEST
 from hybridsim.engine.run.compiled_loop import CompiledLoop, compile_loops
 from hybridsim.engine.run.stepping import Flow, Stepper, Watch
@@ -59,9 +59,12 @@ class Exact(Integrator):
         compile_loops(system, _kernels)
 
     def compiled_loop(self, system: System, tolerances: Tolerances, longest: float) -> CompiledLoop | None:
-        """Return the compiled loop, or None if max_step is set, because a closed form has no steps."""
-        is_free = math.isinf(tolerances.max_step)
-        return CompiledLoop(_kernels(system, tolerances, longest)) if is_free else None
+        """Return the compiled loop, or None if max_step is set, because a closed form has no steps.
+
+        The result is also None if a monitor, which the system has as a corner, is not linear.
+        """
+        is_possible = math.isinf(tolerances.max_step) and what_is_not_linear(system) is None
+        return CompiledLoop(_kernels(system, tolerances, longest)) if is_possible else None
 
     def start(
         self,

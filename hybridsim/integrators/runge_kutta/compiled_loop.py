@@ -187,4 +187,4 @@ class RungeKuttaKernels(MethodKernels):
 
     def block(self, result: Any, rows: StepRows, last_steps: np.ndarray, *record: np.ndarray) -> HermiteBlock:
         """Return the segments of a call as one block."""
-        return HermiteBlock(self.system, last_steps, *rows, *record)
+        return HermiteBlock(self.recorded, last_steps, *rows, *record)

@@ -107,4 +107,4 @@ class TaylorKernels(MethodKernels):
 
     def block(self, result: Any, rows: StepRows, last_steps: np.ndarray, *record: np.ndarray) -> SeriesBlock:
         """Return the segments of a call as one block."""
-        return SeriesBlock(self.system, last_steps, *rows, *record)
+        return SeriesBlock(self.recorded, last_steps, *rows, *record)
