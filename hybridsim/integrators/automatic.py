@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.events.monitor_corners import corners_of_monitors
 from hybridsim.engine.events.outcome import Situation
 from hybridsim.engine.events.resolve import EventResolution
 from hybridsim.engine.linear.modes import is_linear_beside_corners, what_is_not_linear
@@ -44,14 +45,14 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
         return _for_functions(system, x0, z0, span)
     model = system.model
     is_small = system.n + system.guard_count <= _SMALL and span[1] >= span[0]
-    is_monitored, rest = bool(model.monitors or model.inputs), ""
+    rest = ""
     if is_small and what_is_not_linear(system) is None and is_linear_beside_corners(system):
-        if not is_monitored:
+        obstacle = "inputs" if model.inputs else _monitors_for_python(system)
+        if not obstacle:
             return Choice("exact", "its modes are linear in the states")
-        what = "monitors" if model.monitors else "inputs"
-        rest = f" (the model has {what}, with which exact may be slower: name integrator='exact' to try it)"
+        rest = f" (the model has {obstacle}, with which exact may be slower: name integrator='exact' to try it)"
     steps = _steps_for_stability(system, x0, z0, span)
-    in_python = is_monitored or system.has_corners or span[1] < span[0]
+    in_python = bool(model.inputs) or system.has_corners or span[1] < span[0]
     if steps > _MANY or (steps > _MANY_IN_PYTHON and in_python and _is_apart(system, x0, z0, span[0])):
         return Choice("rodas5p", f"for stability an explicit method would need {steps:.0e} steps")
     if system.has_corners:
@@ -62,6 +63,16 @@ def choose(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, fl
     if rtol < _TIGHT:
         return Choice("taylor", f"its modes are smooth and the tolerance is tight{rest}")
     return Choice("dop853", f"its modes are smooth and not stiff at the start{rest}")
+
+
+def _monitors_for_python(system: System) -> str:
+    """Return which monitors keep `exact` from running in compiled code, or an empty text."""
+    if not system.monitor_names:
+        return ""
+    corners = corners_of_monitors(system).system
+    if system.n + corners.guard_count > _SMALL:
+        return "many monitors"
+    return "" if what_is_not_linear(corners) is None else "monitors that are not linear in the states"
 
 
 def _for_functions(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float]) -> Choice:

@@ -108,7 +108,8 @@ class RunSetup:
         if self._buffer is None:
             settled = self._at_start(task, ())
             if self.begins_silently:
-                self._buffer = HybridState.of(*settled)
+                corners = self._pattern.corners
+                self._buffer = HybridState.of(*settled) if corners is None else corners.state(*settled)
         return self._buffer
 
     def start(self, task: Task, due: tuple[int, ...]) -> LazyState:
@@ -123,7 +124,8 @@ class RunSetup:
             self._start = self._buffer.copy().outcome(), self._buffer.p
         if self._start is None:
             outcome = settled_start(system, task, self.origin, due)
-            is_recorded = due or outcome.changes or outcome.warnings or outcome.status or system.monitor_names
+            is_recorded = due or outcome.changes or outcome.warnings or outcome.status
+            is_recorded = is_recorded or not outcome.monitor_sides.all()
             self.begins_silently = forward and not is_recorded
             self._start = outcome, system.vector(self.origin, system.discrete(outcome.p), forward)
         return self._start

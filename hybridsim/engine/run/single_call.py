@@ -105,12 +105,12 @@ def _is_over(system: System, kernel_run: KernelRun) -> bool:
     """Return whether one call certainly completed the run: no events accumulate, and no bounces are hidden."""
     if not kernel_run.is_at_target or kernel_run.has_news or not kernel_run.count:
         return False
-    if kernel_run.events == 0:
-        return True
     fires = kernel_run.fires
+    if not len(fires):
+        return True
     last = system.owner[fires[-1]]
     if not system.has_surface[last] and may_be_hidden(
-        system, kernel_run.end.outcome(), kernel_run.event_block or ()
+        system, kernel_run.outcome(), kernel_run.event_block or ()
     ):
         return False
     work = np.empty((2, MAX_EVENTS_PER_TURN))
