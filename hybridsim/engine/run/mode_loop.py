@@ -72,7 +72,9 @@ class ModeLoop:
         self.headway = Headway(system, self.record.counters, self.origin, self.end)
         self.compiled_loop = compiled_loop or setup.compiled_loop()
         if self.compiled_loop is not None and has_known_times(system):
-            self.compiled_loop.times_ahead = TimesAhead(system, self.timetable, self.end)
+            corners = self.compiled_loop.corners
+            of_loop = system if corners is None else corners.system  # it numbers the resets
+            self.compiled_loop.times_ahead = TimesAhead(of_loop, self.timetable, self.end)
         is_replaceable = task.successor is not None and method is not task.successor
         stiffness_monitor = self.headway if is_replaceable else None
         self.notices = Notices(
@@ -328,8 +330,10 @@ class ModeLoop:
             steps = self.record.counters.steps - steps
             errors = errors_when_due(self.system, target, self.outcome, steps, self.method.rounding, x_before)
             error = np.maximum(error, errors)
+        monitors = MonitorSides.of(self.system.model.monitors, self.outcome.monitor_sides)
         settled = self._resolve_appointment(target, self.outcome, x, appointment.schedules, error)
-        return True, self._adopt(target, settled, x, appointment.schedules)
+        settled = self._apply_crossed(settled, 0.0, monitors)
+        return True, self._adopt(target, settled, x, appointment.schedules, monitors)
 
     def _divide(self, target: Instant) -> None:
         """Start a new segment at a step end that a compiled loop reached with all guards away from zero."""
