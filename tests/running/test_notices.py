@@ -198,7 +198,11 @@ def test_a_load_that_is_negative_from_the_start(name: str, x: float) -> None:
 
 
 def test_auto_says_what_keeps_a_linear_model_from_the_closed_form() -> None:
-    watched = replace(hs.load("dfcs"), monitors=(hs.Monitor("up", "v", direction="up"),))
-    sol = hs.simulate(watched, (0, 0.01))
-    assert "the model has monitors, with which exact may be slower" in sol.message
+    def message(function: str) -> str:
+        watched = replace(hs.load("dfcs"), monitors=(hs.Monitor("seen", function),))
+        return hs.simulate(watched, (0, 0.01)).message
+
+    obstacle = "the model has monitors that are not linear in the states, with which exact may be slower"
+    assert obstacle in message("x**2 - 1e-9")
+    assert "exact, chosen because its modes are linear in the states" in message("x - 1e-9")
     assert "which exact may be slower" not in hs.simulate("belt", (0, 0.1)).message

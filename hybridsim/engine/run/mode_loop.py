@@ -341,6 +341,7 @@ class ModeLoop:
         if self.adopted != target:  # otherwise an event happened there
             self.adopted, outcome = target, self.outcome
             outcome.sides[:], outcome.orders[:], outcome.guard_floors[:] = 1, 0, 0.0
+            outcome.monitor_orders[:], outcome.monitor_floors[:] = 0, 0.0
 
     def _segment_run(self) -> SegmentRun:
         system, outcome = self.system, self.outcome

@@ -34,9 +34,9 @@ class Exact(Integrator):
     so that defective, oscillatory and stiff modes are treated alike. A guard that is one undamped wave has
     its zeros in closed form. Every other guard is followed by lower bounds made of its Taylor polynomial and
     the largest remainder, so that no zero is passed over, and its zeros are accurate to rounding. There is no
-    step and no truncation error: rtol and atol are not used. A segment with something unusual (a monitor, an
-    input, a case decided by rounding, time running backward) is computed from its Taylor series, which
-    converges everywhere, to rounding of the states' nominal sizes. There atol is used.
+    step and no truncation error: rtol and atol are not used. A segment with something unusual (a monitor
+    that is not linear in the states, a case decided by rounding, time running backward) is computed from its
+    Taylor series, which converges everywhere, to rounding of the states' nominal sizes. There atol is used.
 
     When to choose it: whenever it applies. It is the fastest and the most accurate.
     """
