@@ -104,7 +104,9 @@ def test_a_reset_at_a_known_time_carries_a_monitor_over_zero(integrator: str, ac
 
 @pytest.mark.parametrize("integrator", METHODS)
 def test_resets_of_clocks_keep_their_own_values_beside_resets_of_monitors(integrator: str) -> None:
-    more = '[discrete]\nheld = { start = 0 }\n[clocks.tick]\nperiod = 0.5\noffset = 0.25\nset = { held = "t" }\n'
+    more = (
+        '[discrete]\nheld = { start = 0 }\n[clocks.tick]\nperiod = 0.5\noffset = 0.25\nset = { held = "t" }\n'
+    )
     model = swing(hs.Monitor("count", "x - 0.3", action="reset", reset={"n": "n + 1"}), more=more)
     solution = hs.simulate(model, (0, 4), integrator=integrator)
     assert solution.status == "finished"

@@ -18,7 +18,7 @@ from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.system.system import System
 from hybridsim.expr import of_tree
 from hybridsim.model.free_name import free_name, names_of_model
-from hybridsim.model.parts.component import Choice, Corner, Guard, Mode
+from hybridsim.model.parts.component import Choice, Guard, Mode, MonitorCorner
 from hybridsim.model.parts.model import Model
 from hybridsim.model.parts.monitor import Monitor
 
@@ -27,18 +27,16 @@ _DIRECTIONS = ("down", "up")  # in which a monitor leaves the modes
 _FATAL = "a monitor acts"  # never shown, because compiled loops leave such an event to the general loop
 
 
-def _corner(name: str, monitor: Monitor) -> Corner:
+def _corner(name: str, monitor: Monitor) -> MonitorCorner:
     """Return the corner of a monitor."""
     modes = []
     for mode, other, direction in zip(_MODES, reversed(_MODES), _DIRECTIONS, strict=True):
         tree = monitor.expr.tree
         side = of_tree(tree if mode == "+" else ast.UnaryOp(ast.USub(), tree), monitor.expr.place)
         is_record = monitor.action == "record" or monitor.direction not in ("both", direction)
-        guard = (
-            Guard("side", side, then=(Choice(other),)) if is_record else Guard("side", side, fatal=_FATAL)
-        )
+        guard = Guard("side", side, then=(Choice(other),)) if is_record else Guard("side", side, fatal=_FATAL)
         modes.append(Mode(mode, (guard,)))
-    return Corner(name, tuple(modes), initial="+")
+    return MonitorCorner(name, tuple(modes), initial="+")
 
 
 def _with_corners(model: Model) -> Model:

@@ -54,7 +54,7 @@ AT_TARGET, STOPPED, FULL = 0, 1, 2  # why a call ended
 # Least number of steps in a part of a segment; with less space the next call takes the segment.
 MIN_STEPS_IN_PART = 64
 FOLLOWED = 3  # returned by a segment kernel that has followed a segment
-# An event this close before a known time, relative to the segment or to the time, may belong to that time.
+# An event this close before a known time or the target may belong to that time: relative to the segment, to the time.
 _NEAR_KNOWN, _NEAR_IN_TIME = 2.0**-20, 2.0**-40
 NO_GUARD = -1  # the end of a segment without an event
 
@@ -214,7 +214,7 @@ def event_loop(
         work.float_slots[SPREAD], work.int_slots[ROW] = spread(end.steps, STAGES), k
         is_rejected = (
             is_crowded(since + s, clock, pace)
-            or (kind >= 0 and bound - s <= max(near, _NEAR_KNOWN * bound))
+            or bound - s <= max(near, _NEAR_KNOWN * bound)
             or (
                 is_shallow(slope, bend, end.last_step)
                 and is_hidden(model, fired, slope, bend, at, error, state, work)

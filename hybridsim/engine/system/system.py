@@ -22,7 +22,7 @@ from hybridsim.engine.system.instant import Instant, phase_of
 from hybridsim.engine.system.modules import compiled
 from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.signals import Signal
-from hybridsim.model.parts.component import Corner, LoadAutomaton
+from hybridsim.model.parts.component import Corner, LoadAutomaton, MonitorCorner
 from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.explicit_corners import smoothed
 from hybridsim.model.smoothing.jumps import SIGN
@@ -51,6 +51,7 @@ class Automaton:
     is_corner: bool = False  # a corner: both modes agree at the border
     is_step: bool = False  # a corner whose modes may differ at the border: a step in time
     is_load: bool = False  # the load of a contact that opens
+    is_monitor: bool = False  # a corner in place of a monitor
     limit: int = -1  # mode that is entered at the limit of its transitions
 
     @property
@@ -94,6 +95,7 @@ def _automaton(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automaton
         is_corner=isinstance(component, Corner),
         is_step=isinstance(component, Corner) and any(v.startswith(SIGN) for v in component.variables),
         is_load=isinstance(component, LoadAutomaton),
+        is_monitor=isinstance(component, MonitorCorner),
         limit=names.index(component.limit.to) if component.limit else -1,
     )
 

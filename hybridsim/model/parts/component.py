@@ -277,5 +277,10 @@ class Corner(Component):
 
 
 @dataclass(frozen=True)
+class MonitorCorner(Corner):
+    """A corner in place of a monitor, for compiled loops (`hybridsim.engine.events.monitor_corners`)."""
+
+
+@dataclass(frozen=True)
 class LoadAutomaton(Component):
     """The automaton of a contact that can lift off; its mode follows the sign of the load."""

@@ -12,7 +12,7 @@ from hybridsim.engine.events.choice.joint_choice import (
     joint_choice,
     rank_candidates,
 )
-from hybridsim.engine.events.choice.verdict import FINE, LEAVES, verdict
+from hybridsim.engine.events.choice.verdict import FINE, LEAVES, UNDECIDED, verdict
 from hybridsim.engine.events.compiled.guard_series import guard_series, is_continuous
 from hybridsim.engine.events.compiled.scratch import ROW, called_by, located
 from hybridsim.engine.linear.guard_coefficients import measure_point
@@ -34,11 +34,19 @@ def cluster_of(automata: Any, c: int) -> Any:
 def row_verdict(
     automata: Any, lin: Any, k: int, z: Any, members: Any, continuous: bool, row: int, work: Any
 ) -> int:
-    """Return the verdict on the modes in row `k`, if the other guards are positive."""
+    """Return the verdict on the modes in row `k`, if the other guards are positive.
+
+    A monitor that stays at zero has reached its event, which compiled loops do not record. It is UNDECIDED.
+    """
     for g in range(work.all_sides.shape[1]):
         short_loop()
         work.all_sides[row, g], work.all_orders[row, g], work.all_floors[row, g] = 1, 0, 0.0
-    return call_noinline(verdict, (automata, lin, k, work, z, members, continuous, False, row))
+    found = call_noinline(verdict, (automata, lin, k, work, z, members, continuous, False, row))
+    for g in range(work.all_sides.shape[1]):
+        short_loop()
+        if work.all_sides[row, g] == 0 and automata.is_monitor[automata.owner[g]]:
+            return UNDECIDED
+    return found
 
 
 @inline_always

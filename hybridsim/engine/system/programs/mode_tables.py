@@ -46,6 +46,7 @@ class Automata(NamedTuple):
     is_corner: np.ndarray  # (C,)
     is_unique: np.ndarray  # (C,)
     is_unilateral: np.ndarray  # (C,)
+    is_monitor: np.ndarray  # (C,)
 
 
 class Tapes(NamedTuple):
@@ -117,6 +118,7 @@ def automata_of(system: System) -> Automata:
             system.is_corner,
             np.array([a.is_unique for a in automata], dtype=np.bool_),
             np.array([a.is_unilateral for a in automata], dtype=np.bool_),
+            np.array([a.is_monitor for a in automata], dtype=np.bool_),
         )
     )
     return packed_automata
