@@ -332,7 +332,7 @@ class ModeLoop:
             error = np.maximum(error, errors)
         monitors = MonitorSides.of(self.system.model.monitors, self.outcome.monitor_sides)
         settled = self._resolve_appointment(target, self.outcome, x, appointment.schedules, error)
-        settled = self._apply_crossed(settled, 0.0, monitors)
+        settled = apply_crossed(self.system, self.forward, settled, 0.0, monitors)
         return True, self._adopt(target, settled, x, appointment.schedules, monitors)
 
     def _divide(self, target: Instant) -> None:

@@ -124,9 +124,8 @@ class RunSetup:
             self._start = self._buffer.copy().outcome(), self._buffer.p
         if self._start is None:
             outcome = settled_start(system, task, self.origin, due)
-            is_recorded = due or outcome.changes or outcome.warnings or outcome.status
-            is_recorded = is_recorded or not outcome.monitor_sides.all()
-            self.begins_silently = forward and not is_recorded
+            is_recorded = bool(due or outcome.changes or outcome.warnings or outcome.status)
+            self.begins_silently = forward and not is_recorded and bool(outcome.monitor_sides.all())
             self._start = outcome, system.vector(self.origin, system.discrete(outcome.p), forward)
         return self._start
 
