@@ -21,9 +21,8 @@ from hybridsim.engine.linear.modes import holds_constants, is_always_linear
 from hybridsim.engine.linear.motion_summary import NODES, WEIGHTS, MotionSummary
 from hybridsim.engine.native.kernels import ENABLED, Precompiled
 from hybridsim.engine.native.struct_pack import address_in, opaque, packed, replaced
-from hybridsim.engine.run.compiled_loop import CallArrays
 from hybridsim.engine.run.event_loop import LoopRecord, link_event_loop
-from hybridsim.engine.run.method_kernels import NOT_LINEAR
+from hybridsim.engine.run.method_kernels import NOT_LINEAR, CallArrays
 from hybridsim.engine.system.per_structure import spare_scratch
 from hybridsim.engine.system.period import common_multiple
 from hybridsim.engine.system.programs.mode_tables import automata_of, tape_cache_of

@@ -24,11 +24,16 @@ def resolve_schedules(
     schedules: tuple[int, ...],
     error: np.ndarray,
     s_error: float,
+    adopted: Instant | None,
 ) -> Outcome:
     """Resolve a scheduled event, with the values of the inputs after it.
 
-    before: the outcome that holds until then. s_error: error of the times of zeros located there.
+    before: the outcome that holds until then. s_error: error of the times of zeros located there. adopted: the
+    last event before. One within two roundings has its zero at the instant as well.
     """
+    rounding = math.ulp(float(instant))
+    if adopted is not None and abs(instant.minus(adopted)) <= 2.0 * rounding:
+        s_error = max(s_error, rounding)
     at = situation_when_due(system, forward, instant, before.p, x_minus, before.z, error)
     at.s_error = max(s_error, at.s_error)
     resets = [("schedule", k) for k in schedules]

@@ -71,8 +71,8 @@ class MonitorCorners:
         self.count = len(plain.monitor_names)
         numbers = np.array([a.guards for a in self.system.automata[len(plain.automata) :]], dtype=np.int64)
         self._guards = numbers.reshape(self.count, 2)  # of each monitor in its two modes
-        kept = self.system.owner[: plain.guard_count]
-        assert np.array_equal(kept, plain.owner) and np.array_equal(self.system.rates, plain.rates)
+        owners = self.system.owner[: plain.guard_count]
+        assert np.array_equal(owners, plain.owner) and np.array_equal(self.system.rates, plain.rates)
 
     def numbered(self, fires: np.ndarray, modes: np.ndarray) -> np.ndarray:
         """Return the guards that fired, with two numbers beyond the others for each monitor, down and up."""

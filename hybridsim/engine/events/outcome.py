@@ -70,6 +70,11 @@ class Outcome:
         state: dict[str, Any] = {name: arrays[name].copy() for name in _STATE}
         return cls(**state, continuous=bool(arrays["continuous"]))
 
+    def leave_zeros(self) -> None:
+        """Take all guards as positive and all monitors as away from zero."""
+        self.sides[:], self.orders[:], self.guard_floors[:] = 1, 0, 0.0
+        self.monitor_orders[:], self.monitor_floors[:] = 0, 0.0
+
     def copy(self) -> Outcome:
         """Return a copy with its own arrays."""
         return Outcome(

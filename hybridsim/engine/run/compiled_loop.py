@@ -11,15 +11,11 @@ import numpy as np
 
 from hybridsim.engine.events.compiled.known_time import (
     KNOWN,
-    ORIGIN_AT,
-    PHASES_AT,
     SEGMENTS,
-    SIGNALS_AT,
     STEPS,
-    known_time_arrays,
     store_known_times,
 )
-from hybridsim.engine.events.compiled.scratch import functions_of, work_space
+from hybridsim.engine.events.compiled.scratch import functions_of
 from hybridsim.engine.events.monitor_corners import MonitorCorners
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.events.state import HybridState
@@ -27,15 +23,13 @@ from hybridsim.engine.events.zeno.accumulation import MAX_EVENTS_PER_TURN, canno
 from hybridsim.engine.native.array_layout import ALIGNED, LARGEST, ArrayLayout
 from hybridsim.engine.native.constants import MAX_SEGMENTS
 from hybridsim.engine.native.kernels import Precompiled
-from hybridsim.engine.native.struct_pack import opaque, packed, replaced
+from hybridsim.engine.native.struct_pack import opaque, replaced
 from hybridsim.engine.record.blocks import SegmentBlock
 from hybridsim.engine.record.checkpoint import damaged
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.trajectory import Trajectory
 from hybridsim.engine.run.event_loop import (
     MIN_STEPS_IN_PART,
-    LoopCall,
-    LoopModel,
     LoopRecord,
     call_event_loop,
     link_event_loop,
@@ -49,12 +43,13 @@ from hybridsim.engine.run.kernel_run import (
     record_layout,
     skipped_rows,
 )
-from hybridsim.engine.run.method_kernels import NOT_LINEAR, STEPS_PER_LOOK, MethodKernels
+from hybridsim.engine.run.method_kernels import NOT_LINEAR, STEPS_PER_LOOK, CallArrays, MethodKernels
 from hybridsim.engine.system.failures import StepFailure
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.known_times import TimesAhead
-from hybridsim.engine.system.programs.mode_tables import automata_of, tape_cache_of
+from hybridsim.engine.system.programs.mode_tables import tape_cache_of
 from hybridsim.engine.system.system import System
+from hybridsim.engine.system.timetable import Timetable
 from hybridsim.engine.system.tolerances import Tolerances
 
 _CALL_DOUBLES = LARGEST // 8  # doubles for the steps of one call, in a reusable block of memory
@@ -87,38 +82,6 @@ def compile_loops(system: System, make: Callable[[System, Tolerances, float], Me
         _compiled.append(make)
 
 
-class CallArrays:
-    """The arrays of one call of a compiled loop, which later calls reuse.
-
-    Parameters
-    ----------
-    like : a state of the system.
-    lin : tables of linear modes of the shape for which the arrays are made.
-    """
-
-    def __init__(self, kernels: MethodKernels, like: HybridState, tapes: Any, lin: Any) -> None:
-        system, layout = kernels.system, kernels.system.layout
-        self.state = like.copy()
-        self.as_packed = self.state.packed()
-        self.work = work_space(system, len(lin.kinds), len(lin.factors))
-        self.call: LoopCall = packed(
-            LoopCall(
-                int_slots=np.zeros(6, dtype=np.int64),
-                longest=np.zeros(1),
-                times=np.zeros(4),
-                rates=np.zeros(layout.phases),
-                scale=np.empty(system.n),
-                pace=np.empty(3),
-                known=known_time_arrays(system),
-            )
-        )
-        offsets = layout.origin_at, layout.phases_at, layout.signals_at
-        self.call.int_slots[[ORIGIN_AT, PHASES_AT, SIGNALS_AT]] = offsets
-        self.rates: np.ndarray | None = None  # those in `call`
-        self.own = kernels.arrays()
-        self.model: LoopModel = packed(LoopModel(automata_of(system), tapes, system.registers.inputs, lin))
-
-
 class CompiledLoop:
     """The compiled loop of one run, which integrates whole segments with their ordinary events.
 
@@ -146,6 +109,10 @@ class CompiledLoop:
     def pass_monitors(self, corners: MonitorCorners) -> None:
         """Make this loop, whose system has corners in place of monitors, the loop of the system with monitors."""
         self.corners, self.system, self.kernels.recorded = corners, corners.plain, corners.plain
+
+    def look_ahead(self, timetable: Timetable, end: Instant) -> None:
+        """Let the calls pass the known times up to the end of the run."""
+        self.times_ahead = TimesAhead(self.kernels.system, timetable, end)
 
     def fresh_copy(self) -> CompiledLoop:
         """Return a copy of this loop for another run; the loop must not have been used."""

@@ -9,14 +9,18 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
+from hybridsim.engine.events.compiled.known_time import ORIGIN_AT, PHASES_AT, SIGNALS_AT, known_time_arrays
+from hybridsim.engine.events.compiled.scratch import work_space
 from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.linear.tables import no_tables
+from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.record.blocks import SegmentBlock
 from hybridsim.engine.record.counters import Counters
+from hybridsim.engine.run.event_loop import LoopCall, LoopModel
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.known_times import KnownTimes
 from hybridsim.engine.system.per_structure import spare_scratch
-from hybridsim.engine.system.programs.mode_tables import Tapes
+from hybridsim.engine.system.programs.mode_tables import Tapes, automata_of
 from hybridsim.engine.system.system import System
 
 NOT_LINEAR = no_tables()  # for kernels without tables of linear modes
@@ -138,3 +142,35 @@ class MethodKernels(ABC):
     def place(self, place: np.ndarray) -> None:
         """Restore the method's state between calls from a checkpoint."""
         return
+
+
+class CallArrays:
+    """The arrays of one call of a compiled loop, which later calls reuse.
+
+    Parameters
+    ----------
+    like : a state of the system.
+    lin : tables of linear modes of the shape for which the arrays are made.
+    """
+
+    def __init__(self, kernels: MethodKernels, like: HybridState, tapes: Any, lin: Any) -> None:
+        system, layout = kernels.system, kernels.system.layout
+        self.state = like.copy()
+        self.as_packed = self.state.packed()
+        self.work = work_space(system, len(lin.kinds), len(lin.factors))
+        self.call: LoopCall = packed(
+            LoopCall(
+                int_slots=np.zeros(6, dtype=np.int64),
+                longest=np.zeros(1),
+                times=np.zeros(4),
+                rates=np.zeros(layout.phases),
+                scale=np.empty(system.n),
+                pace=np.empty(3),
+                known=known_time_arrays(system),
+            )
+        )
+        offsets = layout.origin_at, layout.phases_at, layout.signals_at
+        self.call.int_slots[[ORIGIN_AT, PHASES_AT, SIGNALS_AT]] = offsets
+        self.rates: np.ndarray | None = None  # those in `call`
+        self.own = kernels.arrays()
+        self.model: LoopModel = packed(LoopModel(automata_of(system), tapes, system.registers.inputs, lin))

@@ -39,7 +39,6 @@ from hybridsim.engine.run.setup import LazyState, setup_of
 from hybridsim.engine.run.stepping import Method, Watch
 from hybridsim.engine.system.failures import Collapsed, StepFailure
 from hybridsim.engine.system.instant import Instant
-from hybridsim.engine.system.known_times import TimesAhead
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.timetable import Appointment, Timetable
 
@@ -72,9 +71,7 @@ class ModeLoop:
         self.headway = Headway(system, self.record.counters, self.origin, self.end)
         self.compiled_loop = compiled_loop or setup.compiled_loop()
         if self.compiled_loop is not None and has_known_times(system):
-            corners = self.compiled_loop.corners
-            of_loop = system if corners is None else corners.system  # it numbers the resets
-            self.compiled_loop.times_ahead = TimesAhead(of_loop, self.timetable, self.end)
+            self.compiled_loop.look_ahead(self.timetable, self.end)
         is_replaceable = task.successor is not None and method is not task.successor
         stiffness_monitor = self.headway if is_replaceable else None
         self.notices = Notices(
@@ -331,17 +328,15 @@ class ModeLoop:
             errors = errors_when_due(self.system, target, self.outcome, steps, self.method.rounding, x_before)
             error = np.maximum(error, errors)
         monitors = MonitorSides.of(self.system.model.monitors, self.outcome.monitor_sides)
-        settled = self._resolve_appointment(target, self.outcome, x, appointment.schedules, error)
-        settled = apply_crossed(self.system, self.forward, settled, 0.0, monitors)
+        settled = self._resolve_appointment(target, self.outcome, x, appointment.schedules, error, monitors)
         return True, self._adopt(target, settled, x, appointment.schedules, monitors)
 
     def _divide(self, target: Instant) -> None:
         """Start a new segment at a step end that a compiled loop reached with all guards away from zero."""
         self.timetable.mark_done(target)
         if self.adopted != target:  # otherwise an event happened there
-            self.adopted, outcome = target, self.outcome
-            outcome.sides[:], outcome.orders[:], outcome.guard_floors[:] = 1, 0, 0.0
-            outcome.monitor_orders[:], outcome.monitor_floors[:] = 0, 0.0
+            self.adopted = target
+            self.outcome.leave_zeros()
 
     def _segment_run(self) -> SegmentRun:
         system, outcome = self.system, self.outcome
@@ -428,8 +423,8 @@ class ModeLoop:
             if not appointment.is_renewal:
                 self.timetable.mark_done(appointment)
             # located events come first, because they belong to the signals before the instant
-            outcome = self._resolve_appointment(instant, self.outcome, x_minus, schedules, error, s_error)
-            outcome = apply_crossed(self.system, self.forward, outcome, 0.0, monitors)
+            at = instant, self.outcome, x_minus, schedules, error
+            outcome = self._resolve_appointment(*at, monitors, s_error)
             return self._adopt(instant, outcome, x_minus, schedules, monitors)
         return self._accumulated(instant, found.at.x, arrival.fired)
 
@@ -454,9 +449,8 @@ class ModeLoop:
             outcome = found.resolved(self.system, instant, self.forward, fired, []) if fired else self.outcome
             if appointment and not outcome.status:
                 x, error = (outcome.x, outcome.x_error) if fired else (found.at.x, error)
-                outcome = self._resolve_appointment(
-                    instant, outcome, x, appointment.schedules, error, s_error
-                )
+                schedules = appointment.schedules
+                outcome = self._resolve_appointment(instant, outcome, x, schedules, error, None, s_error)
         firing = monitors.fire(outcome)
         return [("monitor", k) for k in firing if k in acting]
 
@@ -467,15 +461,16 @@ class ModeLoop:
         x_minus: np.ndarray,
         schedules: tuple[int, ...],
         error: np.ndarray,
+        monitors: MonitorSides | None,
         s_error: float = 0.0,
     ) -> Outcome:
-        """Resolve a scheduled event; an event resolved within two roundings of it has its zero there as well."""
-        rounding = math.ulp(float(instant))
-        if self.adopted is not None and abs(instant.minus(self.adopted)) <= 2.0 * rounding:
-            s_error = max(s_error, rounding)
-        return resolve_schedules(
-            self.system, self.forward, instant, before, x_minus, schedules, error, s_error
-        )
+        """Resolve a scheduled event.
+
+        monitors: those whose resets apply if the event carries them over zero.
+        """
+        at = instant, before, x_minus, schedules, error, s_error
+        found = resolve_schedules(self.system, self.forward, *at, self.adopted)
+        return apply_crossed(self.system, self.forward, found, 0.0, monitors) if monitors else found
 
     def _accumulated(self, instant: Instant, x_minus: np.ndarray, fired: tuple[int, ...]) -> bool:
         """Detect an accumulation of events; return whether the run ends there."""
@@ -532,8 +527,8 @@ class ModeLoop:
         self.timetable.mark_done(target)
         x, schedules = self.outcome.x, appointment.schedules
         monitors = replace(monitors, before=self.outcome.monitor_sides)
-        settled = self._resolve_appointment(target, self.outcome, x, schedules, self.outcome.x_error)
-        return self._adopt(target, settled, x, schedules, monitors)
+        at = target, self.outcome, x, schedules, self.outcome.x_error
+        return self._adopt(target, self._resolve_appointment(*at, monitors), x, schedules, monitors)
 
     def _adopt(
         self,

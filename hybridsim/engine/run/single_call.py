@@ -88,10 +88,13 @@ class LazyTrajectory(Trajectory):
 class _FailedCall:
     """The replacement of a compiled loop whose first call failed; it raises the error in the mode loop."""
 
-    kernel_run = times_ahead = corners = None
+    kernel_run = None
 
     def __init__(self, place: tuple[np.ndarray, ...], error: BaseException) -> None:
         self.place, self._error = place, error
+
+    def look_ahead(self, *_: Any) -> None:
+        """Pass no known times."""
 
     def advance(self, *_: Any) -> Any:
         """Raise the error of the failed call."""

@@ -22,7 +22,7 @@ from hybridsim.engine.system.instant import Instant, phase_of
 from hybridsim.engine.system.modules import compiled
 from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.signals import Signal
-from hybridsim.model.parts.component import Corner, LoadAutomaton, MonitorCorner
+from hybridsim.model.parts.component import Corner, LoadAutomaton
 from hybridsim.model.parts.model import Model
 from hybridsim.model.smoothing.explicit_corners import smoothed
 from hybridsim.model.smoothing.jumps import SIGN
@@ -51,7 +51,6 @@ class Automaton:
     is_corner: bool = False  # a corner: both modes agree at the border
     is_step: bool = False  # a corner whose modes may differ at the border: a step in time
     is_load: bool = False  # the load of a contact that opens
-    is_monitor: bool = False  # a corner in place of a monitor
     limit: int = -1  # mode that is entered at the limit of its transitions
 
     @property
@@ -95,7 +94,6 @@ def _automaton(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automaton
         is_corner=isinstance(component, Corner),
         is_step=isinstance(component, Corner) and any(v.startswith(SIGN) for v in component.variables),
         is_load=isinstance(component, LoadAutomaton),
-        is_monitor=isinstance(component, MonitorCorner),
         limit=names.index(component.limit.to) if component.limit else -1,
     )
 
@@ -209,9 +207,7 @@ class System:
         self.starts: dict[tuple[Any, ...], Any] = {}  # cache of `hybridsim.engine.events.start`
         self.tables: dict[tuple[float, bool], Any] = {}  # cache of `hybridsim.engine.linear.tables`
         self.with_corners: Any = None  # cache of `hybridsim.engine.events.monitor_corners`
-        self.opposed: set[tuple[Any, ...]] = (
-            set()
-        )  # starts accepted by `hybridsim.engine.events.dissipation_check`
+        self.opposed: set[tuple[Any, ...]] = set()  # starts that the check of dissipation accepted
         self.has_tape: bool = data["tape"] is not None  # whether the model consists of expressions
         if self.has_tape:
             self.registers: Registers = _registers_of(self)  # of the tape's inputs and results

@@ -23,6 +23,7 @@ from hybridsim.engine.system.programs.mode_code import (
 from hybridsim.engine.system.programs.modes_index import index_of
 from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
+from hybridsim.model.parts.component import MonitorCorner
 
 _ALL = 27  # largest number of vectors of modes that are all present from the start, as for three contacts
 
@@ -118,7 +119,7 @@ def automata_of(system: System) -> Automata:
             system.is_corner,
             np.array([a.is_unique for a in automata], dtype=np.bool_),
             np.array([a.is_unilateral for a in automata], dtype=np.bool_),
-            np.array([a.is_monitor for a in automata], dtype=np.bool_),
+            np.array([isinstance(c, MonitorCorner) for c in system.model.all_components()], dtype=np.bool_),
         )
     )
     return packed_automata
