@@ -82,20 +82,16 @@ def measured(n: int) -> dict[str, tuple[float, float, float]]:
 
 
 def picture(rows: dict[int, dict[str, tuple[float, float, float]]], path: Path) -> None:
-    """Time per event and per unit of time over the number of blocks."""
-    figure = style.figure(10.0, 4.2)
-    left, right = figure.subplots(1, 2)
+    """Time per event over the number of blocks."""
+    figure = style.figure(7.0, 4.2)
+    axes = figure.subplots()
     for name in rows[SIZES[0]]:
         colour, marks = LINES[name]
-        cost = np.array([rows[n][name][0] for n in SIZES])
-        events = np.array([rows[n][name][1] for n in SIZES])
-        left.loglog(SIZES, 1e3 * cost / events, marks, color=colour, label=name)
-        right.loglog(SIZES, cost, marks, color=colour, label=name)
-    left.set(xlabel="number of blocks n", ylabel="time per event / us")
-    right.set(xlabel="number of blocks n", ylabel="time per unit of simulated time / ms")
-    for axes in (left, right):
-        style.dress(axes)
-        axes.legend(fontsize=8)
+        per_event = [1e3 * rows[n][name][0] / rows[n][name][1] for n in SIZES]
+        axes.loglog(SIZES, per_event, marks, color=colour, label=name)
+    axes.set(xlabel="number of blocks n", ylabel="time per event [µs]")
+    style.dress(axes)
+    axes.legend(fontsize=8)
     style.save(figure, path)
 
 
@@ -152,7 +148,7 @@ units, compared with a run of hybridsim at rtol 1e-13.
 | --- | --- | --- | {" | ".join(["---"] * len(names))} |
 {table}
 
-![Time per event and per unit of simulated time against the number of blocks](../images/chain.png)
+![Time per event against the number of blocks](../images/chain.png)
 
 In hybridsim an event restarts only the few blocks around it whose series changes by more than a tenth of the tolerance.
 All blocks are expanded together at the end of a step, and all events of the step share this cost. The other methods

@@ -83,7 +83,11 @@ def page(
 ) -> str:
     """The page."""
     bad = [f"| {what} | {here.status[count // 2 + k]} |" for k, what in enumerate(BAD)]
-    others = Counter(str(s) for k, s in enumerate(here.status) if not count // 2 <= k < count // 2 + len(BAD))
+    others = Counter(
+        str(s).partition(":")[0]
+        for k, s in enumerate(here.status)
+        if not count // 2 <= k < count // 2 + len(BAD)
+    )
     statuses = [f"| {number} | {status} |" for status, number in others.most_common()]
     kinds = ", ".join(
         f"{number} {kind}" for kind, number in Counter(map(str, here["kind"][~here.failed])).most_common()

@@ -17,7 +17,6 @@ _PICTURES = {
     "figure 5": "figure-5",
     "figure 6": "figure-6",
     "figure 7": "figure-7",
-    "figures 8, 9": "figures-8-9",
     "figure 10": "figure-10",
     "figure 11": "figure-11",
     "figure 12": "figure-12",
@@ -31,7 +30,6 @@ _CAPTIONS = {
     "figure 5": "The same over eps_v. The grey line is the published setting.",
     "figure 6": "Left is the run time. Right is the number of evaluations, which no other program disturbs.",
     "figure 7": "The grey mark is +225 %.",
-    "figures 8, 9": "A curved line is a method, or a law, that depends on more than F0/N and r.",
     "figure 10": "The columns have the published A2 with the velocity of a sticking body kept, "
     "set to zero, and the exact A2.",
     "figure 11": "The same for the energy.",
@@ -49,7 +47,7 @@ def page(study: Study, image: Callable[[str], str]) -> str:
     claims = study.claims
     parts = [_head(study, claims)]
     for claim in claims:
-        parts.append(_section(claim, image(_PICTURES[claim.name])))
+        parts.append(_section(claim, image))
     parts += [
         _readings(study),
         _truth(study, image),
@@ -102,21 +100,19 @@ One command makes this page, its pictures and the [verdicts as data](he2026.json
 `hybridsim study he2026{quick} --out FOLDER`."""
 
 
-def _section(claim: Claim, picture: str) -> str:
+def _section(claim: Claim, image: Callable[[str], str]) -> str:
     title = claim.name[0].upper() + claim.name[1:]
-    return "\n".join(
-        [
-            f"## {title}: {claim.verdict}",
-            "",
-            f"The paper claims that {claim.claim}.",
-            "",
-            f"**Result.** {claim.why}",
-            "",
-            f"![{claim.name}]({picture})",
-            "",
-            f"*{_CAPTIONS[claim.name]}*",
-        ]
-    )
+    lines = [
+        f"## {title}: {claim.verdict}",
+        "",
+        f"The paper claims that {claim.claim}.",
+        "",
+        f"**Result.** {claim.why}",
+    ]
+    if claim.name in _PICTURES:
+        picture = f"![{claim.name}]({image(_PICTURES[claim.name])})"
+        lines += ["", picture, "", f"*{_CAPTIONS[claim.name]}*"]
+    return "\n".join(lines)
 
 
 def _percent(value: float) -> str:

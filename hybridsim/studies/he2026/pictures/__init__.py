@@ -17,7 +17,6 @@ from hybridsim.studies.he2026.pictures.maps import (
     timed_map,
 )
 from hybridsim.studies.he2026.pictures.motions import motions
-from hybridsim.studies.he2026.pictures.reduction import reduction
 from hybridsim.studies.he2026.pictures.run_times import interval_cost, stick_cost
 
 __all__ = ["pictures"]
@@ -36,7 +35,6 @@ def pictures(study: Study) -> dict[str, Callable[[], Figure]]:
         ),
         "figure-6": lambda: interval_cost(study.times),
         "figure-7": lambda: stick_cost(study.times),
-        "figures-8-9": lambda: reduction(study.reduction),
         "figure-10": lambda: deviation_maps(study.maps, "A"),
         "figure-11": lambda: deviation_maps(study.maps, "E"),
         "figure-12": lambda: motions(study.figure_12, "Figure 12: F0/N = 0.54, r = 0.55"),
