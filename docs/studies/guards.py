@@ -196,7 +196,8 @@ size.
 ## Pairs, by depth over size
 
 A pair is *found* if both zeros are found. It is *flagged* if neither is found, but a near-grazing is reported there.
-It is *lost* if neither is found without a report, or if only one is found.
+It is *lost* if both are missed without a report, or if
+only one is found.
 
 | depth | exact found | flagged | lost | taylor found | flagged | lost |
 | --- | --- | --- | --- | --- | --- | --- |

@@ -133,7 +133,7 @@ def smooth_restarts(count: int, seed: int) -> Iterator[Restart]:
             error = np.abs([x, y]) * 4.0 * UNIT * (rng.random() < 0.5)
             late = float(rng.choice([0.0, math.ulp(t)]))
             found = system.series(t, np.array([x, y]), p, z, error, late)
-            kind = "expression, " + ("a zero by decree" if decreed else "no decree")
+            kind = "expression, " + ("a zero by definition" if decreed else "no zero by definition")
             yield Restart(kind, found.guards[0], found.guard_bounds[0], true, decreed)
 
 
@@ -188,7 +188,7 @@ def friction_restarts(count: int, seed: int) -> Iterator[Restart]:
                 for j, sign in enumerate((-1, 1)):
                     true = [a + sign * b for a, b in zip(reach, force, strict=True)]
                     fired = kind == "release" and sign == -way
-                    title = f"{kind}, stick" + (", the limit by decree" if fired else "")
+                    title = f"{kind}, stick" + (", the limit by definition" if fired else "")
                     yield Restart(title, found.guards[j], found.guard_bounds[j], true, int(fired))
                 continue
             flow, sign = SLIP[name], 1 if name == "slip+" else -1
@@ -196,7 +196,10 @@ def friction_restarts(count: int, seed: int) -> Iterator[Restart]:
             decreed = 0 if kind == "start" else 2 if kind == "release" and equal else 1
             if decreed:
                 true[0] = 0
-            title = f"{kind}, slip, " + ("no decree", "v = 0 by decree", "v = a = 0 by decree")[decreed]
+            title = (
+                f"{kind}, slip, "
+                + ("no zero by definition", "v = 0 by definition", "v = a = 0 by definition")[decreed]
+            )
             yield Restart(title, found.guards[0], found.guard_bounds[0], true, decreed)
         number += 1
 
