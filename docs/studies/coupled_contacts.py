@@ -105,7 +105,8 @@ admissible combinations. Each system also runs with its coordinates and contacts
 {table}
 
 With only one coefficient of friction the motion is unique. Several combinations are sometimes counted because the check
-has limits. It uses two derivatives, none for redundant sets, and takes 1e-9 for zero. With static friction above
+has limits. It uses two
+derivatives, and for redundant sets none. It takes values below 1e-9 for zero. With static friction above
 kinetic friction, several outcomes may be possible. The run begins with all contacts that may stick, and releases
 those that cannot hold. Differences among orders are rounding. They grow as the motion itself separates neighbouring
 states.
