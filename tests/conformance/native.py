@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+# The mechanisms, which the index of the atlas explains.
 CLOSED = "closed sign test"
 ENDS = "only step ends"
 BRENT = "Brent's method"
@@ -9,22 +10,6 @@ TWO_VALUES = "two values at a step end"
 NUMBERS = "no number in a trial"
 LONG = "a long run"
 DENSE = "a zero of the dense output"
-
-MECHANISMS = {
-    CLOSED: "the sign test is closed at both ends of a step: what is zero where a run or a restart begins fires at "
-    "once if it is negative, or again zero, at the end of the first step",
-    ENDS: "signs are tested at the ends of a step only: of two zeros within one step neither is seen, and what dips "
-    "below zero and comes back in a step has not happened",
-    BRENT: "its root finder stops with an error after 100 iterations where a zero is of third order",
-    TWO_VALUES: "signs are tested on the state at the end of a step and the zero is sought on the dense output, which "
-    "differs there by rounding: the root finder stops with an error, finding no change of sign",
-    LONG: "no fault of the events: a thousand periods without damping take more steps than there is time for, or lose "
-    "more digits than the scene allows",
-    DENSE: "a zero is found on the dense output, which is less accurate than the steps: errors stay where it leaves "
-    "them",
-    NUMBERS: "the step beyond the domain of the model is tried and its Jacobian or its state is no number; the solver "
-    "stops or goes astray before the event is looked for",
-}
 
 # scene -> mechanism, and where it is another one with some solvers, solver -> mechanism ("" where it is right)
 FAILURES: dict[str, tuple[str, dict[str, str]]] = {

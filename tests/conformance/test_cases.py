@@ -21,8 +21,8 @@ REFUSED = {"contacts", "transitions", "monitors", "scheduled", "backward", "corn
 
 
 # These step from Python, and those of a library share all that hybridsim adds to them: each scene has its turn with one
-# method of SUNDIALS and one of SciPy. The rest, some minutes, is run where slow tests are asked for, and by
-# `python -m conformance.table`. What is compiled runs every scene.
+# method of SUNDIALS and one of SciPy. The rest takes some minutes and is run as slow tests. What is compiled runs every
+# scene.
 NATIVE = [name for name in INTEGRATORS if name.startswith("scipy-")]
 QUICK = "scipy-dop853"
 TURNS = [name for name in NATIVE if name != QUICK]

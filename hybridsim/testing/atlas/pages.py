@@ -9,6 +9,7 @@ from collections.abc import Collection, Mapping, Sequence
 from hybridsim.testing.atlas.cell import Cell
 from hybridsim.testing.atlas.configurations import Configuration
 from hybridsim.testing.atlas.matrix import Atlas
+from hybridsim.testing.facts import CASES
 from hybridsim.testing.scene import TROUBLES, Scene
 from hybridsim.testing.verdict import ERROR, HANG, NOT_RUN, REFUSED, RIGHT, VERDICTS, WRONG, WRONG_SEQUENCE
 
@@ -54,6 +55,21 @@ reason.
 Most methods share the location of events and the selection of modes. The exceptions are methods with native events,
 with a cooldown or with regularized forms, and the fixed-step methods. If all methods are right in a scene, the text
 describes the failure of other programs.
+
+The native event location of `solve_ivp` fails by these mechanisms:
+
+| mechanism | effect |
+| --- | --- |
+| closed sign test | The test of signs includes both ends of a step. A guard that is zero where a run or a restart begins \
+fires at the end of the first step, if it is then negative or zero again. |
+| only step ends | Signs are tested only at the ends of a step. Two zeros within one step are missed, and so is a dip below \
+zero. |
+| Brent's method | The root finder stops with an error after 100 iterations if a zero is of third order. |
+| two values at a step end | Signs are tested on the state at the end of a step. The zero is searched on the dense output, \
+which differs there by rounding. The root finder then finds no change of sign and stops with an error. |
+| dense output | A zero is found on the dense output, which is less accurate than the steps. |
+| trial steps | A step beyond the domain of the model is tried, and its state or Jacobian is not a number. The solver \
+fails before it searches for the event. |
 
 The picture of a scene shows one state in a time window around the first visible error of a method. The solid line is a
 correct run. The dashed line is the failing method named in the legend, at the setting given in the table. The strip
@@ -131,7 +147,9 @@ def page(result: Atlas, trouble: str, scenes: list[Scene], pictures: Collection[
         lines += [_filled(scene.story), ""]
         if scene.name in pictures:
             lines += [f"![{scene.title}]({trouble or 'scenes'}/{scene.name}.png)", ""]
-        lines += [*verdicts(result.row(scene), result.configurations), ""]
+        lines += verdicts(result.row(scene), result.configurations)
+        source = CASES.get(scene.name, {}).get("source")
+        lines += [*([f"| source | {_safe(source)} |"] if source else []), ""]
     return "\n".join(lines).rstrip() + "\n"
 
 
