@@ -60,12 +60,15 @@ The native event location of `solve_ivp` fails by these mechanisms:
 
 | mechanism | effect |
 | --- | --- |
-| closed sign test | The test of signs includes both ends of a step. A guard that is zero where a run or a restart begins \
+| closed sign test | The test of signs includes both ends of a step. A guard that is zero where a run or a \
+restart begins \
 fires at the end of the first step, if it is then negative or zero again. |
-| only step ends | Signs are tested only at the ends of a step. Two zeros within one step are missed, and so is a dip below \
+| only step ends | Signs are tested only at the ends of a step. Two zeros within one step are missed, and so is \
+a dip below \
 zero. |
 | Brent's method | The root finder stops with an error after 100 iterations if a zero is of third order. |
-| two values at a step end | Signs are tested on the state at the end of a step. The zero is searched on the dense output, \
+| two values at a step end | Signs are tested on the state at the end of a step. The zero is searched on the \
+dense output, \
 which differs there by rounding. The root finder then finds no change of sign and stops with an error. |
 | dense output | A zero is found on the dense output, which is less accurate than the steps. |
 | trial steps | A step beyond the domain of the model is tried, and its state or Jacobian is not a number. The solver \
