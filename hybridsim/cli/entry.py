@@ -21,7 +21,7 @@ from types import ModuleType
 from typing import Any, NoReturn, TextIO
 
 from hybridsim import __version__
-from hybridsim.cli import (
+from hybridsim.cli.commands import (
     advise,
     atlas,
     cache,

@@ -110,7 +110,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         "hybridsim.studies.he2026.measured.he2026",
         lambda **keywords: SimpleNamespace(to_plain=lambda: numbers),
     )
-    monkeypatch.setattr("hybridsim.cli.study._write", lambda *arguments: None)
+    monkeypatch.setattr("hybridsim.cli.commands.study._write", lambda *arguments: None)
     return tmp_path
 
 
@@ -197,7 +197,8 @@ def test_results_of_comparisons_hold_no_numbers_that_json_has_not() -> None:
 
 PIPED = """
 import os, sys
-from hybridsim.cli import main, models
+from hybridsim.cli import main
+from hybridsim.cli.commands import models
 execute = models.execute
 def noisy(*arguments):
     print("by Python", flush=True)

@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from hybridsim.cli import options, outcome, run, values
+from hybridsim.cli import options, outcome, values
+from hybridsim.cli.commands import run
 from hybridsim.cli.output import print_json, require_folder, require_writable, say
 from hybridsim.cli.session import Session
 
