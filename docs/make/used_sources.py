@@ -27,7 +27,7 @@ def modules_of(command: str) -> set[Path]:
     folder = ROOT / "tests" if command.startswith("cd tests") else ROOT
     if words[0] == PACKAGE:
         others = set(_of_command_line())
-        chosen = f"{PACKAGE}.cli.{words[1]}"
+        chosen = f"{PACKAGE}.cli.commands.{words[1]}"
         return _reached({(ENTRY, ""), (chosen, "")}, others - {chosen})
     script = (
         folder.joinpath(*words[2].split(".")) if words[1] == "-m" else folder / words[1].removesuffix(".py")
@@ -153,7 +153,9 @@ def _of_command_line() -> tuple[str, ...]:
     file = _file(ENTRY)
     assert file is not None
     return tuple(
-        f"{PACKAGE}.cli.{name}" for module, name in _imports(file) if module == f"{PACKAGE}.cli" and name
+        f"{PACKAGE}.cli.commands.{name}"
+        for module, name in _imports(file)
+        if module == f"{PACKAGE}.cli.commands" and name
     )
 
 

@@ -130,7 +130,7 @@ def test_every_subcommand_prints_one_document_whatever_libraries_print(
         hs.simulate("dfcs", (0, 0.1)).save(folder / "run.hsol")
     if command == "fit":
         (folder / "record.csv").write_text("t,x\n0,10.5\n1,6.1\n2,-3.5\n3,-8.4\n")
-    module = importlib.import_module(f"hybridsim.cli.{command}")
+    module = importlib.import_module(f"hybridsim.cli.commands.{command}")
     execute = module.execute
 
     def noisy(*arguments: Any) -> int:

@@ -201,7 +201,7 @@ def test_out_of_memory_names_options_that_the_command_has(
     command: str, hybridsim: Callable, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     known = set(re.findall(r"--[a-z][a-z0-9-]*", hybridsim(command.replace("_", "-"), "--help").out))
-    monkeypatch.setattr(f"hybridsim.cli.{command}.execute", raising(MemoryError()))
+    monkeypatch.setattr(f"hybridsim.cli.commands.{command}.execute", raising(MemoryError()))
     found = hybridsim(command.replace("_", "-"), *LINES[command])
     assert found.code == 1 and found.err.startswith("hybridsim: out of memory")
     named = set(re.findall(r"--[a-z][a-z0-9-]*", found.err))
