@@ -69,7 +69,9 @@ class Carrier:
         largest = sizes(solution)
         self._scale = np.where(largest > 0.0, largest, 1.0)
         self._vector = VectorSlopes(self.system, solution._segments[0].origin)
-        self._flow = FlowDerivatives(self.system, self._scale, self._vector)
+        self._flow = FlowDerivatives(solution, self._scale, self._vector)
+        self._end = solution._segments[-1].end
+        self._rounding = time_rounding(solution)
 
     def carry(self, directions: Directions, *, sided: bool = False) -> Carried:
         """Compute the derivatives along M directions of change from the start of the run to its end.
@@ -89,17 +91,18 @@ class Carrier:
             whole = all_segment_events[-1].segment  # at the end, and left the states and modes as they were
             all_segment_events.append(SegmentEvents(replace(whole, s=whole.s[-1:], x=whole.x[-1:]), (), ()))
         Y, Yd = self._started(all_segment_events[0].segment, Y, Yd, G, event_times)
-        for segment_events, following in zip(
-            all_segment_events, [*all_segment_events[1:], None], strict=True
+        self._flow.prepare(Yd, G)
+        for number, (segment_events, following) in enumerate(
+            zip(all_segment_events, [*all_segment_events[1:], None], strict=True)
         ):
-            segment, s = segment_events.segment, float(segment_events.segment.s[0])
+            segment = segment_events.segment
             starts.append((Y, Yd))
-            for one in segment_events.recorded:
-                here = one.instant.minus(segment.origin)
-                Y, s = self._flow.at_end(segment, Y, Yd, G, s, here), here
-                x = segment.dense(np.array([here]))[0]
-                times.append((float(one.instant), event_times.recorded(segment, one, here, x, Y, Yd)))
-            Y = self._flow.at_end(segment, Y, Yd, G, s, float(segment.s[-1]))
+            stops = [one.instant.minus(segment.origin) for one in segment_events.recorded]
+            if len(segment.s) > 1:
+                *passed, Y = self._flow.over(number, Y, Yd, G, np.array([*stops, segment.s[-1]]))
+                for one, s, there in zip(segment_events.recorded, stops, passed, strict=True):
+                    x = segment.dense(np.array([s]))[0]
+                    times.append((float(one.instant), event_times.recorded(segment, one, s, x, there, Yd)))
             if following is None:
                 break
             behind = self._through(segment_events, following.segment, Y, Yd, G, event_times)
@@ -116,14 +119,13 @@ class Carrier:
     def between(self, carried: Carried, directions: Directions, number: int, stops: np.ndarray) -> np.ndarray:
         """Return the derivatives (k, n + d, M) at ascending local times (k,) of the segment with this number."""
         Y, Yd = carried.starts[number]
-        segment = self.solution._segments[number]
-        x = self._flow.over(segment, Y, Yd, directions.parameters, float(segment.s[0]), stops)
+        self._flow.prepare(Yd, directions.parameters)
+        x = self._flow.over(number, Y, Yd, directions.parameters, stops)
         return np.concatenate([x, np.broadcast_to(Yd, (len(stops), *Yd.shape))], axis=1)
 
     def _is_end(self, segment: Segment) -> bool:
         """Return whether a segment begins at the end of the run, within rounding."""
-        end = self.solution._segments[-1].end
-        return bool(segment.start.minus(end) >= -time_rounding(self.solution))
+        return bool(segment.start.minus(self._end) >= -self._rounding)
 
     def _moves(self, shift: np.ndarray) -> np.ndarray:
         """Return a mask (M,) of the directions in which a time with the derivatives `shift` moves."""

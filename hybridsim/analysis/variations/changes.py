@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hybridsim.analysis.variations.tapes import tangent_tape
 from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
 from hybridsim.engine.system.system import System
-from hybridsim.engine.system.tangents import TangentTape
 
 _ALIKE = 1e-7  # of its terms: a smaller change is zero
 _ROUNDING = 1e-11  # of the effect of a change of everything by its own size: a smaller one is rounding
@@ -83,7 +83,9 @@ class Changes:
 
     def flow(self, at: Place) -> tuple[np.ndarray, np.ndarray]:
         """Return the rates (n,) of the states, and their derivatives by all arguments of the rates."""
-        found = TangentTape(self.system, at.z)(np.array([at.s]), at.x[None, :], at.p, self.vector.seeds(at.p))
+        found = tangent_tape(self.system, at.z)(
+            np.array([at.s]), at.x[None, :], at.p, self.vector.seeds(at.p)
+        )
         return found.values[0], found.slopes[0]
 
     def of(
@@ -95,7 +97,7 @@ class Changes:
     ) -> list[Changed]:
         """Return values and derivatives of the guards, monitors and surfaces with the given numbers."""
         system, n = self.system, self.system.n
-        tape = TangentTape(system, at.z, guards, monitors, surfaces)
+        tape = tangent_tape(system, at.z, guards, monitors, surfaces)
         found = tape(np.array([at.s]), at.x[None, :], at.p, self.vector.seeds(at.p))
         flow, changes = found.values[0, :n], np.concatenate([at.Y, at.Yd, self.G])
         sized = np.concatenate([np.maximum(np.abs(at.Y), at.large), np.abs(at.Yd), np.abs(self.G)])

@@ -6,12 +6,20 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.analysis.variations.smooth import transitions
+from hybridsim.analysis.variations.smooth import (
+    Pieces,
+    Steps,
+    divided,
+    over_intervals,
+    stiff_transitions,
+    transitions,
+)
+from hybridsim.analysis.variations.tapes import tangent_tape
 from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
 from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.series.dual_numbers import differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.system.system import System
-from hybridsim.engine.system.tangents import TangentTape
+from hybridsim.solution import Solution
 
 
 class FlowDerivatives:
@@ -23,48 +31,111 @@ class FlowDerivatives:
     vector : derivatives of the run-time vector.
     """
 
-    def __init__(self, system: System, scale: np.ndarray, vector: VectorSlopes) -> None:
-        module: Any = system.code.module
-        self.system, self._scale, self._vector = system, scale, vector
+    def __init__(self, solution: Solution, scale: np.ndarray, vector: VectorSlopes) -> None:
+        self.system: System = solution._system
+        module: Any = self.system.code.module
+        self._of_run, self._scale, self._vector = solution._segments, scale, vector
+        self._segments: list[Segment] = list(solution._segments)
         self._project = differentiated(module.project)
+        self._moving: list[int] = []  # discrete states and parameters that change
+        self._pieces: Pieces | None = None
+        self._stiff: set[int] = set()
 
-    def at_end(
-        self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, begin: float, end: float
-    ) -> np.ndarray:
-        """Return the derivatives (n, M) at one local time of a segment from those at an earlier one."""
-        found: np.ndarray = self.over(segment, Y, Yd, G, begin, np.array([end]))[0]
-        return found
+    def prepare(self, Yd: np.ndarray, G: np.ndarray) -> None:
+        """Compute the derivatives over all segments, for changes of all discrete states and of some parameters.
+
+        Yd (d, M), G (P, M): derivatives of the discrete states and parameters.
+        """
+        d, n = len(Yd), self.system.n
+        moving = [*range(d), *(d + k for k in range(len(G)) if G[k].any())]
+        if not n or (self._pieces is not None and moving == self._moving):
+            return
+        self._moving = moving
+        values = np.abs(np.concatenate([self.system.discrete_start, list(self.system.values.values())]))[
+            moving
+        ]
+        self._constants = np.where(values > 0.0, values, 1.0)
+        chosen = [*range(n), *(n + 1 + k for k in moving)]
+        self._seeds = [np.ascontiguousarray(self._vector.seeds(one.p)[:, chosen]) for one in self._segments]
+        index, s, _ = self._of_run.knots()
+        inside = np.flatnonzero((index[1:] == index[:-1]) & (s[1:] > s[:-1]))
+        steps = Steps(index[inside], s[inside], s[inside + 1])
+        self._stiff = set()
+        if len(inside):
+            steps, self._stiff = divided(self._slopes, steps, self.system.fastest)
+        self._pieces = transitions(self._slopes, *steps, self._scale, self._constants)
+
+    def _slopes(self, number: np.ndarray, s: np.ndarray) -> np.ndarray:
+        """Return the derivatives (m, n, n + q) of the rates in segments with ascending numbers (m,)."""
+        x = self._of_run.states(number, s)
+        first = np.flatnonzero(np.diff(number, prepend=-1))
+        parts = []
+        for begin, end in zip(first.tolist(), [*first[1:].tolist(), len(number)], strict=True):
+            one = int(number[begin])
+            segment = self._segments[one]
+            tape = tangent_tape(self.system, segment.z)
+            parts.append(tape(s[begin:end], x[begin:end], segment.p, self._seeds[one]).slopes)
+        n = self.system.n
+        return np.concatenate(parts) if parts else np.zeros((0, n, n + len(self._moving)))
 
     def over(
-        self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, begin: float, stops: np.ndarray
+        self, number: int, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, stops: np.ndarray
     ) -> np.ndarray:
-        """Return the derivatives (k, n, M) at ascending local times (k,), from those at an earlier one.
+        """Return the derivatives (k, n, M) at ascending local times (k,) of a segment from those at its start.
 
-        Y (n, M), Yd (d, M): derivatives of the states and discrete states at the local time `begin`. G (P, M):
-        derivatives of the parameters.
+        Y (n, M), Yd (d, M): derivatives of the states and discrete states. G (P, M): derivatives of the parameters.
         """
-        if stops[-1] <= begin or not self.system.n:
+        n, segment = self.system.n, self._segments[number]
+        if not n or stops[-1] <= segment.s[0]:
             return np.broadcast_to(Y, (len(stops), *Y.shape))
-        tape = TangentTape(self.system, segment.z)
-        directions = self._vector.seeds(segment.p)
-        n = self.system.n
-        constant = np.concatenate([Yd, G])
-        moving = [k for k in range(len(constant)) if constant[k].any()]
-        chosen = [*range(n), *(n + 1 + k for k in moving)]
-
-        def slopes(s: np.ndarray) -> np.ndarray:
-            return tape(s, segment.dense(s), segment.p, directions[:, chosen]).slopes
-
-        values = np.abs(np.concatenate([self.system.discrete(segment.p), segment.p[: len(G)]]))[moving]
-        later = np.unique(np.concatenate([segment.s[segment.s < stops[-1]], stops]))
-        knots = np.concatenate([[begin], later[later > begin]])
-        found = transitions(slopes, knots, self._scale, np.where(values > 0.0, values, 1.0), stops)
-        moved = found[:, :, :n] @ Y + found[:, :, n:] @ constant[moving]
+        found = self._stiffly(number, stops) if number in self._stiff else self._regularly(number, stops)
+        moved = found[:, :, :n] @ Y + found[:, :, n:] @ np.concatenate([Yd, G])[self._moving]
         if not self.system.holds(segment.z):
             return moved
         return np.array(
             [self.projected(segment, one, Yd, G, s) for one, s in zip(moved, stops.tolist(), strict=True)]
         )
+
+    def _regularly(self, number: int, stops: np.ndarray) -> np.ndarray:
+        """Return d(states)/d(states at the start of the segment, constants) at local times, (k, n, n + q)."""
+        assert self._pieces is not None
+        first, last = np.searchsorted(self._pieces.number, [number, number + 1])
+        n = self.system.n
+        totals = [np.eye(n, n + len(self._moving))]
+        for matrix in self._pieces.matrices[first:last]:
+            total = matrix[:, :n] @ totals[-1]
+            total[:, n:] += matrix[:, n:]
+            totals.append(total)
+        ends, begins = self._pieces.ends[first:last], self._pieces.begins[first:last]
+        piece = np.searchsorted(ends, stops)  # the piece that ends at a stop or after it
+        found = np.empty((len(stops), *totals[0].shape))
+        is_inside = (piece < len(ends)) & (stops > begins[0])
+        is_inside[is_inside] = stops[is_inside] < ends[piece[is_inside]]
+        for k in np.flatnonzero(~is_inside).tolist():
+            found[k] = totals[min(int(piece[k]) + 1, len(ends))] if stops[k] > begins[0] else totals[0]
+        inside = np.flatnonzero(is_inside)
+        if len(inside):
+            here = piece[inside]
+            numbers = np.full(len(inside), number)
+            matrices, _ = over_intervals(
+                self._slopes, numbers, begins[here], stops[inside], self._scale, self._constants
+            )
+            before = np.array(totals)[here]
+            found[inside] = matrices[:, :, :n] @ before
+            found[inside, :, n:] += matrices[:, :, n:]
+        return found
+
+    def _stiffly(self, number: int, stops: np.ndarray) -> np.ndarray:
+        """Return the same in a segment in which changes decay within a step."""
+        segment = self._segments[number]
+        begin = float(segment.s[0])
+        later = np.unique(np.concatenate([segment.s[segment.s < stops[-1]], stops]))
+        knots = np.concatenate([[begin], later[later > begin]])
+
+        def slopes(s: np.ndarray) -> np.ndarray:
+            return self._slopes(np.full(len(s), number), s)
+
+        return stiff_transitions(slopes, knots, self._scale, self._constants, stops)
 
     def projected(
         self, segment: Segment, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, s: float | None = None

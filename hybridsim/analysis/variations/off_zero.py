@@ -15,10 +15,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hybridsim.analysis.variations.changes import Changed, Changes, Place
+from hybridsim.analysis.variations.tapes import tangent_tape
 from hybridsim.engine.lowering.reset_keys import added
 from hybridsim.engine.series.dual_numbers import Dual, differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.system.system import System
-from hybridsim.engine.system.tangents import TangentTape
 
 _SAME = 1e-9  # of their size: rates on two sides of a guard that differ by less are equal
 
@@ -236,7 +236,7 @@ class _Sides:
                 return [self.off(name, back, other, there, speed)] if differ(there, self.here) else []
             if speed == 0.0 and automaton.is_corner and self._is_smooth(z):
                 return []
-        if not numbers and TangentTape(self.system, z).is_same(TangentTape(self.system, self.at.z)):
+        if not numbers and tangent_tape(self.system, z).is_same(tangent_tape(self.system, self.at.z)):
             return []
         return [self.off(name, one, other, there, 0.0)]
 

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from hybridsim.analysis.variations.both_sides import OneSide
+from hybridsim.analysis.variations.carried import Carrier
 from hybridsim.analysis.variations.directions import Directions
 from hybridsim.analysis.variations.quantities import QuantityDerivatives
 from hybridsim.arguments import as_times
 from hybridsim.errors import UsageError, nearest
 from hybridsim.presentation.readable import Readable
 from hybridsim.solution import Solution
-
-if TYPE_CHECKING:
-    from hybridsim.analysis.variations.both_sides import OneSide
 
 
 @dataclass(frozen=True)
@@ -45,8 +44,8 @@ class Derivatives(Readable):
 class OverTime:
     """Derivatives of one run at any time."""
 
-    def __init__(self, solution: Solution, directions: Directions, sides: OneSide) -> None:
-        self._solution, self._sides = solution, sides
+    def __init__(self, solution: Solution, directions: Directions, sides: type[OneSide]) -> None:
+        self._solution, self._sides = solution, sides(Carrier(solution), directions)
         self._quantities = QuantityDerivatives(solution, directions)
         self._known = (*solution.names, *solution.quantities)
         self._starts = len(directions.x) + len(directions.discrete)
@@ -60,7 +59,14 @@ class OverTime:
                     f"model {self._solution.model.name} has no quantity {name!r}",
                     remedy=nearest(str(name), self._known, kind="quantities"),
                 )
-        times, side = self._solution._within(as_times(t), side)
+        found = self.along(as_times(t), names, side)
+        if np.ndim(t) == 0:
+            found = found[0]
+        return Derivatives(tuple(names), found[..., : self._starts], found[..., self._starts :])
+
+    def along(self, times: np.ndarray, names: Sequence[str], side: str) -> np.ndarray:
+        """Return the derivatives (k, m, M) of states or quantities in all directions."""
+        times, side = self._solution._within(times, side)
         index, s = self._solution._of_model.segment_at(times, side)
         found = np.empty((len(times), len(names), self._width))
         for number in np.unique(index).tolist():
@@ -68,6 +74,16 @@ class OverTime:
             chosen = chosen[np.argsort(s[chosen], kind="stable")]
             Y = self._sides.within(number, s[chosen], side == "+")
             found[chosen] = self._quantities.of(names, self._solution._segments[number], s[chosen], Y)
-        if np.ndim(t) == 0:
-            found = found[0]
-        return Derivatives(tuple(names), found[..., : self._starts], found[..., self._starts :])
+        return found
+
+    def at_end(self) -> np.ndarray:
+        """Return the derivatives (n + d, M) of the states and discrete states at the end of the run."""
+        return self._sides.at_end()
+
+    def of_times(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return the times (E,) of the events, and their derivatives (E, M)."""
+        return self._sides.of_times()
+
+    def differing(self) -> list[tuple[str, np.ndarray]]:
+        """Return names of functions at zero, each with the mask (M,) of the directions in which the sides differ."""
+        return self._sides.differing()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
@@ -11,7 +11,6 @@ import numpy as np
 
 from hybridsim.analysis.compare.comparison_request import checked_names
 from hybridsim.analysis.variations.both_sides import BothSides, OneSide
-from hybridsim.analysis.variations.carried import Carrier
 from hybridsim.analysis.variations.directions import Directions
 from hybridsim.analysis.variations.over_time import Derivatives, OverTime
 from hybridsim.analysis.variations.refused import refuse_limits
@@ -185,22 +184,14 @@ def _found(
                 f"model {model.name} has no parameter {name!r}",
                 remedy=remedy_for_parameter(model, name),
             )
-    _refuse(solution)
+    refuse(solution)
     n, d = system.n, system.layout.discrete
-    by_parameter = value_slopes(model, chosen)
-    starts = start_slopes([s.start for s in model.states], model, by_parameter)
-    starts[solution._run.task.x0 != system.start_state({})] = 0.0  # stick may have moved them since
-    discrete_starts = start_slopes([s.start for s in model.discrete], model, by_parameter)
-    if not starts_follow:
-        starts[:], discrete_starts[:] = 0.0, 0.0
-    directions = Directions(
-        np.concatenate([np.eye(n), np.zeros((n, d)), starts], axis=1),
-        np.concatenate([np.zeros((d, n)), np.eye(d), discrete_starts], axis=1),
-        np.concatenate([np.zeros((len(names), n + d)), by_parameter], axis=1),
-    )
-    found = sides(Carrier(solution), directions)
-    end, (times, shifts) = found.at_end(), found.of_times()
     states = (*solution.names, *(q.name for q in model.discrete))
+    changed_by_run = np.array(solution.names)[solution._run.task.x0 != system.start_state({})]
+    fixed = set(changed_by_run.tolist()) if starts_follow else set(states)  # stick may have moved them since
+    directions = directions_by(solution, chosen, states, fixed)
+    found = OverTime(solution, directions, sides)
+    end, (times, shifts) = found.at_end(), found.of_times()
     changed = [*(f"the start of {name}" for name in states), *chosen]
     result = Sensitivities(
         states,
@@ -217,11 +208,32 @@ def _found(
             for name, mask in found.differing()
         ),
     )
-    object.__setattr__(result, "_over_time", OverTime(solution, directions, found))
+    object.__setattr__(result, "_over_time", found)
     return result
 
 
-def _refuse(solution: Solution) -> None:
+def directions_by(
+    solution: Solution, parameters: Sequence[str], starts: Sequence[str], fixed: Container[str]
+) -> Directions:
+    """Return the directions of the starts of some states, then those of some parameters.
+
+    fixed : states and discrete states whose starts do not follow parameters.
+    """
+    model = solution.model
+    by_parameter = value_slopes(model, parameters)
+    parts = []
+    for states in (model.states, model.discrete):
+        names = [state.name for state in states]
+        slopes = start_slopes([state.start for state in states], model, by_parameter)
+        slopes[[name in fixed for name in names]] = 0.0
+        chosen = np.array([[float(name == start) for start in starts] for name in names])
+        parts.append(np.concatenate([chosen.reshape(len(names), len(starts)), slopes], axis=1))
+    unmoved = np.zeros((len(by_parameter), len(starts)))
+    return Directions(parts[0], parts[1], np.concatenate([unmoved, by_parameter], axis=1))
+
+
+def refuse(solution: Solution) -> None:
+    """Reject runs of which derivatives cannot be computed."""
     if solution._save != "all":
         raise UsageError(
             f"the run was made with keep={solution._save!r}, but derivatives need all of the run",

@@ -31,6 +31,9 @@ _CANCELS = (
     1e-5  # times _RESOLVED: a change of the states, relative to their sizes, of a few hundred roundings
 )
 
+_RADIANS = 0.25  # of a piece at first: fewer rounds of halving than with longer ones
+_MAX_PARTS = 2**17  # of a step at first
+
 _FADES = 32  # decays by a factor e per step of the run: explicit methods stay below it, stiff methods do not
 _ENTRIES_PER_BATCH = 2**22  # entries of the linear systems that are solved together
 _MAX_RADIANS = 2**17  # additional radians that are followed; more take minutes
@@ -62,54 +65,95 @@ GAUSS = Collocation.at(legendre.leggauss(_STAGES)[0])
 # the zeros of P_s - P_(s-1); the last is the end of the piece
 RADAU = Collocation.at(np.sort(legendre.legroots([*[0.0] * (_STAGES - 1), -1.0, 1.0]).real))
 
+NumberedSlopes = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""The type of derivatives (m, n, n + q) in segments with given numbers (m,) at local times (m,)."""
+
 Slopes = Callable[[np.ndarray], np.ndarray]
 """The type of derivatives (m, n, n + q) of the rates at local times (m,), by n states and q constants."""
 
 
-def transitions(
-    slopes: Slopes, knots: np.ndarray, scale: np.ndarray, constants: np.ndarray, stops: np.ndarray
-) -> np.ndarray:
-    """Return d(states at the stops)/d(states at the first knot, constants) as an array (k, n, n + q).
+class Pieces(NamedTuple):
+    """Pieces of segments in order of time: number of the segment, local times of both ends, and derivatives.
 
-    knots: ascending local times, between which the flow is smooth. scale (n,), constants (q,): sizes of the
-    states and of the constants, all positive. stops (k,): ascending local times, each of which is a knot.
+    matrices (K, n, n + q) : d(states at the end of a piece)/d(states at its begin, constants).
     """
-    begins, ends = knots[:-1], knots[1:]
-    fades, turns = _work(slopes, begins, ends)
-    if fades > _FADES * len(begins) + 2**12:
-        return stiff_transitions(slopes, knots, scale, constants, stops)
-    if turns > _FADES * len(begins) + _MAX_RADIANS:
+
+    number: np.ndarray
+    begins: np.ndarray
+    ends: np.ndarray
+    matrices: np.ndarray
+
+
+class Steps(NamedTuple):
+    """Steps of a run: number of the segment (K,), and local times (K,) of both ends."""
+
+    number: np.ndarray
+    begins: np.ndarray
+    ends: np.ndarray
+
+
+def divided(slopes: NumberedSlopes, steps: Steps, fastest: float) -> tuple[Steps, set[int]]:
+    """Return steps that resolve the eigenvalues and the fastest forcing, and the numbers of the stiff segments.
+
+    In a stiff segment changes decay within a step. Its steps are left out. Fast rotation is refused.
+    """
+    number, begins, ends = steps
+    decay, size = _speeds(slopes, number, begins, ends)
+    counts = np.bincount(number)
+    fades = np.bincount(number, decay * (ends - begins))
+    turns = np.bincount(number, size * (ends - begins))
+    stiff = fades > _FADES * counts + 2**12
+    for one in np.flatnonzero((turns > _FADES * counts + _MAX_RADIANS) & ~stiff):
+        here = number == one
         raise UsageError(
-            f"derivatives between t = {knots[0]:.9g} and {knots[-1]:.9g} (since the last event) oscillate over about "
-            f"{turns:.1g} radians: the computation takes minutes or longer",
+            f"derivatives between t = {begins[here].min():.9g} and {ends[here].max():.9g} (since the last event) turn "
+            f"by about {turns[one]:.1g} radians: the computation takes minutes or longer",
             remedy="simulate a shorter time, or choose parameters for which the motion is slower",
         )
-    found_parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+    regular = ~stiff[number]
+    number, begins, ends, size = number[regular], begins[regular], ends[regular], size[regular]
+    radians = (ends - begins) * np.maximum(size, fastest)
+    count = np.ceil(radians / _RADIANS).clip(1, _MAX_PARTS).astype(np.int64)
+    part = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    number, first, length = (np.repeat(each, count) for each in (number, begins, (ends - begins) / count))
+    is_last = part + 1 == np.repeat(count, count)
+    last = np.where(is_last, np.repeat(ends, count), first + (part + 1) * length)
+    return Steps(number, first + part * length, last), set(np.flatnonzero(stiff).tolist())
+
+
+def transitions(
+    slopes: NumberedSlopes,
+    number: np.ndarray,
+    begins: np.ndarray,
+    ends: np.ndarray,
+    scale: np.ndarray,
+    constants: np.ndarray,
+) -> Pieces:
+    """Return the derivatives over pieces of segments, which are halved until they are resolved.
+
+    scale (n,), constants (q,): sizes of the states and of the constants, all positive.
+    """
+    found_parts: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = []
     before = np.full(len(begins), np.inf)
     for halving in range(_HALVINGS):
         count = 1 + len(begins) * (_STAGES * len(scale)) ** 2 // _ENTRIES_PER_BATCH
         parts = np.array_split(np.arange(len(begins)), count)
-        done = [_over_intervals(slopes, begins[part], ends[part], scale, constants) for part in parts]
+        done = [
+            over_intervals(slopes, number[part], begins[part], ends[part], scale, constants) for part in parts
+        ]
         found, tails = (np.concatenate(each) for each in zip(*done, strict=True))
         is_rounding = (tails <= _NOISE) & (tails >= 0.7 * before)
         good = (tails <= _RESOLVED) | is_rounding | (halving == _HALVINGS - 1)
-        found_parts.append((begins[good], ends[good], found[good]))
+        found_parts.append((number[good], begins[good], ends[good], found[good]))
         if good.all():
             break
-        begins, ends, before = begins[~good], ends[~good], tails[~good]
+        number, begins, ends, before = number[~good], begins[~good], ends[~good], tails[~good]
         middle = 0.5 * (begins + ends)
-        begins, ends = np.concatenate([begins, middle]), np.concatenate([middle, ends])
-        before = np.concatenate([before, before])
-    starts, until, matrices = (np.concatenate(each) for each in zip(*found_parts, strict=True))
-    order = np.argsort(starts, kind="stable")
-    n, q = len(scale), len(constants)
-    total = np.eye(n, n + q)
-    reached = _Stops(stops, knots[0], total)
-    for end, matrix in zip(until[order].tolist(), matrices[order], strict=True):
-        total = matrix[:, :n] @ total
-        total[:, n:] += matrix[:, n:]
-        reached.add(end, total)
-    return np.array(reached.found)
+        begins, ends = np.stack([begins, middle], axis=1).ravel(), np.stack([middle, ends], axis=1).ravel()
+        number, before = np.repeat(number, 2), np.repeat(before, 2)
+    numbers, starts, until, matrices = (np.concatenate(each) for each in zip(*found_parts, strict=True))
+    order = np.lexsort((starts, numbers))
+    return Pieces(numbers[order], starts[order], until[order], matrices[order])
 
 
 class _Stops:
@@ -124,18 +168,17 @@ class _Stops:
             self.found.append(total)
 
 
-def _work(slopes: Slopes, begins: np.ndarray, ends: np.ndarray) -> tuple[float, float]:
-    """Return the integral of the fastest decay rate, and the integral of the largest absolute eigenvalue."""
-    middle, lengths = 0.5 * (begins + ends), ends - begins
-    found = slopes(middle)
+def _speeds(
+    slopes: NumberedSlopes, number: np.ndarray, begins: np.ndarray, ends: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the fastest decay rate (K,), and the largest absolute eigenvalue (K,), in the middle of each piece."""
+    found = slopes(number, 0.5 * (begins + ends))
     A = found[:, :, : found.shape[1]]
-    finite = np.isfinite(A).all(axis=(1, 2))
-    eigenvalues = np.linalg.eigvals(A[finite])
-    fastest = (
-        np.maximum(-eigenvalues.real, 0.0).max(axis=1, initial=0.0),
-        np.abs(eigenvalues).max(axis=1, initial=0.0),
-    )
-    return float(fastest[0] @ lengths[finite]), float(fastest[1] @ lengths[finite])
+    finite = np.asarray(np.isfinite(A).all(axis=(1, 2)))
+    A = np.where(finite[:, None, None], A, 0.0)
+    eigenvalues = np.linalg.eigvals(A)
+    decay = np.maximum(-eigenvalues.real, 0.0).max(axis=1, initial=0.0)
+    return decay, np.abs(eigenvalues).max(axis=1, initial=0.0)
 
 
 def stiff_transitions(
@@ -178,12 +221,18 @@ def stiff_transitions(
     )
 
 
-def _over_intervals(
-    slopes: Slopes, begins: np.ndarray, ends: np.ndarray, scale: np.ndarray, constants: np.ndarray
+def over_intervals(
+    slopes: NumberedSlopes,
+    number: np.ndarray,
+    begins: np.ndarray,
+    ends: np.ndarray,
+    scale: np.ndarray,
+    constants: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the derivatives over each piece, and a measure of how well each piece is resolved."""
     lengths = ends - begins
-    rates = _rates(GAUSS, slopes, begins, lengths)
+    at = np.repeat(number, _STAGES)
+    rates = _rates(GAUSS, lambda s: slopes(at, s), begins, lengths)
     moved = lengths[:, None, None] * np.einsum("i,kiab->kab", GAUSS.b, rates)
     n = moved.shape[1]
     moved[:, :, :n] += np.eye(n)

@@ -85,9 +85,13 @@ def test_stick_forgets_the_velocity_exactly() -> None:
     assert (hs.sensitivities(solution, ()).by_start[1] == 0.0).all()
 
 
+def decay(t: float, x: np.ndarray, p: object) -> tuple[float]:
+    return (-x[0],)
+
+
 def test_what_cannot_be_differentiated_is_refused() -> None:
     with pytest.raises(UsageError, match="Python functions"):
-        hs.sensitivities(hs.simulate(hs.Model(states={"x": 1.0}, flow=lambda t, x: [-x[0]]), (0, 1)))
+        hs.sensitivities(hs.simulate(hs.Model("m", states={"x": 1.0}, flow=decay), (0, 1)))
     with pytest.raises(UsageError, match="keep"):
         hs.sensitivities(hs.simulate("dfcs", (0.0, 0.1), keep="events"))
     with pytest.raises(UsageError, match="'nu'"):

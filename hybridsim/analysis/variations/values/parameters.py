@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -49,5 +50,10 @@ def expression_slope(
     total = np.zeros(width)
     for name in sorted(expression.names):
         if slopes[name].any():
-            total = total + evaluate(slope(expression, name), values) * slopes[name]
+            total = total + evaluate(_slope(expression, name), values) * slopes[name]
     return total
+
+
+@lru_cache(maxsize=4096)
+def _slope(expression: Expression, name: str) -> Expression:
+    return slope(expression, name)
