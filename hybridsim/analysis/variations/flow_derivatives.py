@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -70,7 +71,7 @@ class FlowDerivatives:
         x = self._of_run.states(number, s)
         first = np.flatnonzero(np.diff(number, prepend=-1))
         parts = []
-        for begin, end in zip(first.tolist(), [*first[1:].tolist(), len(number)], strict=True):
+        for begin, end in pairwise([*first.tolist(), len(number)]):
             one = int(number[begin])
             segment = self._segments[one]
             tape = tangent_tape(self.system, segment.z)
