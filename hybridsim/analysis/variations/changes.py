@@ -99,27 +99,24 @@ class Changes:
         system, n = self.system, self.system.n
         tape = tangent_tape(system, at.z, guards, monitors, surfaces)
         found = tape(np.array([at.s]), at.x[None, :], at.p, self.vector.seeds(at.p))
-        flow, changes = found.values[0, :n], np.concatenate([at.Y, at.Yd, self.G])
-        sized = np.concatenate([np.maximum(np.abs(at.Y), at.large), np.abs(at.Yd), np.abs(self.G)])
-        constants = np.abs(np.concatenate([system.discrete(at.p), at.p[: len(self.G)]]))
-        result = []
-        for value, row in zip(found.values[0, n:], found.slopes[0, n:], strict=True):
-            by = np.concatenate([row[:n], row[n + 1 :]])
-            terms = np.append(row[:n] * flow, row[n])
-            fixed = np.abs(row[n + 1 :]) @ constants
-            size = np.abs(row[:n]) @ self._scale
-            passing = row[n] * at.shift
-            sizes = np.abs(by) @ sized + np.abs(passing)
-            exact = np.abs(row[:n]) @ np.abs(at.x) + fixed + np.abs(terms).sum() * abs(at.origin + at.s)
-            result.append(
-                Changed(
-                    float(value),
-                    by @ changes + passing,
-                    sizes + _ROUNDING / _ALIKE * (size + fixed) / self.own,
-                    row[:n],
-                    float(row[n]),
-                    bool(abs(value) <= _EXACT * exact),
-                    bool(abs(value) <= _ZERO * size),
-                )
+        flow, rows = found.values[0, :n], found.slopes[0, n:]
+        by_states, by_time, by_others = rows[:, :n], rows[:, n], rows[:, n + 1 :]
+        others = np.concatenate([at.Yd, self.G])
+        by = by_states @ at.Y + by_others @ others + np.outer(by_time, at.shift)
+        states, times, constants = np.abs(by_states), np.abs(by_time), np.abs(by_others)
+        fixed = constants @ np.abs(np.concatenate([system.discrete(at.p), at.p[: len(self.G)]]))
+        size = states @ self._scale
+        sizes = states @ np.maximum(np.abs(at.Y), at.large) + constants @ np.abs(others)
+        sizes += np.outer(times, np.abs(at.shift)) + _ROUNDING / _ALIKE * np.outer(
+            size + fixed, 1.0 / self.own
+        )
+        passing = (states @ np.abs(flow) + times) * abs(at.origin + at.s)
+        exact = states @ np.abs(at.x) + fixed + passing
+        values = found.values[0, n:]
+        is_zero, is_near = np.abs(values) <= _EXACT * exact, np.abs(values) <= _ZERO * size
+        return [
+            Changed(
+                value, by[k], sizes[k], by_states[k], float(by_time[k]), bool(is_zero[k]), bool(is_near[k])
             )
-        return result
+            for k, value in enumerate(values.tolist())
+        ]

@@ -29,6 +29,13 @@ class VectorSlopes:
         differentiated(module.rates)(0.0, [], p, [], out)
         self._rates = values_and_slopes(out, P)[1]  # of the forcing's angular rates
         self._signals = self._of_signals()
+        n, d = system.n, layout.discrete
+        self._fixed = np.zeros(
+            (n + 1 + layout.size, n + 1 + d + P)
+        )  # the part that does not depend on the instant
+        self._fixed[: n + 1, : n + 1] = np.eye(n + 1)
+        self._fixed[n + 1 :][layout.discrete_slice, n + 1 : n + 1 + d] = np.eye(d)
+        self._fixed[n + 1 : n + 1 + P, n + 1 + d :] = np.eye(P)
 
     def _of_signals(self) -> list[SignalSlopes]:
         model, width = self.system.model, self.system.layout.parameters
@@ -47,24 +54,20 @@ class VectorSlopes:
 
     def of(self, p: np.ndarray) -> np.ndarray:
         """Return the derivatives (size of p, d + P) of a run-time vector."""
-        layout = self.system.layout
-        P, d, origin = layout.parameters, layout.discrete, float(p[layout.origin_at])
-        found = np.zeros((layout.size, d + P))
-        found[layout.discrete_slice, :d] = np.eye(d)
-        found[:P, d:] = np.eye(P)
-        found[layout.phases_at : layout.signals_at, d:] = origin * self._rates
-        for k, signal in enumerate(self._signals):
-            if not signal.is_fixed:
-                at = layout.signals_at + SIGNAL_SLOTS * k
-                found[at : at + SIGNAL_SLOTS, d:] = signal.coefficients(origin, p[at : at + SIGNAL_SLOTS])
-        return found
+        n = self.system.n
+        return self.seeds(p)[n + 1 :, n + 1 :]
 
     def seeds(self, p: np.ndarray) -> np.ndarray:
         """Return derivatives of the formulas' arguments by states, local time, discrete states and parameters."""
-        n, below = self.system.n, self.of(p)
-        found = np.zeros((n + 1 + below.shape[0], n + 1 + below.shape[1]))
-        found[: n + 1, : n + 1] = np.eye(n + 1)
-        found[n + 1 :, n + 1 :] = below
+        layout, found = self.system.layout, self._fixed.copy()
+        below = found[self.system.n + 1 :, self.system.n + 1 + layout.discrete :]
+        origin = float(p[layout.origin_at])
+        if layout.phases:
+            below[layout.phases_at : layout.signals_at] = origin * self._rates
+        for k, signal in enumerate(self._signals):
+            if not signal.is_fixed:
+                at = layout.signals_at + SIGNAL_SLOTS * k
+                below[at : at + SIGNAL_SLOTS] = signal.coefficients(origin, p[at : at + SIGNAL_SLOTS])
         return found
 
     def lifted(self, p: np.ndarray, d: np.ndarray, Yd: np.ndarray, G: np.ndarray) -> list[Any]:
