@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from hybridsim.analysis.fit.record import Record
+from hybridsim.analysis.fit.slopes_of_run import NoDerivative, is_cheaper, slopes_of_run
 from hybridsim.analysis.fit.unknown import Unknown, start_of
 from hybridsim.model import Model
 from hybridsim.simulate import simulate
@@ -38,8 +40,12 @@ class Residuals:
         self.model, self.records, self.unknowns, self._settings = model, records, unknowns, dict(settings)
         self._starts = {start_of(s.name): s.name for s in model.states}
         self.runs = 0
+        self.without: dict[int, str] = {}  # numbers of the records without exact derivatives, and the reasons
+        self._latest: tuple[bytes, list[Solution]] = b"", []
         self.failure: Solution | None = None  # the last run that did not reach the end of its record
         self.present = [np.isfinite(values) for record in records for values in record.columns.values()]
+        counts = [sum(int(np.isfinite(v).sum()) for v in record.columns.values()) for record in records]
+        self._rows = np.cumsum([0, *counts])  # first sample of each record, and their number
         self.measured = np.concatenate(
             [values[np.isfinite(values)] for record in records for values in record.columns.values()]
         )
@@ -87,17 +93,22 @@ class Residuals:
 
     def predicted(self, coordinates: np.ndarray) -> np.ndarray:
         """Return the simulated value (m,) of each sample; NaN after the end of a run that stopped early."""
-        values, found, k = self.values(coordinates), [], 0
-        for record in self.records:
-            solution = self.solution(record, values)
-            reached = record.t <= solution.t_end
-            if not reached.all():
-                self.failure = solution
-            for name in record.columns:
-                column = np.full(len(record.t), np.nan)
-                column[reached] = solution.output(name, record.t[reached])
-                found.append(column[self.present[k]])
-                k += 1
+        values = self.values(coordinates)
+        runs = [self.solution(record, values) for record in self.records]
+        self._latest = coordinates.tobytes(), runs
+        return np.concatenate(
+            [self._samples(record, run) for record, run in zip(self.records, runs, strict=True)]
+        )
+
+    def _samples(self, record: Record, solution: Solution) -> np.ndarray:
+        """Return the simulated values (m,) of the samples of one record."""
+        reached, found = record.t <= solution.t_end, []
+        if not reached.all():
+            self.failure = solution
+        for name, measured in record.columns.items():
+            column = np.full(len(record.t), np.nan)
+            column[reached] = solution.output(name, record.t[reached])
+            found.append(column[np.isfinite(measured)])
         return np.concatenate(found)
 
     def has_jumps(self, coordinates: np.ndarray) -> bool:
@@ -113,14 +124,50 @@ class Residuals:
         return False
 
     def slopes(self, coordinates: np.ndarray, base: np.ndarray, is_coarse: bool = False) -> np.ndarray:
-        """Return the derivatives (m, n) of `predicted` by the coordinates, by central differences.
+        """Return the derivatives (m, n) of `predicted` by the coordinates.
 
-        A sample that a jump of its quantity passes on one side has the difference of the other side. Coarse
-        differences include these jumps: their mean over neighbouring samples shows how the jumps move.
+        They are those of the runs. A record whose run has none gets central differences.
 
         base : `predicted` at the coordinates.
+        is_coarse : whether to use coarse differences, which include jumps. Their mean over neighbouring samples shows
+            how the jumps move.
         """
-        found = np.empty((len(base), len(coordinates)))
+        if not is_coarse:
+            self.without = {}
+        parts = []
+        for number, (begin, end) in enumerate(pairwise(self._rows)):
+            part = None if is_coarse else self._exact(coordinates, number)
+            parts.append(
+                self._differences(coordinates, number, base[begin:end], is_coarse) if part is None else part
+            )
+        return np.concatenate(parts)
+
+    def _exact(self, coordinates: np.ndarray, number: int) -> np.ndarray | None:
+        """Return the derivatives (m, n) of the samples of one record, or None if there are none."""
+        record = self.records[number]
+        values = self.values(coordinates)
+        is_latest = self._latest[0] == coordinates.tobytes()
+        solution = self._latest[1][number] if is_latest else self.solution(record, values)
+        present = {name: np.isfinite(measured) for name, measured in record.columns.items()}
+        if not is_cheaper(solution, len(values)):
+            self.without[number] = "they take less time"
+            return None
+        try:
+            found = slopes_of_run(solution, record, list(values), present)
+        except NoDerivative as reason:
+            self.without[number] = str(reason)
+            return None
+        units = [values[name] if unknown.log else 1.0 for name, unknown in self.unknowns.items()]
+        return found * np.array(units)
+
+    def _differences(
+        self, coordinates: np.ndarray, number: int, base: np.ndarray, is_coarse: bool
+    ) -> np.ndarray:
+        """Return the derivatives (m, n) of the samples of one record by central differences.
+
+        A sample that a jump of its quantity passes on one side has the difference of the other side.
+        """
+        record, found = self.records[number], np.empty((len(base), len(coordinates)))
         for k, unknown in enumerate(self.unknowns.values()):
             low, high = unknown.coordinate_bounds
             size = self._scale[k] if unknown.log else max(self._scale[k], abs(coordinates[k]))
@@ -130,9 +177,21 @@ class Residuals:
                 moved = coordinates.copy()
                 moved[k] += move
                 if low <= moved[k] <= high:
-                    one_sided.append((self.predicted(moved) - base) / move)
+                    run = self.solution(record, self.values(moved))
+                    one_sided.append((self._samples(record, run) - base) / move)
             found[:, k] = _central(one_sided, is_coarse)
         return found
+
+    @property
+    def derivatives(self) -> str:
+        """Text about the derivatives that were used."""
+        if not self.without:
+            return "exact"
+        reason = next(iter(self.without.values()))
+        if len(self.without) == len(self.records):
+            return f"central differences, because {reason}"
+        listed = ", ".join(str(number) for number in self.without)
+        return f"exact, and central differences for the records {listed}, because {reason}"
 
 
 def _central(one_sided: list[np.ndarray], is_coarse: bool) -> np.ndarray:

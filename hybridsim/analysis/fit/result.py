@@ -55,6 +55,8 @@ class Fit(Readable):
         Bounds and guess of each unknown.
     settings : mapping
         Options of the runs.
+    derivatives : str
+        Whether the derivatives were exact or central differences, and why.
 
     Examples
     --------
@@ -82,6 +84,7 @@ class Fit(Readable):
     records: tuple[Record, ...]
     unknowns: dict[str, Unknown]
     settings: Mapping[str, Any] = field(default_factory=dict)
+    derivatives: str = "exact"
 
     @property
     def degrees_of_freedom(self) -> int:
@@ -171,6 +174,7 @@ class Fit(Readable):
             "correlation": self.correlation.tolist(),
             "noise": dict(self.noise),
             **fields_of(self, "cost", "samples", "runs"),
+            "derivatives": self.derivatives,
             "undetermined": list(self.undetermined),
             "warnings": list(self.warnings),
         }

@@ -62,5 +62,5 @@ def summed_up(
         undetermined=tuple(map(str, lacking)),
         warnings=doubts(residuals, off, noise, [names[k] for k in np.flatnonzero(at_bound)], is_stated=is_stated),
         success=best.status > 0, message=str(best.message), records=residuals.records, unknowns=unknowns,
-        settings=dict(options),
+        settings=dict(options), derivatives=residuals.derivatives,
     )  # fmt: skip

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hybridsim.analysis.variations.smooth import (
-    Pieces,
+    Intervals,
     Steps,
     divided,
     over_intervals,
@@ -39,7 +39,7 @@ class FlowDerivatives:
         self._segments: list[Segment] = list(solution._segments)
         self._project = differentiated(module.project)
         self._moving: list[int] = []  # discrete states and parameters that change
-        self._pieces: Pieces | None = None
+        self._intervals: Intervals | None = None
         self._stiff: set[int] = set()
 
     def prepare(self, Yd: np.ndarray, G: np.ndarray) -> None:
@@ -49,7 +49,7 @@ class FlowDerivatives:
         """
         d, n = len(Yd), self.system.n
         moving = [*range(d), *(d + k for k in range(len(G)) if G[k].any())]
-        if not n or (self._pieces is not None and moving == self._moving):
+        if not n or (self._intervals is not None and moving == self._moving):
             return
         self._moving = moving
         values = np.abs(np.concatenate([self.system.discrete_start, list(self.system.values.values())]))[
@@ -64,7 +64,7 @@ class FlowDerivatives:
         self._stiff = set()
         if len(inside):
             steps, self._stiff = divided(self._slopes, steps, self.system.fastest)
-        self._pieces = transitions(self._slopes, *steps, self._scale, self._constants)
+        self._intervals = transitions(self._slopes, *steps, self._scale, self._constants)
 
     def _slopes(self, number: np.ndarray, s: np.ndarray) -> np.ndarray:
         """Return the derivatives (m, n, n + q) of the rates in segments with ascending numbers (m,)."""
@@ -99,15 +99,15 @@ class FlowDerivatives:
 
     def _regularly(self, number: int, stops: np.ndarray) -> np.ndarray:
         """Return d(states)/d(states at the start of the segment, constants) at local times, (k, n, n + q)."""
-        assert self._pieces is not None
-        first, last = np.searchsorted(self._pieces.number, [number, number + 1])
+        assert self._intervals is not None
+        first, last = np.searchsorted(self._intervals.number, [number, number + 1])
         n = self.system.n
         totals = [np.eye(n, n + len(self._moving))]
-        for matrix in self._pieces.matrices[first:last]:
+        for matrix in self._intervals.matrices[first:last]:
             total = matrix[:, :n] @ totals[-1]
             total[:, n:] += matrix[:, n:]
             totals.append(total)
-        ends, begins = self._pieces.ends[first:last], self._pieces.begins[first:last]
+        ends, begins = self._intervals.ends[first:last], self._intervals.begins[first:last]
         piece = np.searchsorted(ends, stops)  # the piece that ends at a stop or after it
         found = np.empty((len(stops), *totals[0].shape))
         is_inside = (piece < len(ends)) & (stops > begins[0])

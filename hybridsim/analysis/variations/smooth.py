@@ -72,8 +72,8 @@ Slopes = Callable[[np.ndarray], np.ndarray]
 """The type of derivatives (m, n, n + q) of the rates at local times (m,), by n states and q constants."""
 
 
-class Pieces(NamedTuple):
-    """Pieces of segments in order of time: number of the segment, local times of both ends, and derivatives.
+class Intervals(NamedTuple):
+    """Intervals of segments in order of time: number of the segment, local times of both ends, and derivatives.
 
     matrices (K, n, n + q) : d(states at the end of a piece)/d(states at its begin, constants).
     """
@@ -128,7 +128,7 @@ def transitions(
     ends: np.ndarray,
     scale: np.ndarray,
     constants: np.ndarray,
-) -> Pieces:
+) -> Intervals:
     """Return the derivatives over pieces of segments, which are halved until they are resolved.
 
     scale (n,), constants (q,): sizes of the states and of the constants, all positive.
@@ -153,7 +153,7 @@ def transitions(
         number, before = np.repeat(number, 2), np.repeat(before, 2)
     numbers, starts, until, matrices = (np.concatenate(each) for each in zip(*found_parts, strict=True))
     order = np.lexsort((starts, numbers))
-    return Pieces(numbers[order], starts[order], until[order], matrices[order])
+    return Intervals(numbers[order], starts[order], until[order], matrices[order])
 
 
 class _Stops:

@@ -1,0 +1,61 @@
+"""This module computes exact derivatives of the simulated samples of a record by the unknowns."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from hybridsim.analysis.fit.record import Record
+from hybridsim.analysis.fit.unknown import start_of
+from hybridsim.analysis.variations.both_sides import BothSides
+from hybridsim.analysis.variations.over_time import OverTime
+from hybridsim.analysis.variations.sensitivities import directions_by, refuse
+from hybridsim.errors import UsageError
+from hybridsim.solution import Solution
+
+# Processor times as multiples of that of a step of a run, from packaged models with 0 to 140 events; only ratios count.
+_RUN, _SEGMENT, _STEP = 150.0, 60.0, 2.5  # of exact derivatives: for each run, segment and step
+_SIMULATION = 50.0  # of a run: for each run, beside its steps
+
+
+def is_cheaper(solution: Solution, unknowns: int) -> bool:
+    """Return whether exact derivatives take less time than two runs for each unknown."""
+    steps = solution.stats["steps"]
+    exact = _RUN + _SEGMENT * len(solution._segments) + _STEP * steps
+    return exact < 2 * unknowns * (_SIMULATION + steps)
+
+
+class NoDerivative(Exception):
+    """The run of a record has no derivative by some unknown; the text is the reason."""
+
+
+def slopes_of_run(
+    solution: Solution, record: Record, names: Sequence[str], present: Mapping[str, np.ndarray]
+) -> np.ndarray:
+    """Return the derivatives (m, n) of the samples of a record by n unknowns.
+
+    names : the unknowns. present : masks (k,) of the times at which each quantity was measured.
+
+    Raises
+    ------
+    NoDerivative
+        If there is none, or none is known.
+    """
+    starts = {start_of(name): name for name in solution.names}
+    parameters = [name for name in names if name not in starts]
+    chosen = [starts[name] for name in names if name in starts]
+    try:
+        refuse(solution)
+        directions = directions_by(solution, parameters, chosen, {*record.x0, *chosen})
+        found = OverTime(solution, directions, BothSides)
+        values = found.along(record.t, tuple(record.columns), "+")
+    except (UsageError, ArithmeticError, ValueError) as error:
+        raise NoDerivative(str(error).split("\n")[0]) from None
+    if not np.isfinite(values).all():
+        raise NoDerivative("; ".join(name for name, _ in found.differing()) or "a derivative is not finite")
+    ordered = [*(start_of(name) for name in chosen), *parameters]
+    columns = [ordered.index(name) for name in names]
+    rows = [values[present[name], k] for k, name in enumerate(record.columns)]
+    slopes: np.ndarray = np.concatenate(rows)[:, columns]
+    return slopes
