@@ -9,7 +9,6 @@ import numpy as np
 from hybridsim.engine.linear.matrix_template import template_of
 from hybridsim.engine.linear.tables import (
     LinearTables,
-    atoms_of,
     of_matrices,
     usable_modes,
 )
@@ -102,8 +101,8 @@ def _group(
     A, rows, usable = (part[np.repeat(known, modes)] for part in (A, rows, usable))
     if not len(numbers):
         return None
-    first, _ = of_matrices(atoms_of(system, template, registers[0]), A, rows, usable, system.n, horizon)
+    first, _ = of_matrices(template.atoms(registers[0]), A, rows, usable, system.n, horizon)
     fields = {name: getattr(first, name) for name in LinearTables._fields}
-    atoms = zip(LinearTables._fields, atoms_of(system, template, registers), strict=False)
+    atoms = zip(LinearTables._fields, template.atoms(registers), strict=False)
     fields |= {name: np.ascontiguousarray(array) for name, array in atoms if name in _COMPUTED}
     return EnsembleTables(numbers, fields, modes)

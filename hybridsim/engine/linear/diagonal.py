@@ -127,10 +127,11 @@ def check_eigenvectors(
 
 @kernel
 def write_diagonal(
-    values: Any, vectors: Any, inverses: Any, scales: Any, chosen: Any, exponent: int, out: Any
+    counts: Any, values: Any, vectors: Any, inverses: Any, scales: Any, chosen: Any, exponent: int, out: Any
 ) -> None:
     """Write one block for each eigenvalue of the chosen matrices to `out` (`hybridsim.engine.linear.modal.Modals`)."""
     for k in range(values.shape[0]):
+        out.counts[k] = counts[k]
         if not chosen[k]:
             continue
         j, size = 0, values.shape[1]

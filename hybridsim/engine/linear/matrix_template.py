@@ -11,6 +11,7 @@ import numpy as np
 from hybridsim.engine.linear.form import Atoms, Form, Monomial
 from hybridsim.engine.linear.modes import LinearMode, NoMode, modes_of, single_changes
 from hybridsim.engine.linear.recipe import Numbers, Recipe
+from hybridsim.engine.native.kernels import Precompiled, kernel
 from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
@@ -82,6 +83,7 @@ class MatrixTemplate:
             np.cumsum([0, *(len(a.terms) for a in met_atoms)]).astype(np.int64),
             np.array([source for source, _ in terms], dtype=np.int64),
             _factors([[2 * used.index(a) + part for a, part in m] for m in monomials], 2 * len(met_atoms)),
+            np.array([system.layout.phases_at, system.layout.signals_at], dtype=np.int64),
         )
         self.recipe: Recipe = Recipe(numbers, None if begun is None else begun.recipe)
 
@@ -103,15 +105,30 @@ class MatrixTemplate:
         """
         lead = registers.shape[:-1]
         A, rows = (np.zeros(lead + shape) for shape in self._shapes)
-        for matrix, (positions, sources) in ((A, self._flow), (rows, self._guards)):
-            matrix.reshape(*lead, -1)[..., positions] = registers[..., sources]
+        for matrix, entries in ((A, self._flow), (rows, self._guards)):
+            _put(registers.reshape(-1, registers.shape[-1]), entries, matrix.reshape(-1))
         return A, rows
 
     def atoms(self, registers: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Return the basic functions of time and their monomials as arrays, in the order of `LinearTables`."""
-        kinds, term_start, sources, factors = self._fixed
-        rates, offsets, weights = (registers[..., positions] for positions in self._computed)
-        return kinds, rates, offsets, term_start, sources, weights, factors
+        """Return the basic functions of time and their monomials as arrays, in the order of `LinearTables`.
+
+        The last array is the range of angles in the run-time vector.
+        """
+        kinds, term_start, sources, factors, angles = self._fixed
+        rates, offsets, weights = (registers.take(positions, -1) for positions in self._computed)
+        return kinds, rates, offsets, term_start, sources, weights, factors, angles
+
+
+@kernel
+def put_entries(registers: Any, entries: Any, out: Any) -> None:
+    """Write the entries of some matrices for each row of registers, one behind the other."""
+    size = out.shape[0] // registers.shape[0]
+    for point in range(registers.shape[0]):
+        for j in range(entries.shape[1]):
+            out[point * size + entries[0, j]] = registers[point, entries[1, j]]
+
+
+_put = Precompiled(put_entries)
 
 
 def _factors(monomials: Sequence[Sequence[int]], one: int) -> np.ndarray:

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,7 +23,9 @@ from hybridsim.engine.linear.diagonal import (
     write_diagonal,
 )
 from hybridsim.engine.linear.small_entries import with_small_rows
+from hybridsim.engine.native.array_layout import ArrayLayout
 from hybridsim.engine.native.kernels import Precompiled
+from hybridsim.engine.native.lapack import eigenvectors, inverse_matrices
 
 _balance, _real_columns = Precompiled(balance), Precompiled(real_columns)
 _check_eigenvectors, _diagonal = Precompiled(check_eigenvectors), Precompiled(write_diagonal)
@@ -92,52 +95,43 @@ class Modals(NamedTuple):
 
 def modal(A: np.ndarray, horizon: float = math.inf) -> Modal:
     """Return the block diagonal form of a square real matrix (m, m), for times up to about `horizon`."""
-    return Modal(*(field[0] for field in modals(np.ascontiguousarray(A[None]), horizon)[1:-1]))
+    found = modals(np.ascontiguousarray(A[None]), horizon)
+    return Modal(*(getattr(found, name)[0] for name in Modals._fields[1:-1]))
 
 
 def modals(
     A: np.ndarray, horizon: float = math.inf, exponent: int = 1, multiple: int = 1, least: int = 0
 ) -> Modals:
-    """Return the block diagonal forms of many matrices (K, m, m), padded to a common size."""
+    """Return the block diagonal forms of many matrices (K, m, m), padded to a common size, as a pack."""
     scales, counts = np.empty(A.shape[:2]), np.empty(len(A), dtype=np.int64)
     balanced, basis = np.empty(A.shape), np.empty(A.shape)
     is_diagonal, are_right = np.empty(len(A), dtype=np.bool_), np.empty(len(A), dtype=np.bool_)
     _balance(A, horizon, basis, scales, balanced)
-    # NumPy calls LAPACK here in 25 us, where a kernel would need 15 us: it would need SciPy for LAPACK's address, and
-    # importing SciPy takes 0.1 s
-    values, vectors = np.linalg.eig(balanced)
-    values, vectors = values.astype(complex, copy=False), vectors.astype(complex, copy=False)
+    values, vectors = eigenvectors(balanced)
     _real_columns(values, vectors, basis)
-    inverses, others = _inverses(basis), {}
+    inverses, others = inverse_matrices(basis), {}
     if not _check_eigenvectors(balanced, values, vectors, inverses, horizon, counts, is_diagonal, are_right):
         for k in np.flatnonzero(~is_diagonal).tolist():
             others[k] = _by_blocks(balanced[k], values[k], vectors[k], scales[k], bool(are_right[k]))
             counts[k] = len(others[k].values)
     count, size, widest = *A.shape[:2], -(-int(counts.max(initial=least)) // multiple) * multiple
-    result = Modals(
-        counts,
-        np.zeros((count, widest), dtype=complex),
-        np.zeros((count, widest, widest), dtype=complex),
-        np.zeros((count, widest), dtype=np.int64),
-        np.zeros((count, size, widest), dtype=complex),
-        np.zeros((count, widest, size), dtype=complex),
-        *(np.zeros((count, widest)) for _ in range(3)),
-    )
-    _diagonal(values, vectors, inverses, scales, is_diagonal, exponent, result)
+    result: Modals = _layout(count, size, widest).zeros()
+    _diagonal(counts, values, vectors, inverses, scales, is_diagonal, exponent, result)
     for k, flow in others.items():
-        for whole, part in zip(result[1:], (*vars(flow).values(), flow.power(exponent)), strict=True):
-            whole[k][tuple(slice(0, m) for m in part.shape)] = part
+        parts = (*vars(flow).values(), flow.power(exponent))
+        for name, part in zip(Modals._fields[1:], parts, strict=True):
+            getattr(result, name)[k][tuple(slice(0, m) for m in part.shape)] = part
     return result
 
 
-def _inverses(vectors: np.ndarray) -> np.ndarray:
-    """Return inverses of matrices (K, m, m); the inverse of a singular matrix is infinite."""
-    try:
-        return np.linalg.inv(vectors)
-    except np.linalg.LinAlgError:  # one of them is singular
-        if len(vectors) == 1:
-            return np.full_like(vectors, np.inf)
-        return np.concatenate([_inverses(one[None]) for one in vectors])
+@lru_cache(64)
+def _layout(count: int, size: int, widest: int) -> ArrayLayout:
+    """Return the layout of `Modals` of matrices (count, size, size) with at most `widest` coordinates."""
+    fields: list[tuple[Any, tuple[int, ...]]] = [
+        (np.int64, ()), (complex, (widest,)), (complex, (widest, widest)), (np.int64, (widest,)),
+        (complex, (size, widest)), (complex, (widest, size)), *[(float, (widest,))] * 3,
+    ]  # fmt: skip
+    return ArrayLayout((Modals,), [(dtype, (count, *shape), 0) for dtype, shape in fields])
 
 
 def _by_blocks(

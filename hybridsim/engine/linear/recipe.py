@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.engine.native.kernels import kernel
+from hybridsim.engine.native.kernels import Precompiled, kernel
 from hybridsim.engine.series.interpreter import advance
 from hybridsim.engine.series.operations import ADD, DIV, MUL, NEG, SUB
 
@@ -114,6 +114,9 @@ class Traced(float):
 _NOTHING = np.empty((0, 1)), np.empty((0, 5), dtype=np.int64), np.empty((0, 3), dtype=np.int64)
 
 
+_advance = Precompiled(advance)
+
+
 class Recipe:
     """A recorded computation, to be repeated with other inputs."""
 
@@ -131,8 +134,8 @@ class Recipe:
         """Return all registers for the given inputs, or None if a comparison differs from the recorded one."""
         V = self._start.copy()
         V[: self._inputs, 0] = inputs
-        advance(self._rows, V, 0)
-        registers = V[:, 0]
+        _advance(self._rows, V, 0)
+        registers = V.reshape(-1)
         same = (registers[self._left] == registers[self._right]) == self._found
         return registers if same.all() else None
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from hybridsim.engine.linear.guards import guard_series, modal_guards
 from hybridsim.engine.native.kernels import kernel
 from hybridsim.engine.native.simd.products import LANES
 
@@ -90,3 +91,58 @@ def write_lengths(flows: Any, lasting: Any, near: Any) -> None:
                 lasting[k] = min(lasting[k], _PARTING / (fastest - slowest))
             j = ends[j]
         near[k] = _NEAR / speed
+
+
+@kernel
+def write_tables(A: Any, guards: Any, n: int, usable: Any, flows: Any, gamma: Any, tables: Any) -> None:
+    """Write the rows of all modes to `tables` (`hybridsim.engine.linear.tables.LinearTables`), which are zero.
+
+    A (K, m, m), guards (K, G, m), usable (K,): see `leave_out`. flows: `hybridsim.engine.linear.modal.Modals`.
+    gamma (J,): scratch.
+    """
+    for k in range(A.shape[0]):
+        tables.counts[k] = flows.counts[k]
+        for j in range(flows.values.shape[1]):
+            tables.values[k, j], tables.ends[k, j] = flows.values[k, j], flows.ends[k, j]
+            for i in range(flows.values.shape[1]):
+                tables.upper[k, i, j] = flows.upper[k, i, j]
+            for i in range(n):
+                tables.basis[k, i, j] = flows.full_basis[k, i, j]
+        for i in range(A.shape[1]):
+            for j in range(A.shape[1]):
+                tables.flows[k, i, j] = A[k, i, j] if usable[k] else math.nan
+    guard_series(A, guards, n, tables.series, tables.roundings, tables.largest)
+    write_bases(A, n, flows, tables.inverse, tables.states, tables.spreads, tables.slopes)
+    for k in range(A.shape[0]):
+        if not usable[k]:
+            tables.inverse[k], tables.slopes[k] = math.nan, math.nan
+    write_lengths(flows, tables.lasting, tables.near)
+    modal_guards(
+        guards, flows, gamma, tables.terms, tables.sizes, tables.rests, tables.farthest, tables.grown, tables.turning,
+        tables.waves,
+    )  # fmt: skip
+
+
+@kernel
+def write_atoms(
+    kinds: Any,
+    rates: Any,
+    offsets: Any,
+    starts: Any,
+    sources: Any,
+    weights: Any,
+    factors: Any,
+    phases: Any,
+    tables: Any,
+) -> None:
+    """Write the functions of time to `tables`."""
+    for a in range(kinds.shape[0]):
+        tables.kinds[a], tables.rates[a], tables.offsets[a] = kinds[a], rates[a], offsets[a]
+    for a in range(starts.shape[0]):
+        tables.term_start[a] = starts[a]
+    for i in range(sources.shape[0]):
+        tables.sources[i], tables.weights[i] = sources[i], weights[i]
+    for m in range(factors.shape[0]):
+        for d in range(factors.shape[1]):
+            tables.factors[m, d] = factors[m, d]
+    tables.phases[0], tables.phases[1] = phases[0], phases[1]

@@ -8,13 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybridsim.engine.linear.guards import guard_series, modal_guards
-from hybridsim.engine.linear.matrix_template import MatrixTemplate, template_of
-from hybridsim.engine.linear.table_rows import leave_out, write_bases, write_lengths
+from hybridsim.engine.linear.matrix_template import template_of
+from hybridsim.engine.linear.table_rows import leave_out, write_atoms, write_tables
 from hybridsim.engine.linear.units import scaled_modals, units_of
 from hybridsim.engine.native.array_layout import ArrayLayout
 from hybridsim.engine.native.constants import BOUND_TERMS
-from hybridsim.engine.native.kernels import ENABLED, Precompiled
+from hybridsim.engine.native.kernels import Precompiled
 from hybridsim.engine.native.simd.products import LANES, filled_up
 from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.bounded import ORDER
@@ -120,21 +119,16 @@ class _Rows:
 
     def __init__(self, form: tuple[Any, ...], rows: int) -> None:
         self.form, self.most, self.count = form, rows, 0
-        self._layout = _layout(*form, rows)
-        self._memory = self._layout.blank()
-        self._memory[0][:] = 0
-        self.size = self._memory[0].nbytes
-        self.fields: LinearTables = self._layout.rows(self._memory)
+        layout = _layout(*form, rows)
+        self.size, self.all = layout.size, layout.zeros()
 
-    def first(self, count: int) -> LinearTables:
-        """Return tables of the first `count` rows."""
-        atoms, rows = self.fields[: len(_ATOMS)], self.fields[len(_ATOMS) :]
-        tables: LinearTables
-        if count < self.most or not ENABLED:
-            tables = packed(LinearTables(*atoms, *(row[:count] for row in rows)))
-        else:
-            (tables,) = self._layout.packed(self._memory)
-            vars(tables).update(self.fields._asdict())
+    def part(self, first: int, count: int) -> LinearTables:
+        """Return tables of the rows from `first` up to `count`."""
+        tables: LinearTables = self.all
+        if first or count < self.most:
+            fields = ((name, getattr(tables, name)) for name in LinearTables._fields)
+            of_part = (field if name in _ATOMS else field[first:count] for name, field in fields)
+            tables = packed(LinearTables(*of_part))
         return tables
 
     def gone_on_with(self, first: int, count: int) -> _Rows:
@@ -143,9 +137,9 @@ class _Rows:
             rows = self
             if self.count != first or count > self.most:
                 rows = _Rows(self.form, 2 * count)
-                for name, known, new in zip(LinearTables._fields, self.fields, rows.fields, strict=True):
+                for name in LinearTables._fields:
                     part = slice(None) if name in _ATOMS else slice(first)
-                    new[part] = known[part]
+                    getattr(rows.all, name)[part] = getattr(self.all, name)[part]
             rows.count = count
         return rows
 
@@ -180,7 +174,7 @@ def linear_tables(
     usable = np.empty(len(A), dtype=np.bool_)
     if not _leave_out(A, guards, system.n, usable):
         return None
-    atoms = atoms_of(system, template, registers)
+    atoms = template.atoms(registers)
     if begun is not None:
         first, former = len(begun.flows), (getattr(begun.tables, name) for name in _ATOMS)
         same = zip((begun.flows, begun.guards, *former), (A[:first], guards[:first], *atoms), strict=True)
@@ -190,9 +184,7 @@ def linear_tables(
     return Made(*of_matrices(atoms, A, guards, usable, system.n, horizon, begun, units), A, guards)
 
 
-_leave_out, _guard_series, _modal_guards, _write_bases, _write_lengths = map(
-    Precompiled, (leave_out, guard_series, modal_guards, write_bases, write_lengths)
-)
+_leave_out, _write_atoms, _write_tables = map(Precompiled, (leave_out, write_atoms, write_tables))
 
 
 def usable_modes(A: np.ndarray, guards: np.ndarray, n: int) -> np.ndarray:
@@ -200,12 +192,6 @@ def usable_modes(A: np.ndarray, guards: np.ndarray, n: int) -> np.ndarray:
     usable = np.empty(len(A), dtype=np.bool_)
     _leave_out(A, guards, n, usable)
     return usable
-
-
-def atoms_of(system: System, template: MatrixTemplate, registers: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return the fields that describe functions of time; the last field is the range of angles in `p`."""
-    angles = np.array([system.layout.phases_at, system.layout.signals_at], dtype=np.int64)
-    return *template.atoms(registers), angles
 
 
 def of_matrices(
@@ -237,27 +223,10 @@ def of_matrices(
         rows = _Rows(((len(kinds), len(sources), factors.shape[1]), surfaces, n, size, widest), count)
         rows.count = count
     if not first:
-        for own, array in zip(rows.fields, atoms, strict=False):
-            own[...] = array
-    new = LinearTables(*atoms, *(field[first:count] for field in rows.fields[len(atoms) :]))
-    A, guards, usable = A[first:], guards[first:], usable[first:]
-    new.counts[:], new.values[:], new.upper[:], new.ends[:] = (
-        flows.counts,
-        flows.values,
-        flows.upper,
-        flows.ends,
-    )
-    new.basis[:], new.flows[:] = flows.full_basis[:, :n], A
-    _guard_series(A, guards, n, new.series, new.roundings, new.largest)
-    _write_bases(A, n, flows, new.inverse, new.states, new.spreads, new.slopes)
-    if not usable.all():
-        new.inverse[~usable], new.slopes[~usable], new.flows[~usable] = np.nan, np.nan, np.nan
-    _write_lengths(flows, new.lasting, new.near)
-    _modal_guards(
-        guards, flows, np.empty(widest, dtype=complex), new.terms, new.sizes, new.rests, new.farthest, new.grown,
-        new.turning, new.waves,
-    )  # fmt: skip
-    return rows.first(count), rows
+        _write_atoms(*atoms, rows.all)
+    scratch = np.empty(widest, dtype=complex)
+    _write_tables(A[first:], guards[first:], n, usable[first:], flows, scratch, rows.part(first, count))
+    return rows.part(0, count), rows
 
 
 def tables_of(
@@ -281,7 +250,29 @@ def tables_of(
     return found
 
 
-cached_tables = per_structure(lambda system: dict[bytes, Made]())  # by parameters, mode vectors and horizon
+class TableCache(dict[bytes, Made]):
+    """The last tables of a structure, by parameters, mode vectors and horizon."""
+
+    size = 0  # bytes of all tables
+
+    def store(self, key: bytes, made: Made, replaced: Made | None) -> None:
+        """Add tables, and discard the tables that they replace, and the oldest ones."""
+        with _lock:
+            for other in [k for k, one in self.items() if one is replaced] if replaced is not None else ():
+                self.discard(other)
+            self.discard(key)
+            self[key] = made
+            self.size += made.rows.size
+            while len(self) > _MAX_CACHED or (len(self) > 1 and self.size > _MAX_BYTES):
+                self.discard(next(iter(self)))
+
+    def discard(self, key: bytes) -> None:
+        """Remove tables, if they are stored."""
+        made = self.pop(key, None)
+        self.size -= made.rows.size if made is not None else 0
+
+
+cached_tables = per_structure(lambda system: TableCache())
 
 
 def _made(
@@ -294,12 +285,5 @@ def _made(
         found = linear_tables(system, modes, p, horizon, begun, is_scaled)
         if found is None:
             return None
-        with _lock:
-            for other in [other for other, made in cached.items() if made is begun]:
-                del cached[other]  # tables of fewer modes at the same values
-            cached[key] = found
-            while len(cached) > _MAX_CACHED or (
-                len(cached) > 1 and sum(made.rows.size for made in cached.values()) > _MAX_BYTES
-            ):
-                del cached[next(iter(cached))]
+        cached.store(key, found, begun)  # it replaces tables of fewer modes at the same values
     return found

@@ -17,6 +17,21 @@ from hybridsim.engine.native.struct_pack import SLOTS_PER_ARRAY
 if ENABLED:
     from hybridsim.engine.native.struct_pack import Packed, type_of_fields
 
+    class LayoutPack(Packed):
+        """A pack of the arrays of a layout; each array is made when it is first read in Python."""
+
+        def __init__(self, layout: ArrayLayout, blocks: tuple[np.ndarray, ...], *rest: Any) -> None:
+            super().__init__(None, *rest)
+            self._layout, self._blocks = layout, blocks
+
+        def __getattr__(self, name: str) -> np.ndarray:
+            if name.startswith("_") or name not in self._layout:
+                raise AttributeError(name)
+            array = self._layout.array(self._blocks, name)
+            setattr(self, name, array)
+            return array
+
+
 ALIGNED = 64  # bytes; suitable for numbers of any kind
 _LARGE, LARGEST = 1 << 18, 1 << 21  # bytes of blocks that go through a pool
 _RETURNED = 2  # first blocks that a layout keeps for reuse
@@ -101,12 +116,33 @@ class ArrayLayout:
             for kind, count in self._kinds:
                 packs.append(kind(*(a[k:] for a, k in islice(arrays, count))))
             return packs
-        table = np.empty_like(self._entries)
-        address = _lay_out(self._entries, self._steps, self._owners, rows, blocks, table)
+        table, address = self._table(blocks, rows)
         for form, size in self._types:
             packs.append(Packed(None, table, form, address))
             address += size
         return packs
+
+    def _table(self, blocks: tuple[np.ndarray, ...], skipped: np.ndarray) -> tuple[np.ndarray, int]:
+        table = np.empty_like(self._entries)
+        return table, _lay_out(self._entries, self._steps, self._owners, skipped, blocks, table)
+
+    def zeros(self) -> Any:
+        """Return new arrays of zeros as a pack; the layout is that of one named tuple."""
+        blocks = self.blank()
+        for block in blocks:
+            block[:] = 0
+        if not ENABLED:
+            return self._kinds[0][0](*self.rows(blocks))
+        table, address = self._table(blocks, self._from_the_first)
+        return LayoutPack(self, blocks, table, self._types[0][0], address)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._specs
+
+    @property
+    def size(self) -> int:
+        """Return the bytes of all blocks."""
+        return sum(self._sizes)
 
     def rows(self, blocks: tuple[np.ndarray | None, ...]) -> Any:
         """Return the arrays, with None for the arrays of missing blocks."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from hybridsim.expr import evaluate
-from hybridsim.model.checks.scope import Scope
+from hybridsim.model.checks.scope import Findings, Scope
 from hybridsim.model.checks.smooth import Remedies, need_smooth
 from hybridsim.model.parts.impact import ROUNDING, SPEED, Impact
 
@@ -39,7 +39,7 @@ def _impact(scope: Scope, impact: Impact) -> None:
     need_smooth(scope, impact, f"{what}: the gap", impact.gap, _REMEDIES)
 
 
-def check_restitution(scope: Scope, impact: Impact, values: Mapping[str, float]) -> None:
+def check_restitution(scope: Findings, impact: Impact, values: Mapping[str, float]) -> None:
     """Report a constant restitution outside 0 to 1."""
     if impact.restitution.names <= values.keys():
         e = evaluate(impact.restitution, values)

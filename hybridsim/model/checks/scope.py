@@ -16,12 +16,22 @@ from hybridsim.model.parts.model import Model
 from hybridsim.model.parts.quantities import Output
 
 
-class Scope:
-    """The names of one model by kind, and the list of errors found by the checks."""
+class Findings:
+    """The errors that checks of one model find."""
 
     def __init__(self, model: Model) -> None:
         self.model = model
         self.errors: list[ModelError] = []
+
+    def fail(self, part: Declared, message: str, remedy: str) -> None:
+        self.errors.append(part.error(message, remedy))
+
+
+class Scope(Findings):
+    """The names of one model by kind, and the list of errors found by the checks."""
+
+    def __init__(self, model: Model) -> None:
+        super().__init__(model)
         # the automata of each contact; empty for a contact that could not be built
         self.made = [self._made(contact) for contact in model.contacts]
         self.components = tuple(self._expanded())
@@ -48,9 +58,6 @@ class Scope:
         yield from (surface.component() for surface in self.model.surfaces)
         yield from (impact.component() for impact in self.model.impacts)
         yield from self.model.components
-
-    def fail(self, part: Declared, message: str, remedy: str) -> None:
-        self.errors.append(part.error(message, remedy))
 
     def unknown(self, part: Declared, what: str, name: str, known: Iterable[str], kind: str) -> None:
         """Report an unknown name, with similar known names."""

@@ -3,156 +3,194 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, NamedTuple
 
 from hybridsim.errors import ModelError
 from hybridsim.expr import Expression, evaluate
 from hybridsim.expr.evaluate import dependency_order
 from hybridsim.model.checks.impacts import check_restitution
-from hybridsim.model.checks.scope import Scope
+from hybridsim.model.checks.scope import Findings
+from hybridsim.model.elements.requirement import Requirement
 from hybridsim.model.laws.law import SPEED
 from hybridsim.model.parts.contact import Contact
 from hybridsim.model.parts.declared import Declared
 from hybridsim.model.parts.inputs import Input
 from hybridsim.model.parts.model import Model
+from hybridsim.model.parts.quantities import Discrete, State
+from hybridsim.model.parts.schedule import Schedule
 
 # Relative difference between the stick limit and the slip force at v = 0 that counts as rounding. It occurs in
 # laws such as Stribeck's if both coefficients are equal; each of the few operations has an error of 1e-16.
 ROUNDING = 1e-12
 
 
+class _Check(NamedTuple):
+    """The check of one value: a function, its part of the model, and the names that the value depends on."""
+
+    function: Callable[[Findings, Any, dict[str, float]], None]
+    part: Any
+    names: frozenset[str]
+    defines: str | None = None  # the definition whose value is checked
+
+
 def errors_of_numbers(model: Model, changed: frozenset[str]) -> tuple[ModelError, ...]:
     """Return the errors of a copy of a valid model that differs in the values of some parameters."""
-    checked = model.once_per_expressions("checked names", lambda: checked_names(model))
-    if changed.isdisjoint(checked):
-        try:
-            model.parameter_values()
-        except ModelError as fault:
-            return (fault,)
-        return ()
-    scope = Scope(model)
-    check_values(scope)
-    return tuple(scope.errors)
+    findings, checks = Findings(model), _checks_of(model)
+    used = frozenset[str]().union(*(c.names for c in checks if not changed.isdisjoint(c.names)))
+    affected = (c for c in checks if not changed.isdisjoint(c.names) or c.defines in used)
+    _carry_out(findings, affected)
+    return tuple(findings.errors)
 
 
-def check_values(scope: Scope) -> None:
+def check_values(findings: Findings) -> None:
     """Report parameters without a value, and values outside their valid range."""
-    model = scope.model
+    _carry_out(findings, None)
+
+
+def _carry_out(findings: Findings, checks: Iterable[_Check] | None) -> None:
+    """Carry out some checks, or all checks."""
     try:
-        values = model.parameter_values()
+        values = findings.model.parameter_values()
     except ModelError as fault:
-        scope.errors.append(fault)
+        findings.errors.append(fault)
         return
-    if model.duration is not None:
-        declared = Declared(place=model.duration.place)
-        _positive(scope, declared, f"model {model.name}", "duration", model.duration, values)
-    for discrete in model.discrete:
-        _value(scope, discrete.start, values)
-    for state in model.states:
-        _value(scope, state.start, values)
-        _size(scope, state, f"state {state.name}: 'nominal'", state.nominal)
-    for schedule in model.schedules:
-        for time in (*schedule.times, *([schedule.start] if schedule.start else [])):
-            _value(scope, time, values)
-        _positive(scope, schedule, f"schedule {schedule.name}", "period", schedule.period, values)
-    for signal in model.inputs:
-        _input(scope, signal, values)
-    constants = _constant_definitions(scope, values)
-    for contact in model.contacts:
-        _contact(scope, contact, constants)
-    for requirement in model.requirements:
-        if requirement.low.names | requirement.high.names <= constants.keys():
-            low, high = (_value(scope, expr, constants) for expr in (requirement.low, requirement.high))
-            if low is not None and high is not None and not low < high:
-                scope.fail(requirement, *requirement.fault(low, high))
-    for impact in model.impacts:
-        check_restitution(scope, impact, constants)
+    for check in _checks_of(findings.model) if checks is None else checks:
+        check.function(findings, check.part, values)
 
 
 def checked_names(model: Model) -> frozenset[str]:
     """Return the parameters that these checks depend on; all others may have any finite value."""
-    used: set[str] = set() if model.duration is None else set(model.duration.names)
-    for start in (*(d.start for d in model.discrete), *(s.start for s in model.states)):
-        used |= start.names
-    for schedule in model.schedules:
-        for time in (*schedule.times, schedule.start, schedule.period):
-            used |= time.names if time is not None else set()
-    for signal in model.inputs:
-        used |= set().union(*(expression.names for expression in signal.expressions.values()))
-    for contact in model.contacts:
-        used |= contact.normal.names
-        if contact.law.is_set_valued:
-            used |= set().union(
-                *(contact.limit_force(b).names | contact.onset_force(b).names for b in (False, True))
-            )
-    for requirement in model.requirements:
-        used |= requirement.low.names | requirement.high.names
-    if model.impacts:
-        used |= {parameter.name for parameter in model.parameters}
+    used = frozenset[str]().union(*(check.names for check in _checks_of(model) if check.defines is None))
+    return used & {parameter.name for parameter in model.parameters}
+
+
+def _checks_of(model: Model) -> list[_Check]:
+    """Return all checks in their order; copies with other numbers share them."""
+    found: list[_Check] = model.once_per_expressions("checks of values", lambda: list(_all_checks(model)))
+    return found
+
+
+def _all_checks(model: Model) -> Iterator[_Check]:
     made_of = {p.name: p.value.names for p in model.parameters} | {n: e.names for n, e in model.definitions}
-    waiting = set(used)
-    while waiting:
-        waiting = set().union(*(made_of.get(name, frozenset()) for name in waiting)) - used
-        used |= waiting
-    return frozenset(used & {parameter.name for parameter in model.parameters})
+
+    def check(function: Callable[..., None], part: Any, *expressions: Expression | None) -> _Check:
+        waiting = frozenset[str]().union(*(e.names for e in expressions if e is not None))
+        reached = set(waiting)
+        while waiting:
+            waiting = frozenset[str]().union(*(made_of.get(name, ()) for name in waiting)) - reached
+            reached |= waiting
+        return _Check(function, part, frozenset(reached))
+
+    if model.duration is not None:
+        yield check(_duration, model.duration, model.duration)
+    starts: tuple[State | Discrete, ...] = (*model.discrete, *model.states)
+    for part in starts:
+        yield check(_start, part, part.start)
+    for schedule in model.schedules:
+        yield check(_schedule, schedule, *schedule.times, schedule.start, schedule.period)
+    for signal in model.inputs:
+        yield check(_input, signal, *signal.expressions.values())
+    definitions = dict(model.definitions)
+    for name in dependency_order(definitions, "definitions"):
+        yield check(_definition, (name, definitions[name]), definitions[name])._replace(defines=name)
+    for contact in model.contacts:
+        yield check(_contact, contact, contact.normal, *_forces_at_points(contact))
+    for requirement in model.requirements:
+        yield check(_requirement, requirement, requirement.low, requirement.high)
+    for impact in model.impacts:
+        yield check(check_restitution, impact, impact.restitution)
 
 
-def _value(scope: Scope, expr: Expression, values: dict[str, float]) -> float | None:
+def _forces_at_points(contact: Contact) -> Iterator[Expression]:
+    """Yield the stick limit and the slip force at rest and at the points of tables, in both directions."""
+    for backward in (False, True) if contact.law.is_set_valued else ():
+        yield from (contact.limit_force(backward), contact.onset_force(backward))
+        yield from (contact.slip_force_at(speed, backward) for speed in _speeds_of_tables(contact))
+
+
+def _duration(findings: Findings, duration: Expression, values: dict[str, float]) -> None:
+    what = f"model {findings.model.name}"
+    _positive(findings, Declared(place=duration.place), what, "duration", duration, values)
+
+
+def _start(findings: Findings, part: State | Discrete, values: dict[str, float]) -> None:
+    _value(findings, part.start, values)
+    if isinstance(part, State):
+        _size(findings, part, f"state {part.name}: 'nominal'", part.nominal)
+
+
+def _schedule(findings: Findings, schedule: Schedule, values: dict[str, float]) -> None:
+    for time in (*schedule.times, *([schedule.start] if schedule.start else [])):
+        _value(findings, time, values)
+    _positive(findings, schedule, f"schedule {schedule.name}", "period", schedule.period, values)
+
+
+def _definition(findings: Findings, part: tuple[str, Expression], values: dict[str, float]) -> None:
+    """Add the value of a definition that depends on parameters only to the values."""
+    name, expr = part
+    value = _value(findings, expr, values) if expr.names <= values.keys() else None
+    if value is not None:
+        values[name] = value
+
+
+def _requirement(findings: Findings, requirement: Requirement, values: dict[str, float]) -> None:
+    if requirement.low.names | requirement.high.names <= values.keys():
+        low, high = (_value(findings, expr, values) for expr in (requirement.low, requirement.high))
+        if low is not None and high is not None and not low < high:
+            findings.fail(requirement, *requirement.fault(low, high))
+
+
+def _value(findings: Findings, expr: Expression, values: dict[str, float]) -> float | None:
     """Return the value of an expression, or None after reporting that it has no value."""
     try:
         return evaluate(expr, values)
     except ModelError as fault:
-        scope.errors.append(fault)
+        findings.errors.append(fault)
         return None
 
 
-def _size(scope: Scope, part: Declared, what: str, size: float | None) -> None:
+def _size(findings: Findings, part: Declared, what: str, size: float | None) -> None:
     """Report a nominal size that is not positive and finite."""
     if size is not None and not 0 < size < math.inf:
-        scope.fail(part, f"{what} cannot be {size!r}", "use a finite number above zero")
+        findings.fail(part, f"{what} cannot be {size!r}", "use a finite number above zero")
 
 
 def _positive(
-    scope: Scope, part: Declared, what: str, field: str, expr: Expression | None, values: dict[str, float]
+    findings: Findings,
+    part: Declared,
+    what: str,
+    field: str,
+    expr: Expression | None,
+    values: dict[str, float],
 ) -> None:
-    value = None if expr is None else _value(scope, expr, values)
+    value = None if expr is None else _value(findings, expr, values)
     if expr is not None and value is not None and value <= 0:
         shown = "" if expr.is_constant else f" ({expr.text})"
-        scope.fail(part, f"{what}: '{field}' cannot be {value:g}{shown}", "use a value above zero")
+        findings.fail(part, f"{what}: '{field}' cannot be {value:g}{shown}", "use a value above zero")
 
 
-def _input(scope: Scope, signal: Input, values: dict[str, float]) -> None:
+def _input(findings: Findings, signal: Input, values: dict[str, float]) -> None:
     what = f"input {signal.name}"
     for field, expr in signal.expressions.items():
         if field in ("period", "duration"):
-            _positive(scope, signal, what, field, expr, values)
+            _positive(findings, signal, what, field, expr, values)
             continue
-        value = _value(scope, expr, values)
+        value = _value(findings, expr, values)
         if field == "duty" and value is not None and not 0 < value < 1:
-            scope.fail(signal, f"{what}: 'duty' cannot be {value:g}", "use a value between 0 and 1")
+            findings.fail(signal, f"{what}: 'duty' cannot be {value:g}", "use a value between 0 and 1")
 
 
-def _constant_definitions(scope: Scope, values: dict[str, float]) -> dict[str, float]:
-    """Return the values of the parameters and of the definitions that depend only on them."""
-    found = dict(values)
-    definitions = dict(scope.model.definitions)
-    for name in dependency_order(definitions, "definitions"):
-        if definitions[name].names <= found.keys():
-            value = _value(scope, definitions[name], found)
-            if value is not None:
-                found[name] = value
-    return found
-
-
-def _contact(scope: Scope, contact: Contact, values: dict[str, float]) -> None:
+def _contact(findings: Findings, contact: Contact, values: dict[str, float]) -> None:
     """Check constant loads and constant friction forces of a contact."""
     what = f"contact {contact.name}"
     for name, size in contact.nominal.items():
-        _size(scope, contact, f"{what}: 'nominal' of {name}", size)
+        _size(findings, contact, f"{what}: 'nominal' of {name}", size)
     if contact.normal.names <= values.keys():
-        load = _value(scope, contact.normal, values)
+        load = _value(findings, contact.normal, values)
         if load is not None and load < 0:
             shown = "" if contact.normal.is_constant else f" ({contact.normal.text})"
-            scope.fail(
+            findings.fail(
                 contact,
                 f"{what}: the normal load cannot be {load:g}{shown}",
                 "use a load that is not negative",
@@ -161,11 +199,11 @@ def _contact(scope: Scope, contact: Contact, values: dict[str, float]) -> None:
     if not contact.law.is_set_valued:
         return
     for backward in (False, True):
-        _onset(scope, contact, values, backward)
-        _slip_at_points(scope, contact, values, backward)
+        _onset(findings, contact, values, backward)
+        _slip_at_points(findings, contact, values, backward)
 
 
-def _onset(scope: Scope, contact: Contact, values: dict[str, float], backward: bool) -> None:
+def _onset(findings: Findings, contact: Contact, values: dict[str, float], backward: bool) -> None:
     """Check that the stick limit is not below the slip force at v = 0, in one direction of slip."""
     what = f"contact {contact.name}"
     if backward and contact.law.slip_backward is None and contact.law.stick_backward is None:
@@ -173,29 +211,32 @@ def _onset(scope: Scope, contact: Contact, values: dict[str, float], backward: b
     forces = contact.limit_force(backward), contact.onset_force(backward)
     if not all(force.names <= values.keys() for force in forces):
         return
-    limit, onset = (_value(scope, force, values) for force in forces)
+    limit, onset = (_value(findings, force, values) for force in forces)
     if limit is None or onset is None:
         return
     for name, force in (("stick limit", limit), ("slip force at v = 0", onset)):
         if force < 0:
-            scope.fail(
+            findings.fail(
                 contact, f"{what}: the {name} cannot be {force:g}", "a friction force must not be negative"
             )
             return
     if onset - limit > ROUNDING * onset:
         message = f"{what}: the stick limit {limit:g} is below the slip force {onset:g} at v = 0"
-        scope.fail(contact, message, "static friction must be at least kinetic friction (mu_s >= mu_k)")
+        findings.fail(contact, message, "static friction must be at least kinetic friction (mu_s >= mu_k)")
 
 
-def _slip_at_points(scope: Scope, contact: Contact, values: dict[str, float], backward: bool) -> None:
+def _slip_at_points(findings: Findings, contact: Contact, values: dict[str, float], backward: bool) -> None:
     """Check that the slip force is not negative at the points of tables, in one direction of slip."""
     if backward and contact.law.slip_backward is None:
         return
-    speeds = {speed for table in contact.law.tables if table.over.text == SPEED for speed in table.at}
-    for speed in sorted(speeds):
+    for speed in _speeds_of_tables(contact):
         force = contact.slip_force_at(speed, backward)
-        value = _value(scope, force, values) if force.names <= values.keys() else None
+        value = _value(findings, force, values) if force.names <= values.keys() else None
         if value is not None and value < 0:
             message = f"contact {contact.name}: the slip force at v = {speed:g} cannot be {value:g}"
-            scope.fail(contact, message, "a friction force must not be negative")
+            findings.fail(contact, message, "a friction force must not be negative")
             return
+
+
+def _speeds_of_tables(contact: Contact) -> list[float]:
+    return sorted({speed for table in contact.law.tables if table.over.text == SPEED for speed in table.at})

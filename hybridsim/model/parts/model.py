@@ -137,8 +137,8 @@ class Model(Declared):
 
     _part_files: ClassVar[tuple[str, ...]] = ()  # files of its parts, if it was read from a file
     connected_units: ClassVar[dict[str, str]] = {}  # units of the inputs of its parts that are connected
-    # of a checked model: its values; of its copies also the parameters that have other numbers than it
-    _sound: ClassVar[tuple[dict[str, float], frozenset[str]]]
+    # parameters that may have other numbers than the model with which `_unnumbered` began
+    _renumbered: ClassVar[frozenset[str]] = frozenset()
 
     def __post_init__(self) -> None:
         self._functions("flow")
@@ -246,10 +246,7 @@ class Model(Declared):
             are_numbers = are_numbers and former.value.is_constant and changed.value.is_number
         copy = self._valued(parameters=tuple(parameters))
         if are_numbers:
-            vars(copy)["_unnumbered"] = self._unnumbered
-            if "_sound" in vars(self):
-                values, others = self._sound
-                vars(copy)["_sound"] = values, others.union(changes)
+            vars(copy).update(_unnumbered=self._unnumbered, _renumbered=self._renumbered.union(changes))
         return copy
 
     def with_start(self, /, **changes: Expression | str | float) -> Model:
@@ -288,7 +285,7 @@ class Model(Declared):
         """Return a copy that differs only in values and shares all other results with the model."""
         copy: Model = object.__new__(type(self))
         vars(copy).update(vars(self), **parts, _common=self._common)
-        for name in ("_values", "_sound", "_unnumbered"):
+        for name in ("_values", "_renumbered", "_unnumbered"):
             vars(copy).pop(name, None)
         return copy
 
@@ -362,12 +359,13 @@ class Model(Declared):
 
     @cached_property
     def _values(self) -> dict[str, float]:
-        if "_sound" not in vars(self):
+        changed = self.changed_numbers
+        if changed is None:
             return resolve({parameter.name: parameter.value for parameter in self.parameters})
-        values, positions = dict(self._sound[0]), self._positions()
-        for name in self._sound[1]:
+        values, positions = dict(self._unnumbered["sound"][0]), self._positions()
+        for name in changed:
             values[name] = evaluate(self.parameters[positions[name]].value, values)
-        for name, value in self.affected_by(self._sound[1]):
+        for name, value in self.affected_by(changed):
             values[name] = evaluate(value, values)
         return values
 
@@ -458,8 +456,9 @@ class Model(Declared):
 
     @property
     def changed_numbers(self) -> frozenset[str] | None:
-        """The parameters whose numbers differ from the checked model that was copied; None if no model was copied."""
-        return self._sound[1] if "_sound" in vars(self) else None
+        """The parameters whose numbers may differ from a checked model with the same expressions; None without one."""
+        sound = self._unnumbered.get("sound")
+        return None if sound is None else sound[1] | self._renumbered
 
     def validate(self) -> Model:
         """Check the declaration and return the model itself.
@@ -479,7 +478,7 @@ class Model(Declared):
         errors = find_errors(self)
         if errors:
             raise ModelError.collect(errors, f"model {self.name}")
-        vars(self)["_sound"] = self._values, frozenset[str]()
+        self._unnumbered.setdefault("sound", (self._values, self._renumbered))
         return self
 
     def to_toml(self) -> str:
