@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from hybridsim.engine.record.trajectory import Task
 from hybridsim.engine.series.bounded import UNIT
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.system import System
-from hybridsim.expr import rounding_of
+from hybridsim.expr import Expression, rounding_of
 
 _CLOSE = (
     1e-9  # distance from a surface, relative to the largest state, that a holding mode at the start may have
@@ -45,7 +46,7 @@ def settled_start(system: System, task: Task, origin: Instant, due: tuple[int, .
 
 def start_by_kernel(system: System, task: Task, origin: Instant) -> HybridState | None:
     """Return the state just after the start, computed by compiled code, or None if `settled_start` is needed."""
-    if not task.forward or (task.z0 >= 0).any():
+    if not task.forward or max(task.z0.tolist(), default=-1) >= 0:
         return None
     p = system.vector(origin, task.discrete)
     return compiled_start(system, task.x0, start_errors(system, task.x0), p)
@@ -58,12 +59,19 @@ def start_errors(system: System, x0: np.ndarray) -> np.ndarray:
     roundoff; whole numbers are exact. Bounds of guards include the roundoff of the numbers in them. The numbers inside
     Python functions are unknown, so their bounds assume a number of the size of the initial value.
     """
-    rounding = np.where(x0 == np.round(x0), 0.0, UNIT * np.abs(x0))
+    rounding = UNIT * np.abs(x0)
+    rounding[x0 == np.rint(x0)] = 0.0
     errors = rounding.copy()
-    for i, state in enumerate(system.model.states):
-        if not isinstance(state.start.tree, ast.Constant) and x0[i] == system.start_state({})[i]:
-            errors[i] = max(errors[i], rounding_of(state.start, system.values))
+    for i, start in system.model.once_per_expressions("computed starts", partial(_computed_starts, system)):
+        if x0[i] == system.start_state({})[i]:
+            errors[i] = max(errors[i], rounding_of(start, system.values))
     return errors if system.has_tape else errors + rounding
+
+
+def _computed_starts(system: System) -> list[tuple[int, Expression]]:
+    """Return the initial values that are more than a number, with the indices of their states."""
+    starts = [state.start for state in system.model.states]
+    return [(i, start) for i, start in enumerate(starts) if not isinstance(start.tree, ast.Constant)]
 
 
 def _contradictions(system: System, task: Task, p: np.ndarray, z: np.ndarray) -> Iterator[str]:

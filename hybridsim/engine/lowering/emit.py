@@ -281,8 +281,7 @@ class Emitter:
         return "\n".join([*lines, "    return 0"])
 
     def _data(self, guards: list[str]) -> dict[str, Any]:
-        program = self.program
-        index = {n: k for k, n in enumerate(guards)}
+        program, index, fixed = self.program, {n: k for k, n in enumerate(guards)}, self._fixed()
         return {
             "guards": tuple(
                 tuple(tuple(index[f"guard_{c}_{g}"] for g in range(len(m.guards))) for m in component.modes)
@@ -298,6 +297,7 @@ class Emitter:
             "linear": program.linear,
             "quantities": tuple(n for n, _ in self.quantities()),
             "resets": tuple((key, tuple(mapping)) for key, mapping in resets_of(program.model)),
+            "constant_effects": all({s.name for s in e.free_symbols} <= fixed for e in self.lowering.effects),
             "tape": self._tape(guards),
         }
 

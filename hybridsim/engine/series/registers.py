@@ -72,4 +72,5 @@ class Registers:
         """Write the parameters in the run-time vector p and their roundoff to the values of `rounded` inputs."""
         known: Inputs = self.inputs
         numbers, first = p[known.sources], len(known.constants)
-        values[first:, 0], values[first:, 1] = numbers, [own_roundoff(number) for number in numbers.tolist()]
+        if numbers.tobytes() != values[first:, 0].tobytes():
+            values[first:, 0], values[first:, 1] = numbers, list(map(own_roundoff, numbers.tolist()))

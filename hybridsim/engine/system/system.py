@@ -99,27 +99,43 @@ def _automaton(component: Any, guards: tuple[tuple[int, ...], ...]) -> Automaton
 
 
 class _Frame:
-    """The data shared by all systems of one structure."""
+    """The attributes that all systems of one structure share; they become attributes of each system."""
 
     def __init__(self, model: Model, data: dict[str, Any]) -> None:
-        self.names = tuple(s.name for s in model.states)
+        self.names: tuple[str, ...] = tuple(s.name for s in model.states)
+        self.n = len(self.names)
         self.layout = Layout(len(model.parameters), len(model.discrete), data["rates"], len(model.inputs))
-        self.automata = tuple(
+        self.automata: tuple[Automaton, ...] = tuple(
             _automaton(c, g) for c, g in zip(model.all_components(), data["guards"], strict=True)
         )
+        self.resets: dict[tuple[Any, ...], tuple[int, tuple[str, ...]]]
         self.resets = {key: (number, targets) for number, (key, targets) in enumerate(data["resets"])}
-        self.monitor_names = tuple(m.name for m in model.monitors)
-        self.owner = np.zeros(data["guard_count"], dtype=np.int64)
+        self.monitor_names: tuple[str, ...] = tuple(m.name for m in model.monitors)
+        self.owner = np.zeros(data["guard_count"], dtype=np.int64)  # component of each guard
         for c, automaton in enumerate(self.automata):
             for numbers in automaton.guards:
                 self.owner[list(numbers)] = c
         self.has_surface = np.array([a.has_surface for a in self.automata], dtype=np.bool_)
         self.is_corner = np.array([a.is_corner for a in self.automata], dtype=np.bool_)
         self.is_unilateral = np.array([a.is_unilateral for a in self.automata], dtype=np.bool_)
+        # true for impacts or resets; friction and relays alone do not bounce
+        self.may_bounce = bool((self.is_unilateral | ~(self.has_surface | self.is_corner)).any())
+        # corners and loads: their modes follow from the state
         self.led = tuple(c for c, a in enumerate(self.automata) if a.is_corner or a.is_load)
-        self.declared = self.automata[: len(self.automata) - int(self.is_corner.sum())]
+        self.declared = self.automata[: len(self.automata) - int(self.is_corner.sum())]  # without corners
         self.component_numbers = np.arange(len(self.automata))
         self.guard_table = self._guard_table()
+        self.guard_count: int = data["guard_count"]
+        self.surface_of: tuple[int, ...] = data["surfaces"]  # component of each surface
+        self.clusters: tuple[tuple[int, ...], ...] = data["clusters"]
+        # see `hybridsim.engine.lowering.stop_coupling.StopCoupling`
+        self.stop_couplings: tuple[tuple[int, int, bool], ...] = data["stop_couplings"]
+        self.pins: dict[int, tuple[int, ...]] = data["pins"]
+        self.projected: dict[int, tuple[int, ...]] = data["projected"]
+        self.linear: dict[str, tuple[bool, ...]] = data["linear"]
+        self.quantities: tuple[str, ...] = data["quantities"]
+        self.has_constant_effects: bool = data["constant_effects"]
+        self.has_tape: bool = data["tape"] is not None  # whether the model consists of expressions
 
     def _guard_table(self) -> np.ndarray:
         """Return the guard numbers of every mode (components, modes, widest), padded with -1."""
@@ -156,7 +172,7 @@ def _high_rows(system: System, modes: bytes) -> list[tuple[int, ...]]:
 _run_series = Precompiled(run_series)
 
 
-class System:
+class System(_Frame):
     """A model with parameter values, on which integrators and the mode loop work.
 
     Parameters
@@ -169,46 +185,22 @@ class System:
         self.written = model  # kept alive, because `system_cache` finds systems by its identity
         self.model = model = model if as_written else smoothed(model)
         self.code = compiled(model)
-        data = self.code.data
-        self._frame = frame = _frame_of(self)
-        self.names: tuple[str, ...] = frame.names
-        self.n = len(self.names)
-        self.layout: Layout = frame.layout
-        self.automata: tuple[Automaton, ...] = frame.automata
-        self.declared: tuple[Automaton, ...] = frame.declared  # without corners
-        self.has_surface: np.ndarray = frame.has_surface
-        self.is_corner: np.ndarray = frame.is_corner
-        self.is_unilateral: np.ndarray = frame.is_unilateral
-        self.led: tuple[int, ...] = frame.led  # corners and loads: their modes follow from the state
-        # true for impacts or resets; friction and relays alone do not bounce
-        self.may_bounce = bool((frame.is_unilateral | ~(frame.has_surface | frame.is_corner)).any())
-        self.owner: np.ndarray = frame.owner  # component of each guard
-        self.guard_count: int = data["guard_count"]
-        self.surface_of: tuple[int, ...] = data["surfaces"]  # component of each surface
-        self.clusters: tuple[tuple[int, ...], ...] = data["clusters"]
-        self.stop_couplings: tuple[tuple[int, int, bool], ...] = data[
-            "stop_couplings"
-        ]  # see `hybridsim.engine.lowering.stop_coupling.StopCoupling`
-        self.pins: dict[int, tuple[int, ...]] = data["pins"]
-        self.projected: dict[int, tuple[int, ...]] = data["projected"]
-        self.linear: dict[str, tuple[bool, ...]] = data["linear"]
-        self.quantities: tuple[str, ...] = data["quantities"]
-        self.resets: dict[tuple[Any, ...], tuple[int, tuple[str, ...]]] = frame.resets
-        self.monitor_names: tuple[str, ...] = frame.monitor_names
+        vars(self).update(vars(_frame_of(self)))
         self.values = model.parameter_values()
         self._base = np.zeros(self.layout.size)
         self._base[: self.layout.parameters] = list(self.values.values())
         self._base[self.layout.pin_at] = 1.0
         self.rates = self.rates_at(self._base)
-        self.fastest = float(max(map(abs, self.rates), default=0.0))
-        self._turning = tuple(enumerate(self.rates.tolist(), self.layout.phases_at))
+        rates = self.rates.tolist()
+        self.fastest = max(map(abs, rates), default=0.0)
+        self._turning = tuple(enumerate(rates, self.layout.phases_at))
         numbers = {**model.discrete_values(), **constant_inputs(model), **self.values} if model.inputs else {}
         self.signals = tuple(Signal(i, numbers) for i in model.inputs)
         self.starts: dict[tuple[Any, ...], Any] = {}  # cache of `hybridsim.engine.events.start`
         self.tables: dict[tuple[float, bool], Any] = {}  # cache of `hybridsim.engine.linear.tables`
         self.with_corners: Any = None  # cache of `hybridsim.engine.events.monitor_corners`
-        self.opposed: set[tuple[Any, ...]] = set()  # starts that the check of dissipation accepted
-        self.has_tape: bool = data["tape"] is not None  # whether the model consists of expressions
+        # starts accepted by `hybridsim.engine.events.dissipation_check`
+        self.opposed: set[tuple[Any, ...]] = set()
         if self.has_tape:
             self.registers: Registers = _registers_of(self)  # of the tape's inputs and results
 
@@ -398,7 +390,7 @@ class System:
 
     def guards_of(self, z: np.ndarray) -> np.ndarray:
         """Return the numbers of the active guards (components, widest), padded with -1."""
-        return np.asarray(self._frame.guard_table[self._frame.component_numbers, z])
+        return np.asarray(self.guard_table[self.component_numbers, z])
 
     def guard_title(self, guard: int, z: np.ndarray) -> str:
         """Return the name of a guard in the modes `z`, for messages."""

@@ -61,8 +61,9 @@ class TaylorKernels(MethodKernels):
         super().__init__(system, longest)
         rtol = max(tolerances.rtol, TIGHTEST)
         self.order = series_order(rtol, system.is_linear)
-        atol = np.array(tolerances.atol, dtype=float)
-        self.settings = packed(TaylorSettings(np.array([rtol, tolerances.max_step]), atol))
+        self.settings = TaylorSettings(
+            np.array([rtol, tolerances.max_step]), np.array(tolerances.atol, dtype=float)
+        )
         self.kind, self.columns = f"order {self.order}", system.n * (self.order + 1) + 2
         self.codes = series_codes(system, self.order)
 
@@ -73,7 +74,7 @@ class TaylorKernels(MethodKernels):
         return packed(
             TaylorArrays(
                 codes=self.codes.of(tape_cache_of(system).tapes),
-                settings=self.settings,
+                settings=packed(TaylorSettings(np.empty(2), np.empty(n))),
                 V=np.zeros((registers, order + 1)),
                 W=np.zeros((registers, order + 1)),
                 guard_series=np.zeros((guards + fading, order + 1)),
@@ -95,7 +96,8 @@ class TaylorKernels(MethodKernels):
 
     def begin(self, own: Any, tapes: Tapes) -> Any:
         """Write the settings of the run and the code of the tapes to the arrays."""
-        return replaced(own, settings=self.settings, codes=self.codes.of(tapes))
+        own.settings.control[:], own.settings.atol[:] = self.settings
+        return replaced(own, codes=self.codes.of(tapes))
 
     def end(self, own: Any, tapes: Tapes, lin: Any) -> None:
         """Compile machine code for modes in which many steps were taken."""

@@ -37,8 +37,10 @@ class _Check(NamedTuple):
 def errors_of_numbers(model: Model, changed: frozenset[str]) -> tuple[ModelError, ...]:
     """Return the errors of a copy of a valid model that differs in the values of some parameters."""
     findings, checks = Findings(model), _checks_of(model)
-    used = frozenset[str]().union(*(c.names for c in checks if not changed.isdisjoint(c.names)))
-    affected = (c for c in checks if not changed.isdisjoint(c.names) or c.defines in used)
+    affected = [check for check in checks if not changed.isdisjoint(check.names)]
+    if affected:
+        used = frozenset[str]().union(*(check.names for check in affected))
+        affected = [c for c in checks if not changed.isdisjoint(c.names) or c.defines in used]
     _carry_out(findings, affected)
     return tuple(findings.errors)
 
