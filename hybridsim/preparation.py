@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from itertools import chain
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -43,6 +43,31 @@ def _run_key(t_span: Any, settings: tuple[Any, ...]) -> tuple[Any, ...] | None:
     return run_key if _PLAIN.issuperset(map(type, run_key)) else None
 
 
+class _Settings(NamedTuple):
+    """The settings of a run that do not depend on numbers of the model; they are checked once for each structure."""
+
+    span: tuple[float, float]
+    method: Integrator
+    rtol: float
+    longest: float
+    first_step: float | None
+
+
+def _known_settings(model: Model, key: tuple[Any, ...] | None) -> _Settings | None:
+    """Return the settings of an earlier run of a model with the same structure and the same arguments."""
+    known: dict[Any, _Settings] = model.once("settings of runs", dict)
+    found = None if key is None else known.get(key)
+    is_registered = found is not None and type(found.method) is integrator_class(found.method.name)
+    return found if is_registered else None
+
+
+def _store_settings(model: Model, key: tuple[Any, ...], settings: _Settings) -> None:
+    known: dict[Any, _Settings] = model.once("settings of runs", dict)
+    if len(known) >= _MAX_RUNS:
+        known.clear()
+    known[key] = settings
+
+
 def prepared(
     model: Model,
     t_span: Any,
@@ -61,44 +86,53 @@ def prepared(
     keywords: Sequence[str],
 ) -> tuple[Run, float]:
     """Return the prepared run and the compile time in seconds; `keywords` are for suggestions."""
-    run_key = None
-    if x0 is z0 is limits is None:
-        settings: tuple[Any, ...] = (integrator, rtol, atol, max_step, first_step, save)
-        if options:  # an integer option rejects 16.0, which equals 16
-            settings += (*chain(*options.items()), *(type(value).__name__ for value in options.values()))
-        run_key = _run_key(t_span, settings)
+    words: tuple[Any, ...] = (integrator, rtol, atol, max_step, first_step, save)
+    if options:  # an integer option rejects 16.0, which equals 16
+        words += (*chain(*options.items()), *(type(value).__name__ for value in options.values()))
+    key = _run_key(t_span, words)
+    run_key = key if x0 is z0 is limits is None else None
+    if run_key is not None:
         run = runs_of(model).get(run_key)
         if run is not None and type(run.method) is integrator_class(run.method.name):  # still registered
             span = run.task.t0, run.task.t1
             return run.on_grid(arguments.time_grid(t_eval, span, run.task.retention, save)), 0.0
     x0_states, model = arguments.start_values(model, x0)
-    span = arguments.time_span(t_span)
+    known = _known_settings(model, key)
+    span = arguments.time_span(t_span) if known is None else known.span
     announce_compilation()
     name = arguments.integrator_name(integrator)
     began = time.perf_counter()
     system, reason = system_of(model), ""
     modes, start = arguments.initial_modes(system, z0), system.start_state(x0_states)
-    if name == "auto":
-        name, reason = choose(system, start, modes, span, arguments.relative_tolerance(rtol))
-    method = make_integrator(name, options, keywords)
-    arguments.refuse_unused(method, rtol=rtol, atol=atol)
+    if known is not None:
+        method = known.method
+    else:
+        if name == "auto":
+            name, reason = choose(system, start, modes, span, arguments.relative_tolerance(rtol))
+        method = make_integrator(name, options, keywords)
+        arguments.refuse_unused(method, rtol=rtol, atol=atol)
     if isinstance(system.code, PythonCode):
         _check_functions(method, system, system.code, start, span[0])
     _refuse_velocity_powers(method, model)
-    for function in system.hot_functions():
-        system.address(function)
+    if known is None:
+        for function in system.hot_functions():
+            system.address(function)
     method.prepare(system)
     compile_time = time.perf_counter() - began
-    _refuse_lacking(method, model, system, span)
-    relative = arguments.relative_tolerance(rtol)
-    longest = arguments.step_bound(max_step, "max_step")
-    refuse_endless(longest, span, "max_step")
-    tolerances = Tolerances(
-        relative,
-        arguments.absolute_tolerances(model, atol, relative, start),
-        longest,
-        None if first_step is None else arguments.step_bound(first_step, "first_step"),
-    )
+    if known is None:
+        _refuse_lacking(method, model, system, span)
+        known = _Settings(
+            span,
+            method,
+            arguments.relative_tolerance(rtol),
+            arguments.step_bound(max_step, "max_step"),
+            None if first_step is None else arguments.step_bound(first_step, "first_step"),
+        )
+        refuse_endless(known.longest, span, "max_step")
+        if key is not None and integrator != "auto":
+            _store_settings(model, key, known)
+    atols = arguments.absolute_tolerances(model, atol, known.rtol, start)
+    tolerances = Tolerances(known.rtol, atols, known.longest, known.first_step)
     retention = arguments.retention_of(save, system)
     grid = arguments.time_grid(t_eval, span, retention, save)
     discrete = system.discrete_start

@@ -28,7 +28,6 @@ FILES = {
     "arguments.py": 376,
     "engine/events/zeno/accumulation.py": 388,
     "engine/linear/motion.py": 370,
-    "engine/linear/tables.py": 305,
     "engine/lowering/emit.py": 358,
     "engine/lowering/held_states.py": 303,
     "engine/lowering/lower.py": 373,

@@ -15,6 +15,8 @@ from hybridsim.model.parts.quantities import Discrete, State
 
 Part = TypeVar("Part", State, Discrete)
 
+_VALUES = (float, int, str, Expression, Real)  # types of values; the first ones are tested fastest
+
 
 def changed_value(changes: Mapping[str, Any], name: str) -> Expression:
     """Return a changed value as an expression, or raise an error that names the changed quantity."""
@@ -35,7 +37,7 @@ def require_known(
 ) -> None:
     """Raise an error for a changed quantity that the model does not have, or for an invalid value."""
     for name, value in changes.items():
-        if not isinstance(value, Expression | str | Real):
+        if not isinstance(value, _VALUES):
             raise UsageError(f"{kind} {name} cannot be {value!r}", remedy="use a number or an expression")
         if name not in allowed:
             raise UsageError(f"the model '{model}' has no {kind} '{name}'", remedy=remedy(name))

@@ -224,7 +224,8 @@ def test_tables_of_many_values_do_not_fill_the_memory(monkeypatch: pytest.Monkey
     """Those of hundreds of modes take some 30 MB each: the oldest are let go of."""
     model = cornered_chain()
     kept = cached_tables(system_of(model))
-    kept.clear()
+    for key in list(kept):
+        kept.discard(key)
     for end in (1.0, 20.0, 400.0):  # a table for each order of magnitude
         hs.simulate(model, (0, end), integrator="exact", keep="nothing")
     assert len(kept) >= 3
