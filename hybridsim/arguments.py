@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 # The smallest useful rtol: 100 units in the last place, as in SciPy.
 SMALLEST_RTOL = 100 * 2.0**-52
 RTOL = 1e-9
+_NOT_REAL = (str, bytes, bool, np.bool_, complex, np.complexfloating)
 
 
 def without_a_name(value: Any) -> UsageError:
@@ -55,7 +56,9 @@ def number(value: Any, what: str, remedy: str = "use a number") -> float:
 
 def as_real(value: Any) -> float | None:
     """Return a real number as float, or None for other types, including complex numbers."""
-    if isinstance(value, str | bytes | bool | np.bool_ | complex | np.complexfloating) or is_row(value):
+    if type(value) is float:
+        return value
+    if isinstance(value, _NOT_REAL) or is_row(value):
         return None
     if isinstance(value, np.ndarray) and value.dtype.kind not in "iufO":
         return None

@@ -92,12 +92,12 @@ def check_eigenvectors(
     counts: Any,
     chosen: Any,
     right: Any,
-) -> bool:
+) -> int:
     """Write the number of coordinates of each matrix, and whether its eigenvectors are accurate and a good basis.
 
-    inverses: those of `real_columns`. Return whether all are good.
+    inverses: those of `real_columns`. Return the largest number of coordinates, or -1 if some are not good.
     """
-    all_chosen = True
+    all_chosen, most = True, 0
     for k in range(values.shape[0]):
         size, total, largest, fastest = values.shape[1], 0.0, 0.0, 0.0
         counts[k] = 0
@@ -121,8 +121,8 @@ def check_eigenvectors(
         grows = fastest > max(_GROWING / horizon, _SILENT * largest)
         # the Frobenius norm bounds the 2-norm of the inverse; no column of the basis has a norm above 1
         chosen[k] = right[k] and not grows and size * total <= CONDITION**2
-        all_chosen = all_chosen and chosen[k]
-    return all_chosen
+        all_chosen, most = all_chosen and chosen[k], max(most, counts[k])
+    return most if all_chosen else -1
 
 
 @kernel

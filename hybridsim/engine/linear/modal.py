@@ -110,11 +110,13 @@ def modals(
     values, vectors = eigenvectors(balanced)
     _real_columns(values, vectors, basis)
     inverses, others = inverse_matrices(basis), {}
-    if not _check_eigenvectors(balanced, values, vectors, inverses, horizon, counts, is_diagonal, are_right):
+    most = _check_eigenvectors(balanced, values, vectors, inverses, horizon, counts, is_diagonal, are_right)
+    if most < 0:
         for k in np.flatnonzero(~is_diagonal).tolist():
             others[k] = _by_blocks(balanced[k], values[k], vectors[k], scales[k], bool(are_right[k]))
             counts[k] = len(others[k].values)
-    count, size, widest = *A.shape[:2], -(-int(counts.max(initial=least)) // multiple) * multiple
+        most = int(counts.max())
+    count, size, widest = *A.shape[:2], -(-max(most, least) // multiple) * multiple
     result: Modals = _layout(count, size, widest).zeros()
     _diagonal(counts, values, vectors, inverses, scales, is_diagonal, exponent, result)
     for k, flow in others.items():

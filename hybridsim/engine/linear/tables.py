@@ -21,7 +21,7 @@ from hybridsim.engine.system.per_structure import per_structure, spare_scratch
 from hybridsim.engine.system.system import System
 from hybridsim.forks import SharedLock
 
-_MAX_CACHED = 64  # most tables per structure, one for each set of parameter values
+_MAX_CACHED = 16  # most tables per structure, one for each set of parameter values
 _MAX_BYTES = 1 << 26  # most bytes of all these tables except the last
 
 
@@ -250,12 +250,12 @@ def tables_of(
     return found
 
 
-class TableCache(dict[bytes, Made]):
+class TableCache(dict[tuple[Any, ...], Made]):
     """The last tables of a structure, by parameters, mode vectors and horizon."""
 
     size = 0  # bytes of all tables
 
-    def store(self, key: bytes, made: Made, replaced: Made | None) -> None:
+    def store(self, key: tuple[Any, ...], made: Made, replaced: Made | None) -> None:
         """Add tables, and discard the tables that they replace, and the oldest ones."""
         with _lock:
             for other in [k for k, one in self.items() if one is replaced] if replaced is not None else ():
@@ -266,7 +266,7 @@ class TableCache(dict[bytes, Made]):
             while len(self) > _MAX_CACHED or (len(self) > 1 and self.size > _MAX_BYTES):
                 self.discard(next(iter(self)))
 
-    def discard(self, key: bytes) -> None:
+    def discard(self, key: tuple[Any, ...]) -> None:
         """Remove tables, if they are stored."""
         made = self.pop(key, None)
         self.size -= made.rows.size if made is not None else 0
@@ -279,7 +279,7 @@ def _made(
     system: System, modes: np.ndarray, p: np.ndarray, horizon: float, begun: Made | None, is_scaled: bool
 ) -> Made | None:
     cached = cached_tables(system)
-    key = p[: system.layout.parameters].tobytes() + modes.tobytes() + np.array([horizon, is_scaled]).tobytes()
+    key = p[: system.layout.parameters].tobytes(), modes.tobytes(), horizon, is_scaled
     found = cached.get(key)
     if found is None:
         found = linear_tables(system, modes, p, horizon, begun, is_scaled)

@@ -73,11 +73,13 @@ class ResumePoint:
         arrays |= {"step_size": np.array(math.nan), "place": np.concatenate(self.loop().place)}
         return replace(self._before, instant=instant, arrays=arrays, settled=instant)
 
-    @cached_property
+    @property
     def now(self) -> _Now | None:
         """Return the state for a compiled loop, or None if the general loop has to continue from here."""
-        if self._now is not None:
-            return self._now
+        return self._now or self._of_checkpoint
+
+    @cached_property
+    def _of_checkpoint(self) -> _Now | None:
         checkpoint, loop, system = self._before, self.setup.compiled_loop(), self.setup.system
         arrays = checkpoint.arrays
         is_general = (

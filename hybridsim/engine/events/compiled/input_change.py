@@ -22,7 +22,7 @@ from hybridsim.engine.native.struct_pack import packed
 from hybridsim.engine.series.bounded import run_series
 from hybridsim.engine.system.instant import Instant
 from hybridsim.engine.system.per_structure import per_structure, spare_scratch
-from hybridsim.engine.system.programs.mode_tables import automata_of, tape_cache_of
+from hybridsim.engine.system.programs.mode_tables import tape_cache_of
 from hybridsim.engine.system.programs.modes_index import find_modes
 from hybridsim.engine.system.system import System
 
@@ -138,7 +138,7 @@ def changed_inputs(
     changed.p[place] = discrete
     tape = _surface_tape(system, changed.z.tobytes())
     is_certain = _admit_modes(
-        automata_of(system), scratch.tapes, system.registers.inputs, scratch.nothing, tape, system.layout.pin_at,
+        scratch.automata, scratch.tapes, system.registers.inputs, scratch.nothing, tape, system.layout.pin_at,
         former, scratch.as_packed, scratch.work,
     )  # fmt: skip
     found = changed.copy() if is_certain else None

@@ -199,12 +199,12 @@ _plain_start = Precompiled(plain_start)
 
 def compiled_start(system: System, x0: np.ndarray, x_error: np.ndarray, p: np.ndarray) -> HybridState | None:
     """Return the state just after the start from `x0` with error bounds, or None if the general rules must decide."""
+    if not _is_supported(system):
+        return None
     spare = spare_scratch(system, "start")
     try:
         scratch = spare.pop()
     except IndexError:
-        if not _is_supported(system):
-            return None
         scratch = StartScratch(system)
     state = scratch.state
     state.x[:], state.x_error[:], state.p[:] = x0, x_error, p
