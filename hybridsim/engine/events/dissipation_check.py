@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from hybridsim.engine.system.instant import Instant
+from hybridsim.engine.system.per_structure import per_structure
 from hybridsim.engine.system.system import System
 from hybridsim.errors import ModelError
 
-_MAX_ACCEPTED_STARTS = 64  # starts that a system remembers to have been looked at
+_MAX_ACCEPTED_STARTS = 64  # accepted starts that are remembered for each structure
+
+
+_accepted = per_structure(lambda system: set[tuple[Any, ...]]())
+
+
+def _what_effects_read(
+    system: System, t0: float, x: np.ndarray, discrete: np.ndarray, z: np.ndarray
+) -> tuple[Any, ...]:
+    """Return all numbers on which the effects of forces on their velocities depend."""
+    values = tuple(system.values.values())
+    if system.effects_read is not None:
+        return tuple([values[i] for i in system.effects_read])
+    return (*values, t0, x.tobytes(), discrete.tobytes(), z.tobytes())
 
 
 def require_dissipation(
     system: System, t0: float, x: np.ndarray, discrete: np.ndarray, z: np.ndarray
 ) -> None:
     """Raise ModelError for a contact whose force drives its own relative velocity."""
-    start: tuple[object, ...] = ()
-    if not system.has_constant_effects:  # they depend on more than parameters
-        start = (t0, x.tobytes(), discrete.tobytes(), z.tobytes())
-    if start in system.opposed:
+    accepted, key = _accepted(system), _what_effects_read(system, t0, x, discrete, z)
+    if key in accepted:
         return
     try:
         effects = system.effects(0.0, x, system.vector(Instant(t0), discrete), np.maximum(z, 0))
@@ -43,5 +57,6 @@ def require_dissipation(
                 place=place,
                 remedy=f"write '- {name}' in the derivative of the velocity, or reverse the sign of the velocity",
             )
-    if len(system.opposed) < _MAX_ACCEPTED_STARTS:
-        system.opposed.add(start)
+    if len(accepted) >= _MAX_ACCEPTED_STARTS:
+        accepted.clear()
+    accepted.add(key)

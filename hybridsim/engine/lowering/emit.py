@@ -9,6 +9,7 @@ from typing import Any
 
 from sympy import Rational, Symbol
 
+from hybridsim.engine.lowering.fixed_names import fixed_names, parameters_read
 from hybridsim.engine.lowering.impulse_rows import gap_slopes, impulses, restitutions, speed_name
 from hybridsim.engine.lowering.lower import Lowering, Program
 from hybridsim.engine.lowering.program import Assign, Item, Switch, items_for
@@ -281,7 +282,7 @@ class Emitter:
         return "\n".join([*lines, "    return 0"])
 
     def _data(self, guards: list[str]) -> dict[str, Any]:
-        program, index, fixed = self.program, {n: k for k, n in enumerate(guards)}, self._fixed()
+        program, index = self.program, {n: k for k, n in enumerate(guards)}
         return {
             "guards": tuple(
                 tuple(tuple(index[f"guard_{c}_{g}"] for g in range(len(m.guards))) for m in component.modes)
@@ -297,7 +298,7 @@ class Emitter:
             "linear": program.linear,
             "quantities": tuple(n for n, _ in self.quantities()),
             "resets": tuple((key, tuple(mapping)) for key, mapping in resets_of(program.model)),
-            "constant_effects": all({s.name for s in e.free_symbols} <= fixed for e in self.lowering.effects),
+            "effects_read": parameters_read(program, self.lowering.effects),
             "tape": self._tape(guards),
         }
 
@@ -305,7 +306,7 @@ class Emitter:
         program = self.program
         names = [*program.derivatives, *guards, *(n for _, n in program.surfaces)]
         names += [f"monitor_{k}" for k in range(len(program.model.monitors))]
-        builder = TapeBuilder(self._fixed())
+        builder = TapeBuilder(fixed_names(program))
         shared: dict[Any, int] = {}
         parts: list[Any] = []
         for item in items_for(program.items, names):
@@ -330,14 +331,6 @@ class Emitter:
             "constants": tuple((r, *value) for value, r in builder.constants.items()),
             "parameters": tuple((r, int(w[2:-1])) for r, w in sources.items() if w.startswith("p[")),
         }
-
-    def _fixed(self) -> set[str]:
-        """Return the names of parameters, and of definitions that depend only on parameters."""
-        found = {user(q.name) for q in self.program.model.parameters}
-        for item in self.program.items:
-            if isinstance(item, Assign) and {s.name for s in item.expression.free_symbols} <= found:
-                found.add(item.name)
-        return found
 
     def _branch(self, builder: TapeBuilder, item: Switch, mode: int) -> tuple[Any, ...]:
         return tuple(builder.rows([(a.name, a.expression) for a in item.branches[mode]], {}))

@@ -134,7 +134,8 @@ class _Frame:
         self.projected: dict[int, tuple[int, ...]] = data["projected"]
         self.linear: dict[str, tuple[bool, ...]] = data["linear"]
         self.quantities: tuple[str, ...] = data["quantities"]
-        self.has_constant_effects: bool = data["constant_effects"]
+        # the parameters that `effects` read, or None if they read more than parameters
+        self.effects_read: tuple[int, ...] | None = data["effects_read"]
         self.has_tape: bool = data["tape"] is not None  # whether the model consists of expressions
 
     def _guard_table(self) -> np.ndarray:
@@ -199,8 +200,6 @@ class System(_Frame):
         self.starts: dict[tuple[Any, ...], Any] = {}  # cache of `hybridsim.engine.events.start`
         self.tables: dict[tuple[float, bool], Any] = {}  # cache of `hybridsim.engine.linear.tables`
         self.with_corners: Any = None  # cache of `hybridsim.engine.events.monitor_corners`
-        # starts accepted by `hybridsim.engine.events.dissipation_check`
-        self.opposed: set[tuple[Any, ...]] = set()
         if self.has_tape:
             self.registers: Registers = _registers_of(self)  # of the tape's inputs and results
 

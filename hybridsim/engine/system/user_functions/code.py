@@ -255,6 +255,6 @@ def _data(model: Model, resets: list[tuple[tuple[Any, ...], dict[str, Any]]]) ->
         "linear": {"": (False,)} | linear,
         "quantities": tuple(output.name for output in model.outputs),
         "resets": tuple((key, tuple(reset)) for key, reset in resets),
-        "constant_effects": True,  # there are no surfaces
+        "effects_read": (),  # there are no surfaces
         "tape": None,
     }
