@@ -50,8 +50,21 @@ POINTS: list[dict[str, Any]] = [
     {}, {"F0": 2.5}, {"c": 4.0}, {"c": 0.0, "omega": 2.0}, {"c": 0.0}, {"on": 0.0}, {"N": 0.0}, {"F0": 0.0},
     {"k": 5.0}, {"m": "k/2"}, {"omega": 1.3}, {"x1": -0.25}, {"x1": "mu*m", "mu": 0.1}, {"k": 0.0, "omega": 1.0},
 ]  # fmt: skip
+# through equal eigenvalues, resonance, zero damping and the loss of a coupling in steps of 1e-12
+STEPS: list[dict[str, Any]] = [
+    point
+    for k in range(-3, 4)
+    for point in (
+        {"c": 4.0 + 1e-12 * k},
+        {"c": 0.0, "omega": 2.0 + 1e-12 * k},
+        {"c": 1e-12 * k},
+        {"k": 1e-12 * k, "omega": 1.0},
+        {"F0": 1e-12 * k},
+    )
+]
 CASES = {
     "linear": (LINEAR, ("exact", "taylor"), POINTS),
+    "steps": (LINEAR, ("exact",), STEPS),
     "curved": (CURVED, ("taylor", "dop853"), [*POINTS, {"n": 2.0}, {"n": 0.0}, {"n": "mu"}]),
     "timed": (TIMED, ("taylor",), POINTS),
 }
@@ -109,6 +122,34 @@ def test_a_bad_number_is_refused_after_good_ones() -> None:
         with pytest.raises(hs.ModelError) as first:
             anew(LINEAR, changes)
         assert str(later.value).splitlines()[0].split(": ", 1)[-1] in str(first.value)
+
+
+def test_a_number_that_makes_a_model_nonlinear_is_noticed_after_good_ones() -> None:
+    """The settings of the first run are known, and its method does not suit the second."""
+    model = hs.Model("m", [hs.State("x", 1, "-x - q*x**2")], parameters={"q": 0})
+    for name in ("exact", "auto"):
+        assert hs.simulate(model, (0, 1), integrator=name).stats["integrator"] == "exact"
+    with pytest.raises(hs.UsageError, match="exact cannot run"):
+        hs.simulate(model, (0, 1), integrator="exact", params={"q": 1})
+    assert hs.simulate(model, (0, 1), params={"q": 1}).stats["integrator"] != "exact"
+    assert hs.simulate(model, (0, 1), params={"q": -0.0}).stats["integrator"] == "exact"
+
+
+@pytest.mark.parametrize(
+    ("effect", "good", "bad"), [("a/m", {"m": 2.0}, {"m": -1.0}), ("x", {}, {"a": -1.0})]
+)
+def test_a_contact_that_drives_its_velocity_is_refused_after_good_runs(
+    effect: str, good: dict[str, float], bad: dict[str, float]
+) -> None:
+    """The effect of the force depends on parameters alone, or on the state at the start."""
+    states = [hs.State("x", "a", 0), hs.State("v", 0.1, f"1 - v - f*{effect}")]
+    contact = hs.Contact("f", velocity="v", normal=0.5, law="coulomb", arguments={"mu": 0.5})
+    model = hs.Model("m", states, parameters={"a": 1.0, "m": 1.0}, contacts=[contact])
+    for changes in ({}, good, {"a": 2.0}):
+        assert hs.simulate(model, (0, 1), params=changes).success
+    for _ in range(2):
+        with pytest.raises(hs.ModelError, match="acts along its relative velocity"):
+            hs.simulate(model, (0, 1), params=bad)
 
 
 # -- models by name and path ---------------------------------------------------------------------------------------

@@ -49,6 +49,30 @@ def test_a_bad_value_is_refused_in_the_words_of_a_first_check(changes: dict[str,
     model.with_(F0=2).validate()
 
 
+def test_copies_are_checked_against_a_sound_sibling() -> None:
+    """The model itself was never checked: its copies have numbers of their own, and are refused as at a first check."""
+    model = hs.load("dfcs").with_(omega="0.5*sqrt(k/m)")
+    model.with_(F0=1, k=4e4).validate()
+    assert model.parameter_values() == apart(model, {}).parameter_values()
+    assert model.with_(c=2).parameter_values() == apart(model, {"c": 2}).parameter_values()
+    for changes in ({"N": -3}, {"mu": -0.5}, {"m": 0}, {"k": -1}):
+        assert refusal(model.with_(**changes)) == refusal(apart(model, changes))
+    faulty = model.with_(N=-3)
+    faulty.with_(N=2).validate()
+    assert "the normal load cannot be -3" in refusal(faulty)[0]
+
+
+def test_a_number_behind_a_definition_is_checked() -> None:
+    contact = hs.Contact("f", velocity="v", normal="2*load + other", law="coulomb", arguments={"mu": 0.5})
+    model = hs.Model(
+        "m", [hs.State("v", 1, "-f")], parameters={"N": 1, "W": 1}, contacts=[contact],
+        definitions={"load": "N - 1", "other": "W"},
+    ).validate()  # fmt: skip
+    for changes in ({"N": 0.25}, {"W": -1}, {"N": 0.25, "W": 0}):
+        assert refusal(model.with_(**changes)) == refusal(apart(model, changes))
+    model.with_(N=0.5, W=2).validate()
+
+
 @pytest.mark.parametrize("start", ["nowhere", "v", "1/(m - m)", "m > 1"])
 def test_so_is_a_bad_start(start: str) -> None:
     model = hs.load("dfcs")
