@@ -86,10 +86,10 @@ def prepared(
     keywords: Sequence[str],
 ) -> tuple[Run, float]:
     """Return the prepared run and the compile time in seconds; `keywords` are for suggestions."""
-    words: tuple[Any, ...] = (integrator, rtol, atol, max_step, first_step, save)
+    every_argument: tuple[Any, ...] = (integrator, rtol, atol, max_step, first_step, save)
     if options:  # an integer option rejects 16.0, which equals 16
-        words += (*chain(*options.items()), *(type(value).__name__ for value in options.values()))
-    key = _run_key(t_span, words)
+        every_argument += (*chain(*options.items()), *(type(value).__name__ for value in options.values()))
+    key = _run_key(t_span, every_argument)
     run_key = key if x0 is z0 is limits is None else None
     if run_key is not None:
         run = runs_of(model).get(run_key)

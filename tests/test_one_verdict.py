@@ -59,7 +59,7 @@ READERS = {
     "engine/linear/guard_coefficients.py::rough_coefficient": "computes them",
     "engine/linear/guard_coefficients.py::linear_series": "computes them",
     "engine/linear/guard_coefficients.py::_exact_series": "computes them",
-    "engine/linear/tables.py::of_matrices": "passes matrices to kernels that compute them",
+    "engine/linear/table_rows.py::write_tables": "passes matrices to kernels that compute them",
     "engine/events/compiled/resolve_ordinary.py::is_alone": "whether a second guard is zero",
     "engine/events/compiled/at_end.py::may_vanish": "whether a guard is zero at a known time",
     "engine/events/compiled/after_segment.py::is_hidden": "whether a zero was located by rounding",

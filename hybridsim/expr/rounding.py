@@ -14,7 +14,7 @@ from functools import lru_cache
 from hybridsim.expr.parse import Expression
 from hybridsim.expr.walk import NoValue, value_of
 
-_MOST_PLACES = 24  # 5**25 has 18 digits, and the shortest text of a double has at most 17
+_MAX_DIGITS = 24  # 5**25 has 18 digits, and the shortest text of a double has at most 17
 _UNIT = 2.0**-53  # unit roundoff of a double
 _EXACT = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv}
 _WIDER = (
@@ -32,8 +32,8 @@ def own_roundoff(number: float) -> float:
     if not math.isfinite(number) or number.is_integer():
         return 0.0
     # the exact value n/2**k has the digits of n*5**k, which are more than a double's text can have for large k
-    places = number.as_integer_ratio()[1].bit_length() - 1
-    is_exact = places <= _MOST_PLACES and Decimal(repr(number)) == Decimal(number)
+    digits = number.as_integer_ratio()[1].bit_length() - 1
+    is_exact = digits <= _MAX_DIGITS and Decimal(repr(number)) == Decimal(number)
     return 0.0 if is_exact else 0.5 * math.ulp(number)
 
 

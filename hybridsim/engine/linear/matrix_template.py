@@ -103,10 +103,10 @@ class MatrixTemplate:
 
         registers: (R,), or (points, R) for as many of each.
         """
-        lead = registers.shape[:-1]
+        lead, points = registers.shape[:-1], registers if registers.ndim > 1 else registers[None]
         A, rows = (np.zeros(lead + shape) for shape in self._shapes)
         for matrix, entries in ((A, self._flow), (rows, self._guards)):
-            _put(registers.reshape(-1, registers.shape[-1]), entries, matrix.reshape(-1))
+            _put(points, entries, matrix.reshape(-1))
         return A, rows
 
     def atoms(self, registers: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -22,10 +22,10 @@ from hybridsim.engine.linear.diagonal import (
     real_columns,
     write_diagonal,
 )
+from hybridsim.engine.linear.lapack import eigenvectors, inverse_matrices
 from hybridsim.engine.linear.small_entries import with_small_rows
 from hybridsim.engine.native.array_layout import ArrayLayout
 from hybridsim.engine.native.kernels import Precompiled
-from hybridsim.engine.native.lapack import eigenvectors, inverse_matrices
 
 _balance, _real_columns = Precompiled(balance), Precompiled(real_columns)
 _check_eigenvectors, _diagonal = Precompiled(check_eigenvectors), Precompiled(write_diagonal)

@@ -9,10 +9,9 @@ from typing import Any
 
 from sympy import Rational, Symbol
 
-from hybridsim.engine.lowering.fixed_names import fixed_names, parameters_read
 from hybridsim.engine.lowering.impulse_rows import gap_slopes, impulses, restitutions, speed_name
 from hybridsim.engine.lowering.lower import Lowering, Program
-from hybridsim.engine.lowering.program import Assign, Item, Switch, items_for
+from hybridsim.engine.lowering.program import Assign, Item, Switch, fixed_names, items_for, parameters_read
 from hybridsim.engine.lowering.program_names import user
 from hybridsim.engine.lowering.reset_keys import amounts_of, is_added, resets_of
 from hybridsim.engine.lowering.stepped_rows import stepped

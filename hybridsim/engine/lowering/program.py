@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from hybridsim.engine.lowering.program_names import shown
+from hybridsim.engine.lowering.program_names import shown, user
 from hybridsim.errors import ModelError
 
 
@@ -90,3 +90,21 @@ def items_for(items: list[Item], names: Iterable[str]) -> list[Item]:
             selected.append(item)
             open_names |= used(item)
     return selected[::-1]
+
+
+def fixed_names(program: Any) -> set[str]:
+    """Return the names of parameters, and of definitions that depend only on parameters."""
+    found = {user(q.name) for q in program.model.parameters}
+    for item in program.items:
+        if isinstance(item, Assign) and {s.name for s in item.expression.free_symbols} <= found:
+            found.add(item.name)
+    return found
+
+
+def parameters_read(program: Any, expressions: Iterable[Any]) -> tuple[int, ...] | None:
+    """Return the indices of the parameters in expressions, or None if these depend on more than parameters."""
+    names = {s.name for e in expressions for s in e.free_symbols}
+    if not names <= fixed_names(program):
+        return None
+    read = names.union(*(used(item) for item in items_for(program.items, names)))
+    return tuple(i for i, q in enumerate(program.model.parameters) if user(q.name) in read)
