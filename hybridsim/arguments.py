@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 # The smallest useful rtol: 100 units in the last place, as in SciPy.
 SMALLEST_RTOL = 100 * 2.0**-52
 RTOL = 1e-9
-_NOT_REAL = (str, bytes, bool, np.bool_, complex, np.complexfloating)
 
 
 def without_a_name(value: Any) -> UsageError:
@@ -48,7 +47,7 @@ def cannot_be(what: str, value: Any, remedy: str) -> UsageError:
 
 def number(value: Any, what: str, remedy: str = "use a number") -> float:
     """Return a real number as float; other types raise an error."""
-    found = as_real(value)
+    found = value if type(value) is float else as_real(value)
     if found is None:
         raise cannot_be(what, value, remedy)
     return found
@@ -56,9 +55,7 @@ def number(value: Any, what: str, remedy: str = "use a number") -> float:
 
 def as_real(value: Any) -> float | None:
     """Return a real number as float, or None for other types, including complex numbers."""
-    if type(value) is float:
-        return value
-    if isinstance(value, _NOT_REAL) or is_row(value):
+    if isinstance(value, str | bytes | bool | np.bool_ | complex | np.complexfloating) or is_row(value):
         return None
     if isinstance(value, np.ndarray) and value.dtype.kind not in "iufO":
         return None
