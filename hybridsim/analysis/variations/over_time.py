@@ -45,11 +45,16 @@ class OverTime:
     """Derivatives of one run at any time."""
 
     def __init__(self, solution: Solution, directions: Directions, sides: type[OneSide]) -> None:
+        self._made_of = solution, directions, sides
         self._solution, self._sides = solution, sides(Carrier(solution), directions)
         self._quantities = QuantityDerivatives(solution, directions)
         self._known = (*solution.names, *solution.quantities)
         self._starts = len(directions.x) + len(directions.discrete)
         self._width = directions.parameters.shape[1]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the run, of which the derivatives are computed again."""
+        return OverTime, self._made_of
 
     def at(self, t: Any, names: Sequence[str], side: str) -> Derivatives:
         """Return the derivatives of some states or quantities at a time, or at several times."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import mpmath as mp
 import numpy as np
 import pytest
@@ -224,6 +226,13 @@ def test_many_times_at_once_are_the_times_one_by_one() -> None:
         assert together.by_parameter[k] == pytest.approx(alone.by_parameter, rel=1e-9, abs=1e-14)
         assert together.by_start[k] == pytest.approx(alone.by_start, rel=1e-9, abs=1e-14)
     assert found.at(0.02).by_parameter == pytest.approx(found.by_parameter, rel=1e-12)
+
+
+def test_derivatives_pass_through_pickle() -> None:
+    found = hs.sensitivities(hs.simulate("dfcs", (0, 0.02)), ["N"])
+    again = pickle.loads(pickle.dumps(found))
+    assert (again.by_parameter == found.by_parameter).all()
+    assert (again.at(0.01, "f").by_parameter == found.at(0.01, "f").by_parameter).all()
 
 
 def test_unknown_quantities_and_times_outside_are_refused() -> None:
