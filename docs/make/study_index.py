@@ -32,7 +32,15 @@ SECTIONS = {
         "units",
     ),
     "Reliability": ("history", "steps", "survival", "sweeps", "fuzz"),
-    "Speed": ("speed", "published-speed", "profile", "cost-of-stick", "chain", "repeated-runs"),
+    "Speed": (
+        "speed",
+        "published-speed",
+        "profile",
+        "cost-of-stick",
+        "chain",
+        "repeated-runs",
+        "event-costs",
+    ),
     "Systems": ("blade-damper", "brake"),
     "A published study": ("he2026",),
 }
