@@ -58,7 +58,7 @@ class KnownTimes(NamedTuple):
         return self.instant(0) if len(self.kinds) else self.target
 
     def instant(self, i: int) -> Instant:
-        """Return one of the times."""
+        """Return the known time with a given number."""
         return Instant(*self.instants[i].tolist())
 
     def up_to(self, target: Instant) -> KnownTimes:

@@ -22,7 +22,7 @@ ATTRACTION = (
 
 @dataclass(frozen=True)
 class SwitchingSurface(Declared):
-    """A surface expr = 0 at which rates jump; its name u is the sign of expr, or a weight in sliding.
+    """A surface expr = 0 at which rates jump; its name is a variable u that rates contain.
 
     ::
 

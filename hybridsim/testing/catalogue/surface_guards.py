@@ -9,7 +9,7 @@ from hybridsim.testing.scene import Scene, Truth, named, needs
 
 
 def scenes() -> tuple[Scene, ...]:
-    """Return scenes of guards on speeds, at a release, and on gaps."""
+    """Return scenes of guards that read speeds and gaps."""
     return _speeds(), _gaps()
 
 
