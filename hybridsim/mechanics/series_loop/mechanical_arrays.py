@@ -222,7 +222,7 @@ def forcing(
 
 
 def bases(contacts: list[MechanicalContact], rates: list[float]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the constant, sine and cosine terms (m, 3) of the base speeds, and the index in `rates` of each frequency."""
+    """Return the constant, sine and cosine terms (m, 3) of the base speeds, and the index of each frequency."""
     base, rate = np.zeros((len(contacts), 3)), np.full(len(contacts), -1, dtype=np.int64)
     for i, contact in enumerate(contacts):
         if isinstance(contact.base, Harmonic):
