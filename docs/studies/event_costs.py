@@ -145,7 +145,7 @@ do so:
 
 - A quadratic monitor leaves the closed form of `exact`.
 - A monitor of the sliding speed is zero together with the guard of the contact. Both are decided together.
-- An impact asks which contacts are struck together.
+- At an impact all contacts that are struck together are decided together.
 
 `python docs/studies/event_costs.py` writes this page. The table gives medians of processor time in one process, in
 which the runs with and without the part take turns. The monitors are added to 100 periods of the system of the paper.
