@@ -29,8 +29,16 @@ def refusing(function: Callable[Arguments, Result]) -> Callable[Arguments, Resul
     return call
 
 
-def renamed(function: str, options: dict[str, Any], former: str, name: str) -> Any:
-    """Take the value of an argument out of `options` under its former name, and warn that the name is deprecated."""
+class Default(str):
+    """The default of an argument: a word that differs by identity from the same word in a call."""
+
+
+def renamed(function: str, options: dict[str, Any], former: str, name: str, value: Any) -> Any:
+    """Take the value of an argument out of `options` under its former name, and warn that the name is deprecated.
+
+    `value` is the argument under its present name. `UsageError` is raised unless it is a `Default`.
+    """
+    refuse_both(function, former, options[former], name, value)
     text = f"{function}({former}=...) is deprecated; version 0.2 removes it. Use {name}=..."
     package = __name__.partition(".")[0]
     level, frame = 2, sys._getframe(1)
@@ -38,6 +46,15 @@ def renamed(function: str, options: dict[str, Any], former: str, name: str) -> A
         level, frame = level + 1, frame.f_back
     warn(text, DeprecationWarning, stacklevel=level)
     return options.pop(former)
+
+
+def refuse_both(function: str, former: str, old: Any, name: str, new: Any) -> None:
+    """Raise `UsageError` if a call has an argument under its former and under its present name."""
+    if not isinstance(new, Default):
+        raise UsageError(
+            f"{function}() has both {former}={old!r} and {name}={new!r}, but {former} is the former name of {name}",
+            remedy=f"remove `{former}`",
+        )
 
 
 def refuse_unless_taken(

@@ -9,12 +9,15 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any, overload
 
 from hybridsim import arguments
-from hybridsim.calls import renamed
+from hybridsim.calls import Default, renamed
 from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.model import Model
 
 if TYPE_CHECKING:
     from hybridsim.solution import Solution
+
+
+KEEP = Default("all")
 
 
 @overload
@@ -51,7 +54,7 @@ def simulate(
     max_step: float = math.inf,
     first_step: float | None = None,
     t_eval: Sequence[float] | None = None,
-    keep: str | float = "all",
+    keep: str | float = KEEP,
     limits: Mapping[str, float] | None = None,
     progress: Callable[[float], None] | bool | None = None,
     **options: Any,
@@ -124,7 +127,8 @@ def simulate(
     if misplaced:
         raise arguments.without_a_name(misplaced[0])
     if "save" in options:
-        keep = renamed("simulate", options, "save", "keep")
+        keep = renamed("simulate", options, "save", "keep", keep)
+    keep = str(keep) if isinstance(keep, Default) else keep
     if isinstance(model, MechanicalSystem):
         from hybridsim.mechanics.simulate import simulate_mechanical
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from hybridsim.arguments import integrator_name
+from hybridsim.calls import refuse_both
 from hybridsim.errors import UsageError, nearest
 from hybridsim.integrators.registry import integrator_class, option_names
 
@@ -23,7 +24,10 @@ def refuse_unknown(calls: Iterable[Callable[..., Any]], options: Mapping[str, An
         For a name that no function and no integrator accepts, or an unknown integrator.
     """
     own = {name for call in calls for name in _names(call)}
-    own |= {"save"} if "keep" in own else set()  # the deprecated name of an argument of simulate
+    if "keep" in own:
+        own.add("save")  # the deprecated name of an argument of simulate
+        if "keep" in options and "save" in options:
+            refuse_both("simulate", "save", options["save"], "keep", options["keep"])
     name = integrator_name(options.get("integrator", "auto"))
     classes = [integrator_class(one) for one in (_OF_AUTO if name == "auto" else (name,))]
     known = own | {option for one in classes for option in option_names(one)}

@@ -186,6 +186,21 @@ def test_the_former_name_does_the_same_and_warns() -> None:
         hs.Simulator(DFCS).run((0, 0.01), sve="all")
 
 
+@pytest.mark.parametrize("keep", ["all", "events"])
+def test_the_former_and_the_present_name_together_are_refused(keep: str) -> None:
+    for call in (
+        lambda: hs.simulate(DFCS, (0, 0.01), keep=keep, save="nothing"),
+        lambda: hs.Simulator(DFCS).run((0, 0.01), keep=keep, save="nothing"),
+        lambda: hs.simulate(hs.two_blocks_on_belt(), (0, 0.1), keep=keep, save="nothing"),
+        lambda: hs.sweep(
+            DFCS, {"F0": [30.0]}, "final.x", t_span=(0, 0.01), keep=keep, save="nothing", workers=1
+        ),
+        lambda: hs.steady_state(DFCS, keep=keep, save="nothing"),
+    ):
+        with pytest.raises(UsageError, match=rf"both save='nothing' and keep='{keep}'.*\n?.*remove `save`"):
+            call()
+
+
 def test_analyses_take_the_former_name_too() -> None:
     with pytest.warns(DeprecationWarning, match="Use keep="):
         found = hs.sweep(DFCS, {"F0": [30.0]}, "final.x", t_span=(0, 0.01), save="events", workers=1)

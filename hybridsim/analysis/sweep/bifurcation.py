@@ -112,6 +112,9 @@ def bifurcation(
     ((2, 2, 4), ('direction', 'F0'))
     """
     refuse_unknown([simulate], options)
+    for name in ("keep", "save", "t_eval"):
+        if name in options:
+            raise UsageError(f"bifurcation() sets {name!r} itself", remedy=f"remove `{name}`")
     base = chosen_model(model, params).validate()
     points = points_of(base, {text(parameter, "parameter"): values}, "list")
     if points.axes[0].is_start:

@@ -14,6 +14,7 @@ from hybridsim.analysis.steady.steady_state import steady_state
 from hybridsim.analysis.sweep.last_period import OF_MOTION, LastPeriod, MeasuredPeriod, period_of
 from hybridsim.analysis.sweep.work.job import Incomplete
 from hybridsim.arguments import cannot_be
+from hybridsim.calls import Default
 from hybridsim.errors import SimulationError, UsageError, nearest
 from hybridsim.model import Model
 from hybridsim.model.checks.units import time_unit, units_of
@@ -75,7 +76,7 @@ class Final:
 
     def run(self, model: Model, previous: Any) -> dict[str, float]:
         """Return the final states by name; with `warm_start`, the run begins at the previous end."""
-        arguments = {"keep": "nothing", **self.options}
+        arguments = {"keep": Default("nothing"), **self.options}
         if previous is not None:
             arguments["x0"] = previous
         solution = simulate(model, **arguments)

@@ -97,6 +97,7 @@ def test_a_section_that_is_never_passed_is_a_status() -> None:
         ({"samples": 0}, "`samples` cannot be 0"),
         ({"tol": 0}, "`tol` cannot be 0"),
         ({"section": 3}, "`section` cannot be 3"),
+        ({"save": "nothing"}, "sets 'save' itself"),
         ({"rtoll": 1e-8}, "'rtoll' is not an option of simulate"),
         ({"integrator": "dop853", "step": 1.0}, "'step' is not an option of simulate or of dop853"),
     ],
