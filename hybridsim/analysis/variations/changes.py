@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hybridsim.analysis.variations.no_derivative import argument_names, no_derivative
 from hybridsim.analysis.variations.tapes import tangent_tape
 from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
 from hybridsim.engine.system.system import System
@@ -99,6 +100,7 @@ class Changes:
         system, n = self.system, self.system.n
         tape = tangent_tape(system, at.z, guards, monitors, surfaces)
         found = tape(np.array([at.s]), at.x[None, :], at.p, self.vector.seeds(at.p))
+        self._refuse_without(at, found.slopes[0, n:], guards)
         flow, rows = found.values[0, :n], found.slopes[0, n:]
         by_states, by_time, by_others = rows[:, :n], rows[:, n], rows[:, n + 1 :]
         others = np.concatenate([at.Yd, self.G])
@@ -120,3 +122,13 @@ class Changes:
             )
             for k, value in enumerate(values.tolist())
         ]
+
+    def _refuse_without(self, at: Place, rows: np.ndarray, guards: tuple[int, ...]) -> None:
+        """Raise `UsageError` if a guard, monitor or surface has no derivative; rows: derivatives by all arguments."""
+        bad = ~np.isfinite(rows)
+        for k in np.flatnonzero(bad.any(axis=1)):
+            title = "the function of a monitor or surface"
+            if k < len(guards):
+                title = self.system.guard_title(guards[k], at.z)
+            by = [name for name, is_bad in zip(argument_names(self.system), bad[k], strict=True) if is_bad]
+            raise no_derivative(self.system, title, by, at.origin + at.s, at.x, ())

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from hybridsim.analysis.variations.no_derivative import argument_names, no_derivative
 from hybridsim.analysis.variations.smooth import (
     Intervals,
     Steps,
@@ -20,7 +21,10 @@ from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
 from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.series.dual_numbers import differentiated, values_and_slopes, with_slopes
 from hybridsim.engine.system.system import System
+from hybridsim.engine.system.tangents import TangentTape
 from hybridsim.solution import Solution
+
+_ISOLATED = 1e-9  # of a segment: a derivative that is missing at one instant exists at this distance
 
 
 class FlowDerivatives:
@@ -75,9 +79,27 @@ class FlowDerivatives:
             one = int(number[begin])
             segment = self._segments[one]
             tape = tangent_tape(self.system, segment.z)
-            parts.append(tape(s[begin:end], x[begin:end], segment.p, self._seeds[one]).slopes)
+            found = tape(s[begin:end], x[begin:end], segment.p, self._seeds[one]).slopes
+            for k in np.flatnonzero(~np.isfinite(found).all(axis=(1, 2))):
+                found[k] = self._beside(one, tape, float(s[begin + k]))
+            parts.append(found)
         n = self.system.n
         return np.concatenate(parts) if parts else np.zeros((0, n, n + len(self._moving)))
+
+    def _beside(self, number: int, tape: TangentTape, s: float) -> np.ndarray:
+        """Return the derivatives (n, n + q) of the rates next to a local time at which they do not exist."""
+        segment = self._segments[number]
+        begin, end = float(segment.s[0]), float(segment.s[-1])
+        near = np.array([s + _ISOLATED * (end - begin) * (1.0 if 2.0 * s < begin + end else -1.0)])
+        found: np.ndarray = tape(near, segment.dense(near), segment.p, self._seeds[number]).slopes[0]
+        bad = ~np.isfinite(found)
+        if not bad.any():
+            return found
+        names = [self.system.names[i] for i in np.flatnonzero(bad.any(axis=1))]
+        chosen = [*range(self.system.n), *(self.system.n + 1 + k for k in self._moving)]
+        by = [argument_names(self.system)[chosen[i]] for i in np.flatnonzero(bad.any(axis=0))]
+        t, x = float(segment.origin.plus(s)), segment.dense(np.array([s]))[0]
+        raise no_derivative(self.system, f"the rate of {' and '.join(names)}", by, t, x, names)
 
     def over(
         self, number: int, Y: np.ndarray, Yd: np.ndarray, G: np.ndarray, stops: np.ndarray

@@ -14,6 +14,7 @@ from hybridsim.engine.native.kernels import inlined, kernel
 from hybridsim.engine.series import operations as ops
 from hybridsim.engine.series.interpreter import advance
 from hybridsim.engine.series.optimise import live_rows
+from hybridsim.engine.system.slopes_at_edge import slopes_at_edge
 from hybridsim.engine.system.system import System
 
 
@@ -78,6 +79,23 @@ def _tangent(op: int, a: int, b: int, c: int, out: int, V: Any, D: Any) -> None:
         _combine(D, out, 0.0, a, 0.0, a)
 
 
+@inlined
+def _is_at_edge(op: int, a: int, b: int, c: int, out: int, V: Any, D: Any) -> bool:
+    """Return whether an operation may have no derivative at its present arguments, such as a root at zero."""
+    u, v = V[a, 0], V[b, 0]
+    if op == ops.SQRT:
+        return bool(V[out, 0] == 0.0)
+    if op == ops.INTEGRAL:
+        return bool(u == 0.0 and (c != ops.ANGLE or v == 0.0))
+    if op in (ops.ABS, ops.SIGN):
+        return bool(u == 0.0)
+    if op in (ops.MIN, ops.MAX, ops.EQUAL, ops.LESS, ops.LESS_EQUAL) and u == v and c != ops.AGREEING:
+        for j in range(D.shape[1]):
+            if D[a, j] != D[b, j]:
+                return True
+    return False
+
+
 @kernel
 def run_tangents(
     rows: Any,
@@ -91,9 +109,11 @@ def run_tangents(
     D: Any,
     values: Any,
     tangents: Any,
+    edges: Any,
 ) -> None:
     """Write values and derivatives of some registers at times s (m,) and states x (m, n).
 
+    edges (m,): whether an operation may have no derivative there.
     seeds (n + 1 + P, D): directions of the states, of local time, and of each entry of p.
     """
     time, states = inputs.time[0], inputs.states
@@ -118,7 +138,9 @@ def run_tangents(
                 D[states[i], j] = seeds[i, j]
         advance(rows, V, 0)
         for r in range(rows.shape[0]):
-            _tangent(rows[r, 0], rows[r, 1], rows[r, 2], rows[r, 3], rows[r, 4], V, D)
+            op, a, b, c, out = rows[r, 0], rows[r, 1], rows[r, 2], rows[r, 3], rows[r, 4]
+            _tangent(op, a, b, c, out, V, D)
+            edges[m] |= _is_at_edge(op, a, b, c, out, V, D)
         for i in range(outputs.shape[0]):
             values[m, i] = V[outputs[i], 0]
             for j in range(D.shape[1]):
@@ -126,7 +148,7 @@ def run_tangents(
 
 
 class Tangents(NamedTuple):
-    """Values (m, W) and derivatives (m, W, D) of W functions of a mode."""
+    """Values (m, W) and derivatives (m, W, D) of W functions of a mode; NaN where a derivative does not exist."""
 
     values: np.ndarray
     slopes: np.ndarray
@@ -167,11 +189,28 @@ class TangentTape:
 
     def __call__(self, s: np.ndarray, x: np.ndarray, p: np.ndarray, seeds: np.ndarray) -> Tangents:
         """Evaluate values and derivatives at times (m,) and states (m, n), along the columns of `seeds`."""
+        found, edges = self._along(s, x, p, seeds)
+        for m in np.flatnonzero(edges):
+            at = float(s[m]), np.array(x[m], dtype=float), p
+
+            def displaced(ds: float, dx: np.ndarray, dp: np.ndarray, at: Any = at) -> np.ndarray:
+                near, still = self._along(np.array([at[0] + ds]), (at[1] + dx)[None], at[2] + dp, seeds)
+                slopes = near.slopes[0]
+                return np.where(np.isfinite(slopes), slopes, np.nan) if still[0] else slopes
+
+            found.slopes[m] = slopes_at_edge(displaced, *at, seeds)
+        return found
+
+    def _along(
+        self, s: np.ndarray, x: np.ndarray, p: np.ndarray, seeds: np.ndarray
+    ) -> tuple[Tangents, np.ndarray]:
+        """Return values and derivatives by the rules of the operations, and the mask of points at an edge."""
         count, outputs, directions = self._registers.count, len(self._outputs), seeds.shape[1]
         values, slopes = np.empty((len(s), outputs)), np.empty((len(s), outputs, directions))
+        edges = np.zeros(len(s), dtype=np.bool_)
         run_tangents(
             self._rows, self._registers.inputs, np.ascontiguousarray(seeds), self._outputs,
             np.ascontiguousarray(s, dtype=float), np.ascontiguousarray(x, dtype=float), p,
-            np.zeros((count, 1)), np.zeros((count, directions)), values, slopes,
+            np.zeros((count, 1)), np.zeros((count, directions)), values, slopes, edges,
         )  # fmt: skip
-        return Tangents(values, slopes)
+        return Tangents(values, slopes), edges
