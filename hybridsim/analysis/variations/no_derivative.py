@@ -31,7 +31,7 @@ def no_derivative(
     """
     values = dict(zip(system.names, x.tolist(), strict=True))
     at = ", ".join(f"{name} = {value:.6g}" for name, value in values.items())
-    found = list(_edges(system, states, system.values | values | {"t": t}))
+    found = sorted(_edges(system, states, system.values | values | {"t": t}))
     cause = (
         f": {' and '.join(found)} {'has' if len(found) == 1 else 'have'} a kink or an infinite slope there"
         * bool(found)
@@ -56,14 +56,15 @@ def _edges(system: System, states: Sequence[str], values: Mapping[str, float]) -
     for node in (part for tree in trees for part in ast.walk(tree)):
         if (
             isinstance(node, ast.expr)
-            and _is_at_edge(node, values, meanings.lookup)
+            and is_at_edge(node, values, meanings.lookup)
             and (text := write(node)) not in seen
         ):
             seen.add(text)
             yield text
 
 
-def _is_at_edge(node: ast.expr, values: Mapping[str, float], lookup: Lookup) -> bool:
+def is_at_edge(node: ast.expr, values: Mapping[str, float], lookup: Lookup = lambda _: None) -> bool:
+    """Return whether the function of one node may have no derivative at its present arguments."""
     match node:
         case ast.Call(func=ast.Name(id=name), args=args):
             arguments = [number_of(arg, values, lookup) for arg in args]

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 import numpy as np
 
+from hybridsim.analysis.variations.no_derivative import is_at_edge
+from hybridsim.engine.system.slopes_at_edge import DISTANCES, agreed, limit_of
+from hybridsim.errors import ExpressionError, UsageError
 from hybridsim.expr import Expression, evaluate
 from hybridsim.expr.slope import slope
 from hybridsim.model import Model
@@ -50,8 +54,31 @@ def expression_slope(
     total = np.zeros(width)
     for name in sorted(expression.names):
         if slopes[name].any():
-            total = total + evaluate(_slope(expression, name), values) * slopes[name]
+            total = total + _derivative(expression, name, values) * slopes[name]
     return total
+
+
+def _derivative(expression: Expression, name: str, values: Mapping[str, float]) -> float:
+    """Return the derivative of an expression by one name; at a kink or root, its limit from both sides."""
+    found = _slope(expression, name)
+    if not any(is_at_edge(node, values) for node in ast.walk(expression.tree) if isinstance(node, ast.expr)):
+        return evaluate(found, values)
+    size = abs(values[name]) or 1.0
+
+    def near(distance: float) -> np.ndarray:
+        try:
+            return np.array([[evaluate(found, {**values, name: values[name] + distance * size})]])
+        except ExpressionError:  # it has no value on this side
+            return np.array([[np.nan]])
+
+    sides = [limit_of([near(sign * distance) for distance in DISTANCES]) for sign in (1.0, -1.0)]
+    value = float(agreed(sides)[0, 0])
+    if np.isnan(value):
+        raise UsageError(
+            f"{expression.text} has no derivative by {name} at {name} = {values[name]:.6g}",
+            remedy=f"do not request derivatives by {name}, or use another value",
+        )
+    return value
 
 
 @lru_cache(maxsize=4096)
