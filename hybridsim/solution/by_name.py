@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Never, TypeVar
+from typing import Any, Never, TypeVar
 
 from hybridsim.errors import UsageError, nearest
 
@@ -10,7 +10,19 @@ T = TypeVar("T")
 
 
 class ByName(dict[str, T]):
-    """A dict that suggests similar keys in the error for an unknown key."""
+    """A dict that suggests similar keys in the error for an unknown key.
+
+    Parameters
+    ----------
+    remark : a restriction of all values, which is printed with them.
+    """
+
+    def __init__(self, *entries: Any, remark: str = "") -> None:
+        super().__init__(*entries)
+        self.remark = remark
+
+    def __repr__(self) -> str:
+        return f"{super().__repr__()} ({self.remark})" if self.remark else super().__repr__()
 
     def __missing__(self, name: object) -> Never:
         raise UsageError(

@@ -10,6 +10,8 @@ import numpy as np
 from hybridsim.arguments import as_times, two_numbers
 from hybridsim.calls import refusing
 from hybridsim.errors import UsageError
+from hybridsim.expr.grammar import TIME
+from hybridsim.model.parts.impact import OPEN
 from hybridsim.solution.by_name import ByName
 from hybridsim.solution.events_and_modes import EventsAndModes
 from hybridsim.solution.quadrature import integral
@@ -31,7 +33,7 @@ class Energies(EventsAndModes):
 
         Parameters
         ----------
-        *quantities : names of states and other quantities, such as a force and the velocity of its point.
+        *quantities : names of states and other quantities, such as a force and the velocity of its point; "t" is time.
         t_span : (a, b), a part of the run; by default all of it. It may be reversed, with a change of sign.
 
         Returns
@@ -57,12 +59,14 @@ class Energies(EventsAndModes):
                 remedy='use the name of one, or of several: sol.integral("f", "v")',
             )
         for name in quantities:
-            self.output(name, self.t_start)
+            if name != TIME:
+                self.output(name, self.t_start)
 
         def product(times: np.ndarray) -> np.ndarray:
-            return np.prod([self._trajectory.values(name, times, "+") for name in quantities], axis=0)[
-                :, None
+            factors = [
+                times if name == TIME else self._trajectory.values(name, times, "+") for name in quantities
             ]
+            return np.prod(factors, axis=0)[:, None]
 
         whole = (self.t_start, self.t_end)
         first, last = whole if t_span is None else two_numbers(t_span, "t_span", "use two times, (a, b)")
@@ -84,14 +88,19 @@ class Energies(EventsAndModes):
 
         f is the friction force of the contact, positive for a positive relative velocity v_rel. The unit is that of the
         force times that of the velocity times that of t. A contact whose law has states of its own, such as LuGre,
-        stores a part of it. The impulses of friction in an impact are not contained. A run that did not store its
-        states raises `UsageError`.
+        stores a part of it. The impulses of friction in impacts are not contained. After a run with impacts, the
+        printed result says so. A run that did not store its states raises `UsageError`.
         """
         contacts = [contact.name for contact in self.model.contacts]
         if not contacts:
             return ByName()
         found = self._integrated(self._trajectory.friction_powers, self.t_start, self.t_end, len(contacts))
-        return ByName(zip(contacts, found.tolist(), strict=True))
+        impacts = {impact.name for impact in self.model.impacts}
+        count = (
+            len({e.t for e in self.events if e.component in impacts and e.source == OPEN}) if impacts else 0
+        )
+        remark = f"without the impulses of friction in {count} impact{'s' * (count > 1)}" if count else ""
+        return ByName(zip(contacts, found.tolist(), strict=True), remark=remark)
 
     @property
     def work(self) -> dict[str, float]:

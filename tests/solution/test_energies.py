@@ -174,3 +174,25 @@ def test_what_is_refused() -> None:
 def test_a_model_without_contacts_dissipates_nothing() -> None:
     model = hs.Model("free", states=[hs.State("x", 1, "-x")])
     assert hs.simulate(model, (0, 1)).dissipated == {}
+
+
+def test_time_is_a_quantity_of_an_integral() -> None:
+    """The integral of t from 1 to 3 is 4, and that of t v for the constant v = 2 is 8."""
+    model = hs.Model("line", states=[hs.State("x", 0, "2")], outputs=[hs.Output("v", "2")])
+    sol = hs.simulate(model, (1, 3), integrator="dop853")
+    assert sol.integral("t") == pytest.approx(4.0, rel=1e-13)
+    assert sol.integral("t", "v") == pytest.approx(8.0, rel=1e-13)
+
+
+def test_energy_lost_in_impulses_is_said_to_be_missing() -> None:
+    """A body with horizontal speed falls from 0.5 m and strikes the floor once: its friction acts in the impulse."""
+    model = hs.Model(
+        "skid",
+        states=[
+            hs.State("h", 0.5, "w"), hs.State("w", 0, "-10 + p"), hs.State("x", 0, "v"), hs.State("v", 1, "-f")
+        ],
+        contacts=[hs.Contact("f", velocity="v", normal="p", law="coulomb", arguments={"mu": 0.1})],
+        impacts=[hs.Impact("p", gap="h", restitution="0")],
+    )  # fmt: skip
+    assert "without the impulses of friction in 1 impact" in repr(hs.simulate(model, (0, 1)).dissipated)
+    assert "impulses" not in repr(hs.simulate(model, (0, 0.1)).dissipated)

@@ -45,8 +45,8 @@ def limit_of(near: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
 
     The limit is infinite if the values do not converge, and NaN without values.
     """
-    first, second = near[1] - near[0], near[2] - near[1]
     with np.errstate(all="ignore"):
+        first, second = near[1] - near[0], near[2] - near[1]
         largest = np.abs(near[2][np.isfinite(near[2])]).max(initial=0.0)
         is_settled = np.abs(second) <= _ROUNDING * np.abs(near[2]) + _NOISE * largest
         ratio = second / first
