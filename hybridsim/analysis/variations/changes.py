@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hybridsim.analysis.variations.no_derivative import argument_names, no_derivative
 from hybridsim.analysis.variations.tapes import tangent_tape
+from hybridsim.analysis.variations.values.no_derivative import argument_names, no_derivative
 from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
 from hybridsim.engine.system.system import System
 

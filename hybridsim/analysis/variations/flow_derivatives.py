@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from hybridsim.analysis.variations.no_derivative import argument_names, no_derivative
 from hybridsim.analysis.variations.smooth import (
     Intervals,
     Steps,
@@ -17,6 +16,7 @@ from hybridsim.analysis.variations.smooth import (
     transitions,
 )
 from hybridsim.analysis.variations.tapes import tangent_tape
+from hybridsim.analysis.variations.values.no_derivative import argument_names, no_derivative
 from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
 from hybridsim.engine.record.segments import Segment
 from hybridsim.engine.series.dual_numbers import differentiated, values_and_slopes, with_slopes

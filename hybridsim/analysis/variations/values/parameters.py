@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from hybridsim.analysis.variations.no_derivative import is_at_edge
+from hybridsim.analysis.variations.values.no_derivative import is_at_edge
 from hybridsim.engine.system.slopes_at_edge import DISTANCES, agreed, limit_of
 from hybridsim.errors import ExpressionError, UsageError
 from hybridsim.expr import Expression, evaluate
