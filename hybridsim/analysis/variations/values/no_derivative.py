@@ -50,7 +50,7 @@ def _edges(system: System, states: Sequence[str], values: Mapping[str, float]) -
     trees = [state.der.tree for state in model.states if state.name in states or not states]
     trees += [e.tree for mode in modes for name, e in mode.der.items() if name in states or not states]
     trees += [e.tree for mode in modes for e in mode.set.values()]
-    trees += [guard.when.tree for mode in modes for guard in mode.guards if not states]
+    trees += [guard.expr.tree for mode in modes for guard in mode.guards if not states]
     trees += [meanings.definitions[name] for name in sorted(meanings.reached(trees))]
     seen = set()
     for node in (part for tree in trees for part in ast.walk(tree)):
