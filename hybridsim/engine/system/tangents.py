@@ -109,11 +109,10 @@ def run_tangents(
     D: Any,
     values: Any,
     tangents: Any,
-    edges: Any,
 ) -> None:
     """Write values and derivatives of some registers at times s (m,) and states x (m, n).
 
-    edges (m,): whether an operation may have no derivative there.
+    The last column of values is 1 if an operation may have no derivative there, and else 0.
     seeds (n + 1 + P, D): directions of the states, of local time, and of each entry of p.
     """
     time, states = inputs.time[0], inputs.states
@@ -137,10 +136,12 @@ def run_tangents(
             for j in range(D.shape[1]):
                 D[states[i], j] = seeds[i, j]
         advance(rows, V, 0)
+        is_at_edge = False
         for r in range(rows.shape[0]):
             op, a, b, c, out = rows[r, 0], rows[r, 1], rows[r, 2], rows[r, 3], rows[r, 4]
             _tangent(op, a, b, c, out, V, D)
-            edges[m] |= _is_at_edge(op, a, b, c, out, V, D)
+            is_at_edge |= _is_at_edge(op, a, b, c, out, V, D)
+        values[m, outputs.shape[0]] = 1.0 if is_at_edge else 0.0
         for i in range(outputs.shape[0]):
             values[m, i] = V[outputs[i], 0]
             for j in range(D.shape[1]):
@@ -206,11 +207,10 @@ class TangentTape:
     ) -> tuple[Tangents, np.ndarray]:
         """Return values and derivatives by the rules of the operations, and the mask of points at an edge."""
         count, outputs, directions = self._registers.count, len(self._outputs), seeds.shape[1]
-        values, slopes = np.empty((len(s), outputs)), np.empty((len(s), outputs, directions))
-        edges = np.zeros(len(s), dtype=np.bool_)
+        values, slopes = np.empty((len(s), outputs + 1)), np.empty((len(s), outputs, directions))
         run_tangents(
             self._rows, self._registers.inputs, np.ascontiguousarray(seeds), self._outputs,
             np.ascontiguousarray(s, dtype=float), np.ascontiguousarray(x, dtype=float), p,
-            np.zeros((count, 1)), np.zeros((count, directions)), values, slopes, edges,
+            np.zeros((count, 1)), np.zeros((count, directions)), values, slopes,
         )  # fmt: skip
-        return Tangents(values, slopes), edges
+        return Tangents(values[:, :-1], slopes), values[:, -1] > 0.0
