@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from hybridsim.solution import Solution
 
 
-KEEP_ALL = Default("all")
+ALL_PARTS = Default("all")
 
 
 @overload
@@ -54,7 +54,7 @@ def simulate(
     max_step: float = math.inf,
     first_step: float | None = None,
     t_eval: Sequence[float] | None = None,
-    keep: str | float = KEEP_ALL,
+    keep: str | float = ALL_PARTS,
     limits: Mapping[str, float] | None = None,
     progress: Callable[[float], None] | bool | None = None,
     **options: Any,

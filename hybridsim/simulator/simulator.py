@@ -16,7 +16,7 @@ from hybridsim.errors import UsageError, nearest
 from hybridsim.mechanics.declaration.system import MechanicalSystem
 from hybridsim.model import Model
 from hybridsim.preparation import prepared
-from hybridsim.simulate import KEEP_ALL, KEYWORDS, simulate
+from hybridsim.simulate import ALL_PARTS, KEYWORDS, simulate
 from hybridsim.simulator.current_state import CurrentState
 from hybridsim.simulator.ownership import Ownership
 from hybridsim.simulator.position import Position, advanced, begun, changed, require_running
@@ -114,7 +114,7 @@ class Simulator(CurrentState):
         x0: Mapping[str, float] | Sequence[float] | None = None,
         z0: Mapping[str, str] | None = None,
         t_eval: Sequence[float] | None = None,
-        keep: str | float = KEEP_ALL,
+        keep: str | float = ALL_PARTS,
         limits: Mapping[str, float] | None = None,
         progress: Callable[[float], None] | bool | None = None,
         **former: Any,
