@@ -53,16 +53,23 @@ class _Settings(NamedTuple):
     first_step: float | None
 
 
+class _SettingsOfRuns(dict[tuple[Any, ...], _Settings]):
+    """Settings by the arguments of runs; a pickled model leaves them behind, because a method may be a local class."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _SettingsOfRuns, ()
+
+
 def _known_settings(model: Model, key: tuple[Any, ...] | None) -> _Settings | None:
     """Return the settings of an earlier run of a model with the same structure and the same arguments."""
-    known: dict[Any, _Settings] = model.once("settings of runs", dict)
+    known: _SettingsOfRuns = model.once("settings of runs", _SettingsOfRuns)
     found = None if key is None else known.get(key)
     is_registered = found is not None and type(found.method) is integrator_class(found.method.name)
     return found if is_registered else None
 
 
 def _store_settings(model: Model, key: tuple[Any, ...], settings: _Settings) -> None:
-    known: dict[Any, _Settings] = model.once("settings of runs", dict)
+    known: _SettingsOfRuns = model.once("settings of runs", _SettingsOfRuns)
     if len(known) >= _MAX_RUNS:
         known.clear()
     known[key] = settings
