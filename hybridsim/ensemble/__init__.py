@@ -1,4 +1,4 @@
 """This package runs one model for many parameter values and starts together, in compiled code.
 
-Start with `runs`, then `run` and `start`.
+Start with `group`. `runs` and `run` follow runs to their last periods, `orbits` and `search` find steady motions.
 """

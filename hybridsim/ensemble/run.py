@@ -93,8 +93,9 @@ def run_ensemble(
                 at[NEXT] += 1
                 continue
             if keeps_holding(tapes, tables, state, work, own.c):
-                _take_rest(hold, runs.periods[i], state, found)
-                _store_results(found, runs, i)
+                take_rest(hold, runs.periods[i], state, found)
+                store_summary(found, runs, i)
+                runs.done[i] = True
                 at[NEXT] += 1
                 continue
             put(rates, loop.rates)
@@ -112,12 +113,13 @@ def run_ensemble(
         if code == AT_TARGET:
             first, begin = _begin(common, at[STORED], count, runs.ends[i] - runs.periods[i])
             if first >= 0:
-                _clear(found)
+                clear_summary(found)
                 if sum_up(
                     tables, hold, (rows.ends, rows.rows, common.modes, rows.coordinates, common.jumps),
                     first, SEGMENTS + count, begin, rule[0], rule[1], (own.v, slopes), found,
                 ):  # fmt: skip
-                    _store_results(found, runs, i)
+                    store_summary(found, runs, i)
+                    runs.done[i] = True
             count = 0
         elif count > 0:
             at[RESUMED] += 0 if code == FULL else 1
@@ -154,7 +156,8 @@ def _shift_back(record: Any, rows: Any, stored: int, count: int) -> None:
 
 
 @inlined
-def _clear(found: Any) -> None:
+def clear_summary(found: Any) -> None:
+    """Set a `MotionSummary` to that of no motion."""
     for i in range(found.extremes.shape[1]):
         found.extremes[0, i], found.extremes[1, i] = np.inf, -np.inf
         found.integrals[0, i] = found.integrals[1, i] = 0.0
@@ -163,7 +166,7 @@ def _clear(found: Any) -> None:
 
 
 @inlined
-def _take_rest(hold: Any, period: float, state: Any, found: Any) -> None:
+def take_rest(hold: Any, period: float, state: Any, found: Any) -> None:
     """Write the results of a last period in which nothing moves."""
     x, z = state.x, state.z
     for i in range(x.shape[0]):
@@ -177,8 +180,8 @@ def _take_rest(hold: Any, period: float, state: Any, found: Any) -> None:
 
 
 @inlined
-def _store_results(found: Any, runs: Any, i: int) -> None:
-    runs.done[i] = True
+def store_summary(found: Any, runs: Any, i: int) -> None:
+    """Store a `MotionSummary` as that of run `i`."""
     for side in range(2):
         put(found.extremes[side], runs.extremes[i, side])
         put(found.integrals[side], runs.integrals[i, side])

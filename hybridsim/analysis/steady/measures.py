@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import cached_property
 from typing import NamedTuple
 
@@ -38,21 +38,37 @@ class UnknownName(UsageError, KeyError):
 class ByName(Mapping[str, float]):
     """The values of one measure by the names of the quantities, computed on demand.
 
-    Quantities that cannot be read (`unreadable`) are not items of it; accessing them raises an error with the
-    reason.
+    Quantities that cannot be read are not items of it; accessing them raises an error with the reason.
+
+    Parameters
+    ----------
+    listed : returns the names of all quantities, and of those that cannot be read.
+    measure : returns a value by the name of a quantity.
+    kind : of the quantities, for errors.
+    known : values that are known already, by the name of a quantity.
     """
 
     def __init__(
         self,
-        names: tuple[str, ...],
+        listed: Callable[[], tuple[Iterable[str], frozenset[str]]],
         measure: Callable[[str], float],
         kind: str,
-        unreadable: frozenset[str] = frozenset(),
+        known: Mapping[str, float] | None = None,
     ) -> None:
-        self._measure, self._kind, self._unreadable = measure, kind, unreadable
-        self._names = tuple(name for name in names if name not in unreadable)
+        self._listed, self._measure, self._kind, self._known = listed, measure, kind, known or {}
+
+    @cached_property
+    def _unreadable(self) -> frozenset[str]:
+        return self._listed()[1]
+
+    @cached_property
+    def _names(self) -> tuple[str, ...]:
+        names, unreadable = self._listed()
+        return tuple(name for name in names if name not in unreadable)
 
     def __getitem__(self, name: str) -> float:
+        if isinstance(name, str) and name in self._known:
+            return self._known[name]
         if not isinstance(name, str) or (name not in self._names and name not in self._unreadable):
             raise UnknownName(
                 f"the steady state has no {self._kind} {name!r}",
@@ -93,8 +109,15 @@ class Measures:
         system = self.solution._system
         return tuple(system.automata[c].name for c in system.surface_of)
 
-    def _each(self, measure: Callable[[str], float]) -> ByName:
-        return ByName(self._names, measure, "quantity", self._orbit.too_fast)
+    def _each(self, head: str, measure: Callable[[str], float]) -> ByName:
+        return ByName(lambda: (self._names, self._orbit.too_fast), measure, "quantity", self._summed(head))
+
+    def _of_contacts(self, head: str, measure: Callable[[str], float]) -> ByName:
+        return ByName(lambda: (self._contacts, frozenset()), measure, "contact", self._summed(head))
+
+    def _summed(self, head: str) -> dict[str, float]:
+        """Return the values of one measure that the summary of the motion contains."""
+        return {}
 
     @property
     def too_fast(self) -> tuple[str, ...]:
@@ -107,32 +130,32 @@ class Measures:
     @property
     def minimum(self) -> ByName:
         """Least value of each quantity over the period."""
-        return self._each(lambda q: self._extreme(q, 0))
+        return self._each("minimum", lambda q: self._extreme(q, 0))
 
     @property
     def maximum(self) -> ByName:
         """Greatest value of each quantity over the period."""
-        return self._each(lambda q: self._extreme(q, 1))
+        return self._each("maximum", lambda q: self._extreme(q, 1))
 
     @property
     def amplitude(self) -> ByName:
         """(max - min)/2 of each quantity, from its dense output."""
-        return self._each(lambda q: 0.5 * (self._extreme(q, 1) - self._extreme(q, 0)))
+        return self._each("amplitude", lambda q: 0.5 * (self._extreme(q, 1) - self._extreme(q, 0)))
 
     @property
     def peak(self) -> ByName:
         """Largest absolute value of each quantity, from its dense output."""
-        return self._each(lambda q: max(abs(self._extreme(q, 0)), abs(self._extreme(q, 1))))
+        return self._each("peak", lambda q: max(abs(self._extreme(q, 0)), abs(self._extreme(q, 1))))
 
     @property
     def mean(self) -> ByName:
         """Mean of each quantity over the period."""
-        return self._each(lambda q: self._orbit.integral(self._orbit.of(q)) / self._orbit.duration)
+        return self._each("mean", lambda q: self._orbit.integral(self._orbit.of(q)) / self._orbit.duration)
 
     @property
     def energy(self) -> ByName:
         """Integral of q^2 over the period (He et al. 2026, eq. 5)."""
-        return self._each(lambda q: self._orbit.integral(self._orbit.of(q) ** 2))
+        return self._each("energy", lambda q: self._orbit.integral(self._orbit.of(q) ** 2))
 
     def harmonic(self, name: str, k: int = 1) -> complex:
         """Return the amplitude c_k of q(t) = c_0 + sum of Re(c_k exp(2 pi i k t/T)), with the forcing's time t.
@@ -154,10 +177,9 @@ class Measures:
         remember = [c.name for c in self.solution.model.contacts if c.name not in self._contacts]
         contacts, too_fast = (*self._contacts, *remember), self._orbit.too_fast
         return ByName(
-            contacts,
+            lambda: (contacts, frozenset(c for c in contacts if {c, f"velocity of {c}"} & too_fast)),
             lambda c: self._orbit.integral(self._orbit.of(c) * self._velocity(c)),
             "contact",
-            frozenset(c for c in contacts if {c, f"velocity of {c}"} & too_fast),
         )
 
     def _velocity(self, contact: str) -> np.ndarray:
@@ -180,7 +202,7 @@ class Measures:
     @property
     def stick_fraction(self) -> ByName:
         """Fraction of the period that each contact spends in stick."""
-        return ByName(self._contacts, self._stuck, "contact")
+        return self._of_contacts("stick_fraction", self._stuck)
 
     def _stuck(self, contact: str) -> float:
         hold = self.held_mode(contact)
@@ -198,7 +220,7 @@ class Measures:
     @property
     def stops_per_period(self) -> ByName:
         """Number of stops of each contact per period."""
-        return ByName(self._contacts, self._stops, "contact")
+        return self._of_contacts("stops_per_period", self._stops)
 
     def _stops(self, contact: str) -> float:
         """Count the stick intervals; one across the end counts once, and permanent stick is not counted."""

@@ -11,10 +11,12 @@ import numpy as np
 from hybridsim.analysis.steady.measures import Measures
 from hybridsim.analysis.steady.motion import Motion
 from hybridsim.analysis.steady.orbit import Orbit as PeriodOrbit
+from hybridsim.analysis.steady.period_readings import Summarised, summed
 from hybridsim.analysis.steady.resolving import orbit_of
 from hybridsim.analysis.steady.shooting import Orbit, multipliers, rates_at_end
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.arguments import whole_number
+from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import HybridsimError, UsageError
 from hybridsim.files import fields_of
 from hybridsim.model import Model
@@ -48,7 +50,7 @@ class SteadyState(Readable, Measures):
 
     Other Parameters
     ----------------
-    motion, kind, orbit, is_free, newton_steps, periods, message : object
+    motion, kind, orbit, is_free, newton_steps, periods, message, summarised : object
         Passed on by `steady_state`; do not construct it by hand.
 
     Examples
@@ -68,7 +70,9 @@ class SteadyState(Readable, Measures):
         newton_steps: int,
         periods: int,
         message: str,
+        summarised: Summarised | None = None,
     ) -> None:
+        self._summarised = summarised
         self.kind, self.newton_steps, self.periods, self.message = kind, newton_steps, periods, message
         self.lyapunov = math.nan
         self._motion, self._closed, self._is_free = motion, orbit, is_free
@@ -105,6 +109,9 @@ class SteadyState(Readable, Measures):
     @property
     def _phase(self) -> float:
         return 0.0 if self._closed is None else self._closed.start.at
+
+    def _summed(self, head: str) -> dict[str, float]:
+        return {} if self._summarised is None else summed(head, self._summarised, system_of(self.model))
 
     @cached_property
     def _orbit(self) -> PeriodOrbit:

@@ -32,6 +32,14 @@ from hybridsim.analysis.steady.settling import (
 )
 from hybridsim.analysis.steady.shooting import Orbit, followed_closely, shoot
 from hybridsim.analysis.steady.shortest_period import with_shortest_period
+from hybridsim.analysis.steady.together import (
+    EQUILIBRIUM,
+    PERIODIC,
+    Effort,
+    Settled,
+    can_be_compiled,
+    settled,
+)
 from hybridsim.analysis.variations.sensitivities import derivatives
 from hybridsim.analysis.variations.sizes import ranges
 from hybridsim.arguments import cannot_be
@@ -44,9 +52,7 @@ from hybridsim.expr import evaluate
 from hybridsim.model import Model
 from hybridsim.simulate import simulate
 
-_SETTLE = 32  # periods of the first run
 _MAX_PERIODS_PER_RUN = 512
-_MAX_PERIODS = 4096
 _MAX_PERIODS_EVER = 10**6  # more would take days
 _TIME_BUDGET = 60.0  # approximate seconds for these periods
 _DURATION = 100.0  # of a first run without forcing, if the model has no duration
@@ -62,13 +68,7 @@ _COMMENSURATE = 1e-9
 _TIGHTER = 1e-2  # the runs' tolerance relative to that of the steady state
 _NOTHING_LEFT = 1e-13  # of the scale that a state once had
 _NEUTRAL = 1e-3  # a smaller exponent per period is zero
-PERIODIC, EQUILIBRIUM, QUASI, CHAOTIC, UNSETTLED = (
-    "periodic",
-    "equilibrium",
-    "quasi-periodic",
-    "chaotic",
-    "not settled",
-)
+QUASI, CHAOTIC, UNSETTLED = "quasi-periodic", "chaotic", "not settled"
 
 
 @refusing
@@ -81,9 +81,9 @@ def steady_state(
     period: float | None = None,
     integrator: str = "auto",
     rtol: float | None = None,
-    tol: float = 1e-10,
-    settle: int = _SETTLE,
-    max_periods: int = _MAX_PERIODS,
+    tol: float = Effort().tol,
+    settle: int = Effort().settle,
+    max_periods: int = Effort().max_periods,
     progress: Callable[[float], None] | bool | None = None,
     **options: Any,
 ) -> SteadyState:
@@ -147,7 +147,10 @@ def steady_state(
         raise cannot_be("tol", tol, "use a relative tolerance between 0 and 1, such as 1e-10")
     system = system_of(model)
     _refuse_what_ends(system, period is not None)
-    own = common_period(system)
+    given, own = (
+        {"x0": x0, "z0": z0, "period": period, "integrator": integrator, **options},
+        common_period(system),
+    )
     if period is None:
         period = own
     else:
@@ -161,7 +164,11 @@ def steady_state(
     motion = Motion(model, {**method, **options}, {"x0": x0, "z0": z0})
     for name, count in (("settle", settle), ("max_periods", max_periods)):
         arguments.whole_number(count, name, 1, _MAX_PERIODS_EVER)
-    motion.time_budget = _TIME_BUDGET * max(1.0, max_periods / _MAX_PERIODS)
+    if own is not None and can_be_compiled(system, given):
+        together = settled(motion, Effort(tol, settle, max_periods))
+        if together is not None:
+            return _settled(motion, together)
+    motion.time_budget = _TIME_BUDGET * max(1.0, max_periods / Effort().max_periods)
     search = _Search(motion, period, tol, settle, max_periods)
     try:
         if period is None and (periods := all_periods(system)):
@@ -335,17 +342,9 @@ class _Search:
         steps = orbit.steps
         orbit = with_shortest_period(self.motion, orbit, self.scale, self.period is not None, self.tol)
         self.newton_steps += orbit.steps - steps
-        if self._rests(orbit):
-            message = f"equilibrium: all motion is rounding; residual {orbit.residual:.1e}"
-            return _found(
-                self.motion, EQUILIBRIUM, orbit, self.period is None, self.newton_steps, self.periods, message
-            )
-        multiple = orbit.multiple
-        what = "" if multiple == 1 else f" of {multiple} periods of the forcing" if self.period else ""
-        message = f"periodic motion{what}; residual {orbit.residual:.1e}"
-        return _found(
-            self.motion, PERIODIC, orbit, self.period is None, self.newton_steps, self.periods, message
-        )
+        kind = EQUILIBRIUM if self._rests(orbit) else PERIODIC
+        message = _message(kind, orbit, self.period is not None)
+        return _found(self.motion, kind, orbit, self.period is None, self.newton_steps, self.periods, message)
 
     def _rests(self, orbit: Orbit) -> bool:
         """Return whether all motion along an orbit is within rounding errors."""
@@ -426,6 +425,21 @@ def _found(
     message: str = "",
 ) -> SteadyState:
     return SteadyState(motion.unwatched(), kind, orbit, is_free, newton_steps, periods, message or kind)
+
+
+def _settled(motion: Motion, found: Settled) -> SteadyState:
+    """Return the result of a search in compiled code."""
+    kind, orbit, message = found.kind, found.orbit, _message(found.kind, found.orbit, True)
+    return SteadyState(
+        motion.unwatched(), kind, orbit, False, orbit.steps, found.followed, message, found.period
+    )
+
+
+def _message(kind: str, orbit: Orbit, is_forced: bool) -> str:
+    if kind == EQUILIBRIUM:
+        return f"equilibrium: all motion is rounding; residual {orbit.residual:.1e}"
+    what = f" of {orbit.multiple} periods of the forcing" if is_forced and orbit.multiple > 1 else ""
+    return f"periodic motion{what}; residual {orbit.residual:.1e}"
 
 
 def _check_period(model: Model, period: float, own: float | None) -> None:

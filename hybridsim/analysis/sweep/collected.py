@@ -19,7 +19,7 @@ class Collected:
 
     def __init__(self, total: int) -> None:
         self.status = np.full(total, NOT_RUN, dtype=object)
-        self.done = 0
+        self.done = self.one_by_one = 0
         self._arrays: dict[str, np.ndarray] = {}
         self._first_positions: dict[
             str, tuple[int, int]

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybridsim.analysis.steady.measures import Measures
-from hybridsim.analysis.sweep.parameters import Setter
-from hybridsim.analysis.sweep.work.job import DONE, Job, Outcome, Settings, Watch
+from hybridsim.analysis.steady.period_readings import Reader, period_reader
+from hybridsim.analysis.sweep.work.job import Job, Outcome, Settings, Together, Watch
+from hybridsim.analysis.sweep.work.together import PointsTogether
 from hybridsim.engine.system.period import common_period
+from hybridsim.engine.system.system import System
 from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import SimulationError, UsageError
 from hybridsim.model import Model
@@ -23,8 +25,6 @@ if TYPE_CHECKING:
     from hybridsim.solution import Solution
 
 OF_MOTION = ("period", "residual", "word")
-_OF_STATES = ("amplitude", "peak", "maximum", "minimum", "mean", "energy")
-_OF_CONTACTS = ("stick_fraction", "stops_per_period")
 _SMALLEST = 1e-3  # relative to a state's size; the least range used to scale its change
 
 
@@ -75,33 +75,21 @@ class LastPeriod:
         points: Sequence[Settings],
         alone: Callable[[Settings], Outcome],
         watch: Watch,
-    ) -> list[Outcome] | None:
-        """Run all points in one compiled call, or return None; the function `alone` runs the points that fail in it.
-
-        If the watch requests a stop, the outcomes are those of the first points, as far as they were run.
-        """
-        from hybridsim.ensemble.runs import Ensemble, can_run_together
+    ) -> Together | None:
+        """Run all points in compiled code, or return None; the function `alone` runs the points that fail in it."""
+        from hybridsim.ensemble.group import Ensemble, can_run_together
+        from hybridsim.ensemble.runs import last_periods
 
         system = system_of(job.model)
         readers = [_reader(word, system) for word in self.reading_names]
         if not self._is_plain() or None in readers or not can_run_together(system):
             return None
-        parameters, starts, sound = Setter(job.model, job.names, job.at).values(points)
-        outcomes: list[Outcome | None] = [None] * len(points)
-        for last in Ensemble(system, watch.may_continue).runs(parameters[sound], starts[sound], self.after):
-            rows = np.array([read(last) for read in readers if read]).T.tolist()
-            for number, row in zip(sound[last.numbers].tolist(), rows, strict=True):
-                outcomes[number] = _outcome(dict(zip(self.reading_names, row, strict=True)))
-            watch.tell(len(rows))
-        known: list[Outcome] = []
-        for outcome, settings in zip(outcomes, points, strict=True):
-            if outcome is None:
-                if not watch.may_continue():
-                    break
-                outcome = alone(settings)
-                watch.tell(1)
-            known.append(outcome)
-        return known
+        batch = PointsTogether(job, points, alone, watch)
+        ensemble = Ensemble(system, watch.may_continue)
+        for last in last_periods(ensemble, batch.parameters, batch.starts, self.after):
+            rows = zip(*(read(last).tolist() for read in readers if read), strict=True)
+            batch.put(last.numbers, [dict(zip(self.reading_names, row, strict=True)) for row in rows])
+        return batch.finished()
 
     def _is_plain(self) -> bool:
         return self.options.get("integrator", "auto") in ("auto", "exact") and not self.options.keys() - {
@@ -126,43 +114,13 @@ def period_of(model: Model) -> float:
     return period
 
 
-def _outcome(found: dict[str, Any]) -> Outcome:
-    missing = [word for word, value in found.items() if not math.isfinite(value)]
-    return Outcome(f"not a number: {', '.join(missing)}" if missing else DONE, found)
-
-
-def _reader(word: str, system: Any) -> Callable[[LastPeriods], np.ndarray] | None:
+def _reader(word: str, system: System) -> Reader | None:
     """Return a function that computes one value from sums over the last periods, or None."""
-    head, _, rest = word.partition(".")
-    if head == "period":
+    if word == "period":
         return lambda last: last.periods
-    if head == "residual":
+    if word == "residual":
         return _residuals
-    if head in _OF_STATES and rest in system.names:
-        return _of_state(head, system.names.index(rest))
-    contacts = [automaton.name for automaton in system.automata]
-    if head in _OF_CONTACTS and rest in contacts:
-        c = contacts.index(rest)
-        if head == "stick_fraction":
-            return lambda last: last.summary.held[:, 0, c] / last.periods
-        # an interval across the end of the period counts once, permanent stick counts zero
-        return lambda last: last.summary.held[:, 1, c] - last.summary.holding[:, :, c].all(axis=1)
-    return None
-
-
-def _of_state(head: str, i: int) -> Callable[[LastPeriods], np.ndarray]:
-    def read(last: LastPeriods) -> np.ndarray:
-        low, high = last.summary.extremes[:, :, i].T
-        whole, squares = last.summary.integrals[:, :, i].T
-        if head == "amplitude":
-            return np.asarray(0.5 * (high - low))
-        if head == "peak":
-            return np.maximum(np.abs(low), np.abs(high))
-        if head == "mean":
-            return np.asarray(whole / last.periods)
-        return {"maximum": high, "minimum": low, "energy": squares}[head]
-
-    return read
+    return period_reader(word, system)
 
 
 def _residuals(last: LastPeriods) -> np.ndarray:

@@ -3,18 +3,31 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from hybridsim.analysis.compare.comparison_request import whole
 from hybridsim.analysis.keyword_options import refuse_unknown
+from hybridsim.analysis.steady.period_readings import Reader, period_reader
 from hybridsim.analysis.steady.result import SteadyState
 from hybridsim.analysis.steady.steady_state import steady_state
+from hybridsim.analysis.steady.together import (
+    EQUILIBRIUM,
+    PERIODIC,
+    can_be_compiled,
+    effort_of,
+    steady_motions,
+)
 from hybridsim.analysis.sweep.last_period import OF_MOTION, LastPeriod, MeasuredPeriod, period_of
-from hybridsim.analysis.sweep.work.job import Incomplete
+from hybridsim.analysis.sweep.work.job import Incomplete, Job, Outcome, Settings, Together, Watch
+from hybridsim.analysis.sweep.work.together import PointsTogether
 from hybridsim.arguments import cannot_be
 from hybridsim.calls import Default
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.system_cache import system_of
 from hybridsim.errors import SimulationError, UsageError, nearest
 from hybridsim.model import Model
 from hybridsim.model.checks.units import time_unit, units_of
@@ -57,6 +70,28 @@ class Steady:
             }
             raise Incomplete(f"{result.kind}: {result.message}", known)
         return {word: _reading(result, word) for word in self.reading_names}
+
+    def together(
+        self,
+        job: Job,
+        points: Sequence[Settings],
+        alone: Callable[[Settings], Outcome],
+        watch: Watch,
+    ) -> Together | None:
+        """Find the steady states of all points in compiled code, or return None.
+
+        The function `alone` measures the points that compiled code cannot decide.
+        """
+        system, checked = system_of(job.model), effort_of(self.options)
+        readers = {word: _steady_reader(word, system) for word in self.reading_names}
+        if checked is None or None in readers.values() or not can_be_compiled(system, self.options):
+            return None
+        batch = PointsTogether(job, points, alone, watch)
+        for found in steady_motions(system, batch.parameters, batch.starts, checked, watch.may_continue):
+            rows = zip(*(read(found).tolist() for read in readers.values() if read), strict=True)
+            blank = [("period",) if rests else () for rests in found.rests.tolist()]
+            batch.put(found.numbers, [dict(zip(readers, row, strict=True)) for row in rows], blank)
+        return batch.finished()
 
     def blank(self, result: SteadyState) -> tuple[str, ...]:
         """Return the values that a result does not have, such as the period of an equilibrium, as NaN."""
@@ -186,6 +221,19 @@ def _of(word: str, names: Sequence[str], kind: str) -> str:
     if name not in names:
         raise UsageError(f"there is no measure {word!r}", remedy=nearest(name, names, kind=kind))
     return name
+
+
+def _steady_reader(word: str, system: System) -> Reader | None:
+    """Return a function that computes one value of `hybridsim.ensemble.orbits.Orbits`, or None."""
+    of_motion: dict[str, Reader] = {
+        "period": lambda found: np.where(found.rests, math.nan, found.periods),
+        "multiple": lambda found: np.where(found.rests, 0.0, found.multiples),
+        "residual": lambda found: found.residuals,
+        "newton_steps": lambda found: found.newton_steps.astype(float),
+        "periods": lambda found: found.followed.astype(float),
+        "kind": lambda found: np.where(found.rests, EQUILIBRIUM, PERIODIC),
+    }
+    return of_motion.get(word) or period_reader(word, system)
 
 
 def _reading(steady: SteadyState | MeasuredPeriod, word: str) -> Any:

@@ -55,6 +55,8 @@ class Sweep(Readable):
         Whether Ctrl-C ended it; the points that were not run have the status "not run".
     wall_time, executor : float, str, optional
         The total time in seconds, and the executor that did the work.
+    one_by_one : int, optional
+        Number of points that were measured one by one in this call. Compiled code measures all others together.
 
     Examples
     --------
@@ -74,6 +76,7 @@ class Sweep(Readable):
     interrupted: bool = False
     wall_time: float = math.nan
     executor: str = ""
+    one_by_one: int = 0
 
     @property
     def dimensions(self) -> tuple[str, ...]:
@@ -150,6 +153,7 @@ class Sweep(Readable):
             "interrupted": self.interrupted,
             "wall_time": self.wall_time if math.isfinite(self.wall_time) else None,
             "executor": self.executor,
+            "one_by_one": self.one_by_one,
             "provenance": provenance(self.model),
         }
 

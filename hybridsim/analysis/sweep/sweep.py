@@ -199,6 +199,7 @@ def sweep(
         not finished,
         time.perf_counter() - began,
         who,
+        collected.one_by_one,
     )
 
 

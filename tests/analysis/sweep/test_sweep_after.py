@@ -11,7 +11,8 @@ import pytest
 
 import hybridsim as hs
 from hybridsim.engine.system.system_cache import system_of
-from hybridsim.ensemble.runs import Ensemble, can_run_together
+from hybridsim.ensemble.group import Ensemble, can_run_together
+from hybridsim.ensemble.runs import last_periods
 from hybridsim.errors import UsageError
 from hybridsim.reference.closed_forms.den_hartog import no_stops
 
@@ -275,7 +276,8 @@ def test_a_long_run_ends_where_the_sweep_is_to_end() -> None:
     start = np.zeros((1, 2))
     done = {
         answer: [
-            last.numbers.tolist() for last in Ensemble(system, lambda a=answer: a).runs(values, start, 10_000)
+            last.numbers.tolist()
+            for last in last_periods(Ensemble(system, lambda a=answer: a), values, start, 10_000)
         ]
         for answer in (False, True)
     }

@@ -75,11 +75,19 @@ class Outcome(NamedTuple):
     found: dict[str, Reading] | None
 
 
+class Together(NamedTuple):
+    """The outcomes of points that were measured together, and how many of them had to be measured one by one."""
+
+    outcomes: list[Outcome]
+    alone: int
+
+
 class Batch(NamedTuple):
-    """The outcomes of a batch in order, and the time in seconds that the batch took."""
+    """The outcomes of a batch in order, its time in seconds, and the number of points measured one by one."""
 
     outcomes: list[Outcome]
     seconds: float
+    alone: int
 
 
 class Watch(NamedTuple):
@@ -107,7 +115,7 @@ def run_batch(job: Job, points: Sequence[Settings], watch: Watch | None = None) 
     began = time.perf_counter()
     together = None if job.chained else _together(job, points, watch)
     if together is not None:
-        return Batch(together, time.perf_counter() - began)
+        return Batch(together.outcomes, time.perf_counter() - began, together.alone)
     outcomes = []
     previous: Any = None
     for settings in points:
@@ -117,15 +125,15 @@ def run_batch(job: Job, points: Sequence[Settings], watch: Watch | None = None) 
         outcomes.append(outcome)
         previous = result if job.chained else None
         watch.tell(1)
-    return Batch(outcomes, time.perf_counter() - began)
+    return Batch(outcomes, time.perf_counter() - began, len(outcomes))
 
 
-def _together(job: Job, points: Sequence[Settings], watch: Watch) -> list[Outcome] | None:
+def _together(job: Job, points: Sequence[Settings], watch: Watch) -> Together | None:
     """Measure many points at once if the measure supports it, otherwise return None."""
     together = getattr(job.measure, "together", None)
     if together is None:
         return None
-    found: list[Outcome] | None = together(job, points, lambda settings: _run(job, settings, None)[0], watch)
+    found: Together | None = together(job, points, lambda settings: _run(job, settings, None)[0], watch)
     return found
 
 

@@ -126,6 +126,7 @@ class Sending:
             if error is None:
                 batch = future.result()
                 self._collected.put(numbers, batch.outcomes)
+                self._collected.one_by_one += batch.alone
                 if self._journal is not None:
                     self._journal.note(numbers, batch.outcomes)
                 self._batches.learn(len(batch.outcomes), batch.seconds)

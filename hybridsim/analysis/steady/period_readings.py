@@ -1,0 +1,74 @@
+"""This module reads amplitudes, energies and stick fractions from summaries of closed-form motions over a period."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from hybridsim.engine.linear.motion_summary import MotionSummary
+    from hybridsim.engine.system.system import System
+
+_OF_STATES = ("amplitude", "peak", "maximum", "minimum", "mean", "energy")
+_OF_CONTACTS = ("stick_fraction", "stops_per_period")
+
+
+class Summarised(Protocol):
+    """The motions of several points over a period of each: an object with their lengths and summaries."""
+
+    @property
+    def periods(self) -> np.ndarray:
+        """Lengths (m,) of the periods."""
+
+    @property
+    def summary(self) -> MotionSummary:
+        """The summaries, one row of each array per point."""
+
+
+Reader = Callable[[Any], np.ndarray]
+
+
+def period_reader(word: str, system: System) -> Reader | None:
+    """Return a function that computes a reading (m,) from `Summarised`, or None if summaries do not contain it."""
+    head, _, name = word.partition(".")
+    if head in _OF_STATES and name in system.names:
+        return _of_state(head, system.names.index(name))
+    contacts = [automaton.name for automaton in system.automata]
+    if head in _OF_CONTACTS and name in contacts:
+        return _of_contact(head, contacts.index(name))
+    return None
+
+
+def summed(head: str, found: Summarised, system: System) -> dict[str, float]:
+    """Return the values of one measure of states or contacts for the motion of a single point."""
+    names = [*system.names, *(automaton.name for automaton in system.automata)]
+    readers = {name: period_reader(f"{head}.{name}", system) for name in names}
+    return {name: float(read(found)[0]) for name, read in readers.items() if read is not None}
+
+
+def _of_contact(head: str, c: int) -> Reader:
+    def stick_fraction(found: Summarised) -> np.ndarray:
+        return np.asarray(found.summary.held[:, 0, c] / found.periods)
+
+    def stops_per_period(found: Summarised) -> np.ndarray:
+        # an interval across the end of the period counts once, permanent stick counts zero
+        return np.asarray(found.summary.held[:, 1, c] - found.summary.holding[:, :, c].all(axis=1))
+
+    return stick_fraction if head == "stick_fraction" else stops_per_period
+
+
+def _of_state(head: str, i: int) -> Reader:
+    def read(found: Summarised) -> np.ndarray:
+        low, high = found.summary.extremes[:, :, i].T
+        whole, squares = found.summary.integrals[:, :, i].T
+        if head == "amplitude":
+            return np.asarray(0.5 * (high - low))
+        if head == "peak":
+            return np.maximum(np.abs(low), np.abs(high))
+        if head == "mean":
+            return np.asarray(whole / found.periods)
+        return {"maximum": high, "minimum": low, "energy": squares}[head]
+
+    return read

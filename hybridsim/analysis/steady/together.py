@@ -1,0 +1,98 @@
+"""This module finds steady motions in compiled code, for models with only contacts, linear modes and forcing.
+
+What compiled code cannot decide is left to `hybridsim.analysis.steady.steady_state`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from hybridsim.analysis.steady.motion import Motion, Point
+from hybridsim.analysis.steady.shooting import Orbit
+from hybridsim.engine.system.system import System
+from hybridsim.engine.system.system_cache import system_of
+
+if TYPE_CHECKING:
+    from hybridsim.ensemble.orbits import Orbits
+
+PERIODIC, EQUILIBRIUM = "periodic", "equilibrium"
+
+
+class Effort(NamedTuple):
+    """The settings of a search: tolerance, periods before the first test, and most periods."""
+
+    tol: float = 1e-10
+    settle: int = 32
+    max_periods: int = 4096
+
+
+def effort_of(options: Mapping[str, Any]) -> Effort | None:
+    """Return the settings of a search among the options of `steady_state`, or None if one is not valid."""
+    effort = Effort(**{name: options[name] for name in Effort._fields if name in options})
+    counts = (effort.settle, effort.max_periods)
+    is_valid = isinstance(effort.tol, float) and 0.0 < effort.tol < 1.0
+    return effort if is_valid and all(type(count) is int and count > 0 for count in counts) else None
+
+
+class Settled(NamedTuple):
+    """The steady motion of one point: its kind and orbit, the periods that were followed, and its summary."""
+
+    kind: str
+    orbit: Orbit
+    followed: int
+    period: Orbits  # the motions of one point
+
+
+def can_be_compiled(system: System, options: Mapping[str, Any]) -> bool:
+    """Return whether compiled code can search the steady motions of a model from its own start.
+
+    options: those of `steady_state`. A period or a start, for example, needs the general search.
+    """
+    from hybridsim.ensemble.group import can_run_together
+
+    given = {name for name, value in options.items() if value is not None}
+    return (
+        options.get("integrator", "auto") in ("auto", "exact")
+        and given <= {"integrator", "rtol", *Effort._fields}
+        and can_run_together(system)
+    )
+
+
+def steady_motions(
+    system: System,
+    parameters: np.ndarray,
+    starts: np.ndarray,
+    effort: Effort,
+    may_continue: Callable[[], bool],
+) -> Iterator[Orbits]:
+    """Yield the steady motions at the points that compiled code can decide; see `steady_orbits`."""
+    from hybridsim.ensemble.group import Ensemble
+    from hybridsim.ensemble.orbits import steady_orbits
+
+    return steady_orbits(Ensemble(system, may_continue), parameters, starts, *effort)
+
+
+def settled(motion: Motion, effort: Effort) -> Settled | None:
+    """Return the steady motion of a model from its own start, or None if compiled code cannot decide it."""
+    system = system_of(motion.model)
+    parameters = np.array([list(system.values.values())])
+    starts = system.start_state({})[None, :]
+    for found in steady_motions(system, parameters, starts, effort, lambda: True):
+        if len(found.numbers):
+            modes = found.modes[0]
+            start = Point(found.starts[0], np.zeros(0), {}, modes)
+            extremes = found.summary.extremes[0]
+            motion.sizes = np.abs(extremes).max(axis=0)
+            orbit = Orbit(
+                start,
+                float(found.periods[0]),
+                int(found.multiples[0]),
+                float(found.residuals[0]),
+                int(found.newton_steps[0]),
+            )
+            kind = EQUILIBRIUM if found.rests[0] else PERIODIC
+            return Settled(kind, orbit, int(found.followed[0]), found)
+    return None

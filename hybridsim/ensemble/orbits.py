@@ -1,0 +1,119 @@
+"""This module finds the steady motions of a model at many values of its parameters, in compiled code."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from hybridsim.engine.linear.motion_summary import NODES, WEIGHTS, MotionSummary
+from hybridsim.engine.native.kernels import Precompiled
+from hybridsim.engine.native.struct_pack import packed
+from hybridsim.engine.run.method_kernels import NOT_LINEAR
+from hybridsim.ensemble.group import Ensemble, Group
+from hybridsim.ensemble.returns import LONGEST_WORD
+from hybridsim.ensemble.search import (
+    FOLLOWED,
+    MAX_PERIODS,
+    MOST_FOLLOWED,
+    MULTIPLE,
+    NEWTON_STEPS,
+    NEXT,
+    OUTCOME,
+    RESTS,
+    UNDECIDED,
+    Searches,
+    search_orbits,
+)
+
+_FEWEST = 4  # periods that are needed for a decision
+_GROUP_SIZE = 256  # points of one compiled call
+# A motion with a larger multiplier is not reached by waiting, as in `hybridsim.analysis.steady.shooting`.
+_ATTRACTS = 1.0 - 1e-6
+
+_search = Precompiled(search_orbits)
+
+
+class Orbits(NamedTuple):
+    """The steady motions of some points, one row of each array per point."""
+
+    numbers: np.ndarray  # numbers (m,) of the points
+    rests: np.ndarray  # (m,) whether the motion is an equilibrium
+    periods: np.ndarray  # periods (m,) of the motions; those of the forcing for an equilibrium
+    multiples: np.ndarray  # (m,) the same in periods of the forcing
+    residuals: np.ndarray  # (m,) changes over the period relative to the scales of the states
+    newton_steps: np.ndarray  # (m,)
+    followed: np.ndarray  # (m,) periods of the forcing that were followed
+    starts: np.ndarray  # states (m, n) at the start of the period
+    modes: np.ndarray  # modes (m, C) there
+    summary: MotionSummary  # the motion over the period
+
+
+def steady_orbits(
+    ensemble: Ensemble, parameters: np.ndarray, starts: np.ndarray, tol: float, settle: int, max_periods: int
+) -> Iterator[Orbits]:
+    """Yield the steady motions that compiled code can decide, in groups; all others are left out.
+
+    parameters (N, P), in the order of the model; starts (N, n). tol, settle, max_periods: as in `hs.steady_state`. The
+    iteration ends early if `may_continue` of the ensemble returns False.
+    """
+    if settle > MOST_FOLLOWED:
+        return
+    settings = tol, max(settle, _FEWEST), min(max_periods, MAX_PERIODS), (NODES, WEIGHTS)
+    starting = *ensemble.vector_positions, ensemble.surfaces, ensemble.hold
+    for group in ensemble.groups(parameters, starts, _GROUP_SIZE, LONGEST_WORD):
+        searches = _searches(ensemble, group)
+        under_way = packed(searches)
+        with ensemble.scratch(group) as scratch:
+            while True:
+                _search(
+                    scratch.loop, scratch.lin_at, NOT_LINEAR, starting, under_way, scratch.search, settings
+                )
+                if searches.at[NEXT] == len(group.numbers) or not ensemble.may_continue():
+                    break
+        yield _decided(group, searches)
+
+
+def _searches(ensemble: Ensemble, group: Group) -> Searches:
+    m, n, count = len(group.numbers), ensemble.system.n, len(ensemble.hold)
+    return Searches(
+        tables=group.tables.addresses,
+        vectors=group.vectors,
+        rates=group.rates,
+        starts=group.starts,
+        periods=group.periods,
+        longest=group.longest,
+        counts=np.zeros((m, 4), dtype=np.int64),
+        residuals=np.zeros(m),
+        matrices=np.zeros((m, n, n)),
+        modes=np.zeros((m, count), dtype=np.int64),
+        extremes=np.empty((m, 2, n)),
+        integrals=np.empty((m, 2, n)),
+        sides=np.empty((m, 2, n)),
+        held=np.empty((m, 2, count)),
+        holding=np.empty((m, 2, count), dtype=np.bool_),
+        at=np.zeros(2, dtype=np.int64),
+    )
+
+
+def _decided(group: Group, searches: Searches) -> Orbits:
+    counts = searches.counts
+    attracts = (np.abs(np.linalg.eigvals(searches.matrices)) <= _ATTRACTS).all(axis=1)
+    done = (counts[:, OUTCOME] != UNDECIDED) & attracts
+    counts = counts[done]
+    summary = (
+        searches.extremes, searches.integrals, searches.sides, searches.held, searches.holding
+    )  # fmt: skip
+    return Orbits(
+        group.numbers[done],
+        counts[:, OUTCOME] == RESTS,
+        counts[:, MULTIPLE] * searches.periods[done],
+        counts[:, MULTIPLE],
+        searches.residuals[done],
+        counts[:, NEWTON_STEPS],
+        counts[:, FOLLOWED],
+        searches.starts[done],
+        searches.modes[done],
+        MotionSummary(*(part[done] for part in summary)),
+    )
