@@ -42,6 +42,7 @@ _ROUNDING = 1e-14  # relative to the states' scale; no step makes the residual s
 _MARGIN = 1.1  # on the expected number of periods
 _NEAR = 1e-6  # of a period: an event this close to its end may move onto it while the motion settles
 _NEARLY = 1e3  # of the tolerance: a shorter return with this residual may be a motion with a shorter period
+_SAME = 10.0  # of the tolerance: the same motion with a shorter period
 _HARDLY = 1e-9  # of its size: a state that moves by less may be at rest
 _MAX_SEGMENTS = 1 << 17  # most segments of one search, some tens of milliseconds
 _SEGMENTS_PER_CALL = 1 << 18  # after these a call returns, so that it can be interrupted
@@ -166,10 +167,12 @@ def _search(packs: Any, lin: Any, hold: Any, searches: Any, i: int, scratch: Any
             return _store(packs, lin, hold, searches, i, scratch, (multiple, segments, rule))
         multiple = nearest_return(states, count, scale)
         left = periods_left(states, count, multiple, scale, tol)
-        if multiple == 1 and left > _FEWEST:
-            segments = _newton(packs, lin, searches, i, scratch, (tol, states[count - 1]))
+        if left > _FEWEST * multiple:
+            segments = _newton(packs, lin, searches, i, scratch, (tol, states[count - 1], multiple))
             if segments > 0:
-                return _store(packs, lin, hold, searches, i, scratch, (1, segments, rule))
+                if multiple > 1:
+                    multiple, segments = _shortest(packs, searches, i, scratch, (tol, multiple))
+                return _store(packs, lin, hold, searches, i, scratch, (multiple, segments, rule))
         if left < math.inf:
             expected = math.ceil(min(_MARGIN * left, 1.0 * MOST_FOLLOWED)) + 2 * multiple
         else:
@@ -180,17 +183,17 @@ def _search(packs: Any, lin: Any, hold: Any, searches: Any, i: int, scratch: Any
 
 @kernel
 def _newton(packs: Any, lin: Any, searches: Any, i: int, scratch: Any, about: Any) -> int:
-    """Find a fixed point of the period map by Newton's method; return the segments of its period, or 0.
+    """Find a fixed point of the map over some periods by Newton's method; return the number of segments, or 0.
 
-    The state is then that at the end of this period. If the method fails, it is as before. about: tolerance, and the
-    state after the last period.
+    The state is then that at the end of these periods. If the method fails, it is as before. about: tolerance, state
+    after the last period, and number of periods.
     """
-    tol, first = about
+    tol, first, multiple = about
     state, record, scale, rows = packs.state, packs.record, scratch.scale, scratch.rows
     n, start, word, before = scale.shape[0], scratch.map.after, 0, math.inf
     put(state.z, scratch.modes)
     for step in range(_STEPS):
-        segments = run_periods(packs, searches.periods[i])
+        segments = run_periods(packs, multiple * searches.periods[i])
         searches.at[SEGMENTS_DONE] += segments
         if segments == 0:
             break
@@ -229,6 +232,31 @@ def _newton(packs: Any, lin: Any, searches: Any, i: int, scratch: Any, about: An
     put(scratch.modes, state.z)
     begin_segment(state)
     return 0
+
+
+@kernel
+def _shortest(packs: Any, searches: Any, i: int, scratch: Any, about: Any) -> tuple[int, int]:
+    """Run the shortest period of the recorded motion; return it in periods of the forcing, and its segments.
+
+    There are 0 segments if the motion nearly repeats earlier. about: tolerance, and a number of periods after which
+    the motion repeats.
+    """
+    tol, multiple = about
+    state, start = packs.state, searches.starts[i]
+    put(packs.record.jumps[0, 0], start)
+    for shorter in range(1, multiple + 1):
+        if multiple % shorter != 0:
+            continue
+        put(start, state.x)
+        put(scratch.modes, state.z)
+        begin_segment(state)
+        segments = run_periods(packs, shorter * searches.periods[i])
+        change = relative_change(start, state.x, scratch.scale)
+        if segments == 0 or shorter == multiple or change <= _SAME * tol:
+            return shorter, segments
+        if change <= _NEARLY * tol:
+            return shorter, 0
+    return multiple, 0
 
 
 @inlined

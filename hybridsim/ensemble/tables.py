@@ -94,7 +94,8 @@ def _group(
 ) -> EnsembleTables | None:
     A, rows = template.matrices(registers)
     modes = A.shape[1]
-    A, rows = (part.reshape(-1, *part.shape[2:]) for part in (A, rows))  # stacked along the first axis
+    count = A.shape[0] * modes
+    A, rows = (part.reshape(count, *part.shape[2:]) for part in (A, rows))  # stacked along the first axis
     usable = usable_modes(A, rows, system.n)
     known = usable.reshape(-1, modes).any(axis=1)
     numbers, registers = numbers[known], registers[known]
