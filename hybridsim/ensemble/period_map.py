@@ -16,7 +16,7 @@ from hybridsim.engine.events.compiled.scratch import EVENT_LOOP
 from hybridsim.engine.linear.motion import functions_of_time, moved, slopes_of, states_of, to_modal
 from hybridsim.engine.native.kernels import call_kernel, inlined, kernel
 from hybridsim.engine.native.loop_hints import put
-from  import dot
+from hybridsim.engine.native.simd.products import dot
 from hybridsim.engine.run.event_loop import AT_TARGET
 from hybridsim.engine.series.bounded import UNIT
 
@@ -36,7 +36,7 @@ class LoopPacks(NamedTuple):
 
 
 class MapScratch(NamedTuple):
-    """Scratch arrays for the derivative of the map; vectors are padded for ``."""
+    """Scratch arrays for the derivative of the map; vectors are padded for `hybridsim.engine.native.simd.products`."""
 
     matrix: np.ndarray  # (n, n) derivative of the states by those at the start
     column: np.ndarray  # (n,) one column of it

@@ -10,7 +10,7 @@ import numpy as np
 from hybridsim.engine.events.outcome import Outcome
 from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.linear.motion_summary import MotionSummary
-from  import vector_of
+from hybridsim.engine.native.simd.products import vector_of
 from hybridsim.engine.native.struct_pack import address_in, opaque, packed
 from hybridsim.engine.run.compiled_loop import CallArrays
 from hybridsim.engine.run.event_loop import LoopRecord, link_event_loop
