@@ -44,7 +44,6 @@ ALLOWED = {
     ("cli", "rungs"): "the option --rungs",
     ("analysis", "rungs"): "an argument of hs.advise",
     ("analysis", "settle"): "an argument of hs.steady_state and hs.bifurcation",
-    ("analysis", "_SETTLE"): "its default",
     ("studies", "break_long_words"): "an argument of textwrap.fill",
     ("preparation", "chain"): "itertools.chain",
     ("model", "pieces"): "cubics of a table: a function is called piecewise",

@@ -127,15 +127,15 @@ class Ensemble:
 
     @contextmanager
     def scratch(self, group: Group) -> Iterator[GroupScratch]:
-        """Lend scratch arrays for a group, with its tables."""
+        """Yield scratch arrays for a group, with its tables."""
         spare: deque[Any] = spare_scratch(self.system, "ensemble", group.tables.form)
         try:
-            lent = spare.pop()
+            scratch = spare.pop()
         except IndexError:
-            lent = GroupScratch(self.system, self.tapes, group.tables.first, group.vectors[0])
-        replaced(lent.model, lin=group.tables.first)
-        yield lent
-        spare.append(lent)
+            scratch = GroupScratch(self.system, self.tapes, group.tables.first, group.vectors[0])
+        replaced(scratch.model, lin=group.tables.first)
+        yield scratch
+        spare.append(scratch)
 
     def _may_begin(self, starts: np.ndarray, vectors: np.ndarray) -> np.ndarray:
         """Return a mask (N,) of runs in which each contact opposes its own velocity."""

@@ -51,16 +51,21 @@ class Orbits(NamedTuple):
 
 
 def steady_orbits(
-    ensemble: Ensemble, parameters: np.ndarray, starts: np.ndarray, tol: float, settle: int, max_periods: int
+    ensemble: Ensemble,
+    parameters: np.ndarray,
+    starts: np.ndarray,
+    tol: float,
+    first_periods: int,
+    max_periods: int,
 ) -> Iterator[Orbits]:
     """Yield the steady motions that compiled code can decide, in groups; all others are left out.
 
-    parameters (N, P), in the order of the model; starts (N, n). tol, settle, max_periods: as in `hs.steady_state`. The
+    parameters (N, P), in the order of the model; starts (N, n). tol, first_periods, max_periods: as in `hs.steady_state`. The
     iteration ends early if `may_continue` of the ensemble returns False.
     """
-    if settle > MOST_FOLLOWED:
+    if first_periods > MOST_FOLLOWED:
         return
-    settings = tol, max(settle, _FEWEST), min(max_periods, MAX_PERIODS), (NODES, WEIGHTS)
+    settings = tol, max(first_periods, _FEWEST), min(max_periods, MAX_PERIODS), (NODES, WEIGHTS)
     starting = *ensemble.vector_positions, ensemble.surfaces, ensemble.hold
     for group in ensemble.groups(parameters, starts, _GROUP_SIZE, LONGEST_WORD):
         searches = _searches(ensemble, group)

@@ -139,10 +139,10 @@ def _begin(packs: Any, lin: Any, none: Any, starting: Any, searches: Any, i: int
 @kernel
 def _search(packs: Any, lin: Any, hold: Any, searches: Any, i: int, scratch: Any, settings: Any) -> int:
     """Follow the motion of a point until it repeats; return PERIODIC, RESTS or UNDECIDED."""
-    tol, settle, most, rule = settings
+    tol, first_periods, most, rule = settings
     period, states, scale, counts = searches.periods[i], scratch.states, scratch.scale, searches.counts[i]
     before = searches.at[SEGMENTS_DONE]
-    expected, followed, segments = settle, 0, 0
+    expected, followed, segments = first_periods, 0, 0
     while followed < most and searches.at[SEGMENTS_DONE] - before < _MAX_SEGMENTS:
         count = expected
         for row in range(count):
@@ -176,7 +176,7 @@ def _search(packs: Any, lin: Any, hold: Any, searches: Any, i: int, scratch: Any
         if left < math.inf:
             expected = math.ceil(min(_MARGIN * left, 1.0 * MOST_FOLLOWED)) + 2 * multiple
         else:
-            expected = max(settle, followed)
+            expected = max(first_periods, followed)
         expected = min(expected, MOST_FOLLOWED)
     return UNDECIDED
 

@@ -38,6 +38,7 @@ from hybridsim.analysis.steady.together import (
     Effort,
     Settled,
     can_be_compiled,
+    message_of,
     settled,
 )
 from hybridsim.analysis.variations.sensitivities import derivatives
@@ -147,7 +148,7 @@ def steady_state(
         raise cannot_be("tol", tol, "use a relative tolerance between 0 and 1, such as 1e-10")
     system = system_of(model)
     _refuse_what_ends(system, period is not None)
-    given, own = (
+    chosen, own = (
         {"x0": x0, "z0": z0, "period": period, "integrator": integrator, **options},
         common_period(system),
     )
@@ -164,7 +165,7 @@ def steady_state(
     motion = Motion(model, {**method, **options}, {"x0": x0, "z0": z0})
     for name, count in (("settle", settle), ("max_periods", max_periods)):
         arguments.whole_number(count, name, 1, _MAX_PERIODS_EVER)
-    if own is not None and can_be_compiled(system, given):
+    if own is not None and can_be_compiled(system, chosen):
         together = settled(motion, Effort(tol, settle, max_periods))
         if together is not None:
             return _settled(motion, together)
@@ -343,7 +344,7 @@ class _Search:
         orbit = with_shortest_period(self.motion, orbit, self.scale, self.period is not None, self.tol)
         self.newton_steps += orbit.steps - steps
         kind = EQUILIBRIUM if self._rests(orbit) else PERIODIC
-        message = _message(kind, orbit, self.period is not None)
+        message = message_of(kind, orbit, self.period is not None)
         return _found(self.motion, kind, orbit, self.period is None, self.newton_steps, self.periods, message)
 
     def _rests(self, orbit: Orbit) -> bool:
@@ -429,17 +430,10 @@ def _found(
 
 def _settled(motion: Motion, found: Settled) -> SteadyState:
     """Return the result of a search in compiled code."""
-    kind, orbit, message = found.kind, found.orbit, _message(found.kind, found.orbit, True)
+    kind, orbit, message = found.kind, found.orbit, message_of(found.kind, found.orbit, True)
     return SteadyState(
         motion.unwatched(), kind, orbit, False, orbit.steps, found.followed, message, found.period
     )
-
-
-def _message(kind: str, orbit: Orbit, is_forced: bool) -> str:
-    if kind == EQUILIBRIUM:
-        return f"equilibrium: all motion is rounding; residual {orbit.residual:.1e}"
-    what = f" of {orbit.multiple} periods of the forcing" if is_forced and orbit.multiple > 1 else ""
-    return f"periodic motion{what}; residual {orbit.residual:.1e}"
 
 
 def _check_period(model: Model, period: float, own: float | None) -> None:

@@ -53,10 +53,10 @@ def can_be_compiled(system: System, options: Mapping[str, Any]) -> bool:
     """
     from hybridsim.ensemble.group import can_run_together
 
-    given = {name for name, value in options.items() if value is not None}
+    chosen = {name for name, value in options.items() if value is not None}
     return (
         options.get("integrator", "auto") in ("auto", "exact")
-        and given <= {"integrator", "rtol", *Effort._fields}
+        and chosen <= {"integrator", "rtol", *Effort._fields}
         and can_run_together(system)
     )
 
@@ -96,3 +96,11 @@ def settled(motion: Motion, effort: Effort) -> Settled | None:
             kind = EQUILIBRIUM if found.rests[0] else PERIODIC
             return Settled(kind, orbit, int(found.followed[0]), found)
     return None
+
+
+def message_of(kind: str, orbit: Orbit, is_forced: bool) -> str:
+    """Return the sentence about a motion that repeats or rests."""
+    if kind == EQUILIBRIUM:
+        return f"equilibrium: all motion is rounding; residual {orbit.residual:.1e}"
+    what = f" of {orbit.multiple} periods of the forcing" if is_forced and orbit.multiple > 1 else ""
+    return f"periodic motion{what}; residual {orbit.residual:.1e}"
