@@ -60,8 +60,9 @@ def steady_orbits(
 ) -> Iterator[Orbits]:
     """Yield the steady motions that compiled code can decide, in groups; all others are left out.
 
-    parameters (N, P), in the order of the model; starts (N, n). tol, first_periods, max_periods: as in `hs.steady_state`. The
-    iteration ends early if `may_continue` of the ensemble returns False.
+    parameters (N, P), in the order of the model; starts (N, n). tol, max_periods: as in `hs.steady_state`.
+    first_periods: periods before the first test. The iteration ends early if `may_continue` of the ensemble returns
+    False.
     """
     if first_periods > MOST_FOLLOWED:
         return
