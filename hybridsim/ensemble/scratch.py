@@ -12,8 +12,8 @@ from hybridsim.engine.events.state import HybridState
 from hybridsim.engine.linear.motion_summary import MotionSummary
 from hybridsim.engine.native.simd.products import vector_of
 from hybridsim.engine.native.struct_pack import address_in, opaque, packed
-from hybridsim.engine.run.method_kernels import CallArrays
 from hybridsim.engine.run.event_loop import LoopRecord, link_event_loop
+from hybridsim.engine.run.method_kernels import CallArrays
 from hybridsim.engine.system.system import System
 from hybridsim.ensemble.period_map import LoopPacks, MapScratch
 from hybridsim.ensemble.run import SEGMENTS

@@ -36,7 +36,6 @@ from hybridsim.analysis.steady.together import (
     EQUILIBRIUM,
     PERIODIC,
     Effort,
-    Settled,
     can_be_compiled,
     message_of,
     settled,
@@ -168,7 +167,7 @@ def steady_state(
     if own is not None and can_be_compiled(system, chosen):
         together = settled(motion, Effort(tol, settle, max_periods))
         if together is not None:
-            return _settled(motion, together)
+            return together
     motion.time_budget = _TIME_BUDGET * max(1.0, max_periods / Effort().max_periods)
     search = _Search(motion, period, tol, settle, max_periods)
     try:
@@ -426,14 +425,6 @@ def _found(
     message: str = "",
 ) -> SteadyState:
     return SteadyState(motion.unwatched(), kind, orbit, is_free, newton_steps, periods, message or kind)
-
-
-def _settled(motion: Motion, found: Settled) -> SteadyState:
-    """Return the result of a search in compiled code."""
-    kind, orbit, message = found.kind, found.orbit, message_of(found.kind, found.orbit, True)
-    return SteadyState(
-        motion.unwatched(), kind, orbit, False, orbit.steps, found.followed, message, found.period
-    )
 
 
 def _check_period(model: Model, period: float, own: float | None) -> None:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from hybridsim.analysis.steady.motion import Motion, Point
+from hybridsim.analysis.steady.result import SteadyState
 from hybridsim.analysis.steady.shooting import Orbit
 from hybridsim.engine.system.system import System
 from hybridsim.engine.system.system_cache import system_of
@@ -35,15 +36,6 @@ def effort_of(options: Mapping[str, Any]) -> Effort | None:
     counts = (effort.settle, effort.max_periods)
     is_valid = isinstance(effort.tol, float) and 0.0 < effort.tol < 1.0
     return effort if is_valid and all(type(count) is int and count > 0 for count in counts) else None
-
-
-class Settled(NamedTuple):
-    """The steady motion of one point: its kind and orbit, the periods that were followed, and its summary."""
-
-    kind: str
-    orbit: Orbit
-    followed: int
-    period: Orbits  # the motions of one point
 
 
 def can_be_compiled(system: System, options: Mapping[str, Any]) -> bool:
@@ -75,26 +67,24 @@ def steady_motions(
     return steady_orbits(Ensemble(system, may_continue), parameters, starts, *effort)
 
 
-def settled(motion: Motion, effort: Effort) -> Settled | None:
+def settled(motion: Motion, effort: Effort) -> SteadyState | None:
     """Return the steady motion of a model from its own start, or None if compiled code cannot decide it."""
     system = system_of(motion.model)
     parameters = np.array([list(system.values.values())])
     starts = system.start_state({})[None, :]
     for found in steady_motions(system, parameters, starts, effort, lambda: True):
         if len(found.numbers):
-            modes = found.modes[0]
-            start = Point(found.starts[0], np.zeros(0), {}, modes)
-            extremes = found.summary.extremes[0]
-            motion.sizes = np.abs(extremes).max(axis=0)
+            motion.sizes = np.abs(found.summary.extremes[0]).max(axis=0)
             orbit = Orbit(
-                start,
+                Point(found.starts[0], np.zeros(0), {}, found.modes[0]),
                 float(found.periods[0]),
                 int(found.multiples[0]),
                 float(found.residuals[0]),
                 int(found.newton_steps[0]),
             )
             kind = EQUILIBRIUM if found.rests[0] else PERIODIC
-            return Settled(kind, orbit, int(found.followed[0]), found)
+            message, followed = message_of(kind, orbit, True), int(found.followed[0])
+            return SteadyState(motion.unwatched(), kind, orbit, False, orbit.steps, followed, message, found)
     return None
 
 
