@@ -75,7 +75,7 @@ READERS = {
     "engine/run/located.py::located": "which guards are zero at an instant",
     "engine/run/located.py::others_near": "which guards are zero at an instant",
     "engine/run/segment_run.py::_at_step_end": "which guards are zero at the end of a step",
-    "engine/run/segment_run.py::_has_not_moved": "whether a guard has left its zero",
+    "engine/run/segment_run.py::_contradicts_flow": "whether a step is accurate",
     "engine/run/segment_run.py::_is_zero": "where a guard is zero",
     "engine/run/segment_run.py::_take_roots": "which zeros of a step are events",
     "integrators/runge_kutta/segments.py::is_zero": "where a guard is zero",

@@ -244,6 +244,7 @@ def test_a_corner_that_turns_says_nothing_of_an_instant(rtol: float) -> None:
     """The corner of abs(c - last) is passed where c turns, and no state is worse known for it."""
     scene = next(scene for scene in SCENES if scene.name == "touch-beside-a-sample")
     sol = hs.simulate(load(scene), scene.span, integrator="scipy-lsoda", rtol=rtol)
+    assert sol.status == "finished"
     seen = [0.0] + [e.x_minus[0] for e in sol.events if e.component == "one" and e.kind == "transition"]
     assert np.abs(np.abs(np.diff(seen)) - 2.0).max() < 1e-8
 

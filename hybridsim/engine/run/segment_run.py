@@ -16,7 +16,7 @@ from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.segments import Dense, PiecewiseDense, Segment
 from hybridsim.engine.roots.roots import POINTS, find_roots
 from hybridsim.engine.run.locate import Findings, Hit, Locator, polish
-from hybridsim.engine.run.stepping import Flow, Method, Step, Stepper, Watch
+from hybridsim.engine.run.stepping import Flow, Method, Step, Stepper, Still, Watch
 from hybridsim.engine.series.bounded import ORDER, UNIT
 from hybridsim.engine.system.failures import Creeping, StepFailure
 from hybridsim.engine.system.instant import Instant
@@ -26,9 +26,7 @@ from hybridsim.errors import UsageError
 
 _NEIGHBOURHOOD = 0.125  # fraction of a step by which an event time may be corrected
 _CORRECTIONS = 5  # Newton iterations for an event time, starting at the accuracy of the dense output
-# Fraction of a step to retry if the step contradicts the flow at its start. A first tenth is a step of its own, and
-# finds the same events there.
-_SHORTER = 0.1
+_SHORTER = 0.1  # factor by which a first step is shortened that contradicts the flow
 _DIRECTIONS = {"up": 1, "down": -1, "both": 0}
 
 
@@ -56,21 +54,6 @@ class Arrival:
     def is_bare(self) -> bool:
         """Return whether the segment ends without an event."""
         return not (self.fired or self.stopping or self.entered)
-
-
-class Still:
-    """The stepper of a model without continuous states: one step to the end of the segment."""
-
-    def __init__(self, bound: float) -> None:
-        self.bound = bound
-
-    def step(self) -> Step:
-        """Return the whole segment as one step."""
-        return Step(0.0, self.bound, np.zeros(0), np.zeros(0), lambda s: np.zeros((len(s), 0)))
-
-    def restep(self, step: Step, s: float) -> Step:
-        """Return the step, shortened to the local time s."""
-        return Step(step.s0, s, step.x0, step.x1, step.dense)
 
 
 class SegmentRun:
@@ -106,6 +89,7 @@ class SegmentRun:
         self.last_step: float | None = None  # the last length that was not limited by the end of the segment
         # consecutive steps that are too short, and the local time at which they began
         self.short, self.since = 0, 0.0
+        self.refused = math.inf  # length of the shortest first step that contradicts the flow
         self.entries = () if forward else entries(system, z)
 
     def run(self, bound: float, first_step: float | None) -> Arrival:
@@ -114,11 +98,11 @@ class SegmentRun:
         # the stepper reports rates that are not finite
         if len(undecided) and np.isfinite(self.flow.rhs(0.0, self.states[0])).all():
             self._refuse_undefined(int(undecided[0]), 0.0)
-        stepper = self._start(bound, first_step)
+        self.bound, self.stepper = bound, self._start(bound, first_step)
         self.counters.restarts += 1
         while True:
             try:
-                step = stepper.step()
+                step = self.stepper.step()
             except Creeping as failure:
                 self._collapse(failure.since, str(failure))
             self.counters.steps += 1
@@ -133,7 +117,7 @@ class SegmentRun:
             whole, known = step.s1, self.scale
             self.scale = np.maximum(known, np.abs(step.x1))
             if step.roots is None:
-                step, arrival = self._examine(stepper, step)
+                step, arrival = self._examine(step)
             else:
                 arrival = self._take_roots(step)
             if self.entries:
@@ -247,18 +231,18 @@ class SegmentRun:
 
     # -- events that the engine locates ---------------------------------------------------------------------
 
-    def _examine(self, stepper: Stepper, step: Step) -> tuple[Step, Arrival | None]:
+    def _examine(self, step: Step) -> tuple[Step, Arrival | None]:
         """Search a step for zeros; if an event stops the segment, return the step up to the event."""
         found = self.locator.search(step, self.rounding)
         first = self._first_stop(found)
-        if first is not None and self._has_not_moved(step, *first):
-            return self._examine(stepper, stepper.restep(step, step.s0 + _SHORTER * (step.s1 - step.s0)))
+        if first is not None and self._contradicts_flow(step, *first):
+            return self._examine(self._start_again(step))
         passed = [hit for hit in found.crossings if self._is_recorded(hit, first)]
         located = []
         for hit, is_monitor in [*((hit, True) for hit in passed), *([first] if first else [])]:
-            ended, is_reached = self._refine(stepper, step, hit, is_monitor)
+            ended, is_reached = self._refine(step, hit, is_monitor)
             if not is_reached:
-                return self._examine(stepper, ended)
+                return self._examine(ended)
             located.append(ended)
         for hit, ended in zip(passed, located, strict=False):
             self.passed_monitors.append(
@@ -279,23 +263,39 @@ class SegmentRun:
             if is_monitor:
                 return ended, Arrival(ended.s1, x, stopping=(hit.number,))
             return ended, Arrival(ended.s1, x, fired=(hit.number,))
-        return self._at_step_end(stepper, step, found)
+        return self._at_step_end(step, found)
 
-    def _has_not_moved(self, step: Step, hit: Hit, is_monitor: bool) -> bool:
-        """Return whether a guard was located in the first step while its change is below rounding error.
+    def _contradicts_flow(self, step: Step, hit: Hit, is_monitor: bool) -> bool:
+        """Return whether the flow contradicts an early zero of a guard that was zero at the start of the segment.
 
-        The step then contradicts the flow at its start, as a long step of a stiff method may if the motion grows away
-        from the surface. A shorter step is searched instead.
+        The guard falls in the first step, and rises along the flow at the zero. The error of the step then exceeds the
+        growth of the guard. A first step of order one may have such an error, and a long step of a stiff method. The
+        guard would rise from the located zero too, and the next segment would begin in the same way.
         """
         order = 0 if is_monitor else int(self.watch.orders[hit.number])
-        if step.s0 != 0.0 or order == 0 or hit.theta >= _SHORTER or self.method.dense_is_accurate:
+        if step.s0 != 0.0 or order == 0 or hit.theta >= _SHORTER or abs(step.s1) >= self.refused:
             return False
-        x = self.flow.project(np.zeros(1), step.x0[None, :])[0]
-        series = self.system.series(0.0, x, self.flow.p, self.flow.z, 4.0 * UNIT * self.scale, 0.0)
-        leading, rounding = abs(series.guards[hit.number, order]), series.guard_bounds[hit.number, 0]
-        found, shorter = abs(hit.theta * step.s1), abs(_SHORTER * step.s1)
-        # the shorter step must be long enough for the guard to exceed rounding
-        return bool(leading * found**order <= rounding < leading * shorter**order)
+        flow, side_of = self.flow, side_after if self.flow.forward else side_before
+        times = hit.theta * np.array([0.0, step.s1])
+        states = flow.project(times, np.array([step.x0, step.dense(times[1:])[0]]))
+        start, found = (
+            self.system.series(s, x, flow.p, flow.z, 4.0 * UNIT * self.scale, math.ulp(s))
+            for s, x in zip(times.tolist(), states, strict=True)
+        )
+        if side_of(found.guards[hit.number], found.guard_bounds[hit.number], 1)[0] <= 0:
+            return False
+        # a shorter step must be long enough for the guard to exceed rounding
+        growth = abs(start.guards[hit.number, order] * (_SHORTER * step.s1) ** order)
+        return bool(growth > start.guard_bounds[hit.number, 0])
+
+    def _start_again(self, step: Step) -> Step:
+        """Return a first step that is shorter than the given one."""
+        self.refused = abs(step.s1)
+        self.counters.rejected += 1
+        self.last_step = _SHORTER * self.refused
+        self.tolerances = replace(self.tolerances, first_step=self.last_step)  # some methods take no other length
+        self.stepper = self._start(self.bound, self.last_step)
+        return self.stepper.step()
 
     def _refuse_undefined(self, guard: int, s: float) -> None:
         t = float(self.origin.plus(s))
@@ -329,7 +329,7 @@ class SegmentRun:
             if hit.theta < theta:
                 self.locator.monitor_sides[hit.number] = hit.direction
 
-    def _at_step_end(self, stepper: Stepper, step: Step, found: Findings) -> tuple[Step, Arrival | None]:
+    def _at_step_end(self, step: Step, found: Findings) -> tuple[Step, Arrival | None]:
         """Set the sides of guards and monitors for the next step; a zero at the end belongs to this step.
 
         A guard that the search left undecided and that is negative beyond rounding at the end was zero before it.
@@ -361,10 +361,10 @@ class SegmentRun:
                 (passed if order == 0 else fired).append(g)
         if passed:
             hit = min((locator.exit(step, g) for g in passed), key=lambda hit: hit.theta)
-            ended, is_reached = self._refine(stepper, step, hit, is_monitor=False)
+            ended, is_reached = self._refine(step, hit, is_monitor=False)
             if not is_reached:
                 vars(locator).update(start)
-                return self._examine(stepper, ended)
+                return self._examine(ended)
             return ended, Arrival(ended.s1, self._projected(ended), fired=(hit.number,))
         for k in open_monitors:
             side, order = side_of(series.monitors[k], series.monitor_bounds[k], 0)
@@ -384,7 +384,7 @@ class SegmentRun:
             return step, Arrival(step.s1, x, tuple(fired), tuple(stopping))
         return step, None
 
-    def _refine(self, stepper: Stepper, step: Step, hit: Hit, is_monitor: bool) -> tuple[Step, bool]:
+    def _refine(self, step: Step, hit: Hit, is_monitor: bool) -> tuple[Step, bool]:
         """Return the step up to the event and True if it is accurate, otherwise a shorter step and False.
 
         If the dense output is less accurate than the method, the step is repeated to the event time, which Newton's
@@ -394,7 +394,7 @@ class SegmentRun:
         s = step.s0 + hit.theta * (step.s1 - step.s0) if hit.theta < 1.0 else step.s1
         if self.method.dense_is_accurate or s == step.s0:
             if step.holds is not None and s != step.s0 and not step.holds(s):
-                return stepper.restep(step, s), False
+                return self.stepper.restep(step, s), False
             x = step.dense(np.array([s]))[0]
             return Step(step.s0, s, step.x0, x, step.dense), True
         on_dense = s
@@ -402,7 +402,7 @@ class SegmentRun:
         window = _NEIGHBOURHOOD * abs(step.s1 - step.s0)
         low = max(min(step.s0, step.s1), s - window)
         high = min(max(step.s0, step.s1), s + window)
-        ended = stepper.restep(step, s)
+        ended = self.stepper.restep(step, s)
         for _ in range(_CORRECTIONS):
             if ended.s1 != s:
                 return ended, False
@@ -417,7 +417,7 @@ class SegmentRun:
             if corrected in (s, step.s0):
                 break
             s = corrected
-            ended = stepper.restep(step, s)
+            ended = self.stepper.restep(step, s)
         if ended.s1 != s:
             return ended, False
         if self._is_zero(ended, hit.number, is_monitor):

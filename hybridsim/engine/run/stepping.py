@@ -146,6 +146,21 @@ class Stepper(Protocol):
         """
 
 
+class Still:
+    """The stepper of a model without continuous states: one step to the end of the segment."""
+
+    def __init__(self, bound: float) -> None:
+        self.bound = bound
+
+    def step(self) -> Step:
+        """Return the whole segment as one step."""
+        return Step(0.0, self.bound, np.zeros(0), np.zeros(0), lambda s: np.zeros((len(s), 0)))
+
+    def restep(self, step: Step, s: float) -> Step:
+        """Return the step, shortened to the local time s."""
+        return Step(step.s0, s, step.x0, step.x1, step.dense)
+
+
 class Method(Protocol):
     """The part of an integrator that the mode loop uses."""
 
