@@ -289,11 +289,11 @@ class SegmentRun:
         return bool(growth > start.guard_bounds[hit.number, 0])
 
     def _start_again(self, step: Step) -> Step:
-        """Return a first step that is shorter than the given one."""
+        """Return a first step that is shorter than the given one; some methods read its length in the tolerances."""
         self.refused = abs(step.s1)
         self.counters.rejected += 1
         self.last_step = _SHORTER * self.refused
-        self.tolerances = replace(self.tolerances, first_step=self.last_step)  # some methods take no other length
+        self.tolerances = replace(self.tolerances, first_step=self.last_step)
         self.stepper = self._start(self.bound, self.last_step)
         return self.stepper.step()
 

@@ -38,10 +38,14 @@ def test_a_knot_just_after_an_event_costs_one_step(integrator: str) -> None:
     assert [steps_with_knot(after, integrator) - far for after in (1e-18, 1e-16)] == [1, 1]
 
 
-@pytest.mark.parametrize(("rtol", "share"), [(1e-6, 0.03), (1e-6, 0.3), (1e-9, 0.03), (1e-9, 0.3), (1e-12, 0.3)])
+@pytest.mark.parametrize(
+    ("rtol", "share"), [(1e-6, 0.03), (1e-6, 0.3), (1e-9, 0.03), (1e-9, 0.3), (1e-12, 0.3)]
+)
 @pytest.mark.parametrize("integrator", ["scipy-lsoda", "scipy-bdf", "cvode-adams", "cvode-bdf"])
-def test_a_rise_below_the_tolerance_is_no_series_of_events(integrator: str, rtol: float, share: float) -> None:
-    """c - 8 = b*t*(2*p - t) rises from a corner's zero for a time p, in which a step of order one sees only its fall."""
+def test_a_rise_below_the_tolerance_is_no_series_of_events(
+    integrator: str, rtol: float, share: float
+) -> None:
+    """c - 8 = b*t*(2*p - t) rises from a corner's zero for a time p. A step of order one falls there."""
     bend, end = 158.0, 0.5
     p = share * (8 * rtol / bend) ** 0.5  # the height b*p**2 is share**2 of the tolerance of c
     model = hs.Model.from_toml(f"""
