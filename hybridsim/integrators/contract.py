@@ -124,7 +124,8 @@ class Integrator(metaclass=_IntegratorType):
        events. Or implement ``run`` for a whole run, as in a fixed-step method that makes its own decisions.
     3. ``start(flow, x0, s_bound, tolerances, first_step, watch)`` begins a segment at local time 0 in the
        state x0. The function ``flow.rhs(s, x)`` is smooth: no sign, no switch. No history of an earlier
-       segment may be used.
+       segment may be used. A segment whose first step contradicts the flow is begun again with a
+       shorter ``first_step``.
     4. ``stepper.step()`` returns the next accepted `Step`, the last one ending exactly at ``s_bound``, or
        raises `StepFailure`. A trial in which a number is not finite is a rejected step, never an accepted
        one. s_bound is negative if time runs backward.
