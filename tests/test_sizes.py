@@ -33,7 +33,7 @@ FILES = {
     "engine/lowering/lower.py": 373,
     "engine/roots/roots.py": 355,
     "engine/run/mode_loop.py": 572,
-    "engine/run/segment_run.py": 495,
+    "engine/run/segment_run.py": 473,
     "engine/series/bounded.py": 365,
     "engine/series/interpreter.py": 444,
     "engine/series/tape.py": 305,

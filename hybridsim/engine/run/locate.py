@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hybridsim.engine.events.choice.verdict import side_after, side_before
 from hybridsim.engine.roots.roots import POINTS, Crossing, Grazing, find_roots, quiet
 from hybridsim.engine.run.stepping import Flow, Step, Watch
 from hybridsim.engine.series.bounded import UNIT
@@ -19,6 +20,7 @@ _WIDER = 6  # doublings of a bracket whose end is on the wrong side because of t
 # another zero.
 _NARROW = 2.0**-24
 _FAR = 2.0**-10  # of the values on a step; a function closer to zero at its end may be zero there
+SHORTER = 0.1  # factor by which a first step is shortened that contradicts the flow
 _SHORT = 2.0**-13  # of the time of a run; on shorter steps it may be close to zero throughout
 
 
@@ -186,6 +188,30 @@ class Locator:
             for a, b, c in zip(first, middle, last):
                 clear = clear and (abs(c) > _FAR * max(abs(a), abs(b)) or a == b == c == 0.0)
         return clear
+
+    def contradicts_flow(self, step: Step, hit: Hit, errors: np.ndarray, is_accurate: bool) -> bool:
+        """Return whether an early zero of a guard that starts from zero is an error of the first step.
+
+        A corner keeps its side if the flow rises from the located zero, and the next segment would begin in the same
+        way. A first step of order one may have such an error. Another guard must have changed by more than rounding,
+        unless the dense output is accurate: a long step of a stiff method may contradict the flow at its start.
+        """
+        g, order, flow = hit.number, int(self.orders[hit.number]), self.flow
+        if order == 0 or hit.theta >= SHORTER:
+            return False
+        times = hit.theta * np.array([0.0, step.s1])
+        start, found = (
+            flow.system.series(s, x, flow.p, flow.z, errors, math.ulp(s))
+            for s, x in zip(times.tolist(), flow.project(times, step.dense(times)), strict=True)
+        )
+        leading, rounding = abs(start.guards[g, order]), start.guard_bounds[g, 0]
+        if flow.system.is_corner[flow.system.owner[g]]:
+            side_of = side_after if flow.forward else side_before
+            is_wrong = side_of(found.guards[g], found.guard_bounds[g], 1)[0] > 0
+        else:
+            is_wrong = not is_accurate and leading * abs(times[1]) ** order <= rounding
+        # a shorter step must be long enough for the guard to exceed rounding
+        return bool(is_wrong and rounding < leading * abs(SHORTER * step.s1) ** order)
 
     def exit(self, step: Step, guard: int) -> Hit:
         """Return the zero of a guard that is positive at the start of a step and negative at the end."""

@@ -15,7 +15,7 @@ from hybridsim.engine.native.constants import IN_A_ROW, STANDSTILL
 from hybridsim.engine.record.counters import Counters
 from hybridsim.engine.record.segments import Dense, PiecewiseDense, Segment
 from hybridsim.engine.roots.roots import POINTS, find_roots
-from hybridsim.engine.run.locate import Findings, Hit, Locator, polish
+from hybridsim.engine.run.locate import SHORTER, Findings, Hit, Locator, polish
 from hybridsim.engine.run.stepping import Flow, Method, Step, Stepper, Still, Watch
 from hybridsim.engine.series.bounded import ORDER, UNIT
 from hybridsim.engine.system.failures import Creeping, StepFailure
@@ -26,7 +26,6 @@ from hybridsim.errors import UsageError
 
 _NEIGHBOURHOOD = 0.125  # fraction of a step by which an event time may be corrected
 _CORRECTIONS = 5  # Newton iterations for an event time, starting at the accuracy of the dense output
-_SHORTER = 0.1  # factor by which a first step is shortened that contradicts the flow
 _DIRECTIONS = {"up": 1, "down": -1, "both": 0}
 
 
@@ -235,8 +234,10 @@ class SegmentRun:
         """Search a step for zeros; if an event stops the segment, return the step up to the event."""
         found = self.locator.search(step, self.rounding)
         first = self._first_stop(found)
-        if first is not None and self._contradicts_flow(step, *first):
-            return self._examine(self._start_again(step))
+        if first is not None and step.s0 == 0.0 and abs(step.s1) < self.refused and not first[1]:
+            errors, is_accurate = 4.0 * UNIT * self.scale, self.method.dense_is_accurate
+            if self.locator.contradicts_flow(step, first[0], errors, is_accurate):
+                return self._examine(self._start_again(step))
         passed = [hit for hit in found.crossings if self._is_recorded(hit, first)]
         located = []
         for hit, is_monitor in [*((hit, True) for hit in passed), *([first] if first else [])]:
@@ -265,34 +266,11 @@ class SegmentRun:
             return ended, Arrival(ended.s1, x, fired=(hit.number,))
         return self._at_step_end(step, found)
 
-    def _contradicts_flow(self, step: Step, hit: Hit, is_monitor: bool) -> bool:
-        """Return whether the flow contradicts an early zero of a guard that was zero at the start of the segment.
-
-        The guard falls in the first step, and rises along the flow at the zero. The error of the step then exceeds the
-        growth of the guard. A first step of order one may have such an error, and a long step of a stiff method. The
-        guard would rise from the located zero too, and the next segment would begin in the same way.
-        """
-        order = 0 if is_monitor else int(self.watch.orders[hit.number])
-        if step.s0 != 0.0 or order == 0 or hit.theta >= _SHORTER or abs(step.s1) >= self.refused:
-            return False
-        flow, side_of = self.flow, side_after if self.flow.forward else side_before
-        times = hit.theta * np.array([0.0, step.s1])
-        states = flow.project(times, np.array([step.x0, step.dense(times[1:])[0]]))
-        start, found = (
-            self.system.series(s, x, flow.p, flow.z, 4.0 * UNIT * self.scale, math.ulp(s))
-            for s, x in zip(times.tolist(), states, strict=True)
-        )
-        if side_of(found.guards[hit.number], found.guard_bounds[hit.number], 1)[0] <= 0:
-            return False
-        # a shorter step must be long enough for the guard to exceed rounding
-        growth = abs(start.guards[hit.number, order] * (_SHORTER * step.s1) ** order)
-        return bool(growth > start.guard_bounds[hit.number, 0])
-
     def _start_again(self, step: Step) -> Step:
         """Return a first step that is shorter than the given one; some methods read its length in the tolerances."""
         self.refused = abs(step.s1)
         self.counters.rejected += 1
-        self.last_step = _SHORTER * self.refused
+        self.last_step = SHORTER * self.refused
         self.tolerances = replace(self.tolerances, first_step=self.last_step)
         self.stepper = self._start(self.bound, self.last_step)
         return self.stepper.step()
