@@ -20,8 +20,8 @@ _WIDER = 6  # doublings of a bracket whose end is on the wrong side because of t
 # another zero.
 _NARROW = 2.0**-24
 _FAR = 2.0**-10  # of the values on a step; a function closer to zero at its end may be zero there
-SHORTER = 0.1  # factor by which a first step is shortened that contradicts the flow
 _SHORT = 2.0**-13  # of the time of a run; on shorter steps it may be close to zero throughout
+SHORTER = 0.1  # factor by which a first step is shortened that contradicts the flow
 
 
 @dataclass(frozen=True)
