@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy import optimize
 
 import hybridsim as hs
 from hybridsim.engine.run import single_call
@@ -111,6 +112,24 @@ def test_resets_of_clocks_keep_their_own_values_beside_resets_of_monitors(integr
     solution = hs.simulate(model, (0, 4), integrator=integrator)
     assert solution.status == "finished"
     assert solution.output("held", [0.1, 0.3, 0.8, 3.9]).tolist() == [0.0, 0.25, 0.75, 3.75]
+
+
+@pytest.mark.parametrize("integrator", METHODS)
+def test_frequencies_of_resets_and_schedules_keep_their_places(integrator: str) -> None:
+    """Each frequency occurs once: in a rate, a monitor, a reset of a monitor, a schedule."""
+    more = '[schedules.jump]\ntimes = [1.5]\nreset = { n = "n + 8*cos(0.9*t)" }\n'
+    monitors = (
+        hs.Monitor("early", "t - 1", action="reset", reset={"n": "n + sin(0.3*t)"}),
+        hs.Monitor("wave", "x - 0.5*sin(2*t)"),
+    )
+    model = replace(
+        swing(*monitors, more=more), states=(hs.State("x", 0, "0.7*cos(0.7*t)"), hs.State("n", 0, "0"))
+    )
+    solution = hs.simulate(model, (0, 2), integrator=integrator, rtol=1e-12, atol=1e-13)
+    assert abs(solution["x"][-1] - math.sin(1.4)) < 1e-10
+    assert abs(solution["n"][-1] - math.sin(0.3) - 8.0 * math.cos(1.35)) < 1e-10
+    crossing = optimize.brentq(lambda t: math.sin(0.7 * t) - 0.5 * math.sin(2.0 * t), 0.3, 1.4, xtol=1e-14)
+    assert [e.t for e in solution.events if e.component == "wave"] == [pytest.approx(crossing, abs=1e-10)]
 
 
 @pytest.mark.parametrize("integrator", METHODS)

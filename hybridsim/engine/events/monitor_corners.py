@@ -24,6 +24,7 @@ from hybridsim.model.parts.monitor import Monitor
 
 _MODES = ("+", "-")
 _DIRECTIONS = ("down", "up")  # in which a monitor leaves the modes
+_POSITIVE = of_tree(ast.Constant(1.0))
 _FATAL = "a monitor acts"  # never shown, because compiled loops leave such an event to the general loop
 
 
@@ -40,13 +41,15 @@ def _corner(name: str, monitor: Monitor) -> MonitorCorner:
 
 
 def _with_corners(model: Model) -> Model:
-    """Return the model with a corner in place of each monitor."""
+    """Return the model with a corner in place of each monitor; monitors with resets stay, but never fire."""
     taken, corners = set(names_of_model(model)), []
     for monitor in model.monitors:
         name = free_name(taken, f"side_of_{monitor.name}")
         taken.add(name)
         corners.append(_corner(name, monitor))
-    return replace(model, components=(*model.components, *corners), monitors=())
+    # resets stay, because the run-time vector has their frequencies and kernels call them by number
+    still = [replace(m, expr=_POSITIVE, action="reset") for m in model.monitors if m.reset]
+    return replace(model, components=(*model.components, *corners), monitors=tuple(still))
 
 
 def corners_of_monitors(system: System) -> MonitorCorners:
@@ -71,8 +74,7 @@ class MonitorCorners:
         self.count = len(plain.monitor_names)
         numbers = np.array([a.guards for a in self.system.automata[len(plain.automata) :]], dtype=np.int64)
         self._guards = numbers.reshape(self.count, 2)  # of each monitor in its two modes
-        owners = self.system.owner[: plain.guard_count]
-        assert np.array_equal(owners, plain.owner) and np.array_equal(self.system.rates, plain.rates)
+        assert self.system.layout == plain.layout and np.array_equal(self.system.rates, plain.rates)
 
     def numbered(self, fires: np.ndarray, modes: np.ndarray) -> np.ndarray:
         """Return the guards that fired, with two numbers beyond the others for each monitor, down and up."""
