@@ -71,10 +71,11 @@ def _monitors_for_python(system: System) -> str:
     """Return which monitors keep `exact` from running in compiled code, or an empty text."""
     if not system.monitor_names:
         return ""
-    corners = corners_of_monitors(system).system
-    if system.n + corners.guard_count > _SMALL:
+    corners = corners_of_monitors(system)
+    if corners is None or system.n + corners.system.guard_count > _SMALL:
         return "many monitors"
-    return "" if what_is_not_linear(corners) is None else "monitors that are not linear in the states"
+    is_linear = what_is_not_linear(corners.system) is None
+    return "" if is_linear else "monitors that are not linear in the states"
 
 
 def _for_functions(system: System, x0: np.ndarray, z0: np.ndarray, span: tuple[float, float]) -> Choice:

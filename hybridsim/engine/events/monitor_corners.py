@@ -22,6 +22,8 @@ from hybridsim.model.parts.component import Choice, Guard, Mode, MonitorCorner
 from hybridsim.model.parts.model import Model
 from hybridsim.model.parts.monitor import Monitor
 
+# Largest number of monitors as corners. Compiled loops store tables for each combination of sides.
+MOST = 32
 _MODES = ("+", "-")
 _DIRECTIONS = ("down", "up")  # in which a monitor leaves the modes
 _POSITIVE = of_tree(ast.Constant(1.0))
@@ -52,8 +54,10 @@ def _with_corners(model: Model) -> Model:
     return replace(model, components=(*model.components, *corners), monitors=tuple(still))
 
 
-def corners_of_monitors(system: System) -> MonitorCorners:
-    """Return the monitors of a system as corners, which are made once for each system."""
+def corners_of_monitors(system: System) -> MonitorCorners | None:
+    """Return the monitors of a system as corners, made once for each system, or None if there are too many."""
+    if len(system.monitor_names) > MOST or not system.has_tape:
+        return None
     if system.with_corners is None:
         system.with_corners = MonitorCorners(system)
     found: MonitorCorners = system.with_corners

@@ -85,6 +85,8 @@ class RunSetup:
         if not model.monitors:
             return self.method.compiled_loop(system, task.tolerances, self.renewal)
         corners = corners_of_monitors(system)
+        if corners is None:
+            return None
         compiled_loop = self.method.compiled_loop(corners.system, task.tolerances, self.renewal)
         if compiled_loop is not None:
             compiled_loop.pass_monitors(corners)
