@@ -18,7 +18,7 @@ EXTRAS = PROJECT["optional-dependencies"]
 # Names of packages that are imported by another name than "-" written as "_".
 IMPORTED_AS = {"scikit-sundae": "sksundae", "pillow": "PIL"}
 # What is used without an import, and by what.
-IF_THERE = {"gymnasium", "ipywidgets"}  # examples use them where they are installed
+IF_THERE = {"gymnasium", "ipywidgets", "jax", "torch"}  # examples and pages use them where they are installed
 NOT_IMPORTED = {
     "pytest-xdist": "-n auto of pytest",
     "pytest-randomly": "the order of the tests",

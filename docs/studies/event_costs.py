@@ -75,10 +75,7 @@ def cases() -> list[Case]:
     one_piece = text.replace("-x - 0.1*y", "-x - 0.1*y + u") + driven % ([0.0, 10.0], [0.0, 1.0])
     falling = PARABOLA % "-9.81"
     struck = PARABOLA % "p - 9.81" + '[impacts.p]\ngap = "h"\nrestitution = 1\n'
-    reset = (
-        falling
-        + '[modes.fly]\nguards.g = { expr = "h", then = { to = "fly", reset = { h = "0", w = "-w" } } }\n'
-    )
+    reset = falling + '[modes.fly]\nguards.g = {expr="h", then={to="fly", reset={h="0", w="-w"}}}\n'
     long = (0.0, 90.0)
     return [
         Case("a linear monitor that never fires", *monitored(far[0]), lambda _: 0, "1.3 times the run"),

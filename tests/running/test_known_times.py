@@ -56,11 +56,11 @@ def test_a_border_that_is_a_constant_input(method: str) -> None:
         assert sol(3.0)[0] == pytest.approx(0.5, abs=1e-9)
 
 
-def test_a_derivative_by_what_moves_the_time_is_refused() -> None:
+def test_a_derivative_by_what_moves_the_time() -> None:
+    """From c on, v = 0.5 (t - c)."""
     model = on_a_belt("v", "(4 if t < a else 1)", "1")
     sol = hs.simulate(model, (0.0, 3.0), integrator="dop853")
-    with pytest.raises(hs.UsageError, match="depends on c, but its derivative with respect to c is unknown"):
-        hs.sensitivities(sol, ["c"])
+    assert hs.sensitivities(sol, ["c"]).by_parameter[0, 0] == pytest.approx(-0.5, abs=1e-9)
 
 
 @pytest.mark.parametrize("integrator", ["exact", "taylor", "dop853", "rodas5p"])

@@ -17,16 +17,16 @@ def announce_engine() -> None:
     folder = kernel_folder()
     if folder is None or not (folder / "announced").exists():
         store(folder and folder / "announced", b"")
-        _tell("the engine (once, about 30 s per integrator)")
+        _tell("compiling the engine (once, about 30 s per integrator)")
 
 
 def announce_part() -> None:
     """Print that a part which no earlier run needed, such as derivatives, is being compiled."""
-    _tell("another part of the engine (once, 10 to 30 s)")
+    _tell("compiling another part of the engine (once, 10 to 30 s)")
 
 
 def _tell(what: str) -> None:
     if not _announced:
         _announced.add(what)
         state = "not cached" if kernel_folder() is None else f"cached in {cache_root()}"
-        print(f"hybridsim: compiling {what}; {state} ...", file=sys.stderr, flush=True)
+        print(f"hybridsim: {what}; {state} ...", file=sys.stderr, flush=True)

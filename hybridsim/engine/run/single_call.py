@@ -88,7 +88,7 @@ class LazyTrajectory(Trajectory):
 class _FailedCall:
     """The replacement of a compiled loop whose first call failed; it raises the error in the mode loop."""
 
-    kernel_run = None
+    kernel_run = times_ahead = None
 
     def __init__(self, place: tuple[np.ndarray, ...], error: BaseException) -> None:
         self.place, self._error = place, error

@@ -58,7 +58,7 @@ def test_what_is_no_number_is_no_warning_where_nothing_is_compiled() -> None:
 import math, warnings
 warnings.simplefilter("error")
 from hybridsim.engine.linear.recipe import computed
-from hybridsim.engine.series.tape import DIV
+from hybridsim.engine.series.operations import DIV
 print(math.isnan(computed(DIV, (0.0, 0.0), 0, 0)[0]), computed(DIV, (1.0, 0.0), 0, 0)[0])
 """
     assert uncompiled(code).split() == ["True", "inf"]
