@@ -84,7 +84,7 @@ def test_the_pages_import_what_the_extras_declare() -> None:
     needed = of_others("docs")
     beside = [*EXTRAS["docs"], *EXTRAS["rivals"], *EXTRAS["cluster"]]
     assert needed <= modules([*PROJECT["dependencies"], *beside])
-    assert modules(beside) <= needed | of_others("tests")
+    assert modules(beside) <= needed | of_others("tests") | IF_THERE
 
 
 def test_each_extra_is_known() -> None:

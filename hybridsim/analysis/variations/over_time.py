@@ -61,7 +61,7 @@ class OverTime:
         for name in names:
             if name not in self._known:
                 raise UsageError(
-                    f"model {self._solution.model.name} has no quantity {name!r}",
+                    f"model {self._solution.model.name} has no quantity {name!r}, which is in names",
                     remedy=nearest(str(name), self._known, kind="quantities"),
                 )
         found = self.along(as_times(t), names, side)

@@ -117,8 +117,9 @@ def holds_between(
     """Return whether the polynomial satisfies the differential equation in the middle of a step.
 
     The ends do not show this. If a step ends before a sharp bend of the flow, such as friction smoothed over a small
-    velocity, its last derivatives are those of the bend. The polynomial is then wrong between correct ends. tolerances:
-    rtol, atol. weights: `middle_weights`. x, dx (n,): scratch.
+    velocity, its last derivatives are those of the bend. The polynomial is then wrong between correct ends. A step may
+    also end where the flow has no derivatives, such as just below the zero of a root. tolerances: rtol, atol. weights:
+    `middle_weights`. x, dx (n,): scratch.
     """
     rtol, atol = tolerances
     n, count = left.shape
@@ -130,12 +131,13 @@ def holds_between(
         x[i] = value
     call(flow, s + 0.5 * h, x, p, z, dx)
     for i in range(n):
-        change, power, sign = 0.0, 1.0, 1.0
+        change, power, sign, start = 0.0, 1.0, 1.0, 0.0
         for k in range(count):
             change += weights[1, k] * power * (left[i, k] - sign * right[i, k])
-            power, sign = power * h, -sign
+            power, sign, start = power * h, -sign, start + abs(left[i, k])
         size = max(abs(x[i]), max(abs(left[i, 0]), abs(right[i, 0])))
-        if abs(change - h * dx[i]) > _DEFECT * (atol[i] + rtol * size):
+        lack = abs(change - h * dx[i])
+        if lack > _DEFECT * (atol[i] + rtol * size) or (math.isnan(lack) and start < math.inf):
             return False
     return True
 
