@@ -151,7 +151,7 @@ class PolynomialKernels(MethodKernels):
 
     def block(self, result: Any, rows: StepRows, last_steps: np.ndarray, *record: np.ndarray) -> SeriesBlock:
         """Return the committed segments of a call."""
-        return SeriesBlock(self.system, last_steps, *rows, *record)
+        return SeriesBlock(self.recorded, last_steps, *rows, *record)
 
 
 @inlined
