@@ -32,10 +32,11 @@ def relative_change(before: Any, after: Any, scale: Any) -> float:
     """Return the largest change of a state relative to its scale; states without a scale are ignored."""
     largest = 0.0
     for i in range(scale.shape[0]):
-        if scale[i] > 0.0:
+        if not scale[i] <= 0.0:
             change = abs(after[i] - before[i]) / scale[i]
-            if not change <= largest:  # also if it is not a number
-                largest = change
+            if not change < math.inf:  # also if it is not a number
+                return math.inf
+            largest = max(largest, change)
     return largest
 
 
