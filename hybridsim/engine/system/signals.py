@@ -37,7 +37,7 @@ class Signal:
         elif self.kind == "wave" and self.shape != "sine":
             duty = self._number.get("duty", 0.5)
             square = ((0.0, 1.0, 0.0), (duty, -1.0, 0.0))
-            self._corners = square if self.shape == "square" else _SHAPES[str(self.shape)]
+            self.corners = square if self.shape == "square" else _SHAPES[str(self.shape)]
 
     def piece(self, origin: Instant, forward: bool) -> tuple[float, ...]:
         """Return the six numbers of the piece after an instant, or before it if the run goes backward in time."""
@@ -113,7 +113,7 @@ class Signal:
             scale, period, phase = number["amplitude"], number["period"], number["phase"]
             corners = [
                 (fraction, (number["offset"] + scale * value, scale * slope / period, 0.0, 0.0))
-                for fraction, value, slope in self._corners
+                for fraction, value, slope in self.corners
             ]
         if not corners:
             return np.empty((0, 2)), np.empty((0, 6))
@@ -156,7 +156,7 @@ class Signal:
         return [
             (multiple(number["phase"], k, number["period"]).plus(fraction * number["period"]), value, slope)
             for k in range(k0 - 2, k0 + 4)
-            for fraction, value, slope in self._corners
+            for fraction, value, slope in self.corners
         ]
 
     def _wave_piece(self, origin: Instant, forward: bool) -> tuple[float, ...]:

@@ -90,6 +90,14 @@ def test_a_sawtooth_and_a_sine() -> None:
     )
 
 
+@pytest.mark.parametrize(("shape", "expected"), [("square", 0.2), ("triangle", 0.08), ("sawtooth", -0.16)])
+def test_a_wave_of_amplitude_zero(shape: str, expected: float) -> None:
+    """The derivative by the amplitude is the integral of the shape over the first fifth of the period."""
+    model = driven("flat", "wave", {"A": 0.0}, shape=shape, amplitude="A", period=1)
+    found = hs.sensitivities(hs.simulate(model, (0, 0.2)), ["A"])
+    assert found.by_parameter[0, 0] == pytest.approx(expected, rel=1e-9)
+
+
 def test_a_chirp() -> None:
     values = {"A": 1.5, "f0": 0.4, "f1": 1.3, "D": 1.7, "p": 0.3}
     model = driven("chirp", "chirp", values, amplitude="A", f0="f0", f1="f1", duration="D", phase="p")

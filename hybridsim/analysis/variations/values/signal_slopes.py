@@ -48,10 +48,9 @@ class SignalSlopes:
             found[1] = -_TWO_PI / period**2 * d["period"]
             found[3], found[5] = d["amplitude"], d["offset"]
         elif kind == "wave":
-            size = slots[1] / v["amplitude"] if v["amplitude"] else 0.0  # slope of the shape
-            unit = (slots[0] - v["offset"]) / v["amplitude"] if v["amplitude"] else 0.0
-            found[0] = d["offset"] + unit * d["amplitude"]
-            found[1] = size * d["amplitude"] - slots[1] / v["period"] * d["period"]
+            _, value, slope = self._corner(origin + slots[4])
+            found[0] = d["offset"] + value * d["amplitude"]
+            found[1] = (slope * d["amplitude"] - slots[1] * d["period"]) / v["period"]
             found[4] = self._wave_knot(origin + slots[4])
         elif kind == "chirp":
             found[:4] = self._chirp(origin, bool(slots[2]))
@@ -75,13 +74,15 @@ class SignalSlopes:
             return np.asarray(-by / rate)
         return np.zeros(self.width)
 
+    def _corner(self, t: float) -> tuple[float, float, float]:
+        """Return the corner of a wave's shape at the knot at time t: fraction of the period, value and slope."""
+        periods = (t - self._value["phase"]) / self._value["period"]
+        return min(self.signal.corners, key=lambda corner: abs(math.remainder(periods - corner[0], 1.0)))
+
     def _wave_knot(self, t: float) -> np.ndarray:
         d, v = self._slope, self._value
-        periods = (t - v["phase"]) / v["period"]
-        found = d["phase"] + periods * d["period"]
-        if self.declared.shape == "square" and abs(periods - round(periods)) > abs(
-            periods - v["duty"] - round(periods - v["duty"])
-        ):
+        found = d["phase"] + (t - v["phase"]) / v["period"] * d["period"]
+        if self.declared.shape == "square" and self._corner(t)[0] != 0.0:
             found = found + v["period"] * d["duty"]
         return found
 
