@@ -10,7 +10,7 @@ import numpy as np
 from hybridsim.analysis.variations.directions import Directions
 from hybridsim.analysis.variations.values.vector_slopes import VectorSlopes
 from hybridsim.engine.record.segments import Segment
-from hybridsim.engine.series.dual_numbers import Dual, differentiated, differentiated_rows, values_and_slopes
+from hybridsim.engine.series.dual_numbers import Dual, differentiated_rows, values_and_slopes
 from hybridsim.engine.system.system import System
 from hybridsim.solution import Solution
 
@@ -61,19 +61,17 @@ class QuantityDerivatives:
     def _slopes(self, name: str, segment: Segment, s: np.ndarray, Y: np.ndarray) -> np.ndarray:
         """Return the derivatives (k, q, M) of all q results of a generated function."""
         system = self.system
-        function: Any = getattr(system.code.module, name)
+        function = differentiated_rows(getattr(system.code.module, name))
         count = len(system.quantities) if name == "quantities" else len(system.surface_of)
         x = segment.dense(s)
-        try:
-            return self._evaluated(differentiated_rows(function), count, segment, s, x, Y)
-        except ValueError:  # a condition has different values at these times
-            parts = [
-                self._evaluated(
-                    differentiated(function), count, segment, s[k : k + 1], x[k : k + 1], Y[k : k + 1]
+        with np.errstate(divide="ignore", invalid="ignore"):  # of derivatives that do not exist
+            try:
+                return self._evaluated(function, count, segment, s, x, Y)
+            except ValueError:  # a condition has different values at these times
+                here = [slice(k, k + 1) for k in range(len(s))]
+                return np.concatenate(
+                    [self._evaluated(function, count, segment, s[k], x[k], Y[k]) for k in here]
                 )
-                for k in range(len(s))
-            ]
-            return np.concatenate(parts)
 
     def _evaluated(
         self,
@@ -89,7 +87,7 @@ class QuantityDerivatives:
         is_single = len(s) == 1
 
         def number(values: np.ndarray, slopes: np.ndarray) -> Dual:
-            return Dual(float(values[0]), slopes[0]) if is_single else Dual(values, slopes.T)
+            return Dual(values[0], slopes[0]) if is_single else Dual(values, slopes.T)
 
         states = [number(x[:, i], Y[:, i]) for i in range(n)]
         d = self.system.discrete(segment.p)
@@ -97,7 +95,7 @@ class QuantityDerivatives:
         if not is_single:
             p = [Dual(one.value, one.slope[:, None]) if isinstance(one, Dual) else one for one in p]
         out: list[Any] = [0.0] * count
-        function(float(s[0]) if is_single else s, states, p, segment.z, out)
+        function(s[0] if is_single else s, states, p, segment.z, out)
         if is_single:
             return values_and_slopes(out, width)[1][None]
         rows = [

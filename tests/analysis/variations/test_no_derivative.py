@@ -82,3 +82,17 @@ def test_a_parameter_at_a_flat_corner_has_its_derivative() -> None:
     """The start a*abs(a) has the derivative 2*abs(a) = 0 at a = 0."""
     found = hs.sensitivities(run({"x": ("1 + a*abs(a)", "0")}, a=0.0), ["a"])
     assert found.by_parameter.tolist() == [[0.0]]
+
+
+def test_a_quantity_at_a_root_has_no_finite_derivative_there_and_others_elsewhere() -> None:
+    """q = sqrt(x) up to x = 1/2, with x = k t, has dq/dk = t/(2 sqrt(k t))."""
+    model = hs.Model(
+        "root",
+        states=[hs.State("x", 0.0, "k")],
+        parameters={"k": 1.0},
+        outputs=[hs.Output("q", "sqrt(x) if x < 0.5 else 1")],
+    )
+    found = hs.sensitivities(hs.simulate(model, (0.0, 1.0)), ["k"]).at([0.0, 0.25, 0.75], "q")
+    first, *others = found.by_parameter[:, 0, 0]
+    assert not math.isfinite(first)
+    assert others == pytest.approx([0.25, 0.0], abs=1e-12)
