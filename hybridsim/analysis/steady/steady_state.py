@@ -147,10 +147,8 @@ def steady_state(
         raise cannot_be("tol", tol, "use a relative tolerance between 0 and 1, such as 1e-10")
     system = system_of(model)
     _refuse_what_ends(system, period is not None)
-    chosen, own = (
-        {"x0": x0, "z0": z0, "period": period, "integrator": integrator, **options},
-        common_period(system),
-    )
+    chosen = {"x0": x0, "z0": z0, "period": period, "integrator": integrator, **options}
+    own = common_period(system)
     if period is None:
         period = own
     else:

@@ -68,7 +68,7 @@ class FlowDerivatives:
         self._stiff = set()
         if len(inside):
             steps, self._stiff = divided(self._slopes, steps, self.system.fastest)
-        self._intervals = transitions(self._slopes, *steps, self._scale, self._constants)
+        self._intervals = transitions(self._slopes, steps, self._scale, self._constants)
 
     def _slopes(self, number: np.ndarray, s: np.ndarray) -> np.ndarray:
         """Return the derivatives (m, n, n + q) of the rates in segments with ascending numbers (m,)."""
@@ -139,10 +139,8 @@ class FlowDerivatives:
         inside = np.flatnonzero(is_inside)
         if len(inside):
             here = piece[inside]
-            numbers = np.full(len(inside), number)
-            matrices, _ = over_intervals(
-                self._slopes, numbers, begins[here], stops[inside], self._scale, self._constants
-            )
+            steps = Steps(np.full(len(inside), number), begins[here], stops[inside])
+            matrices, _ = over_intervals(self._slopes, steps, self._scale, self._constants)
             before = np.array(totals)[here]
             found[inside] = matrices[:, :, :n] @ before
             found[inside, :, n:] += matrices[:, :, n:]

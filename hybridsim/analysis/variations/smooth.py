@@ -121,25 +121,20 @@ def divided(slopes: NumberedSlopes, steps: Steps, fastest: float) -> tuple[Steps
     return Steps(number, first + part * length, last), set(np.flatnonzero(stiff).tolist())
 
 
-def transitions(
-    slopes: NumberedSlopes,
-    number: np.ndarray,
-    begins: np.ndarray,
-    ends: np.ndarray,
-    scale: np.ndarray,
-    constants: np.ndarray,
-) -> Intervals:
+def transitions(slopes: NumberedSlopes, steps: Steps, scale: np.ndarray, constants: np.ndarray) -> Intervals:
     """Return the derivatives over pieces of segments, which are halved until they are resolved.
 
     scale (n,), constants (q,): sizes of the states and of the constants, all positive.
     """
+    number, begins, ends = steps
     found_parts: list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]] = []
     before = np.full(len(begins), np.inf)
     for halving in range(_HALVINGS):
         count = 1 + len(begins) * (_STAGES * len(scale)) ** 2 // _ENTRIES_PER_BATCH
         parts = np.array_split(np.arange(len(begins)), count)
         done = [
-            over_intervals(slopes, number[part], begins[part], ends[part], scale, constants) for part in parts
+            over_intervals(slopes, Steps(number[part], begins[part], ends[part]), scale, constants)
+            for part in parts
         ]
         found, tails = (np.concatenate(each) for each in zip(*done, strict=True))
         is_rounding = (tails <= _NOISE) & (tails >= 0.7 * before)
@@ -222,14 +217,10 @@ def stiff_transitions(
 
 
 def over_intervals(
-    slopes: NumberedSlopes,
-    number: np.ndarray,
-    begins: np.ndarray,
-    ends: np.ndarray,
-    scale: np.ndarray,
-    constants: np.ndarray,
+    slopes: NumberedSlopes, steps: Steps, scale: np.ndarray, constants: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the derivatives over each piece, and a measure of how well each piece is resolved."""
+    number, begins, ends = steps
     lengths = ends - begins
     at = np.repeat(number, _STAGES)
     rates = _rates(GAUSS, lambda s: slopes(at, s), begins, lengths)

@@ -22,7 +22,7 @@ from hybridsim.engine.system.instant import phase_of
 from hybridsim.engine.system.series_at import series_order
 from hybridsim.errors import UsageError
 from hybridsim.mechanics import codes
-from hybridsim.mechanics.arrays import Record, Scratch, State  # fmt: skip
+from hybridsim.mechanics.arrays import Record, Scratch, State
 from hybridsim.mechanics.polynomials import TERMS
 from hybridsim.mechanics.series_loop.decision import choose_jointly
 from hybridsim.mechanics.series_loop.expansion import expand

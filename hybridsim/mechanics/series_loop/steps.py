@@ -17,7 +17,7 @@ from hybridsim.engine.native.simd.vectors import (
     whole_vectors,
 )
 from hybridsim.engine.roots.first_exit import FOUND, NEVER, OPEN, first_exit
-from hybridsim.mechanics import codes  # fmt: skip
+from hybridsim.mechanics import codes
 from hybridsim.mechanics.series_loop.banded_series import law_holds_in_run
 from hybridsim.mechanics.series_loop.expansion import base_coefficient
 from hybridsim.mechanics.series_loop.simd_series import advance_simd_series, lane_place
