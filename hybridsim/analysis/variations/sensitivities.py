@@ -79,6 +79,7 @@ class Sensitivities(Readable):
         -------
         Derivatives
             Arrays ``by_start`` (m, n + d) and ``by_parameter`` (m, P), or (k, m, n + d) and (k, m, P) for k times.
+            A quantity that has no derivative at a time, such as sqrt(x) at x = 0, has NaN or infinity there.
 
         Examples
         --------
