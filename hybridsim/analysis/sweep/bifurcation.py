@@ -29,8 +29,8 @@ UP, DOWN = "up", "down"
 DIRECTION = "direction"
 
 
-class _Branches:
-    """The values of one parameter in rising order as one branch, and in falling order as another."""
+class _UpAndDown:
+    """The values of one parameter in rising order and then in falling order, as one chain of runs."""
 
     def __init__(self, points: Points, count: int) -> None:
         rows = points.settings(range(count))
@@ -40,12 +40,12 @@ class _Branches:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of steps along a branch, and number of branches."""
-        return len(self._rising), 2
+        """Number of steps along the chain, and number of chains."""
+        return 2 * len(self._rising), 1
 
     def settings(self, numbers: range) -> list[Settings]:
-        """Return the settings of points; even numbers belong to the rising branch, odd numbers to the other."""
-        return [self._rising[-1 - k // 2 if k % 2 else k // 2] for k in numbers]
+        """Return the settings of points; the second half of the numbers belongs to the falling branch."""
+        return [self._rising[min(k, 2 * len(self._rising) - 1 - k)] for k in numbers]
 
 
 @refusing
@@ -69,7 +69,8 @@ def bifurcation(
     """Sample the settled motion at a section, while a parameter is raised and lowered in steps.
 
     Each value starts at the end of its neighbour's run, so that coexisting stable motions can be found from
-    below and from above. Branches that differ show hysteresis. Unstable motions are not found.
+    below and from above. The falling branch starts at the end of the rising one. Branches that differ show
+    hysteresis. Unstable motions are not found.
 
     Parameters
     ----------
@@ -85,9 +86,9 @@ def bifurcation(
     tol : float, optional
         Samples are equal within this fraction of the largest size of each state.
     params, x0, z0 : mapping, optional
-        As in `simulate`; x0 and z0 start both branches.
+        As in `simulate`; x0 and z0 start the rising branch.
     executor, workers, progress : object, optional
-        As in `sweep`; there are two chains to share among workers.
+        As in `sweep`; the runs are one chain, so that one worker is busy at a time.
     **options : Any
         Options of `simulate`.
 
@@ -130,10 +131,10 @@ def bifurcation(
         {"x0": x0, "z0": z0},
         options,
     )
-    branches = _Branches(points, len(points.axes[0].values))
+    branches = _UpAndDown(points, len(points.axes[0].values))
     job = Job(new_token(), with_level, (parameter,), frozenset(), measure, True)
     if not level:
-        _refuse_unforced(job, branches.settings(range(0, 2 * len(branches.values), 2)))
+        _refuse_unforced(job, branches.settings(range(len(branches.values))))
     count = None if workers is None else whole(workers, "workers")
     began = time.perf_counter()
     collected, finished, who = work(job, branches, executor, count, callback(progress))
@@ -171,5 +172,6 @@ def _refuse_unforced(job: Job, points: Sequence[Settings]) -> None:
 
 
 def _turned(array: np.ndarray) -> np.ndarray:
-    """Reorder results from (step, branch, ...) to (branch, value, ...), with rising values in both branches."""
-    return np.stack([array[:, 0], array[::-1, 1]])
+    """Reorder results from (step, 1, ...) to (branch, value, ...), with rising values in both branches."""
+    rising, falling = np.split(array[:, 0], 2)
+    return np.stack([rising, falling[::-1]])

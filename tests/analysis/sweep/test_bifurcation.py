@@ -56,6 +56,16 @@ def test_hysteresis_shows_as_two_branches() -> None:
     assert (np.abs(up - down) > 1.0).sum() == (np.abs(b) < fold).sum()
 
 
+def test_the_falling_branch_starts_at_the_end_of_the_rising_one() -> None:
+    """A state that grows by 1 in each period counts the periods of all runs before its own."""
+    counted = hs.Model(
+        "counted", parameters={"r": 1.0}, states=[hs.State("x", 0, "1/(2*pi) + r*cos(t)", nominal=1.0)]
+    )
+    found = hs.bifurcation(counted, "r", [1.0, 2.0], settle=3, samples=2)
+    last = found["x"][:, :, -1]
+    assert last == pytest.approx(np.array([[5.0, 10.0], [20.0, 15.0]]), abs=1e-6)
+
+
 def test_a_level_as_section_of_a_limit_cycle() -> None:
     found = hs.bifurcation(CIRCLE, "r", [0.25, 1.0, 4.0], section="y", settle=10, samples=3)
     assert not found.failed.any()
