@@ -29,6 +29,18 @@ def test_a_grid_fills_its_folder(hybridsim: Callable, tmp_path: Path) -> None:
     assert json.loads((tmp_path / "o" / "sweep.json").read_text(encoding="utf-8"))["values"]
 
 
+def test_processes_give_the_bits_of_threads(hybridsim: Callable, tmp_path: Path) -> None:
+    sweep = ("sweep", "dfcs", "F0=22:30:3", *FINAL)
+    for how in ("processes", "workers"):
+        code, _, err = hybridsim(*sweep, "--out", how, f"--{how}", 2)
+        assert code == 0, err
+    one, two = ((tmp_path / how / "sweep.csv").read_bytes() for how in ("processes", "workers"))
+    assert one == two
+    assert "ProcessPool" in (tmp_path / "processes" / "sweep.json").read_text(encoding="utf-8")
+    code, _, err = hybridsim(*sweep, "--processes", 2, "--workers", 2)
+    assert code == 2 and "--processes cannot be combined with --workers" in err
+
+
 def test_readings_of_the_last_period(hybridsim: Callable) -> None:
     code, out, err = hybridsim(
         "sweep", "dfcs", "F0=22,30", "--measure", "amplitude.x", "--after", 40, "--json"

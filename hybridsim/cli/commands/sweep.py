@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import argparse
 import math
-from contextlib import suppress
+import multiprocessing
+import signal
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import AbstractContextManager, nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -84,6 +87,13 @@ def add_to(commands: Any) -> None:
     options.add_integrator(parser)
     options.add_rtol(parser, "depends on the measure")
     options.add_workers(parser)
+    options.add(
+        parser,
+        "--processes",
+        "N",
+        "use this number of processes instead of threads, for integrators that step in Python (scipy-*, cvode-*)",
+        values.workers,
+    )
     options.add(parser, "--over", "NAME", "plot lines over this parameter instead of a map")
     options.add_out(parser, "sweep-MODEL")
     options.add_json(parser, "the data")
@@ -116,6 +126,10 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 
     if args.after is not None:
         settings["after"] = args.after
+    if args.processes is not None and args.workers is not None:
+        raise UsageError(
+            "--processes cannot be combined with --workers", remedy="remove --workers: it is the number of threads"
+        )
 
     is_new = not folder.exists()
     folder.mkdir(parents=True, exist_ok=True)
@@ -137,12 +151,13 @@ def _fill(
     if journal.exists():
         complain(f"continuing from {journal}")
     try:
-        with Progress(session) as progress, session.stopping_gently():
+        with Progress(session) as progress, session.stopping_gently(), _pool(args.processes) as executor:
             result = hybridsim.sweep(
                 model,
                 axes,
                 args.measure,
                 mode="list" if args.list else "grid",
+                executor=executor,
                 workers=args.workers,
                 warm_start=args.warm_start,
                 journal=journal,
@@ -165,6 +180,18 @@ def _fill(
         complain(f"interrupted after {int((~result.failed).sum())} of {result.status.size} points")
         return session.interrupted_code
     return SimulationError.exit_code if result.failed.all() else 0
+
+
+def _pool(processes: int | None) -> AbstractContextManager[ProcessPoolExecutor | None]:
+    """Return a pool of processes that leave Ctrl-C to this process, or None for threads."""
+    if processes is None:
+        return nullcontext()
+    return ProcessPoolExecutor(
+        processes,
+        mp_context=multiprocessing.get_context("spawn"),
+        initializer=signal.signal,
+        initargs=(signal.SIGINT, signal.SIG_IGN),
+    )
 
 
 def _write(result: Sweep, over: str | None, folder: Path, session: Session) -> None:
