@@ -128,7 +128,8 @@ def execute(args: argparse.Namespace, session: Session) -> int:
         settings["after"] = args.after
     if args.processes is not None and args.workers is not None:
         raise UsageError(
-            "--processes cannot be combined with --workers", remedy="remove --workers: it is the number of threads"
+            "--processes cannot be combined with --workers",
+            remedy="remove --workers: it is the number of threads",
         )
 
     is_new = not folder.exists()
