@@ -199,7 +199,7 @@ def csv_records(path: str | PathLike[str], records: Sequence[Mapping[str, Any]])
 
 
 def fields_of(owner: object, *names: str) -> dict[str, Any]:
-    """Return attributes of an object by name, in this order, for a record."""
+    """Return the named attributes of an object as a record, in the given order."""
     return {name: getattr(owner, name) for name in names}
 
 

@@ -1,4 +1,4 @@
-"""This package is the command line program: start with `entry`, whose function `main` runs one of `commands`."""
+"""This package is the command line program. The function `main` in `entry` runs one of the `commands`."""
 
 from hybridsim.cli.entry import command as command
 from hybridsim.cli.entry import main as main

@@ -23,7 +23,7 @@ def add(
     kind: Callable[[str], Any] = str,
     **more: Any,
 ) -> None:
-    """Add an option with a value: its name, its value in the help, the text of the help, and what reads the value."""
+    """Add an option with a name, a placeholder for its value, a help text, and a function that reads the value."""
     parser.add_argument(name, metavar=metavar, help=text, type=kind, **more)
 
 

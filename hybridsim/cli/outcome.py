@@ -60,7 +60,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def check_arguments(args: argparse.Namespace) -> None:
-    """Reject output files that cannot be written before the run starts."""
+    """Before the run starts, reject output files that cannot be written."""
     options.check_plot(args)
     if args.animate:
         require_writable(args.animate, "--animate", options.ANIMATIONS)
@@ -93,7 +93,7 @@ def check_arguments(args: argparse.Namespace) -> None:
 
 
 def check_drawing(model: Model, args: argparse.Namespace) -> None:
-    """Reject an animation that cannot be made before the run starts."""
+    """Before the run starts, reject an animation that cannot be made."""
     if args.animate:
         from hybridsim.plot.drawing.animation import check_animation
 

@@ -34,7 +34,7 @@ _opposing = Precompiled(opposing)
 
 
 class Group(NamedTuple):
-    """The m points of a group, with what their runs need."""
+    """The m points of a group, with the data for their runs."""
 
     numbers: np.ndarray  # numbers (m,) of the points
     tables: EnsembleTables
@@ -127,7 +127,7 @@ class Ensemble:
 
     @contextmanager
     def scratch(self, group: Group) -> Iterator[GroupScratch]:
-        """Yield scratch arrays for a group, with its tables."""
+        """Yield scratch arrays for a group, including the group's tables."""
         spare: deque[Any] = spare_scratch(self.system, "ensemble", group.tables.form)
         try:
             scratch = spare.pop()

@@ -64,7 +64,7 @@ def run_periods(packs: Any, length: float) -> int:
 
 @inlined
 def begin_segment(state: Any) -> None:
-    """Let a segment begin at the state, in modes whose guards are positive there."""
+    """Begin a segment at the present state, in modes whose guards are positive at this state."""
     for g in range(state.sides.shape[0]):
         state.sides[g], state.orders[g], state.floors[g] = 1, 0, 0.0
 
@@ -91,7 +91,7 @@ def _hold(automata: Any, z: Any, matrix: Any) -> None:
 
 @kernel
 def carry_derivative(packs: Any, lin: Any, count: int, scratch: Any) -> None:
-    """Write the derivative of the states after the recorded segments by those before them to `scratch.matrix`."""
+    """Write the derivative of the last state of the recorded segments by the first one to `scratch.matrix`."""
     automata, record, rows, work, own = (
         packs.model.automata,
         packs.record,
@@ -136,7 +136,7 @@ def carry_derivative(packs: Any, lin: Any, count: int, scratch: Any) -> None:
 
 @inlined
 def solve(rows: Any) -> bool:
-    """Solve linear equations (n, n + 1) in place; the last column becomes the solution. False if they are singular."""
+    """Solve linear equations (n, n + 1) in place in the last column; return False if the matrix is singular."""
     n = rows.shape[0]
     for k in range(n):
         best = k

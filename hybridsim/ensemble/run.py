@@ -1,4 +1,4 @@
-"""This module runs many parameter points in compiled code, and measures the last period of each."""
+"""This module runs many parameter points in compiled code, and measures the last period of each run."""
 
 from __future__ import annotations
 
@@ -157,7 +157,7 @@ def _shift_back(record: Any, rows: Any, stored: int, count: int) -> None:
 
 @inlined
 def clear_summary(found: Any) -> None:
-    """Set a `MotionSummary` to that of no motion."""
+    """Set a `MotionSummary` to its values before any motion."""
     for i in range(found.extremes.shape[1]):
         found.extremes[0, i], found.extremes[1, i] = np.inf, -np.inf
         found.integrals[0, i] = found.integrals[1, i] = 0.0
@@ -181,7 +181,7 @@ def take_rest(hold: Any, period: float, state: Any, found: Any) -> None:
 
 @inlined
 def store_summary(found: Any, runs: Any, i: int) -> None:
-    """Store a `MotionSummary` as that of run `i`."""
+    """Store a `MotionSummary` as the summary of run `i`."""
     for side in range(2):
         put(found.extremes[side], runs.extremes[i, side])
         put(found.integrals[side], runs.integrals[i, side])

@@ -33,7 +33,7 @@ class LastPeriods(NamedTuple):
 def last_periods(
     ensemble: Ensemble, parameters: np.ndarray, starts: np.ndarray, periods: int
 ) -> Iterator[LastPeriods]:
-    """Yield the last of a number of forcing periods of all supported runs, in any order.
+    """Run all supported points over a number of forcing periods, and yield the last periods, in any order.
 
     parameters (N, P), in the order of the model; starts (N, n). The iteration ends early if `may_continue` of the
     ensemble returns False.

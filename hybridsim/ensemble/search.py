@@ -1,4 +1,4 @@
-"""This module finds the periodic motions that runs settle on, for the points of a group, in compiled code.
+"""This module finds, in compiled code, the periodic motions on which the runs of a group settle.
 
 A run is followed period by period until its states repeat. If many more periods are expected, Newton's method on the
 period map replaces waiting, as long as the sequence of modes stays the same. The rules are those of
@@ -111,7 +111,7 @@ def search_orbits(
 
 @inlined
 def _begin(packs: Any, lin: Any, none: Any, starting: Any, searches: Any, i: int, scratch: Any) -> int:
-    """Begin the run of a point; return RESTS for a state that stays, PERIODIC for another, or UNDECIDED."""
+    """Begin the run of a point; return RESTS for a state at rest, PERIODIC for a moving state, or UNDECIDED."""
     origin_at, phases_at, pin_at, surfaces, hold = starting
     model, state, work, call = packs.model, packs.state, packs.work, packs.call
     rates = searches.rates[i]
@@ -236,7 +236,7 @@ def _newton(packs: Any, lin: Any, searches: Any, i: int, scratch: Any, about: An
 
 @kernel
 def _shortest(packs: Any, searches: Any, i: int, scratch: Any, about: Any) -> tuple[int, int]:
-    """Run the shortest period of the recorded motion; return it in periods of the forcing, and its segments.
+    """Run the shortest period of the recorded motion; return its length in forcing periods, and its segments.
 
     There are 0 segments if the motion nearly repeats earlier. about: tolerance, and a number of periods after which
     the motion repeats.
@@ -261,7 +261,7 @@ def _shortest(packs: Any, searches: Any, i: int, scratch: Any, about: Any) -> tu
 
 @inlined
 def _sum_up(packs: Any, lin: Any, hold: Any, segments: int, rule: Any, scratch: Any) -> bool:
-    """Summarise the recorded segments; return False if one oscillates too often."""
+    """Summarise the recorded segments; return False if a segment oscillates too often."""
     record, rows = packs.record, packs.rows
     clear_summary(scratch.summary)
     return sum_up(

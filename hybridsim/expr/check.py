@@ -236,7 +236,8 @@ def check_size(tree: ast.expr, expr: str, place: Place, max_depth: int, max_node
             raise ExpressionError(
                 f"the expression is {what} (at most {max_depth} levels and {max_nodes} parts are allowed)",
                 place=place.at(expr),
-                remedy="move parts of it to [definitions], or group a long sum: (a + b + ...) + (c + ...)",
+                remedy="move parts of the expression to [definitions], or group a long sum: (a + b + "
+                "...) + (c + ...)",
             )
         level = [
             child

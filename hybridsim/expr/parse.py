@@ -86,7 +86,7 @@ class Expression:
 
     @property
     def is_number(self) -> bool:
-        """Whether the value is a number without names, and not true or false."""
+        """Whether the expression is a number: the value is not true or false, and the text contains no names."""
         return not self.names and not self.is_boolean
 
     def error(
@@ -157,7 +157,7 @@ def checked_tree(
         raise ExpressionError(
             "the expression is nested too deeply",
             place=where.at(text),
-            remedy="move parts of it to [definitions]",
+            remedy="move parts of the expression to [definitions]",
         ) from None
     return tree, names
 
@@ -215,7 +215,7 @@ def of_tree(tree: ast.expr, place: Place | None = None) -> Expression:
 
 
 def check_text(text: str, where: Place, also: str = "") -> None:
-    """Reject a text that is empty or too long, or has invalid characters; ``also`` lists further valid ones."""
+    """Reject a text that is empty or too long, or has invalid characters; ``also`` lists further valid characters."""
     if not text:
         raise ExpressionError(
             "the expression is empty", place=where, remedy="write a number or an expression"
@@ -224,7 +224,7 @@ def check_text(text: str, where: Place, also: str = "") -> None:
         raise ExpressionError(
             f"the expression has {len(text)} characters, but at most {MAX_LENGTH} are allowed",
             place=where.at(_short(text)),
-            remedy="move parts of it to [definitions]",
+            remedy="move parts of the expression to [definitions]",
         )
     for column, character in enumerate(text):
         if not (_ALLOWED.match(character) or character in also):

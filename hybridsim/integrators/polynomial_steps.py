@@ -164,7 +164,7 @@ def project(model: Any, work: Any, state: Any, s: float, x: Any) -> None:
 
 @inlined
 def put_sides(state: Any, own: Any) -> None:
-    """Set the sides of the guards to those at the start of the segment."""
+    """Set the sides of the guards to their sides at the start of the segment."""
     put(state.sides, own.sides)
     put(state.orders, own.orders)
     put(state.floors, own.floors)
@@ -219,7 +219,7 @@ def first_zero(start: Any, model: Any, own: Any, s: float, d: float) -> tuple[in
 
 @kernel
 def expand_at(model: Any, k: int, s: float, x: Any, own: Any) -> None:
-    """Compute Taylor coefficients along the flow from (s, x) with the interpreter of tapes; see `guards_at_end`."""
+    """Compute Taylor coefficients along the flow from (s, x) with the tape interpreter; see `guards_at_end`."""
     tapes, inputs, W, n = model.tapes, model.inputs, own.W, x.shape[0]
     rows = tapes.optimised[tapes.optimised_start[k] : tapes.optimised_start[k + 1]]
     if inputs.time[0] >= 0:
@@ -262,7 +262,7 @@ def record_step(call: Any, work: Any, own: Any, rows: Any, s: float, d: float, e
 def end_segment(
     start: Any, model: Any, call: Any, state: Any, work: Any, own: Any, s: float, length: float, number: int
 ) -> SegmentEnd:
-    """Return the end of a segment at s, with the states in ``work.y``; `length` is that of the last step.
+    """Return the end of a segment at s, with the states in ``work.y``; `length` is the length of the last step.
 
     number: of the active guard that is zero there, -1 for none. ``own.guards`` belong to this end if there is one.
     """

@@ -1,4 +1,4 @@
-"""This module registers integrators: built-in ones, and those of plug-ins with an entry point."""
+"""This module registers integrators: built-in integrators, and integrators of plug-ins with an entry point."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def _registered() -> dict[str, type[Integrator]]:
 
 
 def list_integrators() -> tuple[type[Integrator], ...]:
-    """Return all integrators that can be selected by name, built-in ones first.
+    """Return all integrators that can be selected by name; built-in integrators come first.
 
     Returns
     -------

@@ -119,7 +119,7 @@ class ArraysTrajectory(ABC):
         return self._column(name, self.own_times)
 
     def _column(self, name: str, times: np.ndarray) -> np.ndarray:
-        """Return a quantity at times; if a time occurs twice, the first value is that before the event."""
+        """Return a quantity at times. If a time occurs twice, the first value is the value before the event."""
         self.require_states()
         before = self._are_before(times)
         values = self.values(name, times, "+")

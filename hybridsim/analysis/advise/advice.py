@@ -75,7 +75,7 @@ class Advice(Readable):
 
     @property
     def simplest(self) -> Step:
-        """The simplest adequate model, or else the full model; in a region it must be adequate at every point."""
+        """The simplest adequate model, or else the full model. In a region, a model must be adequate at every point."""
         return next(step for step in self.ladder if step.is_adequate)
 
     @property

@@ -32,7 +32,7 @@ class Certificate:
 
 
 def certificates(model: Model) -> tuple[Certificate, ...]:
-    """Return all properties of a model that follow from theory, the strongest first."""
+    """Return all properties of a model that follow from theory; stronger properties come first."""
     found = []
     if bound := _nothing_moves(model):
         load, limit = (f"{value:.6g}" for value in bound)
@@ -134,7 +134,7 @@ def _at(form: Affine, start: Mapping[str, float]) -> float:
 
 
 def _largest(model: Model, form: Affine, force: str, values: Mapping[str, float]) -> float:
-    """Return an upper bound of a linear form over all times, without the contact's force."""
+    """Return an upper bound of |form| over all times, with the contact's force set to zero in the linear form."""
     steady, swing = form.constant, sum(abs(phasor) for phasor in form.waves.values())
     inputs = {i.name: i for i in model.inputs}
     for name, value in form.linear.items():

@@ -86,23 +86,23 @@ class Limits:
     report: Callable[[], None] | None = None
 
     def time_budget(self, full: Answer | None = None) -> TimeBudget:
-        """Return the time limit of one computation: a multiple of the full model's cost, or the remaining time."""
+        """Return the time limit of a computation: a multiple of the full model's cost, at most the remaining time."""
         own = math.inf if full is None else max(_DEARER * full.seconds, self.least)
         return TimeBudget(min(own, self.budget.left), self.report)
 
     def reason(self, fault: OutOfTime, full: Answer) -> str:
-        """Return why a computation was stopped for taking too long."""
+        """Return the reason why a computation was stopped before its end."""
         if not self.budget.left:
             return self.spent
         return f"slower than the full model: {fault}, but the full model takes {duration(full.seconds)}"
 
     @property
     def spent(self) -> str:
-        """The reason for which a computation is skipped when no time is left."""
+        """The reason that is given for a computation that is skipped because no time is left."""
         return f"the budget of {self.budget.seconds:.3g} s is spent"
 
     def warm(self, ask: Callable[[Watch | None], Answer], watch: Watch) -> Answer:
-        """Return the answer; a fast computation is repeated, so that its cost excludes one-time set-up."""
+        """Return the answer. A fast computation is repeated, so that its cost excludes one-time set-up."""
         first = ask(watch)
         if not self.repeat or first.seconds > _AGAIN_BELOW:
             return first
@@ -116,7 +116,7 @@ def duration(seconds: float) -> str:
 
 
 def scene_of(model: Model, motion: Any, v0: float | None) -> Scene:
-    """Return the data that simplified models need: the full model, and its sliding speeds."""
+    """Return the full model with its sliding speeds, as the data that simplified models need."""
     if isinstance(motion, Measures):
         means, peak = speeds(model, motion)
         return Scene(model, means, peak or None, v0)

@@ -117,7 +117,7 @@ def settings(
     limits: Limits,
     report: Callable[[str], None],
 ) -> tuple[Setting, ...]:
-    """Try each integrator from its loosest setting to an adequate one; return all, sorted by `rank`."""
+    """Try the settings of each integrator from the loosest to an adequate one, and return them sorted by `rank`."""
     found = []
     if question.t_span is None:
         loose = Question(question.text, question.function, None, max(_SHARE * tol, question.accuracy))
@@ -145,13 +145,13 @@ def settings(
 
 
 def rank(setting: Setting) -> tuple[bool, bool, float]:
-    """Return the sort key: adequate settings come first, then fast settings; fixed steps get a handicap in time."""
+    """Return the sort key: adequate settings come first, then fast ones. The time of fixed steps gets a handicap."""
     worth = _UNCONTROLLED if "step" in setting.options else 1.0
     return not setting.is_adequate, math.isnan(setting.seconds), worth * setting.seconds
 
 
 def confirmed(one: Setting, finer: Setting, tol: float) -> Setting:
-    """Return a fixed-step setting; it counts as not adequate if a shorter step is not adequate."""
+    """Return a fixed-step setting, marked as not adequate if a shorter step is not adequate."""
     if finer.is_adequate or finer.value is None:
         return one
     why = (

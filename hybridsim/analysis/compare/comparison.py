@@ -126,7 +126,7 @@ class Comparison(Readable):
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """The names of the compared lines, in order; a line is an integrator or a regularised law."""
+        """The names of the compared integrators and regularised laws, in order."""
         return tuple(dict.fromkeys(row.label for row in self.rows))
 
     def table(self) -> str:
@@ -204,7 +204,7 @@ class Comparison(Readable):
 
 
 def _cells(comparison: Comparison, row: Row) -> tuple[str, ...]:
-    """Return the cells of a row; empty for a failure."""
+    """Return the cells of a row; the cells of a failed run are empty."""
     if row.errors is None or row.cost is None:
         return ()
     readings = [comparison.reading(row, quantity) for quantity in comparison.quantities]
@@ -236,7 +236,7 @@ def _heading(comparison: Comparison) -> list[str]:
 
 
 def differences(comparison: Comparison, errors: Errors | None = None) -> str:
-    """Return errors as text in the units of the table; the default is the difference of the two references."""
+    """Return errors as text in the table's units. The default errors are the difference of the two references."""
     readings = {name: comparison.scaled(errors or comparison.difference, name) for name in QUANTITIES}
     return ", ".join(f"{_NAMES[name]} {value:.1e}" for name, value in readings.items() if value) or "nothing"
 

@@ -24,7 +24,7 @@ def positive(value: Any, what: str) -> float:
 
 
 def whole(value: Any, what: str, most: int = MOST) -> int:
-    """Return a whole number between 1 and a limit; larger numbers would exceed memory and time."""
+    """Return a whole number from 1 to a limit that is set by memory and time."""
     remedy = f"use a whole number from 1 to {most}"
     found = number(value, what, remedy)
     if not (1 <= found <= most and found.is_integer()):

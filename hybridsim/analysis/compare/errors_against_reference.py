@@ -44,7 +44,7 @@ class Errors:
 
     @property
     def wrong_modes(self) -> bool:
-        """Whether the run has modes, but in the wrong sequence."""
+        """Whether the run has modes, and their sequence is wrong."""
         return self.sequence is not None and not self.sequence.right
 
 
@@ -86,7 +86,7 @@ class Yardstick:
         return CompletedGraph(trajectory, jumps, self.period or t1 - t0, self.amplitude)
 
     def measure(self, run: Trajectory) -> Errors:
-        """Return the errors of a run that starts like the reference, up to the earlier of the two ends."""
+        """Return the errors of a run that starts like the reference, until one of them ends."""
         matched = match_events(self.trajectory, run)
         end = min(self.trajectory.t_span[1], run.t_span[1])
         shared = self.times <= end
@@ -103,7 +103,7 @@ class Yardstick:
     def _matched_times(
         self, matched: MatchedEvents, t_span: tuple[float, float]
     ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Return the times at which to evaluate the run, and a mask of the times just before an event."""
+        """Return the times at which the run is evaluated, and a mask of the times just before an event."""
         jumps = [(a.t, b.t) for a, b in matched.pairs if a in self.resets]
         if not jumps:
             return self.times, self.before

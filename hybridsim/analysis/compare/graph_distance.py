@@ -64,11 +64,11 @@ class CompletedGraph:
         )
 
     def distance_from(self, times: Array, states: Array, end: float) -> Array:
-        """Return the distance of each point (k,) from this curve up to the time `end`, with states scaled."""
+        """Return the distances (k,) of scaled points from this curve up to the time `end`."""
         return self._refined(times, states, self._bound(times, states, end), end)
 
     def _bound(self, times: Array, states: Array, end: float) -> Array:
-        """Return an upper bound of each distance, from the graph at the same time and at nearby jumps."""
+        """Return an upper bound of each distance, computed from the graph at the same time and at nearby jumps."""
         inside = np.clip(times, self.trajectory.t_span[0], end)
         late = np.abs(times - inside) / self.time
         far = np.min([np.abs(self.at(inside, side) - states).max(axis=1) for side in "-+"], axis=0)
@@ -82,7 +82,7 @@ class CompletedGraph:
         return bound
 
     def _refined(self, times: Array, states: Array, bound: Array, end: float) -> Array:
-        """Return the distances, by searching the part of the graph that contains the nearest points."""
+        """Return the distances, found by a search of the part of the graph that contains the nearest points."""
         for _ in range(_ROUNDS):
             width = bound[:, None] * self.time
             knots = np.clip(times[:, None] + width * _WINDOW, self.trajectory.t_span[0], end)
@@ -123,7 +123,7 @@ class CompletedGraph:
 
 
 def graph_distance(first: CompletedGraph, second: CompletedGraph) -> float:
-    """Return the Hausdorff distance of two completed graphs in the same scaling, up to the earlier end.
+    """Return the Hausdorff distance of two completed graphs in the same scaling, until one of them ends.
 
     It is the maximum over the points of either graph of the distance to the other graph. The distance of two
     points is their largest coordinate difference: |t - t'| / time or |x_i - x_i'| / amplitude_i. The result

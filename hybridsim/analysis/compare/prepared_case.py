@@ -46,7 +46,7 @@ class PreparedCase:
         return lambda: self.simulate(line.integrator, model=model, **options)
 
     def first_run(self, line: Series, value: float, reference: Reference, limit: float = math.inf) -> Row:
-        """Make the untimed first run, and return a row with its errors and counts.
+        """Make the first run without timing, and return a row with the errors and counts of the run.
 
         Parameters
         ----------

@@ -76,7 +76,7 @@ def _velocity_size(model: Model) -> float:
 
 
 def as_set_valued(run: Trajectory, contacts: Collection[str]) -> Trajectory:
-    """Return a run of a regularised model, with its modes renamed like those of the set-valued law."""
+    """Return a run of a regularised model; its modes get the names that they have in the set-valued law."""
     modes = {
         name: _BREAKING.get(mode, mode) if name in contacts else mode
         for name, mode in run.initial_modes.items()

@@ -69,7 +69,7 @@ class Row:
     form: str = ""
 
     def timed(self, wall_times: tuple[float, ...]) -> Row:
-        """Return the row with the measured wall times; the row is unchanged if there are none."""
+        """Return the row with the measured wall times, or the unchanged row if no times were measured."""
         if self.cost is None or not wall_times:
             return self
         return replace(self, cost=replace(self.cost, wall_times=wall_times, repetitions=len(wall_times)))
@@ -77,7 +77,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Reading:
-    """An error, or only an upper bound of an error below the uncertainty of the reference."""
+    """An error, or an upper bound of an error that is below the uncertainty of the reference."""
 
     value: float
     is_bound: bool

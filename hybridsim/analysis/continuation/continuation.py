@@ -168,7 +168,7 @@ class _Follower:
         self.section = self.first_section = fastest(solution, scale)
 
     def follow(self, first: _Closing, sign: float) -> tuple[list[BranchPoint], str]:
-        """Return the points of the branch towards lower (sign -1) or higher parameters, and why it ends."""
+        """Return the branch points towards lower (sign -1) or higher parameters, and the reason why the branch ends."""
         found: list[BranchPoint] = []
         here, step, is_moved = first, _FIRST, False
         self.section = self.first_section

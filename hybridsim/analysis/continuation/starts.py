@@ -1,4 +1,4 @@
-"""This module chooses the start of an unforced periodic orbit, and the state that keeps its value there."""
+"""This module chooses the start of an unforced periodic orbit, and the state that is fixed at the start."""
 
 from __future__ import annotations
 
@@ -35,13 +35,13 @@ def in_shared(tangent: np.ndarray, point: BranchPoint) -> np.ndarray:
 
 
 def fastest(solution: Solution, unit: np.ndarray) -> int:
-    """Return the state that changes fastest, in its unit, as a run begins."""
+    """Return the state that changes fastest at the start of a run, relative to the state's unit."""
     rates = np.abs(rates_at(solution, 0, len(solution.names)))
     return int(np.argmax(rates / unit[: len(rates)])) if len(rates) else 0
 
 
 def rates_at(solution: Solution, k: int, count: int) -> np.ndarray:
-    """Return the rates (count,) of all unknowns at the start (k = 0) or the end (-1) of a run."""
+    """Return the rates (count,) of all unknowns at the start (k = 0) or the end (k = -1) of a run."""
     segment, found = solution._segments[k], np.zeros(count)
     states = rates_of(solution._system, float(segment.s[k]), segment.x[k], segment.p, segment.z)
     found[: len(states)] = states

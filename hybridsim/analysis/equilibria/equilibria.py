@@ -70,7 +70,7 @@ class Equilibrium(Readable):
 def equilibria(
     model: Model | str | PathLike[str], *, params: Mapping[str, Any] | None = None
 ) -> tuple[Equilibrium, ...]:
-    """Find equilibria and steady sliding of an unforced model, in each combination of modes that can hold.
+    """Find the equilibria and steady sliding motions of an unforced model, in all admissible combinations of modes.
 
     In each combination of modes Newton's method finds a point with zero rates; points that violate a guard
     are left out. If contacts stick, the points form a set. Linear programs then give the least and greatest
@@ -130,7 +130,7 @@ def equilibria(
 
 
 def _add(found: list[Equilibrium], new: Equilibrium, rounding: np.ndarray) -> None:
-    """Add an equilibrium; a point on a corner is stored once, with the larger growth rate of its two sides."""
+    """Add an equilibrium. A point on a corner is stored once, with the larger growth rate of its two sides."""
     for i, old in enumerate(found):
         is_same = old.is_point and new.is_point and old.modes == new.modes
         if is_same and (np.abs(old.x - new.x) <= rounding).all():
@@ -191,7 +191,7 @@ def _extent(field: Field, x: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None
 
 
 def _farthest(field: Field, x: np.ndarray, i: int, side: float) -> float | None:
-    """Return the least (side 1) or greatest (side -1) value of state i, by a sequence of linear programs."""
+    """Return the least (side 1) or greatest (side -1) value of state i, found by a sequence of linear programs."""
     at = x
     for _ in range(_ROUNDS):
         solved = _program(field, at, i, side)

@@ -52,7 +52,7 @@ class Field:
         return self if (z == self.z).all() else Field(self.system, z, self.t, self.by_state)
 
     def borders(self, x: np.ndarray) -> list[tuple[int, int]]:
-        """Return the components with a guard that is zero within rounding, and the mode beyond that guard."""
+        """Return the components with a guard that is zero within rounding, and for each the mode beyond the guard."""
         _, _, g, G = self(x)
         rounding = dict(zip(self.guards.tolist(), INSIDE * (np.abs(G) @ self.sizes(x)), strict=True))
         value = dict(zip(self.guards.tolist(), g.tolist(), strict=True))

@@ -1,4 +1,4 @@
-"""This module finds reasons for which the result of a fit may be wrong."""
+"""This module finds reasons why the result of a fit may be wrong."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def doubts(
 
 
 def is_local(residuals: Residuals, off: np.ndarray) -> bool:
-    """Return whether the residuals may be those of a local minimum: large, or with correlated neighbours."""
+    """Return whether residuals suggest a local minimum, because they are large or correlated with their neighbours."""
     for name in residuals.names:
         here = residuals.quantity == name
         spread, size = float(np.std(residuals.measured[here])), float(np.sqrt(np.mean(off[here] ** 2)))
@@ -77,7 +77,7 @@ def is_local(residuals: Residuals, off: np.ndarray) -> bool:
 
 
 def _correlation(residuals: Residuals, off: np.ndarray, name: str) -> float:
-    """Return the correlation of residuals of a quantity with their successors in the same record."""
+    """Return the correlation of consecutive residuals of a quantity in the same record."""
     products, before, after, begin, k = 0.0, 0.0, 0.0, 0, 0
     for record in residuals.records:
         for column in record.columns:

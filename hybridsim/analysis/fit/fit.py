@@ -148,7 +148,7 @@ def fit(
 
 
 def _quantities(residuals: Residuals, record: Any) -> tuple[str, ...]:
-    """Return the names of all quantities of the model, from a run without length."""
+    """Return the names of all quantities of the model, found by a run of zero length."""
     start = record.t0 if record.t0 is not None else float(record.t[0])
     empty = simulate(residuals.model, (start, start), params=dict(record.params), x0=dict(record.x0))
     return (*empty.names, *empty.quantities)
@@ -184,7 +184,7 @@ def _guesses(unknowns: Mapping[str, Unknown], starts: int) -> list[np.ndarray]:
     for name, unknown in unknowns.items():
         if not unknown.is_bounded:
             raise UsageError(
-                f"{name} has no finite bounds, which more than one start needs",
+                f"{name} has no finite bounds, but more than one start needs finite bounds",
                 remedy="give both bounds, or starts=1",
             )
     low, high = np.array([unknown.coordinate_bounds for unknown in unknowns.values()]).T

@@ -13,7 +13,7 @@ _TAKES_PART = 0.03  # of the largest component
 
 @dataclass(frozen=True)
 class Undetermined:
-    """A joint change of unknowns that changes nothing that was measured.
+    """A joint change of unknowns that leaves all measured quantities unchanged.
 
     names : the unknowns that take part; changes : their relative changes, of which the largest is 1.
     """
@@ -36,7 +36,7 @@ class Undetermined:
 def undetermined(
     names: list[str], slopes: np.ndarray, per_value: np.ndarray
 ) -> tuple[list[Undetermined], np.ndarray]:
-    """Return undetermined combinations, and the covariance (n, n) without them, in units of the unknowns' sizes.
+    """Return the undetermined combinations, and the covariance (n, n) that remains without them, in units of sizes.
 
     A combination is undetermined if its derivative is zero within the errors of difference quotients, or if its
     standard deviation is far above the sizes of the unknowns.

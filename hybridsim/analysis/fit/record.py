@@ -1,4 +1,4 @@
-"""This module defines a record of a fit: measured quantities over time, and what holds for this experiment only."""
+"""This module defines a record of a fit: measured quantities over time, and settings of this experiment only."""
 
 from __future__ import annotations
 
@@ -108,7 +108,7 @@ class Record:
 
 
 def records_of(records: Any) -> tuple[Record, ...]:
-    """Return the records; one alone may be given without a list, as data or as a path."""
+    """Return a list of records. A single record may be passed without a list, as data or as a path."""
     if isinstance(records, list | tuple):
         if not records:
             raise cannot_be("records", records, "use at least one record")
@@ -117,7 +117,7 @@ def records_of(records: Any) -> tuple[Record, ...]:
 
 
 def refuse_unknowns_of_records(records: tuple[Record, ...], unknowns: Iterable[str]) -> None:
-    """Raise an error if a record sets a quantity that is unknown, since all records share the unknowns."""
+    """Raise an error if a record sets a quantity that is unknown, because all records share the unknowns."""
     for name in unknowns:
         for record in records:
             if name in record.params or name in map(start_of, record.x0):
@@ -128,7 +128,7 @@ def refuse_unknowns_of_records(records: tuple[Record, ...], unknowns: Iterable[s
 
 
 def _columns(data: Any, quantities: Mapping[str, str] | None) -> dict[str, np.ndarray]:
-    """Return the columns by quantity, the times first; with `quantities` those that it names, and t."""
+    """Return the times and the columns by quantity; `quantities` selects and renames columns."""
     is_file = isinstance(data, str | PathLike)
     if not is_file and not (hasattr(data, "keys") and hasattr(data, "__getitem__")):
         raise cannot_be("data", data, "use a dict of columns, a DataFrame or the path of a CSV file")
@@ -144,7 +144,7 @@ def _columns(data: Any, quantities: Mapping[str, str] | None) -> dict[str, np.nd
         if count > 1:
             raise UsageError(
                 f"`quantities` has {count} columns of {quantity}",
-                remedy="use one record for each, or an output of the model for each sensor",
+                remedy="use one record for each column, or an output of the model for each sensor",
             )
     if "t" in names and "t" not in chosen.values():
         chosen["t"] = "t"

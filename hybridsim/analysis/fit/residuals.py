@@ -55,7 +55,7 @@ class Residuals:
         self._scale = np.array([self._size(name, unknown) for name, unknown in unknowns.items()])
 
     def _size(self, name: str, unknown: Unknown) -> float:
-        """Return the size of an unknown's coordinate: that of its guess, not far below that of its bounds, or 1."""
+        """Return the size of an unknown's coordinate: its guess or a fraction of its range, or 1 if both are zero."""
         if unknown.log:
             return 1.0
         guess = abs(unknown.guess or 0.0)
@@ -195,7 +195,7 @@ class Residuals:
 
 
 def _central(one_sided: list[np.ndarray], is_coarse: bool) -> np.ndarray:
-    """Return the mean of the derivatives on two sides, and the smaller one where fine ones differ grossly."""
+    """Return the mean of the derivatives on two sides, or the smaller one if fine derivatives differ grossly."""
     one_sided = [each for each in one_sided if np.isfinite(each).all()] or [
         np.full_like(one_sided[0], np.nan)
     ]

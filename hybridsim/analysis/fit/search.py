@@ -33,7 +33,7 @@ class Search:
         return self._minimum(guess, noise)
 
     def most_promising(self, guesses: list[np.ndarray], noise: Mapping[str, float]) -> list[np.ndarray]:
-        """Return the guesses that can be simulated, the one with the smallest sum of squares first."""
+        """Return the guesses that can be simulated, in order of their sums of squares."""
         residuals = self.residuals
         weights = 1.0 / np.array([noise[name] for name in residuals.quantity])
         sums = [

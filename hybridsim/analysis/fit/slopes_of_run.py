@@ -27,7 +27,7 @@ def is_cheaper(solution: Solution, unknowns: int) -> bool:
 
 
 class NoDerivative(Exception):
-    """The run of a record has no derivative by some unknown; the text is the reason."""
+    """Raised if the run of a record has no derivative by an unknown; the text gives the reason."""
 
 
 def slopes_of_run(

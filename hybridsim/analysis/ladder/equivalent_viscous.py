@@ -140,7 +140,7 @@ def _by_runs(viscous: Model, scene: Scene, names: list[str]) -> Response:
 
 
 def _solve(response: Response, forces: list[FirstHarmonic], most: int) -> np.ndarray:
-    """Return the damping coefficients (contacts,) that are consistent with the motion with these dampers.
+    """Return the damping coefficients (contacts,) that are consistent with the motion that they produce.
 
     The search starts at small dampers, so that it finds the solution with the largest motion. A single damper
     is found by bisection of log(F1(V(c))/(c V(c))), several by rounds of c <- F1(V(c))/V(c) with half steps
@@ -186,11 +186,11 @@ def _balanced(response: Response, forces: list[FirstHarmonic], c: np.ndarray) ->
 
 
 def _first(response: Response, forces: list[FirstHarmonic]) -> np.ndarray:
-    """Return a first estimate from the frictionless motion, or with small damping if that is unbounded."""
+    """Return a first estimate from the motion without friction, or with small damping if that motion is unbounded."""
     try:
         found = _balanced(response, forces, np.zeros(len(forces)))
     except (np.linalg.LinAlgError, DoesNotApply):
         found = _balanced(response, forces, np.full(len(forces), 1e-6))
     if not (found > 0.0).all():
-        raise DoesNotApply("a contact has no normal load, so a damper has no friction to replace")
+        raise DoesNotApply("a contact has no normal load, so there is no friction for a damper to replace")
     return found

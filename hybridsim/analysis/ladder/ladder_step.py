@@ -15,7 +15,7 @@ class DoesNotApply(Exception):
 
 
 class NothingToDrop(DoesNotApply):
-    """Raised if the model lacks the feature that the simplified model would leave out; the text names it."""
+    """Raised if the model lacks the feature that the simplified model would leave out; the text names the feature."""
 
 
 @dataclass(frozen=True)

@@ -71,7 +71,7 @@ class _Points:
         return found if np.isfinite(found).all() else None
 
     def residuals(self, inner: np.ndarray) -> np.ndarray:
-        """Return the residual at each point; it is large where the values are not determined."""
+        """Return the residual at each point. The residual is large if the points do not determine the values."""
         values = self.values(inner)
         if values is None:
             return np.full(len(self.x), 1e3 * (np.ptp(self.y) or 1.0))
@@ -84,7 +84,7 @@ class _Points:
         return float(residuals @ residuals)
 
     def with_one_more(self, inner: np.ndarray) -> np.ndarray:
-        """Return the inner knots and one more at its best place, all optimised together."""
+        """Return the inner knots with one more knot at its best place; all knots are optimised together."""
         tried = [np.sort(np.append(inner, one)) for one in self.candidates if one not in inner]
         best = min(tried, key=self.error)
         return self.optimised(best, _ROUGH)

@@ -15,7 +15,7 @@ from hybridsim.solution import Solution
 
 @dataclass(frozen=True)
 class LawRow(Measures):
-    """The run of a model under one law; a measure is None if the run failed or does not have it."""
+    """The run of a model under one law. A measure is None if the run failed or lacks this measure."""
 
     label: str
     model: Model
@@ -83,7 +83,7 @@ class LawComparison(Readable):
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """The names of the laws, which differ from each other."""
+        """The names of the laws; no two names are equal."""
         return tuple(row.label for row in self.rows)
 
     def __repr__(self) -> str:

@@ -223,7 +223,7 @@ class Measures:
         return self._of_contacts("stops_per_period", self._stops)
 
     def _stops(self, contact: str) -> float:
-        """Count the stick intervals; one across the end counts once, and permanent stick is not counted."""
+        """Count the stick intervals. An interval across the end counts once, and permanent stick does not count."""
         hold, intervals = (
             self.held_mode(contact),
             [i.mode for i in self.solution.modes[contact] if i.t1 > i.t0],

@@ -135,7 +135,7 @@ class Motion:
         return stands_still(system, point.x, p, point.numbers, self.rtol)
 
     def _tolerances(self, start: Point, rtol: float) -> dict[str, Any]:
-        """Return the absolute tolerances of a run; a state near zero gets one from the size of the motion."""
+        """Return the absolute tolerances of a run. A state near zero gets its tolerance from the size of the motion."""
         if "atol" in self.options or all(state.nominal for state in self.model.states):
             return {}
         found = np.maximum(self.coupled_sizes(start), self.sizes)
@@ -184,7 +184,7 @@ class Motion:
         return solution
 
     def _longer(self, solution: Solution, duration: float, is_carried: bool) -> Solution:
-        """Continue a run that has reached its limits, for as many steps as so far, within the cost limit."""
+        """Continue a run that has reached its limits, for as many steps as it has taken, within the cost limit."""
         spent, reached = _cost_of(solution), solution.t_end - solution.t_start
         spent += _cost_of_carrying(solution) if is_carried else 0.0
         if (

@@ -84,7 +84,7 @@ class Orbit:
         return float((values @ WEIGHTS) @ (0.5 * self.lengths))
 
     def harmonic(self, name: str, frequency: float) -> complex:
-        """Return the amplitude c of q = Re(c exp(i w t)) by an integral over the orbit; the mean if w = 0."""
+        """Return the amplitude c of q = Re(c exp(i w t)) by an integral over the orbit; for w = 0, c is the mean."""
         total = 0.0 + 0.0j
         parts = max(1, int(np.ceil(frequency * self.lengths.max() / POINTS * 2.0)))
         coefficients = self._series(name)

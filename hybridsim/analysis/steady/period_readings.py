@@ -16,7 +16,7 @@ _OF_CONTACTS = ("stick_fraction", "stops_per_period")
 
 
 class Summarised(Protocol):
-    """The motions of several points over a period of each: an object with their lengths and summaries."""
+    """The motions of several points, each over its own period, with the lengths and summaries of the periods."""
 
     @property
     def periods(self) -> np.ndarray:
@@ -31,7 +31,7 @@ Reader = Callable[[Any], np.ndarray]
 
 
 def period_reader(word: str, system: System) -> Reader | None:
-    """Return a function that computes a reading (m,) from `Summarised`, or None if summaries do not contain it."""
+    """Return a function that computes a reading (m,) from `Summarised`, or None if summaries lack the reading."""
     head, _, name = word.partition(".")
     if head in _OF_STATES and name in system.names:
         return _of_state(head, system.names.index(name))

@@ -46,7 +46,7 @@ def middle_of_longest(times: np.ndarray, period: float) -> float:
 
 
 def between_events(times: np.ndarray, t: float, low: float, high: float) -> float:
-    """Return a time in (low, high) midway between the events before and after t; t if there are no events."""
+    """Return a time in (low, high) midway between the events before and after t, or t if there are no events."""
     if not len(times):
         return t
     k = int(np.searchsorted(times, t))

@@ -124,7 +124,7 @@ class SteadyState(Readable, Measures):
 
     @cached_property
     def multipliers(self) -> np.ndarray:
-        """Floquet multipliers, largest first; for an unforced orbit without the trivial multiplier 1.
+        """Floquet multipliers, largest first. For an unforced orbit, the trivial multiplier 1 is left out.
 
         Each stick phase of a contact reduces the rank by one, and makes one multiplier exactly zero.
         """

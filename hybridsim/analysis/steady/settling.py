@@ -102,7 +102,7 @@ class Passings:
         return i if np.ptp(moves[:, i]) <= _STEADY * abs(moves[0, i]) else None
 
     def nearest(self) -> int:
-        """Return after how many passages the motion comes close to repeating."""
+        """Return the smallest number of passages after which the motion comes close to repeating."""
         most = min(LONGEST_WORD, (len(self.values) - 1) // 2)
         residuals = [self.residual(m) for m in range(1, max(most, 1) + 1)]
         return 1 + next(i for i, r in enumerate(residuals) if r <= _ABOUT * min(residuals))

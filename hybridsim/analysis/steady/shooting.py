@@ -133,7 +133,7 @@ def rates_at_end(solution: Solution) -> np.ndarray:
 
 
 def multipliers(matrix: np.ndarray, rates: np.ndarray | None) -> np.ndarray:
-    """Return the Floquet multipliers, largest first; for an unforced orbit without the trivial multiplier 1.
+    """Return the Floquet multipliers, largest first. For an unforced orbit, the trivial multiplier 1 is left out.
 
     rates (n,): dx/dt at the end of the orbit, for a motion without forcing. If another multiplier is about 1
     as well, as on closed orbits of a conservative system, both are accurate only to the square root of

@@ -279,7 +279,7 @@ class _Search:
         return passings
 
     def _passed(self, start: Point | None) -> Passings:
-        """Return the motion over a duration; the first call may shorten it to limit the cost."""
+        """Return the motion over a duration. The first call may shorten the duration to limit the cost."""
         is_free_to_choose = start is None and self.least > 0.0 and "limits" not in self.motion.options
         if is_free_to_choose and self.duration == self.least:
             try:

@@ -23,7 +23,7 @@ PERIODIC, EQUILIBRIUM = "periodic", "equilibrium"
 
 
 class Effort(NamedTuple):
-    """The settings of a search: tolerance, periods before the first test, and most periods."""
+    """The settings of a search: tolerance, number of periods before the first test, and largest number of periods."""
 
     tol: float = 1e-10
     settle: int = 32

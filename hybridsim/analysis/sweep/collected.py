@@ -26,7 +26,7 @@ class Collected:
         ] = {}  # for each name: the first point that has it, and the position there
 
     def put(self, numbers: Sequence[int], outcomes: Sequence[Outcome]) -> None:
-        """Store the outcomes of some points; points without an outcome were not run."""
+        """Store the outcomes of some points. Points without an outcome were not run."""
         for number, (status, found) in zip(numbers, outcomes):
             self.status[number] = status
             for place, (name, value) in enumerate((found or {}).items()):

@@ -63,7 +63,7 @@ class Section:
         return self._passed(motion, start) if self.level else self._strobed(motion, start)
 
     def read(self, result: Passings) -> dict[str, Any]:
-        """Return the samples of each state, and after how many samples they repeat (0 if they do not)."""
+        """Return the samples of each state, and the number of samples after which the samples repeat (or 0)."""
         columns = {f"state {k}": column for k, column in enumerate(result.states.T)}
         return {**columns, REPEATS: repeats_after(result.states, self.tol * result.sizes)}
 
@@ -125,7 +125,7 @@ def with_section(model: Model, section: str | None) -> tuple[Model, str]:
 
 
 def repeats_after(states: np.ndarray, tols: np.ndarray) -> int:
-    """Return after how many samples (k, n) the motion repeats within the tolerances, or 0."""
+    """Return the number of samples after which the motion repeats within the tolerances (or 0)."""
     for n in range(1, len(states) // 2 + 1):
         if (np.abs(states[n:] - states[:-n]) <= tols).all():
             return n

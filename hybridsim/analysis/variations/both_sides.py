@@ -13,7 +13,7 @@ _ROUNDING = 1e-11  # of the states' sizes, for a change of everything by its own
 
 
 class OneSide:
-    """Derivatives of a run; exactly on a guard or surface, those on the side of the run."""
+    """Derivatives of a run. On a guard or surface, the derivatives are one-sided, on the side that the run takes."""
 
     def __init__(self, carrier: Carrier, directions: Directions) -> None:
         self._carrier, self._directions = carrier, directions
@@ -28,7 +28,7 @@ class OneSide:
         return _times(self._carried, self._directions.parameters.shape[1])
 
     def within(self, number: int, stops: np.ndarray, is_after: bool) -> np.ndarray:
-        """Return the derivatives (k, n + d, M) at ascending local times (k,) of the segment with this number.
+        """Return the derivatives (k, n + d, M) at ascending local times (k,) of one segment.
 
         is_after : whether a time of an event means the state after it.
         """

@@ -117,7 +117,7 @@ class Carrier:
         return Carried(Y, Yd, times, self._off, self._lost, starts)
 
     def between(self, carried: Carried, directions: Directions, number: int, stops: np.ndarray) -> np.ndarray:
-        """Return the derivatives (k, n + d, M) at ascending local times (k,) of the segment with this number."""
+        """Return the derivatives (k, n + d, M) at ascending local times (k,) of one segment."""
         Y, Yd = carried.starts[number]
         self._flow.prepare(Yd, directions.parameters)
         x = self._flow.over(number, Y, Yd, directions.parameters, stops)
@@ -135,7 +135,7 @@ class Carrier:
     def _at_end(
         self, last: Last, behind: Segment, Y: np.ndarray, Yd: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the derivatives if an event is exactly at the end, since a small change may move it beyond the end."""
+        """Return the derivatives for an event exactly at the end, which a small change may move beyond the end."""
         before, system = last.segment, self.system
         moves = self._moves(last.shift)
         jumps = bool(

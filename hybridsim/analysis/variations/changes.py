@@ -124,7 +124,7 @@ class Changes:
         ]
 
     def _refuse_without(self, at: Place, rows: np.ndarray, guards: tuple[int, ...]) -> None:
-        """Raise `UsageError` if a guard, monitor or surface has no derivative; rows: derivatives by all arguments."""
+        """Raise `UsageError` if a row of derivatives of a guard, monitor or surface has an entry that is not finite."""
         bad = ~np.isfinite(rows)
         for k in np.flatnonzero(bad.any(axis=1)):
             title = "the function of a monitor or surface"

@@ -147,7 +147,7 @@ class FlowDerivatives:
         return found
 
     def _stiffly(self, number: int, stops: np.ndarray) -> np.ndarray:
-        """Return the same in a segment in which changes decay within a step."""
+        """Return the derivatives of `_regularly` in a segment in which changes decay within a step."""
         segment = self._segments[number]
         begin = float(segment.s[0])
         later = np.unique(np.concatenate([segment.s[segment.s < stops[-1]], stops]))

@@ -149,7 +149,7 @@ class Impacts:
 
 
 def _kinds(problem: ImpactProblem, answer: Answer) -> np.ndarray:
-    """Return what each contact does: 0 open, 1 closed or sticking, 2 and 3 slipping forward and backward."""
+    """Return the behaviour of each contact: 0 open, 1 closed or sticking, 2 and 3 slipping forward and backward."""
     k = problem.normal
     rebound = problem.restitution * np.maximum(-problem.before[:k], 0.0)
     kinds = np.ones(len(problem.before), dtype=np.int64)

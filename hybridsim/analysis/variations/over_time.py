@@ -53,7 +53,7 @@ class OverTime:
         self._width = directions.parameters.shape[1]
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle the run, of which the derivatives are computed again."""
+        """Pickle the run without its derivatives, which are computed again on loading."""
         return OverTime, self._made_of
 
     def at(self, t: Any, names: Sequence[str], side: str) -> Derivatives:

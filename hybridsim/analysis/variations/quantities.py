@@ -1,4 +1,4 @@
-"""This module computes derivatives of outputs and other quantities from those of the states."""
+"""This module computes derivatives of outputs and other quantities from derivatives of the states."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class QuantityDerivatives:
         return found
 
     def _place(self, name: str, z: np.ndarray) -> int:
-        """Return the index of a quantity; a variable of a mode has one for each mode."""
+        """Return the index of a quantity. A variable that modes set has one index for each mode."""
         known = self.system.quantities
         modes = [f"{a.name}.{a.modes[m]}" for a, m in zip(self.system.automata, z, strict=True)]
         special = [f"{name} in {mode}" for mode in modes if f"{name} in {mode}" in known]

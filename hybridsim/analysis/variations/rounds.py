@@ -94,7 +94,7 @@ class Rounds:
         self._run(happened, segment.p, float(segment.s[-1]), float(segment.origin))
 
     def at_appointment(self, instant: Instant, happened: Sequence[Occurrence]) -> None:
-        """Apply the resets of scheduled events; inputs with a knot at this instant are on their next pieces."""
+        """Apply the resets of scheduled events. An input with a knot at this instant uses the piece after the knot."""
         self._run(happened, self.system.vector(instant, self.d), 0.0, float(instant))
 
     def _run(self, happened: Sequence[Occurrence], p: np.ndarray, s: float, origin: float) -> None:
@@ -259,7 +259,7 @@ def component_of(system: System, one: Occurrence) -> tuple[int, Any]:
 
 
 def guard_number(system: System, one: Occurrence) -> int:
-    """Return the number of the guard that caused a transition, or -1 if no guard of its mode did."""
+    """Return the number of the guard that caused a transition, or -1 if the transition had another cause."""
     _, automaton = component_of(system, one)
     m = automaton.modes.index(one.source)
     names = automaton.guard_names[m]

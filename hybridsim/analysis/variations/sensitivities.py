@@ -94,7 +94,7 @@ class Sensitivities(Readable):
         return self._over_time.at(t, chosen, side)
 
     def plot(self, *names: str) -> Any:
-        """Draw the derivatives of the event times, dt/dp, over these times; see `hybridsim.plot.event_slopes`.
+        """Draw the derivatives of the event times, dt/dp, over the event times; see `hybridsim.plot.event_slopes`.
 
         The names are parameters, or states for the initial values; by default the first six parameters. It returns the
         axes; ``hybridsim.plot.save`` writes them to a file. A run without events, or an unknown name, raises
@@ -163,7 +163,7 @@ def sensitivities(
 def derivatives(
     solution: Solution, parameters: Sequence[str] | None = None, *, starts_follow: bool = True
 ) -> Sensitivities:
-    """Return the derivatives of a run; on a guard or surface, the derivatives on the run's own side."""
+    """Return the derivatives of a run. On a guard or surface, the derivatives are one-sided, on the run's side."""
     return _found(solution, parameters, starts_follow, OneSide)
 
 
@@ -216,7 +216,7 @@ def _found(
 def directions_by(
     solution: Solution, parameters: Sequence[str], starts: Sequence[str], fixed: Container[str]
 ) -> Directions:
-    """Return the directions of the starts of some states, then those of some parameters.
+    """Return directions for the initial values of some states, followed by directions for some parameters.
 
     fixed : states and discrete states whose starts do not follow parameters.
     """

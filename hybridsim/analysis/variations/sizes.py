@@ -16,7 +16,7 @@ def sizes(solution: Solution) -> np.ndarray:
 
 
 def ranges(solution: Solution, since: float = -np.inf) -> tuple[np.ndarray, np.ndarray]:
-    """Return the least and greatest value (n,) of each state over a run, or over its part after a time."""
+    """Return the least and greatest value (n,) of each state over a run, or over the part after a given time."""
     begin = max(since, solution.t_start)
     sampled = solution(np.linspace(begin, solution.t_end, _POINTS)).T
     index, s, x = solution._segments.knots()

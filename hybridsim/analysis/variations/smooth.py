@@ -152,7 +152,7 @@ def transitions(slopes: NumberedSlopes, steps: Steps, scale: np.ndarray, constan
 
 
 class _Stops:
-    """Collects the derivatives at the stops, which are ascending."""
+    """Collects the derivatives at given times in ascending order."""
 
     def __init__(self, stops: np.ndarray, begin: float, total: np.ndarray) -> None:
         self._stops, self.found = stops.tolist(), list[np.ndarray]()

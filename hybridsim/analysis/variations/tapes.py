@@ -1,4 +1,4 @@
-"""This module stores the tapes that compute derivatives of formulas, once for all runs of one structure."""
+"""This module stores the instruction tapes that compute derivatives of formulas, once for all runs of one structure."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Numbers = tuple[int, ...]
 def tangent_tape(
     system: System, z: np.ndarray, guards: Numbers = (), monitors: Numbers = (), surfaces: Numbers = ()
 ) -> TangentTape:
-    """Return the tape of the rates in the modes z, and of some guards, monitors and surfaces."""
+    """Return the instruction tape of the rates in the modes z, and of some guards, monitors and surfaces."""
     return _stored(system, z.tobytes(), guards, monitors, surfaces)
 
 

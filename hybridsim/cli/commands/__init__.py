@@ -1,1 +1,1 @@
-"""This folder holds the commands of the program, one module each: its options, and what it does."""
+"""This folder holds the commands of the program, one module each, with options and action."""

@@ -55,7 +55,7 @@ def add_to(commands: Any) -> None:
     )
     parser.add_argument(
         "--loss", choices=("linear", "soft_l1", "huber", "cauchy"), default="linear",
-        help="how far-off samples count (default: linear)",
+        help="loss function; all except linear reduce the weight of outliers (default: linear)",
     )  # fmt: skip
     options.add(parser, "--starts", "N", "number of first guesses (default: 1)", values.count, default=1)
     options.add_integrator(parser)

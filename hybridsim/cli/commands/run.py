@@ -82,7 +82,7 @@ def execute(args: argparse.Namespace, session: Session) -> int:
 def simulated(
     model: Model, settings: dict[str, Any], args: argparse.Namespace, session: Session
 ) -> tuple[Solution, list[str]]:
-    """Return the solution of a run, as far as it came, and the warnings that were printed before it."""
+    """Return the solution of a run, possibly cut short, and the warnings that were printed before the run."""
     t_end = values.end_time(model, args.t_end)
 
     from hybridsim.integrators.registry import UnknownOption, integrator_class, option_names
@@ -127,7 +127,7 @@ def run_settings(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _save_setting(args: argparse.Namespace) -> str | float:
-    """Return the argument `save` for the run, and reject outputs that need more than it stores."""
+    """Return the argument `save` for the run, and reject outputs that need data which the run does not store."""
     if args.keep in ("events", "nothing"):
         for option in ("plot", "animate", "csv", "npz"):
             if getattr(args, option):

@@ -20,7 +20,7 @@ _accepted = per_structure(lambda system: set[tuple[Any, ...]]())
 def _what_effects_read(
     system: System, t0: float, x: np.ndarray, discrete: np.ndarray, z: np.ndarray
 ) -> tuple[Any, ...]:
-    """Return all numbers on which the effects of forces on their velocities depend."""
+    """Return all numbers that determine the effects of contact forces on the relative velocities."""
     values = tuple(system.values.values())
     if system.effects_read is not None:
         return tuple([values[i] for i in system.effects_read])

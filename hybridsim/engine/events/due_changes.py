@@ -1,4 +1,4 @@
-"""Resolve what is due at one instant: schedules and input jumps, then resets of the monitors that crossed zero."""
+"""Resolve the changes that are due at one instant: schedules, input jumps, then resets of crossed monitors."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def resolve_schedules(
     s_error: float,
     adopted: Instant | None,
 ) -> Outcome:
-    """Resolve a scheduled event, with the values of the inputs after it.
+    """Resolve a scheduled event, with the values of the inputs just after the event.
 
     before: the outcome that holds until then. s_error: error of the times of zeros located there. adopted: the
     last event before. One within two roundings has its zero at the instant as well.
@@ -51,7 +51,7 @@ def situation_when_due(
     z: np.ndarray,
     error: np.ndarray,
 ) -> Situation:
-    """Return the state at a scheduled time, with the inputs after it.
+    """Return the state at a scheduled time, with the values of the inputs just after that time.
 
     before: the run-time vector that holds until then.
     """

@@ -65,7 +65,7 @@ def corners_of_monitors(system: System) -> MonitorCorners | None:
 
 
 class MonitorCorners:
-    """The system with corners in place of monitors, and the conversion of states to it and back.
+    """The system with corners in place of monitors, and conversions of states between both systems.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ class MonitorCorners:
         assert self.system.layout == plain.layout and np.array_equal(self.system.rates, plain.rates)
 
     def numbered(self, fires: np.ndarray, modes: np.ndarray) -> np.ndarray:
-        """Return the guards that fired, with two numbers beyond the others for each monitor, down and up."""
+        """Return the numbers of the guards that fired. Each monitor has two more numbers, for the two directions."""
         own, components = self.plain.guard_count, len(self.plain.automata)
         events = np.flatnonzero(fires >= own)
         corners = self.system.owner[fires[events]]

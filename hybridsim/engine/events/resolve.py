@@ -163,7 +163,7 @@ class EventResolution(ClusterChoice):
     # -- transitions by declared choices --------------------------------------------------------------------
 
     def _transitions(self, components: set[int], resets: list[tuple[object, ...]]) -> tuple[str, str] | None:
-        """Take the declared transitions of some components, with resets that read the state before."""
+        """Take the declared transitions of some components. The resets read the state before the transitions."""
         at, system = self.at, self.system
         x_plus, p_plus, z_plus = at.x.copy(), at.p.copy(), at.z.copy()
         x_error = at.x_error.copy()

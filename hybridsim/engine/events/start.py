@@ -69,7 +69,7 @@ def start_errors(system: System, x0: np.ndarray) -> np.ndarray:
 
 
 def _computed_starts(system: System) -> list[tuple[int, Expression]]:
-    """Return the initial values that are more than a number, with the indices of their states."""
+    """Return the initial values that are formulas instead of numbers, with the indices of their states."""
     starts = [state.start for state in system.model.states]
     return [(i, start) for i, start in enumerate(starts) if not isinstance(start.tree, ast.Constant)]
 

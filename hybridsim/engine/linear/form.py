@@ -93,7 +93,7 @@ def _accumulate(form: Form, key: Key, weight: float) -> None:
 
 
 class LinearReader:
-    """Computes the linear forms of the registers of one tape, for given values of the parameters.
+    """Computes the linear forms of the registers of one instruction tape, for given values of the parameters.
 
     constants: (register, value); parameters: (register, source in p); varying: sources that differ from
     segment to segment; p: the run-time vector, from which only the other sources are read, as numbers or as
@@ -125,7 +125,7 @@ class LinearReader:
                 self.forms[register] = math.nan if p is None else p[source]
 
     def read(self, rows: Iterable[tuple[int, ...]]) -> None:
-        """Process rows of the tape; for a nonlinear result, store the reason."""
+        """Process instructions of the tape. If a result is nonlinear, store the reason."""
         for op, a, b, c, out in rows:
             if op == ops.COPY:
                 self.forms[out] = self.forms[a]

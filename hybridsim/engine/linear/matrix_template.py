@@ -121,7 +121,7 @@ class MatrixTemplate:
 
 @kernel
 def put_entries(registers: Any, entries: Any, out: Any) -> None:
-    """Write the entries of some matrices for each row of registers, one behind the other."""
+    """For each row of registers, write the entries of some matrices one after the other."""
     size = out.shape[0] // registers.shape[0]
     for point in range(registers.shape[0]):
         for j in range(entries.shape[1]):

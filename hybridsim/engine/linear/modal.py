@@ -173,7 +173,7 @@ def _by_blocks(
 
 
 def _schur_values(A: np.ndarray) -> np.ndarray:
-    """Return the eigenvalues from the Schur form of A without balancing, with conjugate pairs in a row."""
+    """Return the eigenvalues from the Schur form of A without balancing; conjugate pairs are adjacent."""
     from scipy.linalg import schur
 
     triangular = schur(A, output="real")[0]

@@ -33,7 +33,7 @@ class LinearMode:
         }
 
     def monomials(self) -> set[Monomial]:
-        """Return the functions of time in the forms."""
+        """Return the functions of time that occur in the linear forms."""
         forms = [*self.rates, *self.guards.values()]
         return {key for form in forms for key in form if isinstance(key, tuple)}
 
@@ -72,7 +72,7 @@ class NoMode:
 def modes_of(
     system: System, atoms: Atoms, met: np.ndarray, p: Sequence[float] | None, first: int = 0
 ) -> list[LinearMode | NoMode]:
-    """Return the linear forms of each combination of modes, or why the combination is not linear.
+    """Return the linear forms of each combination of modes, or the reason why a combination is not linear.
 
     Some of the vectors may only be neighbours of those that the run entered. first: number of vectors to
     skip.

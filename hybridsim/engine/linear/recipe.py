@@ -20,7 +20,7 @@ _PLAIN = {ADD: operator.add, SUB: operator.sub, MUL: operator.mul}  # equal resu
 
 
 def computed(op: int, values: Sequence[float], b: int, c: int) -> tuple[float, float]:
-    """Apply an operation of the tape to numbers, and return its two results."""
+    """Apply one instruction of a tape to numbers, and return its two results."""
     if op in _PLAIN:
         return _PLAIN[op](values[0], values[1]), 0.0
     V = np.zeros((4, 1))
@@ -50,7 +50,7 @@ class Numbers:
         return self._constants[name]
 
     def operation(self, op: int, values: Sequence[float], b: int = 0, c: int = 0) -> tuple[Traced, Traced]:
-        """Record an operation of the tape on numbers."""
+        """Record one instruction of a tape that is applied to numbers."""
         operand_registers, out = [self.place(value) for value in values], len(self.values)
         self.rows.append(
             (op, operand_registers[0], operand_registers[1] if len(operand_registers) > 1 else b, c, out)
@@ -67,7 +67,7 @@ class Numbers:
 
 
 def _operators(op: int) -> tuple[Any, Any]:
-    """Return the methods of `Traced` for an operation, and for one with its operands exchanged."""
+    """Return the methods of `Traced` for an operation with its operands in order, and exchanged."""
 
     def first(self: Traced, other: float) -> Traced:
         return self.numbers.operation(op, (self, other))[0]

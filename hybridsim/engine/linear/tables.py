@@ -132,7 +132,7 @@ class _Rows:
         return tables
 
     def gone_on_with(self, first: int, count: int) -> _Rows:
-        """Return `count` rows that include the first rows; use the spare rows behind them if these are free."""
+        """Return `count` rows that include the first rows; spare rows behind the first rows are used if free."""
         with _lock:
             rows = self
             if self.count != first or count > self.most:
@@ -256,7 +256,7 @@ class TableCache(dict[tuple[Any, ...], Made]):
     size = 0  # bytes of all tables
 
     def store(self, key: tuple[Any, ...], made: Made, replaced: Made | None) -> None:
-        """Add tables, and discard the tables that they replace, and the oldest ones."""
+        """Add tables, and discard the oldest tables and the tables that the new ones replace."""
         with _lock:
             for other in [k for k, one in self.items() if one is replaced] if replaced is not None else ():
                 self.discard(other)

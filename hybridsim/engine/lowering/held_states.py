@@ -65,7 +65,7 @@ class HeldStates:
     # -- which ----------------------------------------------------------------------------------------------
 
     def _linear_in(self, c: Held) -> list[int]:
-        """Return the states in which a constraint is linear with a state-free coefficient, simplest first.
+        """Return the states in which a constraint is linear with a state-free coefficient, in order of preference.
 
         For the rate of a gap, velocities come before positions.
         """
@@ -81,7 +81,7 @@ class HeldStates:
         return tuple(i for i, x in enumerate(self.states) if x in self.surfaces[c].free_symbols)
 
     def _without_choice(self, choices: dict[Held, list[int]]) -> set[Held]:
-        """Return the constraints that need projection: nonlinear ones, and others with common states."""
+        """Return the constraints that need projection: nonlinear ones, and constraints that share states with them."""
         found = {c for c, states in choices.items() if not states}
         for c in found:
             surface = self.lowering.components[c[0]].surface

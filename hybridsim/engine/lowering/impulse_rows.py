@@ -24,7 +24,7 @@ def speed_name(k: int) -> str:
 
 
 def impulses(lowering: Lowering) -> Rows:
-    """Return the text of the function ``impulses``, or nothing without unilateral contacts."""
+    """Return the code of the function ``impulses``, or no code if the model has no unilateral contacts."""
     if not _unilateral(lowering):
         return []
     return numbered(slopes_and_growth(lowering, _onset, 2))
@@ -58,12 +58,12 @@ def _unilateral(lowering: Lowering) -> list[tuple[int, int]]:
 
 
 def numbered(values: Iterable[Any]) -> Rows:
-    """Return the rows that write values one after the other."""
+    """Return the lines of code that write values one after the other."""
     return [(f"out[{i}]", value) for i, value in enumerate(values)]
 
 
 def slopes_and_growth(lowering: Lowering, force: Force, count: int) -> Iterator[Any]:
-    """Return d(u_k)/dx and d(rates)/d(unknown_k), then how friction forces grow with the loads of others.
+    """Return d(u_k)/dx and d(rates)/d(unknown_k), then the derivatives of friction forces by the loads of others.
 
     force : a friction force by component, surface and number, from 0 to `count`.
     """

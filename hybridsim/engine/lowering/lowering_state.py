@@ -48,7 +48,7 @@ class LoweringState:
         self.angles = self._defined_angles()
 
     def _defined_angles(self) -> dict[Any, Any]:
-        """Substitute definitions that grow linearly in time, as theta = omega*t, in sines and cosines."""
+        """Substitute definitions that grow linearly in time, such as theta = omega*t, in sines and cosines."""
         waiting = {self.symbols[n]: to_sympy(e, self.symbols) for n, e in self.model.definitions}
         found: dict[Any, Any] = {}
         while True:
@@ -59,7 +59,7 @@ class LoweringState:
             found |= grow
 
     def _rate(self, e: Any) -> Any:
-        """Return de/dt if it is not zero and depends on parameters only, else None."""
+        """Return the time derivative of an expression if it is not zero and depends on parameters only, else None."""
         if self.t not in e.free_symbols:
             return None
         rate = self.sp.diff(e, self.t)

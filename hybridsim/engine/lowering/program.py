@@ -102,7 +102,7 @@ def fixed_names(program: Any) -> set[str]:
 
 
 def parameters_read(program: Any, expressions: Iterable[Any]) -> tuple[int, ...] | None:
-    """Return the indices of the parameters in expressions, or None if these depend on more than parameters."""
+    """Return the indices of the parameters in expressions, or None if the expressions depend on other quantities."""
     names = {s.name for e in expressions for s in e.free_symbols}
     if not names <= fixed_names(program):
         return None

@@ -23,5 +23,5 @@ def declared_name(symbol: Any) -> str:
 
 
 def shown(text: str) -> str:
-    """Return a text about program names in declared names, for messages."""
+    """Return a text for messages, in which declared names replace the names of the program."""
     return re.sub(r"\bv_", "", text).replace(_DOT, ".")

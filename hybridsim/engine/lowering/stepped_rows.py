@@ -15,7 +15,7 @@ from hybridsim.engine.lowering.lower import Lowering
 
 
 def stepped(lowering: Lowering) -> Rows:
-    """Return the text of the function ``stepped``, or nothing without unilateral contacts."""
+    """Return the code of the function ``stepped``, or no code if the model has no unilateral contacts."""
     if not any(lowering.components[c].surface.is_unilateral for c in lowering.unknown):
         return []
     slopes = slopes_and_growth(lowering, _bound, 4)

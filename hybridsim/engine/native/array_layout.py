@@ -141,7 +141,7 @@ class ArrayLayout:
 
     @property
     def size(self) -> int:
-        """Return the bytes of all blocks."""
+        """Return the size of all blocks in bytes."""
         return sum(self._sizes)
 
     def rows(self, blocks: tuple[np.ndarray | None, ...]) -> Any:

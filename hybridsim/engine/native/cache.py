@@ -134,7 +134,7 @@ def model_folder() -> Path | None:
 
 
 def store(path: Path | None, content: bytes) -> bool:
-    """Write a file atomically, so that other processes never read half a file; return success.
+    """Write a file atomically, so that other processes never read half a file; return whether the file was written.
 
     A full disk or a read-only folder only has the effect that code is compiled again.
     """
@@ -177,7 +177,7 @@ def load_whole(path: Path | None) -> bytes | None:
 
 
 def _made_by_us(root: Path) -> tuple[list[Path], list[Path]]:
-    """Return the folders of compiled code that have hybridsim's mark, and folders with similar names that do not."""
+    """Return the folders of compiled code that have hybridsim's mark, and similarly named folders without the mark."""
     ours, others = [], []
     for entry in sorted(root.glob("engine-*")):
         is_folder = entry.is_dir() and not entry.is_symlink()

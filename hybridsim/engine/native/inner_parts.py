@@ -37,7 +37,7 @@ def _version() -> str:
 
 
 def find_part(module: str, name: str, without: str) -> Any:
-    """Return a part of numba or llvmlite, or None if it is missing; print the consequence once."""
+    """Return a part of numba or llvmlite. If the part is missing, print the consequence once and return None."""
     found = _found(module, name)
     if found is None:
         _print_once(f"{_version()} has no {module}.{name}; {without}")
@@ -58,7 +58,7 @@ def needed(name: str) -> Any:
 
 @cache
 def is_complete() -> bool:
-    """Return whether this numba has every part that kernels need; print a note once if not."""
+    """Return whether this numba has every part that kernels need. If a part is missing, print a note once."""
     lacking = next((f"no {module}.{name}" for module, name in _NEEDED if _found(module, name) is None), None)
     if lacking is None:
         try:

@@ -25,7 +25,7 @@ declare double @c_tanh(double)
 
 
 class TooLong(Exception):
-    """Raised for a tape whose code would take too long to compile."""
+    """Raised for an instruction tape whose code would take too long to compile."""
 
 
 def number(value: float) -> str:

@@ -21,7 +21,7 @@ def announce_engine() -> None:
 
 
 def announce_part() -> None:
-    """Print that a part which no earlier run needed, such as derivatives, is being compiled."""
+    """Print that an additional part of the engine, such as derivatives, is being compiled."""
     _tell("compiling another part of the engine (once, 10 to 30 s)")
 
 

@@ -17,7 +17,7 @@ _LINKS = 40  # most links in one path, as in Linux
 
 
 def why_not(path: Path) -> str | None:
-    """Return the reason why another user may have written code at a path, or None if no other user can.
+    """Return the reason why another user may have written code at a path, or None if that is impossible.
 
     Missing parts of the path are accepted, since this user creates them.
     """

@@ -139,7 +139,7 @@ if ENABLED:
         return place
 
     def replaced(pack: Any, **inner: Any) -> Any:
-        """Replace packs inside a pack by others, and return the pack; no kernel may be using the pack."""
+        """Replace packs inside a pack by other packs, and return the pack; no kernel may be using the pack."""
         for name, other in inner.items():
             if getattr(pack, name) is not other:
                 address_in(pack, name)[0] = other.address

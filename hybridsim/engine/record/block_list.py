@@ -1,4 +1,4 @@
-"""This module stores all segments and all events of a run in blocks, and discards old ones."""
+"""This module stores all segments and all events of a run in blocks, and discards old blocks."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ BEGINNING = Pace(None, (), 0.0)
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A point of a run from which it can continue."""
+    """A point of a run from which the run can continue."""
 
     instant: Instant
     arrays: dict[str, np.ndarray]  # the state there, by names that the loop chooses

@@ -63,7 +63,7 @@ def _taking_part(
 
 @kernel
 def _times_at(instants: Any, participants: Any, first: int, component: int, times: Any) -> int:
-    """Write the times of a component's events from a given event on, and return how many there are."""
+    """Write the times of a component's events from a given event on, and return the number of these events."""
     count = 0
     for i in range(first, participants.shape[1]):
         if participants[1, i] == component:

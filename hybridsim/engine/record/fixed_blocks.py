@@ -144,7 +144,7 @@ def _write_instants(high: float, low: float, s: Any, instants: Any) -> None:
 def step_events(
     system: System, origin: Instant, s: np.ndarray, before: np.ndarray, after: np.ndarray, x: np.ndarray
 ) -> EventBlock:
-    """Return the changes of modes between fixed steps, at which the states are continuous, as events."""
+    """Return the mode changes between fixed steps as events without jumps of the states."""
     instants = np.empty((len(s), 2))
     _write_instants(*origin, s, instants)
     no_guard = np.full(len(s), -1, dtype=np.int64)

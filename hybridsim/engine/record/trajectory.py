@@ -1,4 +1,4 @@
-"""This module stores the record of a run: segments with dense output, events, and how it ended."""
+"""This module stores the record of a run: segments with dense output, events, and final status."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ __all__ = ["LOOKED_BACK_ON", "Occurrence", "PiecewiseDense", "Segment", "Task", 
 
 
 class Trajectory:
-    """The record of a run: its segments, its events, and how it ended.
+    """The record of a run: segments, events and final status.
 
     segments and occurrences are sequences of `Segment` and `Occurrence`. Objects can be appended, and blocks
     (`hybridsim.engine.record.blocks`) of a compiled loop added. Items that are not to be kept are discarded during the

@@ -91,7 +91,7 @@ def begin_positive(sides: Any, orders: Any, floors: Any) -> None:
 
 @kernel
 def stays_positive(left: Any, right: Any, order: int, floor: float, d: float, weights: Any) -> bool:
-    """Return whether a polynomial is positive on (0, d] because its Bernstein coefficients are.
+    """Return whether a polynomial is certainly positive on (0, d], because all its Bernstein coefficients are positive.
 
     left, right (K,): its Taylor coefficients at both ends. The first `order` of them are set to zero on the
     left, with an uncertainty `floor`. weights (K, K): from these to the K Bernstein coefficients next to an

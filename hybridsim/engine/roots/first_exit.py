@@ -183,7 +183,7 @@ def _expanded(a: Any, order: int, theta: float) -> tuple[float, float, float]:
 
 @kernel
 def polished(a: Any, order: int, left: float, right: float, start: float) -> float:
-    """Compute the zero of a polynomial between a point with a positive and one with a negative value.
+    """Compute the zero of a polynomial between a point with a positive value and a point with a negative value.
 
     Halley's method (W. Gander, American Mathematical Monthly 92 (1985) 131) starts from a guess between them;
     bisection replaces a step that leaves the interval.

@@ -239,7 +239,7 @@ class CompiledLoop:
         self.kernels.count(counters, run.steps, run.result)
 
     def forget_segments(self, run: KernelRun) -> bool:
-        """Release the memory of all segments except the last end; return False if the memory is needed.
+        """Release the memory of all segments except the run's end; return False if the steps are still needed.
 
         Fewer steps than one look at stiffness takes are never examined.
         """
@@ -250,7 +250,7 @@ class CompiledLoop:
         return True
 
     def segments_of(self, run: KernelRun) -> SegmentBlock:
-        """Return the segments of one call; the call must have stored some and released none."""
+        """Return the segments of one call. The call must have stored segments, and must not have released any."""
         rows, begun = run.rows, slice(run.first, run.first + run.count)
         rows.last_steps[run.first] = 0
         steps = slice(run.first_step, run.first_step + run.steps)

@@ -145,7 +145,7 @@ class KernelRun:
 
     @property
     def is_full(self) -> bool:
-        """Return whether the next call goes on, because arrays were full or the known times were a part."""
+        """Return whether the next call continues because arrays were full or only some known times were passed."""
         return self.code == FULL or (self.code == AT_TARGET and not self.is_at_target)
 
     @property
@@ -166,7 +166,7 @@ class KernelRun:
 
     @property
     def known_passed(self) -> KnownTimesPassed | None:
-        """Return the known times that were passed, or None for a call without any."""
+        """Return the known times that were passed, or None for a call without known times."""
         if self.known is None:
             return None
         ahead = self.known.since(self.passed)

@@ -237,7 +237,7 @@ def _last_transitions(blocks: Sequence[Any], count: int) -> tuple[np.ndarray, np
 
 
 def _last(blocks: Sequence[Any], count: int) -> list[Occurrence]:
-    """Return the last `count` events, or all if there are fewer."""
+    """Return the last `count` events, or all events if there are fewer."""
     found: list[Occurrence] = []
     for block in reversed(blocks):
         first = max(0, len(block) - (count - len(found)))

@@ -1,4 +1,4 @@
-"""Record events: all events of one instant, and events in a segment that did not end it."""
+"""Record events: all events of one instant, and events inside a segment that do not end the segment."""
 
 from __future__ import annotations
 

@@ -75,7 +75,7 @@ class ResumePoint:
 
     @property
     def now(self) -> _Now | None:
-        """Return the state for a compiled loop, or None if the general loop has to continue from here."""
+        """Return the state for a compiled loop, or None if the general loop has to continue from this point."""
         return self._now or self._of_checkpoint
 
     @cached_property
@@ -97,7 +97,7 @@ class ResumePoint:
         return checkpoint.instant, HybridState.of(outcome, outcome.p), loop.used, loop.kernels
 
     def loop(self) -> CompiledLoop:
-        """Return a compiled loop that continues from here."""
+        """Return a compiled loop that continues from this point."""
         assert self.now is not None
         try:
             loop = self.setup.idle_loops.pop()

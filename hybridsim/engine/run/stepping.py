@@ -81,7 +81,7 @@ class Flow:
         self._projected = sorted({i for c in holding for i in system.projected[c]})
 
     def rhs(self, s: float, x: np.ndarray) -> np.ndarray:
-        """Return dx/dt in a new array, with NaN if the model has no value there."""
+        """Return dx/dt in a new array, with NaN if the rates are undefined at this point."""
         out = np.empty(self.n)
         evaluate(self._flow, float(s), x, self.p, self.z, out)
         return out

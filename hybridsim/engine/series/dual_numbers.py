@@ -89,7 +89,7 @@ def _parts(other: Any) -> tuple[float, Any]:
 
 
 def _held(condition: Any) -> bool:
-    """Return whether a condition holds, the same for all values."""
+    """Return whether a condition holds, which must be the same for all values."""
     if np.ndim(condition) and not (condition.all() or not condition.any()):
         raise ValueError("a condition holds at some of the values only")
     return bool(np.all(condition))
@@ -110,7 +110,7 @@ def _smooth(
 
 
 def _functions(of: Any) -> dict[str, Any]:
-    """Return the functions of generated code for dual numbers, from those of the module `math` or of NumPy."""
+    """Return functions of dual numbers for generated code, made from the functions of `math` or of NumPy."""
 
     def power(base: Any, exponent: Any) -> Any:
         (u, du), (n, dn) = _parts(base), _parts(exponent)

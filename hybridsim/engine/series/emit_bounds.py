@@ -28,7 +28,7 @@ _ASKED = frozenset((LESS, LESS_EQUAL))  # comparisons, here only between constan
 
 @dataclass(frozen=True)
 class ConstantSources:
-    """The sources of a tape's constants: numbers with errors, parameters, and phases."""
+    """The sources of the constants of an instruction tape: numbers with errors, parameters, and phases."""
 
     numbers: Mapping[int, tuple[float, float]]
     sources: Mapping[int, int]
@@ -76,7 +76,7 @@ class _Bounded(Trace):
 
 
 def can_bound(tape: ModeTape, constant_rows: Sequence[tuple[int, ...]]) -> bool:
-    """Return whether every operation of a tape can be written as straight-line code."""
+    """Return whether every instruction of a tape can be written as straight-line code."""
     return tape.is_known and all(row[0] in KNOWN | _ASKED for row in constant_rows)
 
 

@@ -50,7 +50,7 @@ def _results(op: int) -> int:
 
 @dataclass(frozen=True)
 class ModeTape:
-    """The parts of the optimised tape of one combination of modes from which the code is written.
+    """The parts of the optimised instruction tape of one combination of modes from which the code is written.
 
     These are its rows, the rows of high orders, the registers of time, states, rates, active guards and
     arguments of fading functions, and the conditions that stay constant as time passes.
@@ -67,7 +67,7 @@ class ModeTape:
 
     @property
     def is_known(self) -> bool:
-        """Return whether every operation of a tape can be written as straight-line code."""
+        """Return whether every instruction of a tape can be written as straight-line code."""
         return all(row[0] in KNOWN for row in self.rows)
 
 
@@ -198,7 +198,7 @@ def sizes_function(name: str, guards: int, order: int) -> str:
 
 
 def _start(tape: ModeTape, stride: int) -> _Expansion:
-    """Return code that computes coefficient 0 in the order of the tape, and stores costly values for later use."""
+    """Return code that computes coefficient 0 in the order of the tape, and stores costly values for reuse."""
     return _in_fixed_order(_expanded(tape, 0, stride))
 
 

@@ -1,4 +1,4 @@
-"""This module rewrites tapes for high orders, so that fewer successive operations lead from states to rates.
+"""This module rewrites instruction tapes for high orders, so that shorter chains of operations lead to the rates.
 
 A coefficient depends on the one before it through every operation between a state and its rate. With a
 compiled tape this latency is most of a step's time. Successive constants become one factor, a sum adds its
@@ -45,7 +45,7 @@ class _Scaled:
     is_negative: bool = False
 
     def row(self, kind: int, out: int) -> Row:
-        """Return the row of the tape that computes the multiple."""
+        """Return the instruction that computes the multiple."""
         operands, flags = [0, 0], NEGATIVE if self.is_negative else 0
         for i, (register, divides) in enumerate(self.constants):
             operands[i] = register

@@ -1,4 +1,4 @@
-"""This module numbers the operations of a tape: those of expressions, and further ones of the optimised tape."""
+"""This module numbers the operations of instruction tapes, including operations that only optimised tapes have."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""This module optimises the tape of one combination of modes: no copies, constants computed once.
+"""This module optimises the instruction tape of one combination of modes: no copies, constants computed once.
 
 The rows of a tape (see `hybridsim.engine.series.tape`) are sorted by their operands. A row over constants has
 one coefficient and runs once. A product with a constant, and the sine of an angle that grows linearly, cost
@@ -26,7 +26,7 @@ _LINEAR_OPERATIONS = (ops.ADD, ops.SUB, ops.NEG)
 
 @dataclass(frozen=True)
 class OptimisedTape:
-    """An optimised tape: rows (operation, a, b, c, out) over the registers of the original tape.
+    """An optimised instruction tape: rows (operation, a, b, c, out) over the registers of the original tape.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def _kind(op: int, kinds: list[int]) -> int:
 
 
 def _special(op: int, a: int, b: int, c: int, kinds: list[int]) -> tuple[int, int, int, int]:
-    """Return a cheaper operation for a constant operand or an angle linear in time."""
+    """Return a cheaper operation for an operation on a constant, or on an angle that is linear in time."""
     if op == ops.SINCOS and kinds[0] == LINEAR:
         return ops.SINCOS_LINEAR, a, b, c
     if len(kinds) == 2 and kinds[1] == CONSTANT:

@@ -1,4 +1,4 @@
-"""This module lists the registers of the inputs of a tape, as index arrays for kernels."""
+"""This module lists the registers of the inputs of an instruction tape, as index arrays for kernels."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from hybridsim.expr import own_roundoff
 
 
 class Inputs(NamedTuple):
-    """The registers of a tape's inputs, with one index array for each kind of input.
+    """The registers of the inputs of an instruction tape, with one index array for each kind of input.
 
     These are constants with values and error bounds (m, 2), parameters and their places in p, phases, time
     (1,) (-1: none) and states.
@@ -29,7 +29,7 @@ class Inputs(NamedTuple):
 
 
 class Registers:
-    """The registers of a tape: their count, and the inputs that kernels read."""
+    """The registers of an instruction tape: their count, and the inputs that kernels read."""
 
     def __init__(self, tape: dict[str, Any], layout: Layout) -> None:
         self.separate = separate_registers(tape)

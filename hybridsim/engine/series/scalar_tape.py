@@ -1,4 +1,4 @@
-"""This module converts a function of a few arguments to an optimised tape."""
+"""This module converts a function of a few arguments to an optimised instruction tape."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from hybridsim.expr.symbolic import to_sympy
 
 @dataclass(frozen=True)
 class ScalarTape:
-    """The optimised tape of one function: its rows, and the registers of its arguments and of its value.
+    """The optimised instruction tape of one function, with the registers of its arguments and of its value.
 
     Parameters
     ----------
@@ -44,7 +44,7 @@ class ScalarTape:
 def scalar_tape(
     expression: Expression, moving: tuple[str, ...], constants: tuple[str, ...], positive: str
 ) -> ScalarTape:
-    """Return the optimised tape of an expression.
+    """Return the optimised instruction tape of an expression.
 
     Parameters
     ----------

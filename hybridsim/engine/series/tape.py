@@ -1,4 +1,4 @@
-"""This module converts expressions to a tape: rows (operation, a, b, c, out) over registers.
+"""This module converts expressions to an instruction tape: rows (operation, a, b, c, out) over registers.
 
 The tape is data. It is built once from SymPy expressions when a model is first lowered, stored beside the
 generated source, and run by `hybridsim.engine.series.bounded` to compute Taylor coefficients with error
@@ -20,7 +20,7 @@ _MAX_INTEGER_POWER = 4096
 
 
 class TapeBuilder:
-    """Converts SymPy expressions to rows of a tape; equal subexpressions share a register.
+    """Converts SymPy expressions to rows of an instruction tape; equal subexpressions share a register.
 
     Parameters
     ----------

@@ -59,14 +59,14 @@ def two_product(a: float, b: float) -> tuple[float, float]:
 
 
 def multiples(start: float, k: np.ndarray, period: float) -> np.ndarray:
-    """Return the scheduled times (m, 2) with the numbers k (m,), bit for bit as `multiple` does."""
+    """Return the scheduled times (m, 2) with the numbers k (m,), bit for bit equal to the results of `multiple`."""
     high, error = _plain(two_product)(k.astype(float), period)
     total, rest = _plain(two_sum)(start, high)
     return np.stack(_plain(two_sum)(total, rest + error), axis=1)
 
 
 def later(instants: np.ndarray, step: float) -> np.ndarray:
-    """Return instants (m, 2) plus a number, bit for bit as `Instant.plus` does."""
+    """Return instants (m, 2) plus a number, bit for bit equal to the results of `Instant.plus`."""
     high, error = _plain(two_sum)(instants[:, 0], step)
     return np.stack(_plain(two_sum)(high, error + instants[:, 1]), axis=1)
 

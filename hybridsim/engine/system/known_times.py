@@ -75,7 +75,7 @@ class KnownTimes(NamedTuple):
         )
 
     def of_like_lengths(self) -> KnownTimes:
-        """Return the known times up to the first at which pieces of another order of magnitude begin."""
+        """Return the known times up to the first one at which pieces of another order of magnitude in length begin."""
         m = int(np.argmax(self.lengths != self.lengths[0]))
         if m == 0:
             return self
@@ -125,7 +125,7 @@ class TimesAhead:
         return not set(system.resets.get(key, (0, ()))[1]) & set(system.names)
 
     def after(self, origin: Instant) -> KnownTimes:
-        """Return the known times after an instant, which must not be before that of the last call."""
+        """Return the known times after an instant, which must not be before the instant of the last call."""
         block = self._block
         if block is not None:
             ahead = _minus(block.instants[self._passed :], np.array([origin])) > 0.0

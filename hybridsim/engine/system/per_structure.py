@@ -1,4 +1,4 @@
-"""This module stores values that depend on a model's structure only, once for all systems with it."""
+"""This module stores values that depend on a model's structure only, once for all systems of this structure."""
 
 from __future__ import annotations
 

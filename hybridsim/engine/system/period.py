@@ -17,7 +17,7 @@ _MAX_PERIOD_RATIO = 64  # longest common period, in units of the longest single 
 
 
 def system_period(system: System) -> float | None:
-    """Return the longest period of all known time dependence if the others divide it, else None."""
+    """Return the longest known period in the model if all other known periods divide it, else None."""
     periods = forcing_periods(system)
     return _multiple_of_all(periods, 1) if periods else None
 

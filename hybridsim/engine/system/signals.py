@@ -40,7 +40,7 @@ class Signal:
             self.corners = square if self.shape == "square" else _SHAPES[str(self.shape)]
 
     def piece(self, origin: Instant, forward: bool) -> tuple[float, ...]:
-        """Return the six numbers of the piece after an instant, or before it if the run goes backward in time."""
+        """Return the six numbers of the piece after an instant; for a run backward in time, of the piece before it."""
         if self.kind == "table":
             return self._table_piece(origin, forward)
         if self.kind == "step":
@@ -55,7 +55,7 @@ class Signal:
         return self._wave_piece(origin, forward)
 
     def next_knot(self, after: Instant, forward: bool) -> Instant | None:
-        """Return the first knot after an instant, or before it if the run goes backward in time, or None."""
+        """Return the next knot in the direction of time, or None if no knot follows an instant."""
         if self.kind == "table":
             # pairs compare in order of time, so bisection works for long tables
             index = bisect_right(self._knots, after) if forward else bisect_left(self._knots, after) - 1

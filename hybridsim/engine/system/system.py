@@ -318,7 +318,7 @@ class System(_Frame):
         return out
 
     def effects(self, s: float, x: np.ndarray, p: np.ndarray, z: np.ndarray) -> dict[int, float]:
-        """Return the effect of each unknown on the rate of its own surface; a negative effect opposes it."""
+        """Return the effect of each unknown on the rate of its own surface; the effect of friction is negative."""
         out = np.zeros(len(self.surface_of))
         self._in_python("effects", s, x, p, z, out)
         return {c: float(out[k]) for k, c in enumerate(self.surface_of)}
@@ -372,7 +372,7 @@ class System(_Frame):
             x_plus[:], p_plus[at] = out[: self.n], out[self.n :]
 
     def _in_python(self, name: str, s: float, x: Any, p: Any, z: Any, out: np.ndarray) -> bool:
-        """Evaluate a rarely called function in Python; return whether it has a value.
+        """Evaluate a rarely called function in Python; return whether the function has a value.
 
         Outside the domain of a function of the standard library there is none, and out is filled with NaN.
         """
@@ -406,18 +406,18 @@ class System(_Frame):
         return mask
 
     def mode_rows(self, z: np.ndarray) -> list[tuple[int, ...]]:
-        """Return the rows of the tape in the modes `z`."""
+        """Return the instructions in the modes `z`."""
         rows: list[tuple[int, ...]] = []
         for component, branches in self.code.data["tape"]["parts"]:
             rows += branches[0 if component < 0 else z[component]]
         return rows
 
     def optimised_tape(self, z: np.ndarray) -> OptimisedTape:
-        """Return the optimised tape of the modes `z`, for series of any order."""
+        """Return the optimised instruction tape of the modes `z`, for series of any order."""
         return _optimised_tape(self, z.tobytes())
 
     def high_rows(self, z: np.ndarray) -> list[tuple[int, ...]]:
-        """Return the tape rows that compute states, active guards and monitors at high orders."""
+        """Return the instructions that compute states, active guards and monitors at high orders."""
         return _high_rows(self, z.tobytes())
 
     def series(

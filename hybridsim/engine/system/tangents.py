@@ -156,7 +156,7 @@ class Tangents(NamedTuple):
 
 
 class TangentTape:
-    """The tape of one combination of modes for rates and other functions with derivatives.
+    """The instruction tape of one combination of modes for rates and other functions with derivatives.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ class TangentTape:
         self._registers = system.registers
 
     def is_same(self, other: TangentTape) -> bool:
-        """Return whether another tape computes the same quantities by the same operations."""
+        """Return whether another instruction tape computes the same quantities by the same operations."""
         return np.array_equal(self._rows, other._rows) and np.array_equal(self._outputs, other._outputs)
 
     def __call__(self, s: np.ndarray, x: np.ndarray, p: np.ndarray, seeds: np.ndarray) -> Tangents:

@@ -1,1 +1,1 @@
-"""This package contains the fixed-step methods: the published ones and Moreau-Jean time stepping."""
+"""This package contains the fixed-step methods: the published methods and Moreau-Jean time stepping."""

@@ -1,4 +1,4 @@
-"""This module defines the base class of fixed-step methods: their options for the step, and their run."""
+"""This module defines the base class of fixed-step methods, with options for the step length."""
 
 from __future__ import annotations
 

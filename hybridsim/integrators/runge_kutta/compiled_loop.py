@@ -165,7 +165,7 @@ class RungeKuttaKernels(MethodKernels):
         return (float, (2,)), (float, (self.system.n, 2 * TERMS))
 
     def begin(self, own: Any, tapes: Tapes) -> Any:
-        """Write the settings of the run and the code of the tapes to the arrays."""
+        """Write the settings of the run and the code of the instruction tapes to the arrays."""
         own.first_step[0], own.counts[:] = self.first_step, 0
         return replaced(own, settings=self.settings, parts=self.parts.of(tapes), codes=self.codes.of(tapes))
 

@@ -95,7 +95,7 @@ class TaylorKernels(MethodKernels):
         return (float, (2,)), (float, (self.system.n, self.order + 1))
 
     def begin(self, own: Any, tapes: Tapes) -> Any:
-        """Write the settings of the run and the code of the tapes to the arrays."""
+        """Write the settings of the run and the code of the instruction tapes to the arrays."""
         own.settings.control[:], own.settings.atol[:] = self.settings
         return replaced(own, codes=self.codes.of(tapes))
 

@@ -113,7 +113,7 @@ def chain_on_belt(
 def two_blocks_on_belt(
     *, coupling: float = 1.2, second: float = 1.3, delta: float = 3.0, belt: float = 0.3
 ) -> MechanicalSystem:
-    """Build two blocks on a moving belt, joined by a spring; the second has the larger friction.
+    """Build two blocks on a moving belt, joined by a spring; the second block has the larger friction.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def two_blocks_on_belt(
 def three_coupled_blocks(
     *, mu: tuple[float, float, float] = (0.15, 0.3, 0.2), amplitude: float = 12.0, omega: float = 1.5
 ) -> MechanicalSystem:
-    """Build three blocks on top of each other, of which the lowest is on the ground and the middle is shaken.
+    """Build a stack of three blocks. The lowest block is on the ground, and the middle block is shaken.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""This module collects the outcomes of a batch whose points compiled code measures together, as far as it can."""
+"""This module collects the outcomes of a batch of points, of which compiled code measures as many as possible."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class PointsTogether:
         readings: Sequence[dict[str, Reading]],
         blank: Sequence[tuple[str, ...]] = (),
     ) -> None:
-        """Store the readings of some of the points in `parameters`; `blank` are names that may be NaN at each."""
+        """Store the readings of some points of `parameters`; the readings named in `blank` may be NaN."""
         for k, (number, found) in enumerate(zip(self._sound[numbers].tolist(), readings, strict=True)):
             missing = [name for name in not_numbers(found) if not (blank and name in blank[k])]
             status = f"not a number: {', '.join(missing)}" if missing else DONE

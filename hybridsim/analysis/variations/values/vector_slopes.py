@@ -84,7 +84,7 @@ class VectorSlopes:
         return found
 
     def knots(self, t: Instant) -> list[tuple[str, np.ndarray]]:
-        """Return the inputs with a knot at an instant, within rounding, and the derivatives (P,) of its time."""
+        """Return the inputs with a knot at an instant, within rounding, and the derivatives (P,) of the knot's time."""
         slack = 4.0 * math.ulp(float(t))
         found = []
         for one in self._signals:

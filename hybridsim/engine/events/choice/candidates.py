@@ -1,4 +1,4 @@
-"""Judge the combinations of modes at the surfaces of a cluster on which the choice depends."""
+"""Judge the combinations of modes on which the choice at the surfaces of a cluster depends."""
 
 from __future__ import annotations
 

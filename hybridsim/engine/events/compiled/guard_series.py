@@ -14,7 +14,7 @@ from hybridsim.engine.series.bounded import run_series
 def interpreted_series(
     tapes: Any, inputs: Any, k: int, s: float, s_error: float, x: Any, x_error: Any, p: Any, work: Any
 ) -> int:
-    """Compute `guard_series` with the tape interpreter; compiled code calls this kernel by its address."""
+    """Compute `guard_series` with the tape interpreter. Compiled code calls this kernel by its address."""
     judged, V, E = work.judged, work.V, work.E
     constant = tapes.constant[tapes.constant_start[k] : tapes.constant_start[k + 1]]
     rows = tapes.optimised[tapes.optimised_start[k] : tapes.optimised_start[k + 1]]

@@ -30,7 +30,7 @@ _LEAST = math.ulp(0.0)  # error of the time of zeros at an instant without an ev
 
 
 class SurfaceTape(NamedTuple):
-    """The tape of one combination of modes, with the registers of the surfaces."""
+    """The instruction tape of one combination of modes, with the registers of the surfaces."""
 
     constant: np.ndarray  # rows executed once per segment
     rows: np.ndarray

@@ -49,7 +49,7 @@ def has_known_times(system: System) -> bool:
 
 
 def known_time_arrays(system: System) -> Any:
-    """Return packed arrays for the known times of one call, or for its target alone."""
+    """Return packed arrays for the known times of one call, or for the target of the call alone."""
     most = MAX_KNOWN_TIMES + 1 if has_known_times(system) else 1
     return packed(
         KnownTimeArrays(
@@ -63,7 +63,7 @@ def known_time_arrays(system: System) -> Any:
 
 
 def store_known_times(arrays: Any, known: KnownTimes, resets: np.ndarray) -> None:
-    """Write the known times ahead of a call to its arrays, followed by its target."""
+    """Write the known times ahead of a call to the arrays of the call, followed by the target of the call."""
     m = len(known.kinds)
     arrays.times[:m], arrays.times[m] = known.instants, known.target
     arrays.kinds[:m], arrays.kinds[m] = known.kinds, -1

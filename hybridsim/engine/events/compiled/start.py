@@ -140,7 +140,7 @@ def _choose_cluster(
 
 @per_structure
 def surfaces_of(system: System) -> tuple[np.ndarray, ...]:
-    """Return the arrays that `plain_start` reads from the tape of the first modes.
+    """Return the arrays that `plain_start` reads from the instruction tape of the first modes.
 
     These are the constant rows, the rows, the registers of the rates and of the surfaces, and the component of each
     surface.
@@ -161,7 +161,7 @@ def _is_supported(system: System) -> bool:
 
 
 class StartScratch:
-    """The arrays of one call that judges modes without an event; `modes` lists the combinations with tapes."""
+    """The arrays of a call that judges modes without an event; `modes` lists the combinations with tapes."""
 
     def __init__(self, system: System) -> None:
         n, count, guards, whole = system.n, len(system.automata), system.guard_count, np.int64

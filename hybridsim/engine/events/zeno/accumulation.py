@@ -276,7 +276,7 @@ class Accumulation:
         return self._shared(self._sign * min(ended)[0], min(ended)[1]) if ended else None
 
     def expected(self, instant: Instant) -> Limit | None:
-        """Return the limit of accumulating events if `instant`, which is not one of them, is close to it, else None."""
+        """Return the limit of accumulating events if it is close to `instant`, the time of another event, else None."""
         for c in sorted(self.under_way):
             time = _expected(self.paces[c], instant)
             if time is not None:
@@ -344,7 +344,7 @@ def _next_turn(pace: Pace) -> tuple[int, float]:
 
 
 def _expected(pace: Pace, instant: Instant) -> float | None:
-    """Return the limit of accumulating events if `instant`, which is not one of them, is close to it, else None."""
+    """Return the limit of accumulating events if it is close to `instant`, the time of another event, else None."""
     if pace.forecast is None:
         return None
     limit, rest = pace.forecast

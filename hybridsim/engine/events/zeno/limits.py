@@ -90,7 +90,7 @@ def _moved(system: System, x: np.ndarray, p: np.ndarray, z: np.ndarray, s0: floa
 def _held_at(
     system: System, outcome: Outcome, p: np.ndarray, s: float, near: list[int], x: np.ndarray, z: np.ndarray
 ) -> Outcome | None:
-    """Return the outcome at local time `s` with nearby surfaces at zero, or None if one cannot be held there."""
+    """Return the outcome at local time `s` with nearby surfaces at zero, or None if a surface cannot be held there."""
     if not np.isfinite(x).all():
         return None
     z = z.copy()
@@ -160,7 +160,7 @@ def closed_now(system: System, outcome: Outcome) -> tuple[int, ...]:
 
 
 def holds_several(system: System, outcome: Outcome) -> bool:
-    """Return whether several switching surfaces are held after an event that were not held before it."""
+    """Return whether several switching surfaces that were free before an event are held after the event."""
     changed = [(system.automata[c.component], c.target) for c in outcome.changes]
     return sum(automaton.is_unique and target == automaton.hold for automaton, target in changed) > 1
 

@@ -1,1 +1,1 @@
-"""This folder computes with vectors of several numbers at once; start with `vectors`."""
+"""This folder computes with vectors of several numbers at once. The module `vectors` defines the vectors."""

@@ -79,7 +79,7 @@ if ENABLED:
     def _over_fours(
         context: Any, builder: Any, kind: Any, value: Any, row: Any, wide: int, body: Any, sums: Any
     ) -> Any:
-        """Emit a loop over a vector that accumulates sums, four entries at a time.
+        """Emit a loop that accumulates sums over a vector, four entries at a time.
 
         row: address of the matrix elements that belong to the start of the vector. wide: matrix elements per
         entry. body(entries, row, sums) returns the next sums. Return the sums and the row address for the

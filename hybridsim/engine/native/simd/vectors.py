@@ -112,7 +112,7 @@ if ENABLED:
 
     @intrinsic
     def larger(typingctx: Any, value: Any, other: Any) -> Any:
-        """Return the larger of two values; if one value is NaN, return the other one."""
+        """Return the larger of two values; if one value is NaN, return the other value."""
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             return builder.select(builder.fcmp_ordered(">", *args), *args)
@@ -121,7 +121,7 @@ if ENABLED:
 
     @intrinsic
     def all_larger(typingctx: Any, value: Any, other: Any) -> Any:
-        """Return whether each number of one vector is larger than the number of another in the same lane."""
+        """Return whether each number of one vector is larger than the number in the same lane of another vector."""
 
         def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             bits = builder.bitcast(builder.fcmp_ordered(">", *args), ir.IntType(WIDTH))
@@ -163,11 +163,11 @@ else:
         return np.where(mask != 0.0, value, other)
 
     def larger(value: Any, other: Any) -> Any:
-        """Return the larger of two values; if one value is NaN, return the other one."""
+        """Return the larger of two values; if one value is NaN, return the other value."""
         return np.where(value > other, value, other)
 
     def all_larger(value: Any, other: Any) -> bool:
-        """Return whether each number of one vector is larger than the number of another in the same lane."""
+        """Return whether each number of one vector is larger than the number in the same lane of another vector."""
         return bool((value > other).all())
 
     def size(value: Any) -> Any:

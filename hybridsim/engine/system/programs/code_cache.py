@@ -48,7 +48,7 @@ class EndsCodes(NamedTuple):
 
 
 class CodeCache:
-    """Machine code of all systems with the same structure, in the order of the tapes.
+    """Machine code of all systems with the same structure, in the order of the instruction tapes.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class CodeCache:
         return self.codes(*(np.zeros(count, dtype=np.int64) for _ in self.codes._fields))
 
     def of(self, tapes: Tapes) -> Any:
-        """Return the packed machine code for the given tapes."""
+        """Return the packed machine code for the given instruction tapes."""
         known = self._known  # read once, because other threads may replace it
         if known[0] is not tapes:
             with self._lock:
@@ -86,7 +86,7 @@ class CodeCache:
         return known[2]
 
     def look(self, tapes: Tapes, codes: Any) -> None:
-        """Compile code for modes in which many steps were taken without it."""
+        """Compile code for modes in which many steps were taken without compiled code."""
         self.compiler.prepare(tapes.modes, codes.lacked, partial(self._put, codes))
 
     def _put(self, codes: Any, k: int, addresses: list[int]) -> None:

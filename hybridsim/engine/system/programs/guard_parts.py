@@ -1,4 +1,4 @@
-"""This module extracts from tapes the rows that the guards need."""
+"""This module extracts from instruction tapes the rows that the guards need."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _LINEAR = {ADD, SUB, NEG, ADD_CONSTANT, SUB_CONSTANT, CONSTANT_SUB, SCALE, DIVID
 
 
 class Parts(NamedTuple):
-    """Tape rows for the guards in each combination of modes, and whether the guards are linear.
+    """Rows of instruction tapes for the guards in each combination of modes, and whether the guards are linear.
 
     The step rows are those that a step needs: of the flow, and of guards that are linear.
     """
@@ -39,7 +39,7 @@ class Parts(NamedTuple):
 
 
 class _ModeParts(NamedTuple):
-    """Tape rows for the guards in one combination of modes."""
+    """Rows of an instruction tape for the guards in one combination of modes."""
 
     guards: np.ndarray
     is_linear: bool
@@ -47,14 +47,14 @@ class _ModeParts(NamedTuple):
 
 
 class GuardParts:
-    """Caches the tape rows for guards, which depend on the model's structure only."""
+    """Caches the instructions for guards, which depend on the model's structure only."""
 
     def __init__(self, system: System) -> None:
         self.system = system
         self._known: tuple[Tapes, Parts] | None = None
 
     def of(self, tapes: Tapes) -> Parts:
-        """Return the rows for the guards of the given tapes."""
+        """Return the instructions for the guards of the given tapes."""
         known = self._known  # read once, because other threads may replace it
         if known is None or known[0] is not tapes:
             self._known = known = tapes, self._parts(tapes)

@@ -36,7 +36,7 @@ NEVER = -(2**62)  # count of misses if code exists, or cannot be made
 
 
 def mode_tape(system: System, z: np.ndarray) -> ModeTape:
-    """Return the tape of one combination of modes with its active guards."""
+    """Return the instruction tape of one combination of modes with its active guards."""
     tape, optimised = system.code.data["tape"], system.optimised_tape(z)
     return ModeTape(
         rows=_rows(optimised.rows),
@@ -61,7 +61,7 @@ def _holding(system: System, z: np.ndarray) -> Iterator[int]:
 
 
 def computed_rates(system: System, z: np.ndarray) -> list[bool]:
-    """Return for each state whether its rate is computed; constant rates, states and held rates are not."""
+    """Return for each state whether its rate is computed. A rate that is constant, held or a state is not computed."""
     tape, sure = system.optimised_tape(z), frozenset(_holding(system, z))
     rows = _rows(tape.rows)
     chosen = {out: b for op, a, b, _, out in rows if op == SELECT and a in sure}
@@ -113,12 +113,12 @@ def _may_fade(op: int, b: int) -> bool:
 
 
 def constant_rows(system: System, z: np.ndarray) -> tuple[tuple[int, ...], ...]:
-    """Return the rows of a tape that are executed only once per segment."""
+    """Return the instructions of a tape that are executed only once per segment."""
     return _rows(system.optimised_tape(z).constant_rows)
 
 
 def constant_sources(system: System) -> ConstantSources:
-    """Return the sources of the constants of the tapes of a system."""
+    """Return the sources of the constants of the instruction tapes of a system."""
     tape = system.code.data["tape"]
     return ConstantSources(
         {register: (value, error) for register, value, error in tape["constants"]},

@@ -1,4 +1,4 @@
-"""This module builds arrays for compiled loops: the automata of a model, and tapes of modes."""
+"""This module builds arrays for compiled loops: the automata of a model, and instruction tapes of modes."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _ALL = 27  # largest number of vectors of modes that are all present from the st
 
 
 class Automata(NamedTuple):
-    """The constant structure of a model: components, guards, clusters and choices; -1 is none."""
+    """The constant structure of a model: components, guards, clusters and choices; -1 means none."""
 
     guards_of: np.ndarray  # guard numbers (C, M, W) of component and mode
     hold: np.ndarray  # holding mode (C,)
@@ -51,7 +51,7 @@ class Automata(NamedTuple):
 
 
 class Tapes(NamedTuple):
-    """The tapes of several combinations of modes, with one row or one slice for each."""
+    """The instruction tapes of several combinations of modes, with one row or one slice for each combination."""
 
     modes: np.ndarray  # modes (K, C)
     hash_slots: np.ndarray  # hash table: `hybridsim.engine.system.programs.modes_index`
@@ -132,7 +132,7 @@ def _flat(lists: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 class TapeCache:
-    """The tapes of the modes that occurred so far; new combinations of modes are added.
+    """The instruction tapes of the modes that occurred so far; new combinations of modes are added.
 
     If there are few vectors, all are present from the start. The presence of a tape decides how an event is resolved,
     and so affects the last digits. These digits then do not depend on earlier runs.
@@ -150,7 +150,7 @@ class TapeCache:
         self.tapes = self._stacked()
 
     def look(self) -> None:
-        """Compile code for modes in which many short series were computed without it."""
+        """Compile code for modes in which many short series were computed without compiled code."""
         tapes = self.tapes
 
         def put(k: int, addresses: list[int]) -> None:
@@ -167,7 +167,7 @@ class TapeCache:
         return lambda: bounds_text(tape, rows, constant_sources(system), numbers, system.guard_count)
 
     def surround(self, z: np.ndarray) -> None:
-        """Add the tapes of a combination of modes, and of the modes to which one event may lead."""
+        """Add the instruction tapes of a combination of modes, and of the modes to which one event may lead."""
         if z.tobytes() in self._surrounded:
             return
         with self._lock:
@@ -239,7 +239,7 @@ class _ModeRows(NamedTuple):
 
     @classmethod
     def of(cls, system: System, z: np.ndarray) -> _ModeRows:
-        """Return the rows of a combination of modes; they are reused when the tapes grow."""
+        """Return the rows of a combination of modes; the rows are reused when more combinations are added."""
         tape = system.optimised_tape(z)
         return cls(
             tape.rows,

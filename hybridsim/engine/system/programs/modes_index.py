@@ -58,7 +58,7 @@ def index_of(modes: np.ndarray) -> np.ndarray:
 
 @inlined
 def find_modes(tapes: Any, z: Any) -> int:
-    """Return the row of a combination of modes in the tapes, or -1."""
+    """Return the row of a combination of modes in the instruction tapes, or -1."""
     modes, index = tapes.modes, tapes.hash_slots
     if modes.shape[0] <= _SEARCHED:
         for k in range(modes.shape[0]):

@@ -102,7 +102,7 @@ class Compiler:
             failures.note(function, t, fault, True)
 
     def _take(self, function: Any, is_flow: bool) -> str:
-        """Compile a function and the code that writes its result; return the reason if numba cannot."""
+        """Compile a function and the code that writes its result. If numba cannot compile them, return the reason."""
         if (id(function), is_flow) in self._written:
             return ""
         if not (inspect.isfunction(function) or hasattr(function, "py_func")):
