@@ -20,8 +20,8 @@ _INTRODUCTION = """\
 
 {answer}
 
-The answer of each scene is known. It is a closed form, or has at least 30 digits from a computation that shares no code
-with the package. The command `hybridsim atlas` runs all scenes with all methods.
+The answer of each scene is known. It is a closed form, or has at least 30 digits. These digits are from a computation
+that shares no code with the package. The command `hybridsim atlas` runs all scenes with all methods.
 
 ![scenes against integrators, a verdict for each pair](matrix.png)
 
@@ -29,8 +29,8 @@ A method is *right* in a scene if it satisfies four conditions:
 
 - It finds every event, in the right mode and order.
 - It reports no other events.
-- The held states are exact at every setting.
-- The errors converge to the scene's tolerance.
+- States that are constant in stick are exact at every setting.
+- At the tightest setting the errors are within the scene's tolerance.
 
 | method | settings |
 | --- | --- |
@@ -42,19 +42,19 @@ A method is *right* in a scene if it satisfies four conditions:
 and unit/120000, if the run needs at most 2e6 steps |
 | `scipy-rk45 cooldown` | rtol 1e-9, guards ignored for 1e-2, 1e-3 and 1e-4 units after each event |
 
-The *unit* of a scene is its typical time. This is the period of the forcing, or about one oscillation. The scene's
-tolerance applies to methods with error control. It is at least 1e-5 for `rk4-dichotomy`, which bisects its steps. It is
-4.2e-4 for methods that place events at the ends of steps, which is two of the finest 4800 steps. In scenes of more than
-fifty units `scipy-rk23` has tolerances that are 100 times looser.
+The *unit* of a scene is its typical time, which is the period of the forcing or about one oscillation. The scene's
+tolerance applies to methods with error control. For `rk4-dichotomy`, which bisects its steps, the tolerance is at least
+1e-5. Other fixed-step methods place events at the ends of steps. Their tolerance is at least 4.2e-4, the length of two
+steps of unit/4800. In scenes longer than fifty units, `scipy-rk23` runs with rtol 100 times as large.
 
-The number after a name is the larger of two errors at the last setting. One is the error of event times in units. The
-other is the error of states relative to their largest true value. If the error decreases with the step, the observed
-order of convergence follows. An integrator also runs scenes beyond its stated limits, and then fails for the stated
-reason.
+In the tables of the scenes, a number follows the name of a method. It is the larger of two errors at the last setting.
+One is the error of event times in units. The other is the error of states relative to their largest true value. If the
+error decreases with the step, the table also has the observed order of convergence. Integrators also run scenes beyond
+their stated limits. They then fail for the stated reason.
 
-Most methods share the location of events and the selection of modes. The exceptions are methods with native events,
-with a cooldown or with regularized forms, and the fixed-step methods. If all methods are right in a scene, the text
-describes the failure of other programs.
+Most methods use the event location and the mode selection of the engine. The exceptions are the fixed-step methods, and
+methods with native events, a cooldown or regularized friction. If all methods are right in a scene, its text describes
+the failure of other programs.
 
 The native event location of `solve_ivp` fails by these mechanisms:
 
@@ -75,9 +75,9 @@ which differs there by rounding. The root finder then finds no change of sign an
 fails before it searches for the event. |
 
 The picture of a scene shows one state in a time window around the first visible error of a method. The solid line is a
-correct run. The dashed line is the failing method named in the legend, at the setting given in the table. The strip
-below shows the events of both runs in this window, and their numbers at its right edge. Circles are known values. An
-error below 4 % of the motion has its own panel.
+correct run. The dashed line is a run of the failing method. The legend names this method, and the table names its
+setting. The strip below the curves shows the events of both runs in this window. The number of events of each run is at
+the right edge of the strip. Circles are known values. If the error is below 4 % of the motion, a second panel shows it.
 """
 _QUESTIONS = {
     "events": "Does a method find each event once, at the right time and in the right order?",
@@ -89,8 +89,8 @@ _QUESTIONS = {
     "sensitivity": "How accurate is a method if the motion amplifies its errors?",
 }
 _FAILURES = (*WRONG, HANG, ERROR)
-_FAILURE = """A failure is a wrong answer, a wrong mode sequence, a hang or an error. A method that refuses a scene,
-or is not run, does not fail. The atlas has the [whole matrix](index.md)."""
+_FAILURE = """A failure is a wrong answer, a wrong mode sequence, a hang or an error. A refusal is not a failure. A
+scene that is not run is not a failure. The first page of the atlas has the [whole matrix](index.md)."""
 _LEAST_ORDER = 0.5  # smallest order that counts as convergence
 _NUMBER = re.compile(r"(?<![\w.])\d+\.\d{9,}(?:e[+-]?\d+)?")
 _DIGITS = 9  # digits of numbers in reasons
@@ -165,7 +165,7 @@ def _overall(result: Atlas) -> str:
     ]
     question = "Which methods solve difficult scenes with events and friction, and which fail?"
     found = f"{question} The atlas runs {len(result.scenes)} scenes by {len(result.configurations)} methods."
-    return _filled(f"{found} These are right in all of them: {', '.join(right)}." if right else found)
+    return _filled(f"{found} These methods are right in all scenes: {', '.join(right)}." if right else found)
 
 
 def _failures(result: Atlas, scenes: Sequence[Scene]) -> tuple[str, list[str]]:
@@ -179,7 +179,7 @@ def _failures(result: Atlas, scenes: Sequence[Scene]) -> tuple[str, list[str]]:
         of_number.setdefault(len(those), []).append(f"`{name}`")
     harmless = len(scenes) - len(set().union(*failed.values()))
     rows = [f"| {number} | {', '.join(names)} |" for number, names in sorted(of_number.items())]
-    sentence = f"No method fails in {harmless} of the {len(scenes)} scenes of this page."
+    sentence = f"In {harmless} of the {len(scenes)} scenes of this page no method fails."
     return sentence, ["| scenes with a failure | methods |", "| --- | --- |", *rows]
 
 
