@@ -63,8 +63,8 @@ This page shows every model of the package. `hybridsim run NAME` runs a model ov
 NAME` prints its source and description, and `hs.load("NAME")` loads it in Python. Tests compare the models with
 closed forms, balances and matrix exponentials. `docs/make/gallery.py` makes the page and its pictures.
 
-Many files also contain a [drawing](../how-to/draw-a-mechanism.md). `hybridsim run NAME --animate NAME.gif` animates it.
-Contacts have the colours of their modes.
+Many files also contain a [drawing](../how-to/draw-a-mechanism.md) of the mechanism. `hybridsim run NAME --animate
+NAME.gif` animates this drawing. Each contact has the colour of its mode.
 
 """
 
@@ -109,7 +109,7 @@ def section(model: hs.Model) -> str:
     moves = f"![The mechanism of {name}](../images/animations/{name}.gif)\n\n" if name in MOVES else ""
     return (
         f"## {model.title}\n\n"
-        f"`hybridsim run {model.name}`, declared in [models/{model.name}.toml](../../models/{model.name}.toml). "
+        f"`hybridsim run {model.name}` runs [models/{model.name}.toml](../../models/{model.name}.toml). "
         f"{' '.join(model.look.split())}\n\n"
         f"*{' '.join(model.source.split()).rstrip('.')}.*\n\n"
         f"{moves}"

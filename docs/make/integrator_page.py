@@ -23,7 +23,7 @@ Pass an option as a keyword of `hs.simulate`, or with `--option NAME=VALUE` on t
 
 ## Capabilities
 
-A model may need a capability that an integrator lacks. A run then raises an error that names it.
+If a model needs a capability that the integrator lacks, the run raises an error that names the capability.
 
 """
 

@@ -183,10 +183,10 @@ def page(
     lines = [
         "# Does the advice name the right model?",
         "",
-        f"Does `advise` name the simplest adequate model? It differs from brute force at "
-        f"**{len(wrong) + len(near) + len(dear)}** of {count} random points. At {len(near)} of these an error lies "
-        f"within 0.01 % of the tolerance. At {len(dear)} the advice had stopped a model that is adequate, but far more "
-        "expensive than the full model.",
+        f"Does `advise` name the simplest adequate model? Its answer differs from brute force at "
+        f"**{len(wrong) + len(near) + len(dear)}** of {count} random points. At {len(near)} of these points an "
+        f"error is within 0.01 % of the tolerance. At {len(dear)} points `advise` had stopped an adequate model, "
+        f"because it takes far more time than the full model.",
         "",
         f"`python docs/studies/advice.py` draws {count} points of the map of the reference model, with F0/N in "
         f"[0.5, 1.5] and r in [0.05, 2]. For each point `advise` names the simplest model whose steady amplitude of x "
@@ -196,10 +196,10 @@ def page(
         "- Formulas give the amplitude without friction and with equivalent viscous damping.",
         "- The regularized models are run for the same time.",
         "",
-        f"Next to the threshold of motion, a force that is smoothed over a hundredth of the speed is stiff. The advice "
-        f"stopped such a model at {stopped} points. The amplitudes of the full model differ by {worst:.1e} at most. In "
-        f"brute force they differ by {drift:.1e} from one period to the next. The advice took {spent:.0f} s, and brute "
-        f"force {brute:.0f} s, each on one thread.",
+        f"Near the threshold of motion, a model with a friction force smoothed over 1 % of the speed is stiff. At "
+        f"{stopped} points `advise` stopped such a model. The amplitudes of the full model by `advise` and by "
+        f"brute force differ by at most {worst:.1e}. By brute force, the amplitudes of successive periods differ "
+        f"by at most {drift:.1e}. On one thread `advise` took {spent:.0f} s, and brute force {brute:.0f} s.",
         "",
         "| simplest within 1 % | points |",
         "| --- | --- |",
@@ -219,10 +219,11 @@ def page(
         "it and at low frequencies, then tanh, then the closed form, and equivalent viscous damping at resonance]"
         "(../images/advice-map.png)",
         "",
-        "*This is the same question on a grid with N = 40 N. Below F0 = 20 N nothing moves. If the motion stops, the "
-        "simplest adequate model is mostly Karnopp's, with v0 = 1 % of the largest speed. At some frequencies it is "
-        "tanh or arctan, smoothed over the same speed. These models are at least as expensive as the full model. If "
-        "the motion does not stop, Den Hartog's formula is exact. Near resonance a viscous damper is enough.*",
+        "*The map shows the answers of `advise` on a grid with N = 40 N. Below F0 = 20 N nothing moves. For "
+        "motions with stops, the simplest adequate model is mostly Karnopp's, with v0 = 1 % of the largest speed."
+        " At some frequencies it is tanh or arctan with this v0. These models take at least as much time as the "
+        "full model. For motions without stops, Den Hartog's formula is exact. Near resonance equivalent viscous "
+        "damping is adequate.*",
         "",
     ]
     return "\n".join(lines)

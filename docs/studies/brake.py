@@ -152,31 +152,31 @@ def page(
     assert np.array_equal(squeals, sizes[LARGE] > 1e-3)  # what the last sentence says
     return f"""# When does a brake begin to squeal?
 
-At which coefficient of friction does a brake begin to squeal? In this model squeal begins at
-**mu = (3/4) (1 + 2 c^2)**, where c is the damping. Linearization and simulation both agree with this closed form.
-Squeal was not found below the onset, even from a large disturbance.
+At which coefficient of friction does a brake begin to squeal? In this model squeal begins at **mu = (3/4) (1 + 2
+c^2)**, where c is the damping. Linearization and simulation both agree with this closed form. Below the onset no
+squeal was found, even after a large disturbance.
 
-The model `models/mode-coupling.toml` is that of Hoffmann, Fischer, Allgaier and Gaul (2002,
-[doi:10.1016/S0093-6413(02)00254-9](<https://doi.org/10.1016/S0093-6413(02)00254-9>)). A block pressed on a belt
-moves along and across the belt. Friction couples the two motions, because the normal load depends on the motion across.
-The coefficient of friction is constant, so that a falling characteristic is not the cause. The script
-`python docs/studies/brake.py` finds the onset in three ways:
+The model `models/mode-coupling.toml` is the model of Hoffmann, Fischer, Allgaier and Gaul (2002,
+[doi:10.1016/S0093-6413(02)00254-9](<https://doi.org/10.1016/S0093-6413(02)00254-9>)). A block pressed on a belt moves
+along and across the belt. Friction couples the two motions, because the normal load depends on the motion across the
+belt. The coefficient of friction is constant, so that friction that decreases with the speed is not the cause. The
+script `python docs/studies/brake.py` finds the onset in three ways:
 
 - **Closed form.** While the block slides, lambda^2 + c lambda + 2 = +-sqrt(1 - 4 mu/3). Up to mu = 3/4 both motions
-  decay with c/2. At mu = 3/4 their frequencies meet. For a larger mu one of the two grows, while c damps it. The
-  onset is at lambda = i sqrt(2).
+  decay with c/2. At mu = 3/4 their frequencies are equal. For a larger mu one of the motions grows if c is small
+  enough. At the onset lambda = i sqrt(2).
 - **Linearization.** `hs.linearize` in the mode `slip-` gives the coefficient at which its `growth` is zero.
 - **Simulation.** The run starts {SHAKE:g} away from steady sliding, and lasts {WATCHED:g} units of time without an
-  event. One matrix that maps the states at t to those at t + {STEP:g} is fitted to the run (dynamic mode
-  decomposition, Schmid 2010, [doi:10.1017/S0022112010001217](https://doi.org/10.1017/S0022112010001217)). Its
-  largest eigenvalue gives the growth. It does not use derivatives of the model.
+  event. A matrix is fitted to the run that maps the states at t to the states at t + {STEP:g} (dynamic mode
+  decomposition, Schmid 2010, [doi:10.1017/S0022112010001217](https://doi.org/10.1017/S0022112010001217)). The largest
+  eigenvalue of the matrix gives the growth. This method uses no derivatives of the model.
 
 | c | onset, closed form | `linearize` (error) | simulation (error) | error of the growth, `linearize` | simulation |
 | --- | --- | --- | --- | --- | --- |
 {table}
 
 The last two columns are the largest differences from the closed form over mu = {FRICTION[0]:g} to {FRICTION[-1]:g}.
-The largest of them are at mu = 3/4 itself. Two eigenvalues meet there, so that they change like the square root of a
+These largest differences are at mu = 3/4. Two eigenvalues are equal there. They change with the square root of a
 change of the matrix.
 
 ![Growth of a small disturbance, and the final amplitude, over the coefficient of friction](../images/brake.png)
@@ -189,8 +189,8 @@ The next table is for c = {SQUEALING:g}.
 
 Simulation also gives the final motion. At mu = {FRICTION[squeals][0]:.2f} and above, the disturbance grows until the
 block sticks to the belt in every cycle. Just above the onset the final amplitude is already
-{sizes[SHAKE][squeals][0]:.2f}. A disturbance of {LARGE:g} is larger than any of these cycles, and the block settles to
-the same motion. Squeal was not found below the onset.
+{sizes[SHAKE][squeals][0]:.2f}. A disturbance of {LARGE:g} is larger than the amplitude of these limit cycles. After
+such a disturbance the motion settles to the limit cycle too. Below the onset no squeal was found.
 """
 
 

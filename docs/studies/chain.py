@@ -123,26 +123,26 @@ def page(rows: dict[int, dict[str, tuple[float, float, float]]], load: float) ->
     verdict = ""
     if HAS_HEYOKA:
         verdict = f"""
-hybridsim is faster than heyoka for n = {ahead or "none"}{but}. heyoka expands the whole chain at every event. Its code
-is compiled for this one chain (not counted), and its event callbacks are Python. The kernels of hybridsim are compiled
-once for all systems.
+hybridsim is faster than heyoka for n = {ahead or "none"}{but}. heyoka expands the series of the whole chain at every
+event. The code of heyoka is compiled for this chain (this time is not counted), and its event callbacks are Python
+functions. The kernels of hybridsim are compiled once for all systems.
 """
     heads = " | ".join(names)
     return f"""# A chain of blocks: what an event costs
 
-How does the cost of an event grow with the number of blocks n? In hybridsim the time per event, including its share of
-the steps, grows as n^{exponent:.2f}.
+How does the cost of an event grow with the number of blocks n? In hybridsim the time per event, with a share of the
+time of all steps, grows as n^{exponent:.2f}.
 
 `hs.chain_on_belt(n)` is a chain of blocks of mass 1 on a belt of speed {BELT}. The leaf springs have a stiffness of
-{LEAF}, and the coupling springs {COUPLING}. The friction is 1/(1 + {DELTA:g}|v|), and the initial positions are random.
-`python docs/studies/chain.py` runs the methods in turns and takes the least time of each. Every run finished.
-{machine()}
+{LEAF}, and the coupling springs of {COUPLING}. The friction is 1/(1 + {DELTA:g}|v|), and the initial positions are
+random. `python docs/studies/chain.py` runs the methods in turns and takes the least time of each method. Every run
+finished. {machine()}
 
-When the study began, other programs kept {load:.1f} of {os.cpu_count()} processors busy. All times are longer for this
-reason, and ratios are uncertain by a factor of two.
+When the study began, other programs kept {load:.1f} of {os.cpu_count()} processors busy. For this reason all times
+are longer, and ratios are uncertain by a factor of two.
 
-The table gives milliseconds per unit of simulated time. In brackets is the largest error of a state after {JUDGED:g}
-units, compared with a run of hybridsim at rtol 1e-13.
+The table gives milliseconds per unit of simulated time. The number in brackets is the largest error of a state after
+{JUDGED:g} units of time. The reference is a run of hybridsim at rtol 1e-13.
 
 | n | events per unit of time | us per event, hybridsim 1e-9 | {heads} |
 | --- | --- | --- | {" | ".join(["---"] * len(names))} |
@@ -150,13 +150,12 @@ units, compared with a run of hybridsim at rtol 1e-13.
 
 ![Time per event against the number of blocks](../images/chain.png)
 
-In hybridsim an event restarts only the few blocks around it whose series changes by more than a tenth of the tolerance.
-All blocks are expanded together at the end of a step, and all events of the step share this cost. The other methods
-restart all blocks at each event. With n times the events, each of their events is n times as expensive.
-{verdict}
-The series methods control their error, and RK4 with h = {STEP:g} does not. When RK4 releases a block, it sets the speed
-of the block 1e-14 off the speed of the belt. The block is then not stopped again at once. siconos was not run, because
-it has no wheel on PyPI (`pip download siconos` finds no version).
+After an event hybridsim restarts only the few neighbouring blocks whose series changes by more than a tenth of the
+tolerance. At the end of a step it expands the series of all blocks, once for all events of the step. The other
+methods restart all blocks at each event. For these methods the cost of an event is therefore proportional to n.
+{verdict} The series methods control their error. RK4 with h = {STEP:g} has no error control. When RK4 releases a
+block, it changes the speed of the block by 1e-14, so that the block does not stop again at once. siconos was not run,
+because PyPI has no wheel of it (`pip download siconos` finds no version).
 """
 
 

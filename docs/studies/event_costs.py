@@ -133,20 +133,20 @@ def page(rows: list[str], never: list[float]) -> str:
     table = "\n".join([head, "| --- | --- | --- | --- | --- | --- | --- | --- |", *rows])
     return f"""# Cost of events
 
-How much do monitors, clocks, tables and impacts add to the time of a run? A linear monitor that never fires makes it
-{min(never):.2f} to {max(never):.2f} times as long.
+How much do monitors, clocks, tables and impacts add to the time of a run? With a linear monitor that never fires, a
+run takes {min(never):.2f} to {max(never):.2f} times as long.
 
-`exact`, `taylor` and `dop853` run from event to event in compiled code. An ordinary event takes microseconds there. An
-event that needs words or a joint decision goes through Python and takes about a millisecond. Three parts of the table
-do so:
+`exact`, `taylor` and `dop853` run from event to event in compiled code, in which an ordinary event takes
+microseconds. Python handles events that need a message or a joint decision, in about a millisecond. Three rows of the
+table have such events:
 
-- A quadratic monitor leaves the closed form of `exact`.
-- A monitor of the sliding speed is zero together with the guard of the contact. Both are decided together.
+- A quadratic monitor has no closed form in `exact`.
+- A monitor of the sliding speed is zero at the same time as the guard of the contact. Both are decided together.
 - At an impact all contacts that are struck together are decided together.
 
-`python docs/studies/event_costs.py` writes this page. The table gives medians of processor time in one process, in
-which the runs with and without the part take turns. The monitors are added to 100 periods of the system of the paper.
-The clock and the table drive an oscillator. A falling body bounces without loss. {machine()}
+`python docs/studies/event_costs.py` writes this page. The table gives medians of processor time in one process. Runs
+with and without the part in the first column alternate. The monitors are added to 100 periods of the system of the
+paper. The clock and the table drive an oscillator. A falling body bounces without loss. {machine()}
 
 {table}
 """

@@ -148,7 +148,7 @@ def table(done: list[dict[str, Any]]) -> str:
     for fault in answers:
         one = results[fault.name]
         out += f"| {fault.words} | {fault.trial} | {one['structures']} | {shown(one['by'])} |\n"
-    out += "\nFaults of files and of the cache are found by tests, not by trials:\n\n"
+    out += "\nTests instead of trials find faults of files and of the cache:\n\n"
     out += "| fault | test | found |\n| --- | --- | --- |\n"
     for fault in faults():
         if fault.trial == "test":

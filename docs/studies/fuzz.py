@@ -83,8 +83,8 @@ TEXT = """# Wrong files, wrong command lines
 
 Does a faulty model file or command line ever cause an internal error? {verdict} The script `docs/studies/fuzz.py` ran
 {files} model files and {lines} command lines. They contain typical mistakes of users, editors and scripts, and
-deliberate attacks. None of them may cause an internal error, a traceback, a warning of a library, a hang or an
-unwanted file. No text of a file may run as code.
+deliberate attacks. No case may cause an internal error, a traceback, a warning of a library, a hang or an unwanted
+file. No text of a file may run as code.
 
 ## Model files
 
@@ -103,15 +103,15 @@ and limits of 2 seconds, 5000 steps and 500 megabytes.
 | --- | --- |
 {file_rows}
 
-A *refusal* is an error that names the fault and its place. An error *on running* is one that only the run can find. An
-example is a method that lacks a capability which the model needs. Another is a start in no mode. A case that takes
-longer than {limit:g} seconds is a *hang*. The other endings are the status of the run.
+A *refusal* is an error that names the fault and its place. An error *on running* is an error that only a run can
+find. For example, the method may lack a capability, or no mode may be possible at the start. A case that takes longer
+than {limit:g} seconds is a *hang*. All other endings in the table are statuses of runs.
 
 ## Command lines
 
-Each command line is a correct one of any of the commands with one to a few changes. A word is lost, doubled, moved,
-misspelt or replaced. Values are of all the kinds above, and include names of devices, of folders and of missing
-files. A command that runs longer than {commanded:g} seconds is interrupted as by Ctrl-C.
+Each command line is a correct command with one to a few changes. A word is lost, doubled, moved, misspelt or
+replaced. Values have the faults listed above. Other values are names of devices, of folders and of missing files. A
+command that runs longer than {commanded:g} seconds is interrupted as by Ctrl-C.
 
 | ending | command lines |
 | --- | --- |
@@ -123,16 +123,17 @@ The exit codes are [those of the reference](../reference/cli.md).
 
 Each case runs in a process that is observed from inside:
 
-- The mutated texts contain the names of a function and of a module, which report when they are reached.
+- The changed texts contain the names of a function and of a module. If this function is called or the module
+  imported, the process records it.
 - An audit hook detects every file opened for writing, every new folder, every started program and every connection.
 
-These are faults: an exception, a warning, an undocumented exit code, a failure without a message, output that is not
-JSON under `--json`, and {limit:g} seconds without an end.
+These results are faults: an exception, a warning, an undocumented exit code, a failure without a message, output that
+is not JSON under `--json`, and a hang.
 
-All faults of earlier runs are fixed, and each has a test in `tests/fuzz/test_found.py`. Most of them were numbers at
-the ends of the range of doubles, whose squares and quotients are infinite. One was a guard whose bound is not a
-number, so that its search never ended. Others were messages as long as the word that they describe. A few cases of
-each kind run with the tests.
+All faults of earlier runs are fixed, and each has a test in `tests/fuzz/test_found.py`. The cause of most faults was
+a number at the end of the range of floating-point numbers, whose square or quotient is infinite. In one fault the
+bound of a guard was not a number, so that the search for a zero never ended. In other faults a message contained a
+very long word. The tests run a few cases of each kind.
 """
 
 
@@ -152,7 +153,7 @@ def page(found: dict[str, list[Case]]) -> str:
         line_rows=rows["lines"],
         commanded=COMMANDED,
         limit=LIMIT,
-        verdict=f"These cases do: {', '.join(faulty)}." if faulty else "No case does.",
+        verdict=f"These cases do: {', '.join(faulty)}." if faulty else "No case of this study does.",
     )
 
 

@@ -162,24 +162,25 @@ def study(count: int, seed: int = 1) -> dict[str, Tally]:
 HEAD = """# Is a zero of a guard ever lost?
 
 Does hybridsim ever miss a zero of a guard? Of {zeros} single zeros of {count} random guards, {missed} were missed.
-Pairs of zeros are found or reported, as the tables below show.
+The tables below show how many pairs of zeros were found or reported.
 
 `python docs/studies/guards.py` draws {count} random guards, half for `exact` and half for `taylor` (rtol {rtol:.0e}).
-It compares every mode change of their runs with an oracle. The oracle has g in closed form at the given doubles. It
-finds depths and zeros in 40 digits.
+It compares every mode change of the runs with an independent solution, the oracle. The oracle has each guard g in
+closed form for the given floating-point numbers. It computes depths and zeros in 40 digits.
 
-A model has two modes, one while g >= 0 and one while -g >= 0. It changes its mode at each zero of g. The next segment
-starts there, with a guard that is zero by definition.
+A model has two modes. The guard of one mode is g, and the guard of the other mode is -g. The mode changes at each
+zero of g. The next segment starts at this zero, with a guard that is zero by definition.
 
 - For `exact` the guard g is a random combination of the terms that linear modes can produce. These are polynomials
   up to degree six, two waves, a damped driven oscillator, decays with waves, and t exp(-t) as a function of time.
-- For `taylor` the guard is a product of up to five factors with a zero. They are polynomial or trigonometric, in t
-  or in a state. Positive functions multiply the product, and the model also has a nonlinear state.
+- For `taylor` the guard is a product of up to five factors with a zero. They are polynomial or trigonometric, in t or
+  in a state. The product is multiplied by positive functions. The model also has a nonlinear state.
 
-Most guards have one or two *close extremes*. There g approaches zero up to a given depth and turns back. It turns
-beyond zero (a pair of zeros) or before it (a near miss). Depths are spread evenly over the decades from 1e-17 to
-1e-1 of the size of the guard. The size is the largest sum of the sizes of its terms for `exact`, and its largest
-value for `taylor`. Zeros closer than 1 % of the span count as a pair.
+Most guards have one or two *close extremes*, at a given distance from zero, which is called the depth. If g turns
+back beyond zero, there is a pair of zeros. If g turns back before zero, there is a near miss. Depths are spread
+evenly over the decades from 1e-17 to 1e-1 of the size of the guard. For `exact` the size is the largest sum of the
+absolute values of the terms. For `taylor` it is the largest value of the guard. Zeros closer than 1 % of the span
+count as a pair.
 
 ## Zeros
 
@@ -187,17 +188,16 @@ value for `taylor`. Zeros closer than 1 % of the span count as a pair.
 | --- | --- | --- | --- | --- | --- | --- |
 """
 PAIRS = """
-A zero of a pair is *late* if its error exceeds {late:.0e} of the span, and is not explained by the error of the
-guard. The error of the guard is 1e-13 of its size for `exact`, and a tenth of rtol for `taylor`. A single zero is
-*late* if its error exceeds 1e-10 of the span and 1e-10 of the size over the slope. With ten times this error it is
-missed, and the event is spurious. *Off by* is the error in time of single zeros, times the slope and divided by the
-size.
+A zero of a pair is *late* if its error exceeds {late:.0e} of the span, and is larger than the error of the guard
+explains. The error of the guard is 1e-13 of its size for `exact`, and a tenth of rtol for `taylor`. A single zero is
+*late* if its error exceeds 1e-10 of the span and 1e-10 of the size divided by the slope. If the error is more than
+ten times as large, the zero counts as missed, and the event as spurious. *Off by* is the error in time of single
+zeros, multiplied by the slope and divided by the size.
 
 ## Pairs, by depth over size
 
-A pair is *found* if both zeros are found. It is *flagged* if neither is found, but a near-grazing is reported there.
-It is *lost* if both are missed without a report, or if
-only one is found.
+A pair is *found* if both zeros are found. It is *flagged* if no zero is found, but a near-grazing is reported. It is
+*lost* if both zeros are missed without a report, or if only one zero is found.
 
 | depth | exact found | flagged | lost | taylor found | flagged | lost |
 | --- | --- | --- | --- | --- | --- | --- |
@@ -205,8 +205,8 @@ only one is found.
 MISSES = """
 ## Near misses, by depth over size
 
-A near miss is *passed* if there is neither an event nor a report. It is *crossed* if the run has a pair of events that
-does not exist.
+A near miss is *passed* if there is neither an event nor a report. It is *crossed* if the run has a false pair of
+events.
 
 | depth | exact passed | flagged | crossed | taylor passed | flagged | crossed |
 | --- | --- | --- | --- | --- | --- | --- |
@@ -214,18 +214,17 @@ does not exist.
 TAIL = """
 ## Error bounds
 
-The deepest pair that is flagged and not found has a depth of {exact:.1e} of the size (`exact`) and {taylor:.1e}
-(`taylor`). The compiled searches use these error bounds:
+The deepest flagged pair has a depth of {exact:.1e} of the size for `exact`, and {taylor:.1e} for `taylor`. The
+compiled searches use these error bounds:
 
 - For `exact` the bound is (16 + 2 J + 2 w s) 2^-53 of the size. J is the number of modal coordinates, w the largest
-  speed and s the time since the last event. The bound is about 4e-15 here.
+  rate, and s the time since the last event. In this study the bound is about 4e-15.
 - For `taylor` the bound is 2 (|a_N| + |a_N-1|) + 8 2^-53 sum |a_k|, with the series of the guard on the step. It is
   at most 6 rtol = {bound:.0e} of the largest value of the guard.
 
-No pair is missed whose dip exceeds ten times the bound. Of the other pairs {lost}.
+No pair whose depth exceeds ten times the bound is lost. Of the other pairs {lost}.
 
-Run `python docs/studies/guards.py [guards]` to repeat the study. The first run compiles. The study takes {minutes:.0f}
-minutes on one core.
+Run `python docs/studies/guards.py [guards]` to repeat the study. It takes {minutes:.0f} minutes on one core.
 """
 
 

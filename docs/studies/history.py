@@ -385,30 +385,29 @@ def differing(found: list[dict[str, Any]]) -> list[str]:
 
 HEAD = """# Does a run depend on earlier runs?
 
-Does the result of a run depend on the runs before it? Of {compared} runs after others, {differ} differ from the same
-run in a fresh process.
+Does the result of a run depend on the runs before it? {compared} runs were made after other runs, and {differ} of
+them differ from the same run in a new process.
 
 `python docs/studies/history.py` makes runs of 100 models. They are the models of the package, three chains of blocks,
 and generated models that combine forms at random ([combined forms](combined-forms.md)). Ten of the generated models
-have more than {limit} vectors of modes, so that a process adds modes to its tables when a run first meets them. This
-page has the figures of {models} models, {many} of them with so many vectors.
+have more than {limit} combinations of modes. For such a model the process adds a combination to its tables when a run
+first reaches it. This page has the figures of {models} models, of which {many} has so many combinations.
 
-For each model one process makes {runs} other runs, in random order and by any of the integrators:
+For each model one process makes {runs} other runs, in random order and by random integrators:
 
 - Values of parameters, starts, tolerances, spans and longest steps are different.
-- A limit stops some runs, and some of these are resumed.
-- An error from outside ends some runs.
+- A limit stops some runs. Some of the stopped runs are resumed.
+- An exception in the `progress` function ends some runs.
 - Some runs go backward in time.
-- Some are runs of another model, or of an equal model that is another object.
+- Some runs are of another model, or of an equal model that is another object.
 
-After 1, 30 and all of these runs the process makes the run of each integrator, twice at the end. It repeats them
-with an equal model. It then makes them on one thread per integrator, all at once, while two further threads make
-other runs.
+After 1, 30 and 1000 of these runs, the process makes the compared run with each integrator, after the 1000 runs
+twice. It repeats the compared runs with an equal model. Then all integrators make the compared runs at once, on one
+thread each. During this time two further threads make other runs.
 
-The reference is the same run in a process that makes no other run, and has no compiled models in its cache. One more
-process makes the run with the cache that the {runs} runs left. The results are compared bit for bit. They are the
-status, the message, the warnings, each event with its states before and after it, all steps, and the dense output at
-{points} times.
+The reference is a run in a process that makes no other run, and has no compiled models in its cache. Another process
+makes the run with the cache of the {runs} runs. All results are compared bit for bit: the status, the message, the
+warnings, the events with the states before and after them, all steps, and the dense output at {points} times.
 
 """
 

@@ -210,12 +210,12 @@ def page(found: dict[str, dict[str, np.ndarray]], every: list[Scene]) -> str:
 
 How fast does the motion with a regularized or spring-like friction law approach the motion with Coulomb's law? The
 order depends on the law and on the events of the motion. With `karnopp` the error is of order 2 at a release and of
-order 1 at a reversal. With a spring contact it is only of order 1/2 at a reversal. The observed orders agree with
-theory.
+order 1 at a reversal. With a spring contact the error is only of order 1/2 at a reversal. The observed orders agree
+with theory.
 
-The laws have a small parameter. It is a velocity v0 over which the friction force changes its sign, or the inverse of a
-contact stiffness. `python docs/studies/limits_of_laws.py` runs the reference model with mu_s = mu_k over {PERIODS}
-periods, and compares it with the closed form for the set-valued law. There are three scenes:
+Each law has a small parameter. This is either a velocity v0 over which the friction force changes its sign, or the
+inverse of a contact stiffness. `python docs/studies/limits_of_laws.py` runs the reference model with mu_s = mu_k over
+{PERIODS} periods, and compares the motion with the closed form for the set-valued law. There are three scenes:
 
 | scene | forcing and start | time in stick | releases | reversals without stick |
 | --- | --- | --- | --- | --- |
@@ -226,7 +226,7 @@ error is the largest error of x over the run.
 
 ![Error over the width of a law, six laws in three scenes](../images/limits-of-laws.png)
 
-The table compares the order of theory with the observed order, both over the smallest decade of e.
+The table compares the theoretical order with the observed order, both over the smallest decade of e.
 
 | law | {heads} |
 | --- | {" | ".join(["---"] * (3 * len(every)))} |
@@ -234,38 +234,41 @@ The table compares the order of theory with the observed order, both over the sm
 
 ## The orders of theory
 
-Two kinds of events determine the error, a release from stick and a reversal without stick. The larger error dominates.
+Two kinds of events cause the error: a release from stick, and a reversal without stick. The larger of the two errors
+dominates.
 
 | law | force | release | reversal |
 | --- | --- | --- | --- |
 {forms}
 
-**Release.** The applied force passes mu N as r s, where s is the time since then. With the set-valued law m v = r
-s^2/2. Let d be the difference between mu N and the force of another law. Then m v' = r s + d, in a layer around s =
-0 in which d and r s are of the same size. The error is the velocity at which the body leaves this layer too early.
+**Release.** Let s be the time since the applied force passed mu N, and let the force be mu N + r s. With the
+set-valued law m v = r s^2/2. Let d be the difference between mu N and the friction force of another law. Then m v' =
+r s + d. Near s = 0 there is an interval in which d and r s have one order of magnitude. The error is the additional
+velocity at the end of this interval.
 
-- `tanh`: d = 2 mu N exp(-2 v/v0). Then v is of size v0 and s of size v0^(1/2). The velocity also has a factor
+- `tanh`: d = 2 mu N exp(-2 v/v0). Then v is of size v0, and s is of size v0^(1/2). The velocity also has a factor
   log(1/v0), because d must decrease from mu N to r s.
-- `arctan`: d = (2/pi) mu N v0/v. With v of size s^2, s^3 is of size v0, and v of size v0^(2/3).
+- `arctan`: d = (2/pi) mu N v0/v. The velocity v is of size s^2. Then s^3 is of size v0, and v is of size v0^(2/3).
 - `dahl`, `lugre`: d = mu N exp(-sigma x/(mu N)). Then x is of size 1/sigma, s of size sigma^(-1/3) and v of size
-  sigma^(-2/3). The damping of the bristles, sqrt(sigma_0 m) v d/(mu N), is smaller than d by sigma^(-1/6).
-- `jenkins`: d = 0 when mu N is reached. The error is the vibration of the body on the spring, with which each stop
-  begins. The vibration itself causes slip as the applied force grows. At the release it is of size 1/k in x.
-- `karnopp`: the release is located. At the stop before, the body is held too early by v0/a, where a is its
-  deceleration. It stops short of its true position by v0^2/(2 a).
+  sigma^(-2/3). The damping of the bristles is sqrt(sigma_0 m) v d/(mu N), which is smaller than d by a factor of
+  sigma^(-1/6).
+- `jenkins`: d = 0 when the force reaches mu N. The error is the vibration of the body on the spring, which begins at
+  each stop. The vibration causes slip when the applied force grows. At the release the vibration of x is of size 1/k.
+- `karnopp`: the release is located. At the stop before, the body sticks too early by v0/a, where a is its
+  deceleration. The distance to the true position of the stop is v0^2/(2 a).
 
-**Reversal.** Friction changes by 2 mu N, and with the set-valued law it changes at once.
+**Reversal.** The friction force changes by 2 mu N. With the set-valued law it changes at once.
 
-- `tanh`, `arctan`, `karnopp`: the change takes the time v0/a. The velocity has an error of the order of v0 during this
-  time. The tails of `arctan` last longer, and the sum of v0/(a s) over s is v0 log(1/v0).
-- `jenkins`, `dahl`, `lugre`: the change takes a distance of the size of 1/stiffness. From rest with a finite
-  acceleration this takes a time of the size of stiffness^(-1/2). The error of the velocity is of the same size. A
-  spring contact is therefore a poor model of Coulomb's law for a body that reverses without stick.
+- `tanh`, `arctan`, `karnopp`: the change takes the time v0/a. The velocity has an error of the order of v0 during
+  this time. With `arctan` the change takes longer, and the integral of v0/(a s) over s is of size v0 log(1/v0).
+- `jenkins`, `dahl`, `lugre`: the change takes a distance of the size of 1/stiffness. From rest and with a finite
+  acceleration, this distance takes a time of the size of stiffness^(-1/2). The error of the velocity is of this size
+  too. If a body reverses without stick, a spring contact is therefore a poor model of Coulomb's law.
 
 ## References
 
-- Regularizations by a function of the velocity, and their cost. E. Pennestri et al., Nonlinear Dyn. 83 (2016) 1785,
-  [doi:10.1007/s11071-015-2485-3](https://doi.org/10.1007/s11071-015-2485-3).
+- Regularizations by a function of the velocity, and their run times: E. Pennestri et al., Nonlinear Dyn. 83 (2016)
+  1785, [doi:10.1007/s11071-015-2485-3](https://doi.org/10.1007/s11071-015-2485-3).
 - Convergence of solutions of regularized fields to those of Filippov. A. F. Filippov, *Differential Equations with
   Discontinuous Righthand Sides* (1988), [doi:10.1007/978-94-015-7793-9](https://doi.org/10.1007/978-94-015-7793-9).
 - Karnopp's law, [doi:10.1115/1.3140698](https://doi.org/10.1115/1.3140698).

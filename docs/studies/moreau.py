@@ -211,16 +211,16 @@ TEXT = """# At which order does time stepping converge?
 At which order of the step does time stepping converge? All orders of `moreau` lie between {least:.2f} and
 {most:.2f}, in ten scenes with friction and impacts.
 
-`moreau` does not locate events. It shares no decision with the methods that do. `python docs/studies/moreau.py` runs
-ten scenes with {levels} steps, each half of the one before. The reference is `exact` or `taylor` at rtol 1e-11,
+`moreau` does not locate events, and has its own mode decisions. `python docs/studies/moreau.py` runs ten scenes with
+{levels} step sizes. Each step size is half of the previous one. The reference is `exact` or `taylor` at rtol 1e-11,
 which locate every event. The place of an impact within its step is random, so that single errors scatter. Each error
-is therefore a mean over {neighbours} neighbouring steps.
+is therefore a mean over {neighbours} neighbouring step sizes.
 
 ![Errors over the step](../images/moreau.png)
 
-For positions the table gives the largest error at any time. Velocities jump. A jump that is one step late is an
-error of the whole jump for this step. The error of velocities is therefore the mean over the time. Both errors are
-relative to the largest value. The order is the slope over all steps, and the errors are those of the finest step.
+For positions the table gives the largest error at any time. Velocities jump. If a jump is one step late, the error
+during this step is the whole jump. For velocities the table therefore gives the mean error over the time. Both errors
+are relative to the largest value, and are for the finest step. The order is the slope over all steps.
 
 | dry friction | changes of mode | order of x | order of v (L1) | finest step | error of x | error of v | seconds |
 | --- | --- | --- | --- | --- | --- | --- | --- |
@@ -230,25 +230,26 @@ relative to the largest value. The order is the slope over all steps, and the er
 | --- | --- | --- | --- | --- | --- | --- | --- |
 {impacts}
 
-`dfcs` is of second order. Its contact stops, and the step of the stop removes exactly its momentum. It is released
-when static and kinetic friction are equal. A reversal without a stop is a stick of one step, which is of first order
-(`free-decay`). A force that depends on the speed is taken at the end of the step, which is also of first order
-(`belt`). The scenes have no grazing impacts. The time of such an impact changes with the square root of a parameter,
-and so does its error.
+`dfcs` is of second order. In the step of a stop, the friction impulse removes exactly the momentum of the body. At a
+release the friction force does not jump, because static and kinetic friction are equal. At a reversal without a stop
+the body sticks for one step. This error is of first order (`free-decay`). A force that depends on the speed is
+evaluated at the end of the step. This error is of first order too (`belt`). The scenes have no grazing impacts. The
+time of a grazing impact, and therefore its error, depends on the square root of a parameter.
 
 - *vibrating table*: a ball is thrown repeatedly. Each flight ends in an accumulation of bounces, and then in rest.
 - *thrown block*: each impact loads the friction. The block slides after the last impact, and then sticks.
-- *two balls*: they are above each other. The upper ball falls on the lower one, which bounces.
-- *pendulum*: its gap is nonlinear in all states. It bounces and comes to rest.
-- *shaken mass*: it moves between two stops. A spring connects it to a block that sticks and slips on a belt.
+- *two balls*: one ball is above the other. The upper ball falls on the lower ball, which bounces.
+- *pendulum*: the gap is nonlinear in all states. The pendulum bounces and comes to rest.
+- *shaken mass*: a mass moves between two stops. A spring connects the mass to a block that sticks and slips on a
+  belt.
 
 ## Chains that collide
 
 `hs.chain_on_belt(n, gap={gap:g})` has n blocks of mass 1 on a belt. The friction of each block is 1/(1 + 3|v|).
-Springs join neighbours, which collide with e = 0.5 when a spring is compressed by {gap:g}. The run lasts {span:g}
-units of time in steps of {step:g}. Friction and impacts act on the same blocks, so that one problem has n + (n - 1)
-contacts. A step is unsettled if its impulses did not converge to 1e-12 of their largest. Times are on one core of a
-machine that also ran other programs.
+Springs connect neighbouring blocks. If a spring is compressed by {gap:g}, its blocks collide with e = 0.5. The run
+lasts {span:g} units of time in steps of {step:g}. Friction and impacts act on the same blocks, so that each step
+solves one problem with n + (n - 1) contacts. A step is unsettled if its impulses did not converge to 1e-12 of the
+largest impulse. Times are on one core of a machine that also ran other programs.
 
 | n | status | unsettled | bounces | changes of mode | us per step | sweeps per step | least gap |
 | --- | --- | --- | --- | --- | --- | --- | --- |
@@ -259,9 +260,9 @@ machine that also ran other programs.
 {works}
 
 With theta = 1/2 the works of a step add up exactly to the gain of kinetic and elastic energy. The missing energy is
-rounding. Neither friction nor impacts add energy, since both sums are negative. A gap takes part in the first step
-that would close it by the middle of the step. It may then be negative by 1 - e/2 times the distance of a step. No
-gap is smaller.
+rounding. Friction and impacts do not add energy, because their sums are negative. A contact becomes active in the
+first step in which its gap would close by the middle of the step. A gap may therefore become negative, by at most 1 -
+e/2 times the distance of a step. No gap in this study is smaller.
 """
 
 

@@ -35,19 +35,21 @@ METHODS: tuple[tuple[str, Method, Method], ...] = (
 )
 HEAD = """# The published methods at their own speed
 
-How much slower are the published methods in hybridsim than the same methods written by hand for one system?
-hybridsim takes {least:.2f} to {most:.2f} times as long.
+How much slower are the published methods in hybridsim than these methods written by hand for one system? hybridsim
+takes {least:.2f} to {most:.2f} times as long.
 
-`python docs/studies/published_speed.py` compares `rk4-dichotomy` and `rk4-sign` with versions for this one system.
-These are compiled by numba (`docs/studies/rivals/published_rk4.py`).
+`python docs/studies/published_speed.py` compares `rk4-dichotomy` and `rk4-sign` with versions for the system of the
+paper alone. numba compiles these versions (`docs/studies/rivals/published_rk4.py`).
 
 - The runs have 100 periods of 1200 steps, and the methods take {turns} turns. {machine}
-- The time is the processor time of `hs.simulate(..., keep="events")` and of reading the times of events and the
-  states at them. The method by hand records only its events.
-- A ratio is that of two calls of one turn. The table gives its median and, in brackets, the middle nine tenths.
-- By hand, a body that is held with v = 0 has no stages. With v kept the force is e at every stage, as in Eq. 4 of
-  the paper.
-- With `rk4-sign` the sign changes in every step in which the body should stick. Rounding decides the number of changes.
+- For hybridsim, the time is the processor time of `hs.simulate(..., keep="events")` and of reading the times and
+  states of all events. The method written by hand only records events.
+- Each turn gives one ratio of two times. The table gives the median of the ratios and, in brackets, the range of the
+  middle 90 %.
+- If the velocity is zero in stick, the method written by hand does not compute stages in stick. If the velocity is
+  kept, the friction force is e at every stage, as in Eq. 4 of the paper.
+- With `rk4-sign` the sign of the velocity changes in each step in which the body should stick. Rounding decides the
+  number of these changes.
 
 | method | scene | events, ours | by hand | median ms, ours | by hand | ratio |
 | --- | --- | --- | --- | --- | --- | --- |

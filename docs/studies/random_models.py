@@ -145,27 +145,29 @@ HEAD = """# Random models against references
 Are runs as accurate as the tolerance requests? Of {runs} runs of random models, {faults} exceed the allowed error.
 
 `python docs/studies/random_models.py` runs 200 random structures with {draws} draws of parameters and initial values
-each. It compares every run with a reference at four times. They are the end and three times between steps, which
-test the dense output.
+each. It compares every run with a reference at four times. These are the end of the run and three times between
+steps, which test the dense output.
 
-- There are 100 dense linear systems x' = A x + f phi(t) of one to eight states. The matrix A is generic or
-  oscillatory (about ten turns). Or it is defective, with chains of equal eigenvalues behind integer transformations,
-  exact in doubles. Or it differs from a defective one by 1e-4 to 1e-15. Stiff systems have ratios from 10 to 1e4,
-  and from 1e4 to 1e8 (`exact` and `rodas5p` only). The forcing phi is zero, constant, a polynomial, an exponential,
-  a sine, or t exp(-e t) cos(w t). The reference is a matrix exponential in integers of {bits} bits.
+- There are 100 dense linear systems x' = A x + f phi(t) of one to eight states. In some systems the matrix A is
+  generic or oscillatory (about ten turns). In others it is defective, with chains of equal eigenvalues after an
+  integer transformation without rounding. In others it differs from a defective matrix by 1e-4 to 1e-15. Stiff
+  systems have ratios of rates from 10 to 1e4, and from 1e4 to 1e8 (only for `exact` and `rodas5p`). The forcing phi
+  is zero, constant, a polynomial, an exponential, a sine, or t exp(-e t) cos(w t). The reference is a matrix
+  exponential in integers of {bits} bits.
 - There are 80 systems of one to four states with random smooth expressions (sums, products, quotients, roots, exp,
   sin, cos, tanh, atan). The reference is a Taylor series in integers, with about 18 correct digits.
-- There are 20 coupled stiff nonlinear systems of two to four states that approach known waves. In 14 the ratios are
-  from 10 to 1e4, and in 6 from 1e4 to 1e8 (`rodas5p`).
+- There are 20 coupled stiff nonlinear systems of two to four states that approach known waves. The ratios of rates
+  are from 10 to 1e4 in 14 of them, and from 1e4 to 1e8 in 6 of them (`rodas5p`).
 
-The error is the largest of all states, relative to the largest state of the run, in units of rtol. The tolerance is
-{asked}. `exact` has no tolerance. Its unit has two parts. One is 2^-53 of the largest state. The other is the change
-of the motion if all numbers of the model change by 2^-53 (the worst of three random changes). No computation in
-doubles can avoid this error. The change of basis in `exact` may add a factor of a hundred.
+The error is the largest error of all states, relative to the largest state of the run, in units of rtol. The
+tolerance is {asked}. `exact` has no tolerance. The unit of its error is a sum of two parts. The first part is 2^-53
+of the largest state. The second part is the change of the motion if all numbers of the model change by a relative
+2^-53 (the worst of three random changes). No floating-point computation can avoid an error of this size. The change
+of basis in `exact` may multiply it by a hundred.
 
 A run is *within* the tolerance if its error is at most {within:.0f} units. For `exact` the limit is {exact:.0e}
-units, which is 1e-12. A method keeps the tolerance in each step. The system determines the effect of the errors of
-all steps.
+units, which is 1e-12. A method controls the error of each step. The effect of these errors at the end depends on the
+system.
 
 | family | integrator | runs | median, end | 99 % | largest | median, between | 99 % | largest | not within |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |
@@ -174,15 +176,15 @@ ORDERS = """
 ## Orders
 
 Twenty of the smooth systems run with fixed steps. The order is log2 of the ratio of the errors of h and h/2. It is
-taken at the finest h whose errors are above rounding (above 1e-13).
+computed at the smallest h for which the errors are above rounding (above 1e-13).
 
 | integrator | order claimed | median observed | from | to |
 | --- | --- | --- | --- | --- |
 """
 PROPORTIONS = """
-The second table tests the error estimators on the same systems. It gives the slope of log error over log rtol
-between 1e-4 and 1e-10. A slope of 1 means an error proportional to the tolerance. `taylor` chooses its order by the
-tolerance.
+The second table tests the error estimators on the same systems. It gives the slope of the logarithm of the error over
+the logarithm of rtol, for rtol between 1e-4 and 1e-10. A slope of 1 means an error proportional to the tolerance. The
+order of `taylor` depends on the tolerance.
 
 | integrator | median | from | to |
 | --- | --- | --- | --- |

@@ -65,60 +65,61 @@ def run_one(tally: Runs, seed: int, number: int, integrator: str) -> None:
 
 HEAD = """# Restarts on a guard
 
-Does a run start correctly on a guard after an event? Of {clear} clear restarts, {spurious} were spurious and
-{missed} were missed.
+Does a run start correctly on a guard after an event? Of {clear} clear restarts, {spurious} had a spurious event, and
+{missed} missed an event.
 
-`python docs/studies/restarts.py` makes random restarts on and near guards. It compares each with exact arithmetic on
-the given doubles. Each restart declares the quantities that are zero by definition
+`python docs/studies/restarts.py` makes random restarts on and near guards. It compares each restart with exact
+arithmetic for the given floating-point numbers, the oracle. In each restart some quantities are zero by definition
 ([events](../explanation/events.md)). They are zero in the oracle too.
 
-A restart is *clear* if the first coefficient of the true series of the guard is beyond twice the error bound of the
-engine. Coefficients that are zero by definition do not count. The verdict of a clear restart must be the true one.
-The other restarts start *inside the error bound*. They are counted separately and must follow the stated rule. A
-coefficient within its bound counts as zero, and the next one decides. If none decides, the verdict is "undecided at
-rounding", and the present mode stays.
+A restart is *clear* if the first coefficient of the true series of the guard is more than twice the error bound of
+the engine. Coefficients that are zero by definition are skipped. The verdict on a clear restart must be the true
+verdict. All other restarts are *inside the error bound*. They are counted separately and must follow this rule. A
+coefficient within its bound counts as zero, and the next coefficient decides. If no coefficient decides, the verdict
+is "undecided at rounding", and the mode does not change.
 
 ## Verdicts
 
-Series and bounds follow from the recurrences of the engine, and true series from integers of {bits} bits. The
-expressions are random (one structure for 500 draws), and so is the state. The guard is moved until it is zero at the
-state to the last bit, or differs from zero by 1e-19 to 1. In three of ten restarts the rate is set to zero in the
-same way. The oscillator is that of the releases below. Its parameters extend over decades, and its time over up to
-10^6 periods. The load is at the limit of friction or very near to it.
+The recurrences of the engine give the series and the bounds. Integers of {bits} bits give the true series. The
+expressions (one structure for 500 draws) and the state are random. A constant is added to the guard, so that its
+value at the state is zero to the last bit, or differs from zero by 1e-19 to 1. In three of ten restarts the rate of
+the guard is changed in this way too. The oscillator is described under "Whole runs". Its parameters vary over
+decades, and its time over up to 10^6 periods. Its applied force is at the limit of friction or very near to it.
 
 | restart | judged | clear | spurious | missed | inside, decided | undecided | against the rule | error/bound |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 SEARCHES = """
-A restart is *spurious* if it is judged to leave and stays. It is *missed* in the opposite case. *Inside, decided*
-means decided by a higher derivative. The last column is the largest error of a coefficient of the engine, divided by
-its bound. The bounds are valid if it is below 1.
+A restart is *spurious* if by its verdict the guard fires, but by the oracle it does not. It is *missed* in the
+opposite case. *Inside, decided* means that a higher derivative decides. The last column is the largest error of a
+coefficient of the engine, divided by its bound. The bounds are valid if this quotient is below 1.
 
 ## Searches
 
 A search finds the first zero after the restart. The functions are random polynomials of up to degree 8 with 0 to 5
-zeros. Some zeros are next to the restart, and some are in pairs. The first 0 to 3 coefficients are zero by
-definition and contain noise. The oracle is Sturm's count in integers.
+zeros. Some zeros are very near to the restart, and some zeros form close pairs. The first 0 to 3 coefficients are
+zero by definition, but contain noise. The oracle counts zeros by Sturm's method in integers.
 
 | zero by definition | searches | stays | leaves | spurious | missed | open | open without reason | start inside |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 RUNS = """
-A search is *open* if it reports that the function comes within its error bound. The general method, which samples
-the guard, then searches again. *Start inside* means that the leading coefficient is within the bound.
+A search is *open* if it reports that the function is within its error bound of zero at some time. The general method,
+which samples the guard, then searches again. *Start inside* means that the leading coefficient is within its bound.
 
 ## Whole runs
 
 A mass that sticks is released, slips, and sticks again. A run has {periods} periods of a random oscillator from a
-random time, at rtol 1e-8. It is compared with the closed form. There are four kinds in turn. In three of them mu_s
-equals mu_k, is above it, or is above it by 1e-14 to 1e-2 of its value. The fourth is undamped.
+random time, at rtol 1e-8. It is compared with the closed form. There are four kinds of oscillators. In the first kind
+mu_s = mu_k. In the second kind mu_s is greater than mu_k. In the third kind mu_s is greater than mu_k by a relative
+1e-14 to 1e-2. The fourth kind has no damping.
 
 | integrator | runs | mode changes | releases | spurious | missed | late | cut short | with a warning |
 | --- | --- | --- | --- | --- | --- | --- | --- | --- |
 """
 TAIL = """
-An event is *late* if its error exceeds 1e-5 of a period. A slip is *cut short* if it lasts less than half of its true
-time after a release. This is the sign of a wrong direction.
+An event is *late* if its error exceeds 1e-5 of a period. A slip after a release is *cut short* if it lasts less than
+half of its true time. The cause is a wrong direction of slip.
 
 Run `python docs/studies/restarts.py [restarts]` to repeat the study. It takes {minutes:.0f} minutes on one core.
 """

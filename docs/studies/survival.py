@@ -216,15 +216,16 @@ def entries(journal: Path) -> int:
 
 TEXT = """# Runs that are stopped, sweeps that are killed
 
-Does a run or a sweep survive an interruption? {verdict} A resumed sweep gives the same results, and one kill costs
-{most} point at most. `docs/studies/survival.py` interrupts both.
+Does a run or a sweep survive an interruption? {verdict} A resumed sweep gives the results of an uninterrupted sweep,
+and computes at most {most} point per kill again. `docs/studies/survival.py` interrupts runs and sweeps.
 
 ## Stopped at a random step and resumed
 
 Each run was stopped at {moments} random steps by `limits={{"steps": ...}}` and continued by `resume()`. The table
-counts the runs that were really stopped. A compiled loop checks its limits only between stretches, and a run that
-ended meanwhile is *done*. Resumed runs are compared bit for bit with a run that was never stopped. The comparison
-has the times of all steps, the states there, all events with the states on both sides, the status and the message.
+counts the runs that stopped. Compiled code checks limits only from time to time, and a run that reached its end
+before such a check is *done*. Resumed runs are compared bit for bit with a run that was never stopped. The compared
+results are the times and states of all steps, all events with the states before and after them, the status and the
+message.
 
 | integrator | {scenes} |
 | --- | {lines} |
@@ -235,8 +236,9 @@ has the times of all steps, the states there, all events with the states on both
 ## Killed
 
 A sweep of {points} points runs in a separate process, and took {seconds:.1f} s without interruption. SIGKILL ended
-it {kills} times at random moments, and each time it was started again. It had already finished {begun} times and
-then began from the start. Each point writes to a separate file that it has begun, before it is computed.
+the process {kills} times at random times, and each time the sweep was started again. The sweep had finished before
+the kill {begun} times. It then began again without a journal. Before a point is computed, it is written to a log
+file.
 
 | | |
 | --- | --- |
@@ -244,7 +246,8 @@ then began from the start. Each point writes to a separate file that it has begu
 | points whose computation was begun more than once, over all kills | {lost} |
 | points begun again after one kill, at most | {most} |
 
-The journal is written after each group of points. A kill costs the points of the current group, with one worker here.
+The journal is written after each group of points. A kill therefore costs the points of the current group. The sweep
+has one worker.
 """
 
 
@@ -268,7 +271,7 @@ def main() -> None:
         verdict = (
             f"{len(faults)} of the resumed runs differ."
             if faults
-            else "No resumed run differs from an undisturbed one."
+            else "No resumed run differs from an uninterrupted run."
         )
         words = deaths | {"same": "yes" if deaths["same"] else "no"}
         PAGE.write_text(

@@ -103,7 +103,8 @@ def page(
             "# A sweep of 10^5 steady states",
             "",
             "Is a large sweep complete, and is it the same on a cluster? "
-            f"In both executions the results of {count} points are {same}. The status of all of them is below.",
+            f"On threads and on a cluster the results of {count} points are {same}. "
+            "The tables below give the status of all points.",
             "",
             f"`python docs/studies/sweeps.py` runs `hs.sweep` of {', '.join(MEASURES)} of `dfcs`",
             f"at {count} random points.",
@@ -114,12 +115,12 @@ def page(
             "| --- | --- | --- |",
             *rates,
             "",
-            "The comparison includes every reading and every status.",
+            "The comparison includes every quantity and every status.",
             "",
             "## Memory",
             "",
-            "The table has the memory of the process during the sweep on threads. The results are four numbers per",
-            "point.",
+            "The table gives the memory of the process during the sweep on threads. Each point has four numbers as its "
+            "result.",
             "",
             "| points done | MB |",
             "| --- | --- |",
@@ -127,7 +128,8 @@ def page(
             "",
             "## Points that cannot succeed",
             "",
-            "Three points in the middle have values without a steady state. Each has a status, and NaN as its result.",
+            "Three points have parameter values without a steady state. For each of these points the sweep has a "
+            "status, and NaN as the result.",
             "",
             "| fault | status |",
             "| --- | --- |",

@@ -71,9 +71,9 @@ def page() -> str:
     lost = Counter((f"`{fault.model}`, `{fault.what}`", end) for fault, end in many if end != ENDS[0])
     out = (
         HEAD.format(share=share)
-        + f"\n## Results\n\nOn the {len(models)} unchanged models the check gives {alarms} warnings. Of the "
+        + f"\n## Results\n\nFor the {len(models)} unchanged models the check gives {alarms} warnings. "
     )
-    out += f"{len(rows)} quantities and expressions in them {unknown} have an unknown unit.\n\n"
+    out += f"These models have {len(rows)} quantities and expressions, of which {unknown} have an unknown unit.\n\n"
     out += f"The first table has the first {FIRST} faults of seed {SEEDS[0]}.\n\n{table(first)}\n"
     seeds = ", ".join(map(str, SEEDS))
     out += f"The second table has {MANY} faults of each of the seeds {seeds}.\n\n{table(many)}\n"
@@ -86,35 +86,37 @@ def page() -> str:
 
 HEAD = """# Faults of units
 
-How many faults of units does `hybridsim check` find? It finds {share:.1f} % of random faults on the right line.
+How many faults of units does `hybridsim check` find? It finds {share:.1f} % of random faults, on the right line.
 
 `python docs/studies/units.py` puts faults of units into the packaged models that declare units, one fault at a time.
-It counts how many `hybridsim check` finds, and on which line. See [Check the units of a
+It counts how many faults `hybridsim check` finds, and on which lines. See [Check the units of a
 model](../how-to/check-units.md).
 
-The faults are drawn at random, the three kinds in turn:
+The faults are drawn at random. There are three kinds:
 
 - *Another unit* means that a declaration gets a unit of another dimension, or of the same dimension in another size.
 - *A factor left out* means that `a*b` becomes `a` or `b`, and `a/b` becomes `a`.
 - *A name exchanged* means that a name in an expression becomes another name of the model.
 
-A fault counts only if it alters a unit. The factor that is left out is not a pure number, and the two names have
-different units. The script has its own table of the units of all names, which shares no code with the check. These
-changes do not count:
+A fault counts only if it alters a unit. A factor that is left out must not be a pure number, and exchanged names must
+have different units. The script has its own table of the units of all names, which shares no code with the check.
+These changes do not count:
 
-- A guard, a monitor or a surface that is one product may have any unit.
-- A number that is left alone has the unit that its place needs.
-- A model that other checks refuse is drawn again.
+- The change is in a guard, monitor or surface that is a single product, which may have any unit.
+- Only a number remains, which has the unit that its place needs.
+- Other checks refuse the changed model.
 
-The right line is that of the changed expression. For a changed declaration it is that line or the line of an expression
-that reads the name. In the law of a contact it is the line of its load or of its arguments.
+The right line is the line of the changed expression. For a changed declaration, the line of the declaration is right,
+and so is the line of each expression with this name. For a change in the law of a contact, the line of its load or of
+its arguments is right.
 """
 REASONS = """These are the reasons:
 
-- The unit of an impact force is not declared. In `-g + p/m` without `m` the force becomes an acceleration, and all
-  units still agree, unless a contact force shows the unit of `p`. The same holds for the unit of t in `thermostat`.
+- The unit of an impact force is not declared. If `m` is left out of `-g + p/m`, the force p becomes an acceleration.
+  All units still agree, unless a contact force determines the unit of `p`. The unit of t in `thermostat` is not
+  declared either.
 - A number in a product may be a constant with a unit, as in `0.6*sqrt(k/m)`, `0.1*A*omega` and `w**2/2`.
-- If two expressions imply different units of a force, the warning may be on the line of the other one.
+- If two expressions imply different units of a force, the warning may be on the line of the unchanged expression.
 """
 
 
